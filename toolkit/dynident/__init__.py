@@ -1,0 +1,1 @@
+"""dynident: robot model identification that tells you what physics your model lacks."""

@@ -1,0 +1,57 @@
+"""The one root of every error that dynident raises on purpose.
+
+A message says what is wrong, where (file, joint, row), and the mend.
+"""
+
+from __future__ import annotations
+
+
+class DynidentError(Exception):
+    """Something the user can mend.
+
+    Parameters
+    ----------
+    what : str
+        What is wrong, in one clause.
+    where : str, optional
+        File, joint, row or key at which it is wrong.
+    mend : str, optional
+        What to do about it.
+    """
+
+    def __init__(self, what: str, where: str | None = None, mend: str | None = None) -> None:
+        self.what, self.where, self.mend = what, where, mend
+        message = f"{where}: {what}" if where else what
+        super().__init__(f"{message}. {mend}" if mend else message)
+
+
+class FileError(DynidentError):
+    """A file cannot be read or written."""
+
+
+class RecordingError(DynidentError):
+    """A recording is unusable."""
+
+
+class RobotError(DynidentError):
+    """A robot description is unusable."""
+
+
+class EffectError(DynidentError):
+    """An effect is unknown, or does not fit the robot."""
+
+
+class StudyError(DynidentError):
+    """A study or experiment file is unusable."""
+
+
+class FitError(DynidentError):
+    """An estimate cannot be computed from this data."""
+
+
+class SimulationError(DynidentError):
+    """A closed loop cannot be simulated."""
+
+
+class DynidentWarning(UserWarning):
+    """The result stands, with a caveat that the user should read."""

@@ -1,0 +1,85 @@
+"""Whole files in and out: nothing is ever half written."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from pathlib import Path
+
+from dynident.errors import FileError
+
+
+def read_bytes(path: str | Path) -> bytes:
+    """Return the content of a file.
+
+    Raises
+    ------
+    FileError
+        If there is no such file, it is a folder, or it may not be read.
+    """
+    path = Path(path)
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise FileError("no such file", str(path), "check the path") from None
+    except IsADirectoryError:
+        raise FileError("is a folder, not a file", str(path), "name a file in it") from None
+    except OSError as error:
+        raise FileError(f"cannot be read ({error.strerror or error})", str(path)) from None
+
+
+def read_text(path: str | Path) -> str:
+    """Return the content of a UTF-8 text file.
+
+    Raises
+    ------
+    FileError
+        As `read_bytes`, and if the content is not UTF-8 text.
+    """
+    data = read_bytes(path)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise FileError(
+            f"is not UTF-8 text (byte {error.start})", str(path), "is it the right file?"
+        ) from None
+
+
+def write_bytes(path: str | Path, data: bytes) -> Path:
+    """Write a file in one step: to a temporary neighbour first, then renamed.
+
+    Raises
+    ------
+    FileError
+        If the folder is missing or may not be written; the old file is then untouched.
+    """
+    path = Path(path)
+    temporary = None
+    try:
+        with tempfile.NamedTemporaryFile(
+            dir=path.parent, prefix=f".{path.name}.", delete=False
+        ) as handle:
+            temporary = Path(handle.name)
+            handle.write(data)
+        # NamedTemporaryFile makes private files; give ours the permissions any new file gets.
+        umask = os.umask(0)
+        os.umask(umask)
+        temporary.chmod(path.stat().st_mode & 0o777 if path.exists() else 0o666 & ~umask)
+        temporary.replace(path)
+    except OSError as error:
+        raise FileError(f"cannot be written ({error.strerror or error})", str(path)) from None
+    finally:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
+    return path
+
+
+def write_text(path: str | Path, text: str) -> Path:
+    """Write UTF-8 text in one step; see `write_bytes`."""
+    return write_bytes(path, text.encode("utf-8"))
+
+
+def sha256(path: str | Path) -> str:
+    """Return the SHA-256 of a file's content as hexadecimal digits."""
+    return hashlib.sha256(read_bytes(path)).hexdigest()
