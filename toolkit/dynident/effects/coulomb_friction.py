@@ -1,0 +1,23 @@
+"""Dry (Coulomb) friction."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.effects.base import Block, JointEffect, Parameter, force_unit
+
+
+class CoulombFriction(JointEffect):
+    """Constant torque against the motion: Fc tanh(v / w), with the package's one width w."""
+
+    name = "coulomb_friction"
+    law = "Fc sign(v)"
+    sign_of = "a step at zero velocity"
+    confounded_with = ("viscous_friction", "stribeck_friction")
+    experiment = "reverse {joint} many times and move it at several speeds"
+
+    def parameters(self, robot):
+        return (Parameter("Fc", force_unit(robot, self.joint), 0.0),)
+
+    def at_joint(self, block: Block) -> np.ndarray:
+        return block.sign(block.v[:, [block.index(self.joint)]])

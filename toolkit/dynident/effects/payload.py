@@ -1,0 +1,48 @@
+"""A load on the last link, in the recordings that carry it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.effects.base import Block, Effect, Parameter
+from dynident.errors import EffectError
+from dynident.inertia import PARAMETERS, UNITS
+
+_NAMES = ("mass", *PARAMETERS[1:])
+
+
+class Payload(Effect):
+    """Inertial parameters added to the last link while the payload is carried.
+
+    Mass and first moment (mx, my, mz), and the second moments that any real load brings with
+    them, about the origin of the last joint's frame.
+    """
+
+    name = "payload"
+    place = "robot"
+    law = "Y_last(q, v, a) [mass, mx, ...]"
+    sign_of = "a residual like gravity and inertia of the last link, in some recordings only"
+    confounded_with = ("drive_gain",)
+    experiment = "repeat one recording with the payload and one without"
+    needs = frozenset({"rigid", "payload"})
+
+    def parameters(self, robot):
+        # A load has mass, and diagonal second moments are sums of m x^2: none is negative.
+        positive = {"mass", "Ixx", "Iyy", "Izz"}
+        return tuple(
+            Parameter(name, unit, 0.0 if name in positive else -np.inf)
+            for name, unit in zip(_NAMES, UNITS, strict=True)
+        )
+
+    def columns(self, block: Block) -> np.ndarray:
+        if block.rigid is None:
+            raise EffectError("needs the rigid-body regressor in the block", self.label)
+        return block.rigid[:, :, -10:] * float(block.carries_payload)
+
+    def simulated_force(self, values, block):
+        return np.zeros_like(block.q)
+
+    def simulated_robot(self, values, robot):
+        theta = np.array(robot.theta, dtype=float)
+        theta[-10:] += np.asarray(values, dtype=float)
+        return robot.with_theta(theta)

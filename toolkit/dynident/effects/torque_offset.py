@@ -1,0 +1,23 @@
+"""A constant torque, of a current amplifier's offset for instance."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.effects.base import Block, JointEffect, Parameter, force_unit
+
+
+class TorqueOffset(JointEffect):
+    """The same torque whatever the robot does."""
+
+    name = "torque_offset"
+    law = "offset"
+    sign_of = "a constant, whatever the joint does"
+    confounded_with = ("asymmetric_friction", "joint_spring")
+    experiment = "move {joint} over a wide range in both directions, so that gravity changes"
+
+    def parameters(self, robot):
+        return (Parameter("offset", force_unit(robot, self.joint)),)
+
+    def at_joint(self, block: Block) -> np.ndarray:
+        return np.ones((len(block.t), 1))
