@@ -1,1 +1,15 @@
-"""TODO"""
+"""Robot descriptions in and out, the regressor, and base parameters."""
+
+from dynident.robot.base import BaseParameters, base_parameters, structural_base
+from dynident.robot.robot import Robot
+from dynident.robot.tree import Description, Joint, Link
+
+__all__ = [
+    "BaseParameters",
+    "Description",
+    "Joint",
+    "Link",
+    "Robot",
+    "base_parameters",
+    "structural_base",
+]

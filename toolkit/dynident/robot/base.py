@@ -1,0 +1,213 @@
+"""Base parameters: the combinations of parameters that data can tell apart.
+
+Pivoted QR of the stacked regressor (Gautier, "Numerical calculation of the base inertial
+parameters of robots", 1991), on columns of unit norm so that units do not decide.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg import qr, solve_triangular
+
+from dynident.errors import FitError
+from dynident.robot.tree import Array
+
+if TYPE_CHECKING:
+    from dynident.robot.robot import Robot
+
+# A column this much smaller than the largest is rounding around zero, not a measurement.
+_ZERO = 1e-13
+# A coefficient of a combination this small (in units of column norms) is rounding.
+_NEGLIGIBLE = 1e-8
+
+
+@dataclass(frozen=True, eq=False)
+class BaseParameters:
+    """A basis of the identifiable combinations of parameters.
+
+    theta_base = theta[independent] + K theta[dependent], and X theta = X[:, independent]
+    theta_base for the regressor X it was computed from (and any other with the same null space).
+
+    Attributes
+    ----------
+    names : tuple of str
+        All parameters.
+    independent : tuple of int
+        Columns that are kept, ascending: one base parameter each.
+    dependent : tuple of int
+        The other columns, ascending.
+    K : (r, p - r) ndarray
+    expressions : tuple of str
+        Each base parameter written out, as in "Izz.link1 + 0.25 m.link2".
+    scale : (p,) ndarray
+        Norm of each column (zero where it shows nothing): how much torque a unit of it makes.
+    diagonal : (min(rows, p),) ndarray
+        Magnitudes of the diagonal of R for unit columns: what the rank was decided on.
+    tolerance : float
+        A diagonal entry below tolerance times the largest counts as zero.
+    """
+
+    names: tuple[str, ...]
+    independent: tuple[int, ...]
+    dependent: tuple[int, ...]
+    K: Array
+    expressions: tuple[str, ...]
+    scale: Array
+    diagonal: Array
+    tolerance: float
+
+    @property
+    def rank(self) -> int:
+        """Number of base parameters."""
+        return len(self.independent)
+
+    @property
+    def gap(self) -> float:
+        """Smallest kept over largest dropped diagonal entry; near 1, the rank is a matter of taste.
+
+        Infinite where nothing nonzero was dropped.
+        """
+        kept, dropped = self.diagonal[: self.rank], self.diagonal[self.rank :]
+        if not len(kept) or not len(dropped) or not np.any(dropped):
+            return float("inf")
+        return float(kept[-1] / dropped[0])
+
+    @property
+    def unidentifiable(self) -> tuple[str, ...]:
+        """Parameters that appear in no base parameter: no torque depends on them."""
+        used = np.any(self.K != 0.0, axis=0)
+        return tuple(
+            self.names[column]
+            for column, is_used in zip(self.dependent, used, strict=True)
+            if not is_used
+        )
+
+    @property
+    def combination(self) -> Array:
+        """The (r, p) matrix B with theta_base = B theta."""
+        B = np.zeros((self.rank, len(self.names)))
+        B[np.arange(self.rank), list(self.independent)] = 1.0
+        B[:, list(self.dependent)] = self.K
+        return B
+
+    def coordinates(self, theta: ArrayLike) -> Array:
+        """Return the base values (r,) of standard parameters (p,)."""
+        theta = self._vector(theta, len(self.names), "theta")
+        dependent = theta[list(self.dependent)]
+        # Parameters without influence may be anything, NaN included.
+        used = np.any(self.K != 0.0, axis=0)
+        return theta[list(self.independent)] + self.K[:, used] @ dependent[used]
+
+    def lift(self, base_values: ArrayLike, theta_prior: ArrayLike) -> Array:
+        """Return the standard parameters (p,) nearest to a prior that have these base values.
+
+        Nearest in the norm that weights each parameter with the torque that a unit of it makes
+        (`scale`), so the choice does not depend on units. What no torque depends on keeps its
+        prior value.
+        """
+        values = self._vector(base_values, self.rank, "base_values")
+        prior = self._vector(theta_prior, len(self.names), "theta_prior")
+        weight = np.divide(1.0, self.scale, out=np.zeros_like(self.scale), where=self.scale > 0)
+        B = self.combination * weight
+        correction = np.linalg.lstsq(B, values - self.coordinates(prior), rcond=None)[0]
+        theta = prior + weight * correction
+        # One step of refinement puts what rounding is left into the independent parameters.
+        theta[list(self.independent)] += values - self.coordinates(theta)
+        return theta
+
+    def reduce(self, regressor: Array) -> Array:
+        """Return the columns (..., r) of a regressor (..., p) that the base parameters multiply."""
+        return regressor[..., list(self.independent)]
+
+    def _vector(self, values: ArrayLike, size: int, what: str) -> Array:
+        array = np.asarray(values, dtype=float)
+        if array.shape != (size,):
+            raise FitError(f"{what} has shape {array.shape} where ({size},) is needed")
+        return array
+
+
+def base_parameters(
+    matrix: ArrayLike, names: Sequence[str], tolerance: float = 1e-9
+) -> BaseParameters:
+    """Return the base parameters of a stacked regressor, or of its R factor.
+
+    Parameters
+    ----------
+    matrix : (rows, p) array_like
+        Any matrix X, or the R of X = QR (they have the same dependencies and column norms).
+    names : sequence of str
+        One name per column.
+    tolerance : float
+        Relative threshold on the diagonal of R, for columns of unit norm. The default separates
+        structural dependence from rounding; raise it (say to 1e-6) for an R that came from
+        normal equations.
+
+    Raises
+    ------
+    FitError
+        If shapes do not match, or the matrix is not finite.
+    """
+    X = np.asarray(matrix, dtype=float)
+    names = tuple(names)
+    if X.ndim != 2 or X.shape[1] != len(names):
+        raise FitError(f"a regressor of shape {X.shape} does not fit {len(names)} parameter names")
+    if not np.all(np.isfinite(X)):
+        column = int(np.argmin(np.all(np.isfinite(X), axis=0)))
+        raise FitError("the regressor is not finite", f"column '{names[column]}'")
+    scale = np.linalg.norm(X, axis=0)
+    scale[scale <= _ZERO * np.max(scale, initial=0.0)] = 0.0
+    shown = np.flatnonzero(scale)
+    R, pivots = qr(X[:, shown] / scale[shown], mode="r", pivoting=True)
+    R = R[: min(R.shape)]
+    diagonal = np.abs(np.diag(R))
+    rank = int(np.count_nonzero(diagonal > tolerance * np.max(diagonal, initial=0.0)))
+    # In unit columns first: there a coefficient can be compared with 1.
+    unit = solve_triangular(R[:rank, :rank], R[:rank, rank:]) if rank else np.zeros((0, len(shown)))
+    unit[np.abs(unit) < _NEGLIGIBLE] = 0.0
+    kept, rest = shown[pivots[:rank]], shown[pivots[rank:]]
+    full = np.zeros((len(names), len(names)))
+    full[np.ix_(kept, rest)] = unit * scale[rest] / scale[kept][:, None]
+    independent = np.sort(kept)
+    dependent = np.setdiff1d(np.arange(len(names)), independent)
+    K = full[np.ix_(independent, dependent)]
+    for array in (K, scale, diagonal):
+        array.setflags(write=False)
+    return BaseParameters(
+        names=names,
+        independent=tuple(int(i) for i in independent),
+        dependent=tuple(int(i) for i in dependent),
+        K=K,
+        expressions=tuple(
+            _expression(names[i], K[row], [names[j] for j in dependent])
+            for row, i in enumerate(independent)
+        ),
+        scale=scale,
+        diagonal=diagonal,
+        tolerance=tolerance,
+    )
+
+
+def structural_base(robot: Robot, seed: int = 0) -> BaseParameters:
+    """Return the base parameters of a robot's inertial parameters, whatever the motion.
+
+    Computed on random motion within the limits (`Robot.random_motion`): what it cannot show, no
+    recording can.
+    """
+    motion = robot.random_motion(seed, 20 * robot.n + 20)
+    regressor = robot.regressor(*motion)
+    return base_parameters(regressor.reshape(-1, 10 * robot.n), robot.parameter_names)
+
+
+def _expression(name: str, coefficients: Array, others: list[str]) -> str:
+    text = name
+    for value, other in zip(coefficients, others, strict=True):
+        if value:
+            sign = "+" if value > 0 else "-"
+            size = f"{abs(value):.6g}"
+            text += f" {sign} {other}" if size == "1" else f" {sign} {size} {other}"
+    return text

@@ -1,0 +1,148 @@
+"""Kinematics from Drake's parser: the sanitised copy in, bodies and joints out.
+
+Drake knows the conventions of all three formats (poses relative to frames, defaults, angles in
+degrees). It is shown only copies without inertias, shapes or plugins, so that nothing broken or
+unresolvable reaches it; what it says about an inertia is used for MJCF geometry alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynident.errors import RobotError
+from dynident.robot.tree import Array
+
+_KINDS = {"revolute": "revolute", "prismatic": "prismatic", "weld": "fixed"}
+WORLD = "world"
+
+
+@dataclass(frozen=True, eq=False)
+class Connection:
+    """A joint between two bodies, moving or fixed.
+
+    Attributes
+    ----------
+    name, kind, parent, child : str
+        Kind "revolute", "prismatic" or "fixed"; names of the bodies it connects.
+    X_PF, X_CM : (4, 4) ndarray
+        Pose of the joint's frame on the parent in the parent body, and of the one on the child
+        in the child body; the two coincide at q = 0 (up to `X_FM` of a fixed joint, which is
+        contained in X_PF).
+    axis : (3,) ndarray
+        In F (and M); zeros for a fixed joint.
+    lower, upper, velocity : float
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    X_PF: Array
+    X_CM: Array
+    axis: Array
+    lower: float
+    upper: float
+    velocity: float
+
+
+@dataclass(frozen=True, eq=False)
+class Kinematics:
+    """Bodies, connections and the pose of a root that nothing attaches.
+
+    Attributes
+    ----------
+    bodies : tuple of str
+        Without the world.
+    connections : tuple of Connection
+    roots : dict
+        Body name -> (4, 4) pose in the world, for bodies without a parent.
+    phi : dict
+        Body name -> (10,) inertial parameters as Drake has them.
+    """
+
+    bodies: tuple[str, ...]
+    connections: tuple[Connection, ...]
+    roots: dict[str, Array]
+    phi: dict[str, Array]
+
+
+def parse(copy: str, suffix: str, where: str) -> Kinematics:
+    """Return the kinematics of a sanitised description.
+
+    Raises
+    ------
+    RobotError
+        With Drake's own words, if it cannot read the copy; or naming a joint of a type that is
+        not supported.
+    """
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import MultibodyPlant
+
+    plant = MultibodyPlant(0.0)
+    try:
+        Parser(plant).AddModelsFromString(copy, suffix)
+    except RuntimeError as error:
+        lines = str(error).strip().splitlines() or ["no reason given"]
+        reason = lines[0].replace("<literal-string>.", "").strip()
+        raise RobotError(f"cannot be understood: {reason}", where) from None
+    world = plant.world_body().index()
+    bodies = [plant.get_body(i) for i in _indices(plant) if i != world]
+    connections = tuple(_connection(plant.get_joint(i), where) for i in plant.GetJointIndices())
+    attached = {connection.child for connection in connections}
+    roots = {
+        body.name(): plant.GetDefaultFloatingBaseBodyPose(body).GetAsMatrix4()
+        for body in bodies
+        if body.name() not in attached
+    }
+    phi = {body.name(): _phi(body.default_spatial_inertia()) for body in bodies}
+    return Kinematics(tuple(body.name() for body in bodies), connections, roots, phi)
+
+
+def _indices(plant):
+    from pydrake.multibody.tree import BodyIndex
+
+    return [BodyIndex(i) for i in range(plant.num_bodies())]
+
+
+def _connection(joint, where: str) -> Connection:
+    kind = _KINDS.get(joint.type_name())
+    if kind is None:
+        raise RobotError(
+            f"is of type '{joint.type_name()}', which is not supported",
+            f"{where}: joint '{joint.name()}'",
+            "use revolute, prismatic and fixed joints",
+        )
+    X_PF = joint.frame_on_parent().GetFixedPoseInBodyFrame().GetAsMatrix4()
+    X_CM = joint.frame_on_child().GetFixedPoseInBodyFrame().GetAsMatrix4()
+    axis = np.zeros(3)
+    lower, upper, velocity = -np.inf, np.inf, np.inf
+    if kind == "fixed":
+        X_PF = X_PF @ joint.X_FM().GetAsMatrix4()
+    else:
+        axis = joint.revolute_axis() if kind == "revolute" else joint.translation_axis()
+        lower = float(joint.position_lower_limits()[0])
+        upper = float(joint.position_upper_limits()[0])
+        velocity = float(joint.velocity_upper_limits()[0])
+    return Connection(
+        joint.name(),
+        kind,
+        joint.parent_body().name(),
+        joint.child_body().name(),
+        X_PF,
+        X_CM,
+        np.asarray(axis, dtype=float),
+        lower,
+        upper,
+        velocity if velocity > 0.0 else np.inf,
+    )
+
+
+def _phi(inertia) -> Array:
+    full = inertia.CopyToFullMatrix6()
+    # [[I, m px], [-m px, m E]] about the body's origin, px the cross product matrix of the com.
+    moment = np.array([full[2, 4], full[0, 5], full[1, 3]])
+    i = full[:3, :3]
+    six = [i[0, 0], i[0, 1], i[1, 1], i[0, 2], i[1, 2], i[2, 2]]
+    return np.array([full[3, 3], *moment, *six])

@@ -1,0 +1,317 @@
+"""`Robot`: a tree of joints and links with its given inertial parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynident import files
+from dynident.errors import RobotError
+from dynident.inertia import PARAMETERS, UNITS, frame_change
+from dynident.robot import dynamics
+from dynident.robot.tree import Array, Description, Joint, Link, frozen
+
+if TYPE_CHECKING:
+    import pinocchio
+
+GRAVITY = (0.0, 0.0, -9.81)
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A tree of moving joints, the links they carry, and gravity.
+
+    Links that fixed (or locked) joints join move as one body: the ten parameters of each such
+    *moving body*, in its joint's frame, are what the inverse dynamics depends on. A moving body
+    is named after the link that its joint drives.
+
+    Attributes
+    ----------
+    name : str
+    joints : tuple of Joint
+        In the order of all columns (q, v, a, tau). Each is `names[i]`.
+    links : tuple of Link
+    gravity : (3,) ndarray
+        m/s^2, in the world's axes.
+    description : Description or None
+        The text it was read from, which `write` patches.
+    locked : tuple of str
+        Moving joints of the description that were not asked for: they stand at q = 0.
+    """
+
+    name: str
+    joints: tuple[Joint, ...]
+    links: tuple[Link, ...]
+    gravity: Array = GRAVITY  # type: ignore[assignment]
+    description: Description | None = None
+    locked: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        gravity = frozen(self.gravity, (3,), "gravity")
+        if not np.all(np.isfinite(gravity)):
+            raise RobotError(f"gravity {gravity.tolist()} is not finite", self.name)
+        object.__setattr__(self, "gravity", gravity)
+        if not self.joints:
+            raise RobotError("has no moving joint", self.name)
+        for index, joint in enumerate(self.joints):
+            seen = {index}
+            while joint.parent != -1:
+                if joint.parent in seen or not -1 <= joint.parent < self.n:
+                    raise RobotError(f"joint '{joint.name}' has an impossible parent", self.name)
+                seen.add(joint.parent)
+                joint = self.joints[joint.parent]
+
+    @staticmethod
+    def from_file(
+        path: str | Path,
+        joints: Sequence[str] | None = None,
+        gravity: ArrayLike | None = None,
+    ) -> Robot:
+        """Read a robot description: URDF, SDF or MJCF, told apart by its root element.
+
+        Parameters
+        ----------
+        path : path
+        joints : sequence of str, optional
+            Joints to keep, in the order of the columns; default: every moving joint in the order
+            of the file. The others are locked at zero.
+        gravity : (3,) array_like, optional
+            m/s^2; default: what the description states (SDF, MJCF), else (0, 0, -9.81).
+
+        Raises
+        ------
+        FileError
+            If the file cannot be read.
+        RobotError
+            If it is no robot description, is broken, or has what is not supported: a floating
+            base, closed chains, mimic joints, joints other than revolute, continuous, prismatic
+            and fixed ones, several robots.
+
+        Notes
+        -----
+        A root link that nothing attaches is welded to the world. Broken inertial *values*
+        (negative, NaN) are kept as they are, for `dynident.inertia.margins` to judge. Friction,
+        damping and rotor inertia that a description states are not read: they are effects.
+        """
+        return Robot.from_text(files.read_text(path), str(path), joints, gravity)
+
+    @staticmethod
+    def from_text(
+        text: str,
+        where: str = "robot description",
+        joints: Sequence[str] | None = None,
+        gravity: ArrayLike | None = None,
+    ) -> Robot:
+        """Read a robot description from its text; `where` names it in messages. See `from_file`."""
+        from dynident.robot.reading import read
+
+        return read(text, where, joints, gravity)
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.joints)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the joints."""
+        return tuple(joint.name for joint in self.joints)
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """ "revolute" or "prismatic" for each joint."""
+        return tuple(joint.kind for joint in self.joints)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Unit of each joint's position, "rad" or "m"."""
+        return tuple("rad" if kind == "revolute" else "m" for kind in self.kinds)
+
+    @property
+    def torque_units(self) -> tuple[str, ...]:
+        """Unit of each joint's torque or force, "N m" or "N"."""
+        return tuple("N m" if kind == "revolute" else "N" for kind in self.kinds)
+
+    @cached_property
+    def driven(self) -> tuple[int, ...]:
+        """Index in `links` of the link that each joint drives."""
+        found: list[int] = []
+        for number, joint in enumerate(self.joints):
+            carried = [i for i, link in enumerate(self.links) if link.joint == number]
+            if not carried:
+                raise RobotError("carries no link", f"joint '{joint.name}'")
+            child = [i for i in carried if self.links[i].name == joint.child]
+            found.append((child or carried)[0])
+        return tuple(found)
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Name of each joint's moving body: the link that the joint drives."""
+        return tuple(self.links[index].name for index in self.driven)
+
+    @cached_property
+    def theta(self) -> Array:
+        """(10 n,) inertial parameters of the moving bodies, in their joint frames."""
+        theta = np.zeros((self.n, 10))
+        for link in self.links:
+            if link.joint >= 0:
+                theta[link.joint] += moved(link)
+        theta.setflags(write=False)
+        return theta.reshape(-1)
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the entries of `theta`: "m.<body>", "mx.<body>", ..."""
+        return tuple(f"{name}.{body}" for body in self.bodies for name in PARAMETERS)
+
+    @property
+    def parameter_units(self) -> tuple[str, ...]:
+        """Units of the entries of `theta`."""
+        return UNITS * self.n
+
+    def with_theta(self, theta: ArrayLike) -> Robot:
+        """Return a robot whose moving bodies have these parameters.
+
+        The difference goes to the driven link of each moving body; links of a body whose ten
+        numbers already are the asked ones stay untouched, to the bit.
+
+        Parameters
+        ----------
+        theta : (10 n,) array_like
+            In the order of `parameter_names`.
+
+        Raises
+        ------
+        RobotError
+            If the shape is wrong, or another link of a changed body is not finite.
+        """
+        theta = self._vector(theta)
+        links = list(self.links)
+        for joint, wanted in enumerate(theta.reshape(-1, 10)):
+            if np.array_equal(wanted, self.theta[10 * joint : 10 * joint + 10], equal_nan=True):
+                continue
+            driven = self.driven[joint]
+            rest = np.array(wanted)
+            for index, link in enumerate(links):
+                if link.joint == joint and index != driven:
+                    if not np.all(np.isfinite(link.phi)):
+                        raise RobotError(
+                            "has inertial values that are not finite",
+                            f"link '{link.name}'",
+                            "mend its inertial element first",
+                        )
+                    rest -= moved(link)
+            link = links[driven]
+            back = frame_change(link.R.T, -link.R.T @ link.p)
+            links[driven] = replace(link, phi=back @ rest, source="set")
+        return replace(self, links=tuple(links))
+
+    def with_gravity(self, gravity: ArrayLike) -> Robot:
+        """Return the same robot under another gravity (3,), m/s^2 in the world's axes."""
+        return replace(self, gravity=frozen(gravity, (3,), "gravity"))
+
+    def pinocchio(self) -> pinocchio.Model:
+        """Return a fresh Pinocchio model: this tree, `theta` and gravity.
+
+        Its joints are in depth-first order and carry the names of `names`.
+
+        Raises
+        ------
+        RobotError
+            If a moving body has no mass but a first moment, or is not finite: Pinocchio cannot
+            hold it (`regressor` and `inverse_dynamics` can).
+        """
+        return dynamics.pinocchio_model(self, self.theta)
+
+    @cached_property
+    def _dynamics(self) -> dynamics.Dynamics:
+        return dynamics.Dynamics(self)
+
+    def regressor(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
+        """Return Y (T, n, 10 n) with tau = Y theta.
+
+        Parameters
+        ----------
+        q, v, a : (T, n) array_like
+            rad or m, and their first and second derivatives by s.
+
+        Raises
+        ------
+        RobotError
+            If a shape is wrong.
+
+        Notes
+        -----
+        10 n^2 doubles a sample: evaluate long recordings in blocks, and keep none of them.
+        """
+        return self._dynamics.regressor(*self._motion(q, v, a))
+
+    def inverse_dynamics(
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, theta: ArrayLike | None = None
+    ) -> Array:
+        """Return tau (T, n), N m or N, for any parameters: physical, massless, or negative.
+
+        Parameters
+        ----------
+        q, v, a : (T, n) array_like
+        theta : (10 n,) array_like, optional
+            Default: the robot's own.
+        """
+        own = self.theta if theta is None else self._vector(theta)
+        return self._dynamics.inverse_dynamics(*self._motion(q, v, a), own)
+
+    def random_motion(self, seed: int, samples: int) -> tuple[Array, Array, Array]:
+        """Return q, v, a (samples, n), uniform within the limits, for structural questions.
+
+        Where a limit is missing (or leaves no room) q is within pi rad or 1 m, the speed within
+        3 rad/s or 1 m/s; accelerations are within 10 rad/s^2 or m/s^2.
+        """
+        rng = np.random.default_rng(seed)
+        reach = np.array([np.pi if kind == "revolute" else 1.0 for kind in self.kinds])
+        fast = np.array([3.0 if kind == "revolute" else 1.0 for kind in self.kinds])
+        lower = np.array([joint.lower for joint in self.joints])
+        upper = np.array([joint.upper for joint in self.joints])
+        lower = np.where(np.isfinite(lower), lower, np.minimum(-reach, upper - 2.0 * reach))
+        lower = np.where(np.isfinite(lower), lower, -reach)
+        upper = np.where(np.isfinite(upper), upper, np.maximum(reach, lower + 2.0 * reach))
+        narrow = upper - lower < 1e-3 * reach
+        lower, upper = np.where(narrow, -reach, lower), np.where(narrow, reach, upper)
+        speed = np.minimum(fast, [joint.velocity for joint in self.joints])
+        q = rng.uniform(lower, upper, (samples, self.n))
+        v = rng.uniform(-speed, speed, (samples, self.n))
+        a = rng.uniform(-10.0, 10.0, (samples, self.n))
+        return q, v, a
+
+    def _vector(self, theta: ArrayLike) -> Array:
+        array = np.asarray(theta, dtype=float)
+        if array.shape != (10 * self.n,):
+            raise RobotError(
+                f"theta has shape {array.shape} where ({10 * self.n},) is needed", self.name
+            )
+        return array
+
+    def _motion(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> tuple[Array, Array, Array]:
+        arrays = tuple(np.ascontiguousarray(x, dtype=float) for x in (q, v, a))
+        for name, array in zip("qva", arrays, strict=True):
+            if array.ndim != 2 or array.shape != (len(arrays[0]), self.n):
+                raise RobotError(
+                    f"{name} has shape {array.shape} where (samples, {self.n}) is needed, "
+                    "the same for q, v and a",
+                    self.name,
+                )
+        return arrays  # type: ignore[return-value]
+
+
+def moved(link: Link) -> Array:
+    """Return a link's phi (10,) in the frame of the joint that carries it."""
+    # NaN times zero is NaN: a broken entry shows in all that depend on it, which is intended.
+    if np.array_equal(link.R, np.eye(3)) and not np.any(link.p):
+        return link.phi
+    with np.errstate(invalid="ignore"):
+        return frame_change(link.R, link.p) @ link.phi

@@ -1,0 +1,180 @@
+"""A small, safe XML reader that knows where in the text each element stands.
+
+The positions let a description be patched in place. Documents that declare a DOCTYPE are
+refused before any of it is expanded: robot descriptions need none, and attacks on XML readers do.
+Namespace prefixes stay part of the tag, so that an undeclared prefix (common in URDF) is no error.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from xml.etree import ElementTree
+from xml.parsers import expat
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dynident.errors import RobotError
+
+Element = ElementTree.Element
+
+# Far deeper than any robot, far shallower than what would exhaust a recursive walk.
+_DEPTH = 200
+
+
+@dataclass(frozen=True)
+class Document:
+    """A parsed XML text.
+
+    Attributes
+    ----------
+    root : Element
+    data : bytes
+        The text as UTF-8, which `spans` count in.
+    spans : dict
+        id(element) -> (start of its start tag, end of its start tag, end of its end tag).
+    """
+
+    root: Element
+    data: bytes
+    spans: dict[int, tuple[int, int, int]]
+
+
+class _Reader:
+    def __init__(self, data: bytes, where: str) -> None:
+        self.data, self.where = data, where
+        self.builder = ElementTree.TreeBuilder()
+        self.open: list[tuple[Element, int, int]] = []
+        self.spans: dict[int, tuple[int, int, int]] = {}
+        self.parser = expat.ParserCreate("utf-8")
+        self.parser.buffer_text = True
+        self.parser.StartDoctypeDeclHandler = self._doctype
+        self.parser.StartElementHandler = self._start
+        self.parser.EndElementHandler = self._end
+        self.parser.CharacterDataHandler = self.builder.data
+
+    def _doctype(self, *_: object) -> None:
+        raise RobotError(
+            "declares a DOCTYPE, which a robot description does not need and which is not read",
+            self.where,
+            "remove the <!DOCTYPE ...> declaration",
+        )
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        begin = self.parser.CurrentByteIndex
+        if len(self.open) >= _DEPTH:
+            raise RobotError(f"nests more than {_DEPTH} elements in each other", self.where)
+        self.open.append((self.builder.start(tag, attributes), begin, tag_end(self.data, begin)))
+
+    def _end(self, tag: str) -> None:
+        self.builder.end(tag)
+        element, begin, inner = self.open.pop()
+        closes_itself = self.data[inner - 2 : inner] == b"/>"
+        end = inner if closes_itself else tag_end(self.data, self.parser.CurrentByteIndex)
+        self.spans[id(element)] = (begin, inner, end)
+
+
+def tag_end(data: bytes, begin: int) -> int:
+    """Return the position just after the '>' of the tag that begins at `begin`."""
+    quote = 0
+    for position in range(begin, len(data)):
+        byte = data[position]
+        if quote:
+            quote = 0 if byte == quote else quote
+        elif byte in b"\"'":
+            quote = byte
+        elif byte == ord(">"):
+            return position + 1
+    return len(data)
+
+
+def parse(text: str, where: str) -> Document:
+    """Parse an XML text.
+
+    Raises
+    ------
+    RobotError
+        If it is not well-formed XML, declares a DOCTYPE, or nests absurdly deep.
+    """
+    data = text.encode("utf-8")
+    reader = _Reader(data, where)
+    try:
+        reader.parser.Parse(data, True)
+    except expat.ExpatError as error:
+        reason = expat.ErrorString(error.code)
+        raise RobotError(
+            f"is not well-formed XML: {reason} (line {error.lineno}, column {error.offset + 1})",
+            where,
+        ) from None
+    return Document(reader.builder.close(), data, reader.spans)
+
+
+def only(element: Element, tag: str, where: str) -> Element | None:
+    """Return the child of that name, None if absent; two are an error."""
+    found = element.findall(tag)
+    if len(found) > 1:
+        raise RobotError(f"has {len(found)} <{tag}> elements", where, "keep one")
+    return found[0] if found else None
+
+
+def reals(text: str | None, count: int, what: str, where: str) -> NDArray[np.float64]:
+    """Read `count` numbers separated by blanks; NaN and infinities pass, for a later check.
+
+    Raises
+    ------
+    RobotError
+        If the text is missing, is no number, or has another count.
+    """
+    words = (text or "").split()
+    try:
+        values = np.array([float(word) for word in words])
+    except ValueError:
+        bad = next(word for word in words if not _is_real(word))
+        raise RobotError(f"{what} = '{bad}' is not a number", where) from None
+    if len(words) != count:
+        needs = "1 number is" if count == 1 else f"{count} numbers are"
+        raise RobotError(f"{what} has {len(words)} numbers where {needs} needed", where)
+    return values
+
+
+def finite(text: str | None, count: int, what: str, where: str) -> NDArray[np.float64]:
+    """Read `count` finite numbers; see `reals`."""
+    values = reals(text, count, what, where)
+    if not np.all(np.isfinite(values)):
+        raise RobotError(f"{what} = '{(text or '').strip()}' is not finite", where)
+    return values
+
+
+def attribute(element: Element, name: str, what: str, where: str) -> float:
+    """Read one number from an attribute that must be there."""
+    if name not in element.attrib:
+        raise RobotError(f"{what} has no '{name}'", where)
+    return float(reals(element.get(name), 1, f"{what} {name}", where)[0])
+
+
+def require_unique(names: Iterable[str], what: str, where: str) -> None:
+    """Refuse a name that is given twice."""
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            raise RobotError(f"has two {what}s named '{name}'", where, "rename one of them")
+        seen.add(name)
+
+
+def closest(name: str, valid: Iterable[str]) -> str:
+    """Return a mend for a misspelt name: the nearest valid one, and the list."""
+    valid = list(valid)
+    near = difflib.get_close_matches(name, valid, n=1)
+    listed = ", ".join(valid) if valid else "none"
+    hint = f"did you mean '{near[0]}'? " if near else ""
+    return f"{hint}Valid names: {listed}"
+
+
+def _is_real(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
