@@ -1,0 +1,109 @@
+"""Models side by side on held-out data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+
+from dynident.diagnose.evidence import ColumnStore, gather
+from dynident.diagnose.held_out import HeldOut, on_recordings
+from dynident.diagnose.maps import residual_maps
+from dynident.errors import FitError
+from dynident.fit.estimate import Estimate
+from dynident.model import Model
+from dynident.recording import Dataset
+from dynident.tables import Table, percent, print_tables
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Errors of several estimates on the same recordings.
+
+    Attributes
+    ----------
+    names : of the estimates.
+    models : theirs.
+    results : what each misses.
+    """
+
+    names: tuple[str, ...]
+    models: tuple[Model, ...]
+    results: tuple[HeldOut, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON of `compare --json`."""
+        first = self.results[0]
+        robot = self.models[0].robot
+        return {
+            "noise": {"floor": first.floor},
+            "models": [
+                {
+                    "name": name,
+                    "effects": [effect.label for effect in model.effects],
+                    "error": result.error,
+                    "joints": [
+                        {"name": joint, "error": float(error)}
+                        for joint, error in zip(robot.names, result.joint_errors, strict=True)
+                    ],
+                }
+                for name, model, result in zip(self.names, self.models, self.results, strict=True)
+            ],
+            "joints": [
+                {
+                    "name": joint,
+                    "noise_rms": None if first.noise_std is None else float(first.noise_std[j]),
+                    "torque_rms": float(first.torque_rms[j]),
+                }
+                for j, joint in enumerate(robot.names)
+            ],
+        }
+
+    def tables(self) -> tuple[Table | str, ...]:
+        """Everything that `show` prints, in its order."""
+        robot, first = self.models[0].robot, self.results[0]
+        rows = []
+        for j, joint in enumerate(robot.names):
+            noise = None if first.noise_std is None else first.noise_std[j] / first.torque_rms[j]
+            errors = (percent(float(r.joint_errors[j])) for r in self.results)
+            rows.append((joint, *errors, percent(noise)))
+        rows.append(("all", *(percent(r.error) for r in self.results), percent(first.floor)))
+        notes = () if first.floor is not None else ("The noise floor is unknown.",)
+        columns = ("joint", *self.names, "noise floor")
+        errors = Table("Relative torque error on held-out recordings", columns, tuple(rows), notes)
+        last = self.results[-1]
+        seen = residual_maps(robot, last, last)
+        where = tuple((m.joint, m.against, m.sentence) for m in seen if m.sentence)
+        title = f"Where '{self.names[-1]}' fails"
+        return (errors, Table(title, ("joint", "against", "what is seen"), where))
+
+    def show(self) -> None:
+        """Print the errors side by side, and where the last estimate fails."""
+        print_tables(*self.tables())
+
+
+def compare(estimates: Estimate | Mapping[str, Estimate], dataset: Dataset) -> Comparison:
+    """Compare estimates with measurements that they were not fitted to.
+
+    Parameters
+    ----------
+    estimates : one, or several by name.
+    dataset : recordings, with their filter and, where nothing repeats, their noise.
+
+    Raises
+    ------
+    FitError
+        If there is no estimate or no recording.
+    """
+    named = {"model": estimates} if isinstance(estimates, Estimate) else dict(estimates)
+    if not named or not dataset.recordings:
+        what = "no estimate" if not named else "no recording to compare with"
+        raise FitError(what, mend='mark some recordings use = "test"')
+    runs = gather(dataset)
+    results = []
+    for estimate in named.values():
+        store = ColumnStore(estimate.model, runs)
+        store.prepare(estimate.model.effects)
+        results.append(on_recordings(store, estimate))
+    return Comparison(tuple(named), tuple(e.model for e in named.values()), tuple(results))

@@ -1,0 +1,310 @@
+"""What a diagnosis says: where the model fails, what is missing, and how sure that is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from dynident.effects import Effect
+from dynident.fit.estimate import Estimate
+from dynident.tables import Table, number, percent, print_tables
+
+Verdict = Literal["nothing_missing", "explained", "unexplained"]
+Status = Literal["material", "not_material", "absorbed"]
+NoiseSource = Literal["replicates", "given", "unknown"]
+
+_VERDICTS: dict[Verdict, str] = {
+    "nothing_missing": "Nothing is missing: what remains is within the noise.",
+    "explained": "Explained: {effects} added, and what remains is within the noise.",
+    "unexplained": "None of these explains it: a material residual remains{whatever}.",
+}
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect that was tried on the model as it was given.
+
+    Attributes
+    ----------
+    effect : with the shape at which it does best.
+    status : "material" (it passes every gate), "not_material", or "absorbed" (this data cannot
+        show it, because the model's own parameters take its place).
+    p_value : of the hypothesis that it has no part, corrected for the number of candidates;
+        None where it is absorbed.
+    test_gain : cross-validated drop of the relative torque error if it were added.
+    values : its parameters if it were added.
+    remark : why it is not material, or the experiment that would show it.
+    """
+
+    effect: Effect
+    status: Status
+    p_value: float | None
+    test_gain: float
+    values: tuple[float, ...] = ()
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One effect added, and what the test recordings say of it.
+
+    Attributes
+    ----------
+    effect : the effect with its refined shape.
+    values : its parameters in the joint fit that follows, (k,).
+    test_error_before, test_error_after : relative torque error on the test recordings.
+    indistinguishable : effects that this data cannot tell from it.
+    p_value : as in `Candidate`.
+    """
+
+    effect: Effect
+    values: tuple[float, ...]
+    test_error_before: float
+    test_error_after: float
+    indistinguishable: tuple[Effect, ...]
+    p_value: float
+
+
+@dataclass(frozen=True)
+class JointResult:
+    """Errors at one joint, on the test recordings.
+
+    Attributes
+    ----------
+    name, torque_unit : the joint, and N m or N.
+    error_before, error_after : norm of the residual over norm of the torque.
+    torque_rms : N m or N.
+    noise_rms : N m or N; None where the noise is unknown.
+    ratio_before, ratio_after : systematic residual over noise (RNR); None likewise.
+    """
+
+    name: str
+    torque_unit: str
+    error_before: float
+    error_after: float
+    torque_rms: float
+    noise_rms: float | None
+    ratio_before: float | None
+    ratio_after: float | None
+
+
+@dataclass(frozen=True)
+class TestError:
+    """Relative torque error over all joints of the test recordings."""
+
+    before: float
+    after: float
+    noise_floor: float | None
+
+
+@dataclass(frozen=True)
+class ResidualMap:
+    """Mean residual of one joint in bins of a quantity, on the test recordings.
+
+    Attributes
+    ----------
+    joint, torque_unit : the joint, and N m or N.
+    against : "velocity", "position", "acceleration", "load", "time" or "cycles per revolution".
+    unit : of that quantity.
+    at : (B,) centres of the bins (or frequencies).
+    before, after : (B,) mean residual (amplitude for a spectrum) of the model as given, and of
+        the model with the effects added.
+    band : (B,) half width of the interval in which noise alone would lie (2 standard errors);
+        NaN where the noise is unknown.
+    sentence : what the picture shows, in plain words.
+    """
+
+    joint: str
+    torque_unit: str
+    against: str
+    unit: str
+    at: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    band: np.ndarray
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Measured and predicted torque of one joint in one test recording, (T,) each, SI units."""
+
+    recording: str
+    joint: str
+    torque_unit: str
+    t: np.ndarray
+    measured: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The answer of `diagnose`.
+
+    Attributes
+    ----------
+    verdict : "nothing_missing", "explained" or "unexplained".
+    noise_source : where the noise floor comes from.
+    joints, test_error : errors before and after, with the floor.
+    steps : effects in the order in which they were added.
+    candidates : every effect tried on the model as given, best first.
+    remaining : every effect tried on the final model, best first.
+    before, after : the estimates of the model as given and of the final one.
+    maps, traces : for pictures.
+    notes : caveats that belong to the verdict, in plain words.
+    """
+
+    verdict: Verdict
+    noise_source: NoiseSource
+    joints: tuple[JointResult, ...]
+    test_error: TestError
+    steps: tuple[Step, ...]
+    candidates: tuple[Candidate, ...]
+    remaining: tuple[Candidate, ...]
+    before: Estimate
+    after: Estimate
+    maps: tuple[ResidualMap, ...] = ()
+    traces: tuple[Trace, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def best(self) -> Step | None:
+        """The first effect to add; None where nothing is to be added."""
+        return self.steps[0] if self.steps else None
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in plain words."""
+        effects = ", ".join(step.effect.title for step in self.steps)
+        whatever = f" after adding {effects}" if effects else ""
+        return _VERDICTS[self.verdict].format(effects=effects, whatever=whatever)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON of `diagnose --json` and `explain --json`."""
+        return {
+            "verdict": self.verdict,
+            "noise": {"source": self.noise_source},
+            "joints": [
+                {
+                    "name": j.name,
+                    "error_before": j.error_before,
+                    "error_after": j.error_after,
+                    "noise_rms": j.noise_rms,
+                }
+                for j in self.joints
+            ],
+            "steps": [
+                {
+                    **place(step.effect),
+                    "test_error_before": step.test_error_before,
+                    "test_error_after": step.test_error_after,
+                    "indistinguishable": [place(effect) for effect in step.indistinguishable],
+                }
+                for step in self.steps
+            ],
+            "candidates": [
+                {
+                    **place(c.effect),
+                    "status": c.status,
+                    "p_value": c.p_value,
+                    "test_gain": c.test_gain,
+                }
+                for c in self.candidates
+            ],
+            "test_error": {
+                "before": self.test_error.before,
+                "after": self.test_error.after,
+                "noise_floor": self.test_error.noise_floor,
+            },
+            "notes": list(self.notes),
+        }
+
+    def tables(self) -> tuple[Table | str, ...]:
+        """Everything that `show` prints, in its order."""
+        return (
+            self.joint_table(),
+            self.map_table(),
+            self.candidate_table(),
+            self.step_table(),
+            self.sentence,
+            *self.notes,
+        )
+
+    def show(self) -> None:
+        """Print where the model fails, what is missing, and the verdict."""
+        print_tables(*self.tables())
+
+    def joint_table(self) -> Table:
+        """Errors per joint."""
+        rows = tuple(
+            (
+                j.name,
+                percent(j.error_before),
+                percent(j.error_after),
+                number(j.noise_rms, 3) + (f" {j.torque_unit}" if j.noise_rms is not None else ""),
+                number(j.ratio_before, 3),
+                number(j.ratio_after, 3),
+            )
+            for j in self.joints
+        )
+        overall = self.test_error
+        floor = percent(overall.noise_floor)
+        total = ("all", percent(overall.before), percent(overall.after), floor, "", "")
+        return Table(
+            "Torque error on the test recordings",
+            ("joint", "before", "after", "noise floor", "systematic / noise", "after"),
+            (*rows, total),
+            (f"Noise floor: {self._noise_in_words()}.",),
+        )
+
+    def map_table(self) -> Table:
+        """Where the model fails, one sentence for each thing seen."""
+        seen = tuple((m.joint, m.against, m.sentence) for m in self.maps if m.sentence)
+        return Table("Where the given model fails", ("joint", "against", "what is seen"), seen)
+
+    def candidate_table(self, most: int = 10) -> Table:
+        """The ranking on the model as given."""
+        shown = [c for c in self.candidates if c.status != "absorbed"][:most]
+        absorbed = [c for c in self.candidates if c.status == "absorbed"]
+        rows = tuple(
+            (
+                c.effect.label,
+                c.status.replace("_", " "),
+                number(c.p_value, 2),
+                f"{100 * c.test_gain:.2f}",
+                c.remark,
+            )
+            for c in shown
+        )
+        notes = tuple(f"Absorbed: {c.effect.title}. {c.remark}" for c in absorbed)
+        columns = ("effect", "status", "p", "gain, points", "remark")
+        return Table("Candidates, tried on the model as given", columns, rows, notes)
+
+    def step_table(self) -> Table:
+        """The effects added, in order."""
+        rows = tuple(
+            (
+                step.effect.label,
+                percent(step.test_error_before),
+                percent(step.test_error_after),
+                ", ".join(effect.label for effect in step.indistinguishable) or "none",
+            )
+            for step in self.steps
+        )
+        columns = ("effect added", "test error before", "after", "cannot be told from")
+        return Table("Effects added", columns, rows)
+
+    def _noise_in_words(self) -> str:
+        return {
+            "replicates": "measured, from the repeated periods",
+            "given": "as the study states it, not measured",
+            "unknown": "unknown (nothing repeats and no noise is stated), so the verdict is weaker",
+        }[self.noise_source]
+
+
+def place(effect: Effect) -> dict[str, str | None]:
+    """An effect as JSON names it."""
+    return {"effect": effect.name, "joint": effect.joint, "source": effect.source}

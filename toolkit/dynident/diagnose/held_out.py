@@ -1,0 +1,156 @@
+"""Errors where the model was not fitted: on test recordings, or on held-out blocks of time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynident.diagnose.evidence import ColumnStore
+from dynident.diagnose.moments import solve
+from dynident.diagnose.noise import differences, inflation, systematic_square
+from dynident.diagnose.present import Present, model_columns
+from dynident.fit.estimate import Estimate
+
+
+@dataclass(frozen=True)
+class HeldOutRun:
+    """One recording with its prediction, (T, n) each, SI units."""
+
+    name: str
+    t: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    measured: np.ndarray
+    predicted: np.ndarray
+
+    @property
+    def residual(self) -> np.ndarray:
+        """Measured minus predicted torque."""
+        return self.measured - self.predicted
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """What a model misses on held-out data.
+
+    Attributes
+    ----------
+    runs : with predictions.
+    noise_std : (n,) N m or N; None where the noise is unknown.
+    ratio : (n,) systematic residual over noise (root mean squares); None likewise.
+    inflation : (n,) variance of a mean of consecutive noise over that of white noise.
+    """
+
+    runs: tuple[HeldOutRun, ...]
+    noise_std: np.ndarray | None
+    ratio: np.ndarray | None
+    inflation: np.ndarray
+
+    @property
+    def torque_rms(self) -> np.ndarray:
+        """Root mean square of the measured torque, (n,)."""
+        return np.sqrt(np.mean(np.concatenate([r.measured for r in self.runs]) ** 2, axis=0))
+
+    @property
+    def residual_rms(self) -> np.ndarray:
+        """Root mean square of the residual, (n,)."""
+        return np.sqrt(np.mean(np.concatenate([r.residual for r in self.runs]) ** 2, axis=0))
+
+    @property
+    def joint_errors(self) -> np.ndarray:
+        """Norm of the residual over norm of the torque, (n,)."""
+        return self.residual_rms / np.where(self.torque_rms > 0, self.torque_rms, np.nan)
+
+    @property
+    def error(self) -> float:
+        """The same over all joints."""
+        return float(np.linalg.norm(self.residual_rms) / np.linalg.norm(self.torque_rms))
+
+    @property
+    def floor(self) -> float | None:
+        """Error of a model from which nothing is missing."""
+        if self.noise_std is None:
+            return None
+        return float(np.linalg.norm(self.noise_std) / np.linalg.norm(self.torque_rms))
+
+
+def on_recordings(store: ColumnStore, present: Present | Estimate) -> HeldOut:
+    """Judge a fitted model on the recordings of a store, which it has not seen."""
+    combination = np.append(-present.values, 1.0)
+    n = present.model.robot.n
+    runs, folded = [], []
+    for r, run in enumerate(store.runs):
+        first = run.versions[0]
+        joints = [model_columns(store, present.model, r, j, present.values) for j in range(n)]
+        residual = np.stack([c[0] @ combination for c in joints], axis=-1)
+        runs.append(
+            HeldOutRun(
+                run.recording.name,
+                first.t,
+                first.q,
+                first.v,
+                first.a,
+                first.tau,
+                first.tau - residual,
+            )
+        )
+        folded.append(
+            np.stack([run.fold([v @ combination for v in c]) for c in joints], axis=-1)
+        )
+    return _judged(store, tuple(runs), folded)
+
+
+def on_blocks(store: ColumnStore, present: Present) -> HeldOut:
+    """Judge a model on blocks of time, each predicted by the fit to all others."""
+    n = present.model.robot.n
+    runs, folded, block = [], [], 0
+    for r, run in enumerate(store.runs):
+        joints = [model_columns(store, present.model, r, j, present.values) for j in range(n)]
+        columns = np.stack([run.fold(c) for c in joints], axis=2)  # (P, S, n, p + 1)
+        residual = np.empty(columns.shape[:3])
+        for start, stop in zip(run.edges[:-1], run.edges[1:], strict=True):
+            signal, total = present.moments.without(block)
+            values = solve(signal[:-1, :-1], total[:-1, :-1], signal[:-1, -1]).values
+            residual[:, start:stop] = columns[:, start:stop] @ np.append(-values, 1.0)
+            block += 1
+        measured = 1 if run.kind == "perturbed" else len(residual)
+        rows = run.index[:measured].ravel()
+        order = np.argsort(rows)
+        rows, misfit = rows[order], residual[:measured].reshape(-1, n)[order]
+        first = run.versions[0]
+        tau = first.tau[rows]
+        runs.append(
+            HeldOutRun(
+                run.recording.name,
+                first.t[rows],
+                first.q[rows],
+                first.v[rows],
+                first.a[rows],
+                tau,
+                tau - misfit,
+            )
+        )
+        folded.append(residual)
+    return _judged(store, tuple(runs), folded)
+
+
+def _judged(
+    store: ColumnStore, runs: tuple[HeldOutRun, ...], folded: list[np.ndarray]
+) -> HeldOut:
+    """Split the residual into what repeats and what does not."""
+    n = runs[0].measured.shape[1]
+    pairs = [
+        (run.kind, e) for run, e in zip(store.runs, folded, strict=True) if run.kind != "single"
+    ]
+    if not pairs:
+        return HeldOut(runs, None, None, np.ones(n))
+    noise = [[differences(e[..., j], kind) for kind, e in pairs] for j in range(n)]
+    power = np.array([np.mean(np.concatenate([d.ravel() for d in ds]) ** 2) for ds in noise])
+    lengths = [e.shape[1] for _, e in pairs]
+    systematic = [[systematic_square(e[..., j], kind) for kind, e in pairs] for j in range(n)]
+    excess = np.average(systematic, axis=1, weights=lengths)
+    ratio = np.sqrt(np.clip(excess, 0.0, None) / np.where(power > 0, power, 1.0))
+    grown = np.array([inflation([row for d in ds for row in d]) for ds in noise])
+    return HeldOut(runs, np.sqrt(power), ratio, grown)

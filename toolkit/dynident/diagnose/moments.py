@@ -1,0 +1,142 @@
+"""Second moments from which noise has been taken out, and regression on them.
+
+Squares of noisy columns are biased by the noise: least squares on them shrinks parameters and
+gives false effects. Where a motion repeats, products of *different* repetitions are not biased:
+the columns of one period are instruments for the others. All of the diagnosis is regression on
+such moments, block of time by block of time:
+
+    signal : sum over pairs of different repetitions, free of noise in the mean
+    total  : sum of plain squares, signal and noise; it gives the variance of the answers
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from dynident.errors import FitError
+
+Kind = Literal["repeated", "perturbed", "single"]
+"""How the versions of a signal come about: repetitions of a period; the measured record followed
+by copies to which the stated noise was added once more; or one record, of unknown noise."""
+
+EXACT = 1e-9
+"""Directions below this share of the largest (of columns scaled to norm 1) are dependent."""
+
+RELIABLE = 0.05
+"""Directions in which less than this share of the square is signal are noise, and left out."""
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Second moments of two sets of columns, per block of time, (B, a, b) each."""
+
+    signal: np.ndarray
+    total: np.ndarray
+
+    def __add__(self, other: Moments) -> Moments:
+        """Stack the blocks of both."""
+        return Moments(
+            np.concatenate([self.signal, other.signal]), np.concatenate([self.total, other.total])
+        )
+
+    def without(self, block: int) -> tuple[np.ndarray, np.ndarray]:
+        """Sums over all blocks but one."""
+        return (
+            self.signal.sum(axis=0) - self.signal[block],
+            self.total.sum(axis=0) - self.total[block],
+        )
+
+    def sums(self) -> tuple[np.ndarray, np.ndarray]:
+        """Sums over all blocks."""
+        return self.signal.sum(axis=0), self.total.sum(axis=0)
+
+
+def moments(left: np.ndarray, right: np.ndarray, edges: np.ndarray, kind: Kind) -> Moments:
+    """Second moments of columns, of one recording.
+
+    Parameters
+    ----------
+    left, right : (P, S, a) and (P, S, b)
+        Columns at S instants in P versions.
+    edges : (B + 1,)
+        First instant of each block, and S.
+    kind : Kind
+        What the versions are.
+    """
+    signal, total = [], []
+    for start, stop in zip(edges[:-1], edges[1:], strict=True):
+        one, two = left[:, start:stop], right[:, start:stop]
+        if kind == "perturbed":
+            plain = one[0].T @ two[0]
+            noise = sum(
+                (a - one[0]).T @ (b - two[0]) for a, b in zip(one[1:], two[1:], strict=True)
+            ) / (len(one) - 1)
+            signal.append(plain - noise)
+        else:
+            plain = one.reshape(-1, one.shape[2]).T @ two.reshape(-1, two.shape[2])
+            if kind == "repeated":
+                together = one.sum(axis=0).T @ two.sum(axis=0)
+                signal.append((together - plain) / (len(one) - 1))
+            else:
+                signal.append(plain)
+        total.append(plain)
+    return Moments(np.array(signal), np.array(total))
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Instrumental-variable regression on summed moments.
+
+    Attributes
+    ----------
+    values : (p,) the minimum-norm solution in the directions that carry signal.
+    basis : (p, r) these directions, orthonormal in the total moment.
+    reliability : (r,) share of signal in each.
+    """
+
+    values: np.ndarray
+    basis: np.ndarray
+    reliability: np.ndarray
+
+    @property
+    def rank(self) -> int:
+        """Number of directions that carry signal."""
+        return self.basis.shape[1]
+
+    def project(self, moment: np.ndarray) -> np.ndarray:
+        """Coefficients of the regression on the columns, for any signal moment (p, k) with them."""
+        return self.basis @ ((self.basis.T @ moment) / self.reliability[:, None])
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Covariance of the values for residuals of variance one, (p, p)."""
+        scaled = self.basis / self.reliability
+        return scaled @ scaled.T
+
+
+def solve(signal: np.ndarray, total: np.ndarray, moment: np.ndarray) -> Solution:
+    """Solve signal @ values = moment where the columns carry signal.
+
+    Parameters
+    ----------
+    signal, total : (p, p)
+        Signal and total moments of the columns.
+    moment : (p,)
+        Signal moment of the columns with the torque.
+    """
+    scale = np.sqrt(np.diag(total))
+    scale = np.where(scale > 0, scale, 1.0)
+    size, directions = np.linalg.eigh(total / np.outer(scale, scale))
+    if not np.all(np.isfinite(size)):
+        raise FitError("the columns of the model are not finite")
+    keep = size > EXACT * max(float(size[-1]), 1e-300)
+    white = directions[:, keep] / np.sqrt(size[keep]) / scale[:, None]
+    reliability, turn = np.linalg.eigh(white.T @ signal @ white)
+    good = reliability > RELIABLE
+    basis = white @ turn[:, good]
+    reliability = reliability[good]
+    values = basis @ ((basis.T @ moment) / reliability)
+    return Solution(values, basis, reliability)

@@ -1,0 +1,171 @@
+"""A model fitted to the evidence: instrumental variables on whitened rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynident.diagnose.evidence import ColumnStore, Signals
+from dynident.diagnose.moments import Moments, Solution, moments, solve
+from dynident.diagnose.noise import (
+    NoiseModel,
+    differences,
+    flat_noise,
+    measure_noise,
+    systematic_square,
+)
+from dynident.model import Model
+
+_ROUNDS = 3  # fit, measure the noise, fit again: the noise model settles at once
+
+
+@dataclass(frozen=True)
+class Present:
+    """A model as it fits the training data.
+
+    Attributes
+    ----------
+    model : with its effects and their shapes.
+    values : (p,) in the order of `model.names`.
+    covariance : (p, p).
+    solution : of the regression behind the values.
+    noise : per joint.
+    noise_known : whether `noise` was measured or given; otherwise it is the residual.
+    white : per run and joint, whitened columns and torque, (P, S, p + 1).
+    moments : (B, p + 1, p + 1) of columns and torque, over all joints.
+    rows : number of whitened rows, over all repetitions and joints.
+    """
+
+    model: Model
+    values: np.ndarray
+    covariance: np.ndarray
+    solution: Solution
+    noise: tuple[NoiseModel, ...]
+    noise_known: bool
+    white: tuple[tuple[np.ndarray, ...], ...]
+    moments: Moments
+    rows: int
+
+    @property
+    def error_signal(self) -> float:
+        """Squared systematic residual, whitened: what no noise explains."""
+        combination = np.append(-self.values, 1.0)
+        return float(combination @ self.moments.sums()[0] @ combination)
+
+    @property
+    def error_total(self) -> float:
+        """Squared residual, whitened, with its noise."""
+        combination = np.append(-self.values, 1.0)
+        return float(combination @ self.moments.sums()[1] @ combination)
+
+
+def fit_present(store: ColumnStore, model: Model) -> Present:
+    """Fit a model to the runs of a store.
+
+    Raises
+    ------
+    FitError
+        If the columns are not finite.
+    """
+    n = model.robot.n
+    values: np.ndarray | None = np.zeros(model.size) if model.needs_torque else None
+    torque_std = [
+        float(np.sqrt(np.mean(np.concatenate([r.versions[0].tau[:, j] for r in store.runs]) ** 2)))
+        for j in range(n)
+    ]
+    noise = tuple(flat_noise(std or 1.0) for std in torque_std)
+    known = any(run.kind != "single" for run in store.runs)
+    columns = []
+    for _ in range(_ROUNDS):
+        if not columns or model.needs_torque:
+            columns = [
+                [model_columns(store, model, r, j, values) for j in range(n)]
+                for r in range(len(store.runs))
+            ]
+        white = _whiten(store, columns, noise)
+        summed = _moments(store, white)
+        values, solution = _solve(summed)
+        noise = tuple(_noise(store, columns, values, j) for j in range(n))
+    white = _whiten(store, columns, noise)
+    summed = _moments(store, white)
+    values, solution = _solve(summed)
+    rows = sum(part.shape[0] * part.shape[1] for run in white for part in run)
+    return Present(
+        model, values, solution.covariance, solution, noise, known, white, summed, rows
+    )
+
+
+def model_columns(
+    store: ColumnStore, model: Model, run: int, joint: int, values: np.ndarray | None
+) -> Signals:
+    """Columns of a model and the torque at one joint, (T, p + 1) for each version of a run."""
+    recording = store.runs[run].recording
+    parts = [[rigid[:, joint] for rigid in store.rigid(run)]]
+    for effect in model.effects:
+        columns = store.of(effect, run, model, values)
+        if columns[0].shape[1] == 1 and effect.place != "robot":
+            here = model.robot.names.index(str(effect.joint)) == joint
+            at = [c[:, 0] * float(here) for c in columns]
+        else:
+            at = [c[:, joint] for c in columns]
+        if "payload" in effect.needs:
+            at = [c * float(bool(recording.payload)) for c in at]
+        parts.append(at)
+    torque = [version.tau[:, [joint]] for version in store.runs[run].versions]
+    return [np.hstack(pieces) for pieces in zip(*parts, torque, strict=True)]
+
+
+def residuals(store: ColumnStore, model: Model, values: np.ndarray) -> list[np.ndarray]:
+    """Torque minus prediction of each run, folded, (P, S, n) in N m or N."""
+    combination = np.append(-values, 1.0)
+    found = []
+    for r, run in enumerate(store.runs):
+        joints = [
+            run.fold([c @ combination for c in model_columns(store, model, r, j, values)])
+            for j in range(model.robot.n)
+        ]
+        found.append(np.stack(joints, axis=-1))
+    return found
+
+
+def _whiten(store: ColumnStore, columns, noise) -> tuple[tuple[np.ndarray, ...], ...]:
+    return tuple(
+        tuple(run.whitened(c, j, noise[j]) for j, c in enumerate(joints))
+        for run, joints in zip(store.runs, columns, strict=True)
+    )
+
+
+def _moments(store: ColumnStore, white) -> Moments:
+    found = None
+    for run, joints in zip(store.runs, white, strict=True):
+        parts = [moments(w, w, run.edges, run.kind) for w in joints]
+        here = Moments(np.sum([p.signal for p in parts], 0), np.sum([p.total for p in parts], 0))
+        found = here if found is None else found + here
+    assert found is not None
+    return found
+
+
+def _solve(summed: Moments) -> tuple[np.ndarray, Solution]:
+    signal, total = summed.sums()
+    solution = solve(signal[:-1, :-1], total[:-1, :-1], signal[:-1, -1])
+    return solution.values, solution
+
+
+def _noise(store: ColumnStore, columns, values: np.ndarray, joint: int) -> NoiseModel:
+    combination = np.append(-values, 1.0)
+    stretches, speeds, plain, systematic = [], [], [], []
+    for run, joints in zip(store.runs, columns, strict=True):
+        residual = run.fold([c @ combination for c in joints[joint]])
+        if run.kind == "single":
+            plain.append(residual[0])
+            continue
+        systematic.append(systematic_square(residual, run.kind))
+        speed = run.versions[0].v[:, joint][run.index]
+        for stretch, v in zip(differences(residual, run.kind), speed, strict=False):
+            stretches.append(stretch)
+            speeds.append(v)
+    if stretches:
+        misfit = float(np.sqrt(max(np.mean(systematic), 0.0)))
+        return measure_noise(stretches, speeds, misfit)
+    return flat_noise(float(np.sqrt(np.mean(np.concatenate(plain) ** 2))) or 1.0)

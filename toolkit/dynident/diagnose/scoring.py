@@ -1,0 +1,224 @@
+"""What an effect would bring: tests, penalties and cross-validation on the moments."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from dynident.diagnose.evidence import ColumnStore, joints_of
+from dynident.diagnose.moments import Moments, moments, solve
+from dynident.diagnose.present import Present
+from dynident.effects import Effect
+
+ABSORBED = 2e-3
+"""An effect of whose columns less than this share (in norm) is left beside the model is absorbed."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """What one effect, with one shape, would bring if it were added.
+
+    Attributes
+    ----------
+    effect : with its shape.
+    carriers : which runs carry the payload; None for effects to which that does not matter.
+    absorbed : whether nothing of its columns is left beside the model's.
+    rank : number of its parameters that the data can tell.
+    drop : of the squared, whitened, noise-free residual.
+    share : drop over the squared residual with its noise.
+    p_value : before correction for the number of tests; blocks of time are the sampling units.
+    penalised : drop less the price of its parameters and of its grid.
+    values, sigma : (k,) its parameters and their standard deviations.
+    losses : (B,) held-out squared residual of each block with the effect in the model.
+    gains : (B,) held-out squared residual of each block without it less that with it.
+    """
+
+    effect: Effect
+    carriers: tuple[bool, ...] | None
+    absorbed: bool
+    rank: int = 0
+    drop: float = 0.0
+    share: float = 0.0
+    p_value: float = 1.0
+    penalised: float = -np.inf
+    values: tuple[float, ...] = ()
+    sigma: tuple[float, ...] = ()
+    losses: np.ndarray | None = None
+    gains: np.ndarray | None = None
+
+
+def candidate_moments(
+    store: ColumnStore, present: Present, variants: Sequence[Effect]
+) -> list[tuple[Moments, Moments]]:
+    """Moments of columns with the model's and the torque, and with themselves.
+
+    A payload counts as carried in every run; see `carried`.
+
+    Parameters
+    ----------
+    variants : one effect at one place, with any number of shapes.
+
+    Returns
+    -------
+    (B, p + 1, k) and (B, k, k) for each variant
+    """
+    joints = joints_of(variants[0], present.model)
+    with_model, with_self = None, None
+    width = 0
+    for r, run in enumerate(store.runs):
+        each = [store.of(effect, r, present.model, present.values) for effect in variants]
+        width = each[0][0].shape[2]
+        signals = [np.concatenate(shapes, axis=2) for shapes in zip(*each, strict=True)]
+        one, two = [], []
+        for position, joint in enumerate(joints):
+            white = run.whitened([s[:, position] for s in signals], joint, present.noise[joint])
+            one.append(moments(present.white[r][joint], white, run.edges, run.kind))
+            two.append(moments(white, white, run.edges, run.kind))
+        sums = [
+            Moments(np.sum([m.signal for m in part], 0), np.sum([m.total for m in part], 0))
+            for part in (one, two)
+        ]
+        with_model = sums[0] if with_model is None else with_model + sums[0]
+        with_self = sums[1] if with_self is None else with_self + sums[1]
+    assert with_model is not None and with_self is not None
+    starts = range(0, width * len(variants), width)
+    return [
+        (_columns(with_model, slice(i, i + width)), _block(with_self, slice(i, i + width)))
+        for i in starts
+    ]
+
+
+def _columns(part: Moments, columns: slice) -> Moments:
+    return Moments(part.signal[:, :, columns], part.total[:, :, columns])
+
+
+def _block(part: Moments, columns: slice) -> Moments:
+    return Moments(part.signal[:, columns, columns], part.total[:, columns, columns])
+
+
+def carried(part: Moments, store: ColumnStore, carriers: tuple[bool, ...]) -> Moments:
+    """Moments of columns that are zero in the runs which do not carry the payload."""
+    blocks = [np.full(len(run.edges) - 1, c) for run, c in zip(store.runs, carriers, strict=True)]
+    mask = np.concatenate(blocks).astype(float)[:, None, None]
+    return Moments(part.signal * mask, part.total * mask)
+
+
+def score(
+    present: Present,
+    effect: Effect,
+    with_model: Moments,
+    with_self: Moments,
+    grid: int,
+    carriers: tuple[bool, ...] | None = None,
+) -> Score:
+    """Score an effect from its moments; `grid` is the number of shapes that were tried."""
+    p = len(present.values)
+    solution = present.solution
+    signal, total = with_model.sums()
+    own_signal, own_total = with_self.sums()
+    back = solution.project(signal[:p])  # the model's share of the columns
+    left_signal = own_signal - signal[:p].T @ back
+    model_total = present.moments.sums()[1][:p, :p]
+    cross = back.T @ total[:p]
+    left_total = own_total - cross - cross.T + back.T @ model_total @ back
+    scale = np.sqrt(np.clip(np.diag(own_signal), 0.0, None))
+    if not np.any(scale > 0):
+        return Score(effect, carriers, absorbed=True)
+    scale = np.where(scale > 0, scale, 1.0)
+    # Directions of the columns, by what is left of them beside the model.
+    size, directions = np.linalg.eigh(own_signal / np.outer(scale, scale))
+    keep = size > 1e-9 * size[-1]
+    white = directions[:, keep] / np.sqrt(size[keep]) / scale[:, None]
+    left, turn = np.linalg.eigh(white.T @ left_signal @ white)
+    visible = left > ABSORBED**2
+    if not np.any(visible):
+        return Score(effect, carriers, absorbed=True)
+    directions = white @ turn[:, visible]
+    part = solve(
+        directions.T @ left_signal @ directions,
+        directions.T @ left_total @ directions,
+        directions.T @ (signal[p] - back.T @ present.moments.sums()[0][:p, p]),
+    )
+    if part.rank == 0:
+        return Score(effect, carriers, absorbed=False)
+    values = directions @ part.values
+    moment = directions.T @ (signal[p] - back.T @ present.moments.sums()[0][:p, p])
+    drop = float(part.values @ moment)
+    covariance = directions @ part.covariance @ directions.T
+    penalised = drop - part.rank * np.log(present.rows) - 2.0 * np.log(grid)
+    blocks = _block_scores(present, with_model, back) @ directions @ part.basis
+    return Score(
+        effect,
+        carriers,
+        absorbed=False,
+        rank=part.rank,
+        drop=drop,
+        share=drop / present.error_total,
+        p_value=_block_p_value(blocks),
+        penalised=float(penalised),
+        values=tuple(float(v) for v in values),
+        sigma=tuple(float(s) for s in np.sqrt(np.clip(np.diag(covariance), 0.0, None))),
+    )
+
+
+def cross_validate(
+    present: Present, with_model: Moments, with_self: Moments
+) -> tuple[np.ndarray, np.ndarray]:
+    """Held-out squared residuals per block, without and with an effect, (B,) each."""
+    signal = _joined(present.moments.signal, with_model.signal, with_self.signal)
+    total = _joined(present.moments.total, with_model.total, with_self.total)
+    p = len(present.values)
+    both = Moments(signal, total)
+    without = np.r_[0:p, signal.shape[1] - 1]
+    return (
+        held_out_losses(
+            Moments(signal[:, without][:, :, without], total[:, without][:, :, without])
+        ),
+        held_out_losses(both),
+    )
+
+
+def held_out_losses(summed: Moments) -> np.ndarray:
+    """Squared residual of each block under the fit to all others, free of noise in the mean."""
+    found = []
+    for block in range(len(summed.signal)):
+        signal, total = summed.without(block)
+        values = solve(signal[:-1, :-1], total[:-1, :-1], signal[:-1, -1]).values
+        combination = np.append(-values, 1.0)
+        found.append(combination @ summed.signal[block] @ combination)
+    return np.array(found)
+
+
+def _joined(model: np.ndarray, cross: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Moments of [model columns, effect columns, torque], from their parts."""
+    p = model.shape[1] - 1
+    top = np.concatenate([model[:, :p, :p], cross[:, :p], model[:, :p, p:]], axis=2)
+    middle = np.concatenate([cross[:, :p].transpose(0, 2, 1), own, cross[:, p:].transpose(0, 2, 1)], axis=2)
+    bottom = np.concatenate([model[:, p:, :p], cross[:, p:], model[:, p:, p:]], axis=2)
+    return np.concatenate([top, middle, bottom], axis=1)
+
+
+def _block_scores(present: Present, with_model: Moments, back: np.ndarray) -> np.ndarray:
+    """Each block's share of the moment of residual and cleared columns, (B, k)."""
+    p = len(present.values)
+    combination = np.append(-present.values, 1.0)
+    plain = np.einsum("i,bik->bk", combination, with_model.signal)
+    model = np.einsum("i,bij->bj", combination, present.moments.signal)[:, :p]
+    return plain - model @ back
+
+
+def _block_p_value(scores: np.ndarray) -> float:
+    """Hotelling's test that the mean of the blocks' scores is zero."""
+    blocks, k = scores.shape
+    if blocks <= k + 1:
+        return 1.0
+    mean = scores.mean(axis=0)
+    spread = np.atleast_2d(np.cov(scores, rowvar=False)) / blocks
+    try:
+        statistic = float(mean @ np.linalg.solve(spread, mean))
+    except np.linalg.LinAlgError:
+        return 1.0
+    return float(stats.f.sf(statistic * (blocks - k) / (k * (blocks - 1)), k, blocks - k))

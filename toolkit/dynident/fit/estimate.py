@@ -1,0 +1,324 @@
+"""What a fit returns: values with units, uncertainties, what they rest on, and what to make of it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dynident import files
+from dynident.effects import catalogue
+from dynident.errors import FitError
+from dynident.inertia import margins
+from dynident.model import Model
+from dynident.robot import BaseParameters, Robot
+from dynident.tables import Table, number, percent, print_tables
+
+FORMAT = "dynident-estimate-1"
+
+
+@dataclass(frozen=True)
+class Source:
+    """A recording that an estimate rests on: its file and the SHA-256 of the file's content."""
+
+    file: str
+    sha256: str
+    filter: str
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Identified parameters of a model.
+
+    Attributes
+    ----------
+    model : the model that was fitted, with its shape parameters as refined.
+    values : (p,) in the order of `model.names`. Combinations that the data do not excite keep
+        the values of the robot description.
+    covariance : (p, p); rows of parameters that are not identified on their own are zero.
+    basis : which combinations of `model.names` the data identify, and the rank decision.
+    torque_std : (n,) standard deviation of the torque residual, N m or N.
+    joint_errors : (n,) norm of the residual over norm of the torque, on the data of the fit.
+    error : the same over all joints.
+    condition_number : of the columns identified, as they were weighted.
+    rows : number of equations.
+    method : how it was estimated.
+    status : the solver's word.
+    notes : caveats in plain words.
+    sources : the recordings.
+    """
+
+    model: Model
+    values: np.ndarray
+    covariance: np.ndarray
+    basis: BaseParameters
+    torque_std: np.ndarray
+    joint_errors: np.ndarray
+    error: float
+    condition_number: float
+    rows: int
+    method: str
+    status: str
+    notes: tuple[str, ...] = ()
+    sources: tuple[Source, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return self.model.names
+
+    @cached_property
+    def identified(self) -> np.ndarray:
+        """Which parameters are identified, alone or as the head of a combination, (p,) bool."""
+        found = np.zeros(self.model.size, dtype=bool)
+        found[list(self.basis.independent)] = True
+        return found
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """Standard deviations, (p,); NaN where a parameter is not identified."""
+        sigma = np.sqrt(np.clip(np.diag(self.covariance), 0.0, None))
+        return np.where(self.identified, sigma, np.nan)
+
+    @property
+    def relative_sigma(self) -> np.ndarray:
+        """Standard deviations over absolute values, (p,)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return self.sigma / np.abs(self.values)
+
+    @cached_property
+    def robot(self) -> Robot:
+        """The robot with the identified base parameters.
+
+        What the data cannot tell (how a base parameter is shared among the links) stays as near to
+        the given description as it can; the links need not be physically consistent.
+        """
+        robot = self.model.robot
+        rigid = self.values[: len(self.model.base.independent)]
+        return robot.with_theta(self.model.base.lift(rigid, robot.theta))
+
+    def effect_values(self, label: str) -> np.ndarray:
+        """Parameters of one effect, by its label."""
+        return self.values[self.model.slices[label]]
+
+    def value(self, name: str) -> float:
+        """One parameter by its name.
+
+        Raises
+        ------
+        FitError
+            If there is no such parameter.
+        """
+        if name not in self.names:
+            raise FitError(f"no parameter '{name}'", mend=f"parameters: {', '.join(self.names)}")
+        return float(self.values[self.names.index(name)])
+
+    # --- in words ------------------------------------------------------------------------------
+
+    def parameter_table(self) -> Table:
+        """Values, standard deviations and what each parameter is a combination of."""
+        heads = {
+            index: text
+            for index, text in zip(self.basis.independent, self.basis.expressions, strict=True)
+        }
+        rows = []
+        for i, name in enumerate(self.names):
+            expression = heads.get(i, "not identified on its own; see the combinations")
+            if expression == name:
+                expression = self.model.expressions[i]
+            rows.append(
+                (
+                    name,
+                    number(self.values[i], 6),
+                    number(self.sigma[i], 3),
+                    percent(self.relative_sigma[i], 1),
+                    self.model.units[i],
+                    "" if expression == name else expression,
+                )
+            )
+        columns = ("parameter", "value", "sigma", "relative", "unit", "stands for")
+        return Table("Parameters", columns, tuple(rows), self._parameter_notes())
+
+    def error_table(self) -> Table:
+        """Torque errors on the data of the fit."""
+        robot = self.model.robot
+        rows = tuple(
+            (name, percent(error), number(std, 3), unit)
+            for name, error, std, unit in zip(
+                robot.names, self.joint_errors, self.torque_std, robot.torque_units, strict=True
+            )
+        )
+        columns = ("joint", "relative error", "residual std", "unit")
+        title = f"Torque error on the data of the fit: {percent(self.error, 4)}"
+        return Table(title, columns, rows)
+
+    def tables(self) -> tuple[Table | str, ...]:
+        """Everything that `show` prints, in its order."""
+        return (self.parameter_table(), self.error_table(), *self.notes)
+
+    def summary(self) -> str:
+        """The tables as text."""
+        return "\n".join(str(part) for part in self.tables())
+
+    def show(self) -> None:
+        """Print parameters, errors and caveats."""
+        print_tables(*self.tables())
+
+    def _parameter_notes(self) -> tuple[str, ...]:
+        return (
+            f"{self.method}; {self.rows} equations, {len(self.basis.independent)} of "
+            f"{self.model.size} parameters identified ({_decision(self.basis)}), "
+            f"condition number {self.condition_number:.6g}; {self.status}.",
+            "sigma is that of least squares with independent errors: what the model lacks, or noise "
+            "in the positions, is not in it.",
+        )
+
+    # --- files ---------------------------------------------------------------------------------
+
+    def to_dict(self) -> dict[str, Any]:
+        """The estimate as JSON holds it."""
+        description = self.model.robot.description
+        return {
+            "format": FORMAT,
+            "method": self.method,
+            "status": self.status,
+            "parameters": [
+                {
+                    "name": name,
+                    "value": float(self.values[i]),
+                    "sigma": float(self.sigma[i]) if self.identified[i] else None,
+                    "unit": self.model.units[i],
+                    "expression": self.model.expressions[i],
+                }
+                for i, name in enumerate(self.names)
+            ],
+            "covariance": self.covariance.tolist(),
+            "basis": _basis_to_dict(self.basis),
+            "torque_std": self.torque_std.tolist(),
+            "joint_errors": self.joint_errors.tolist(),
+            "error": self.error,
+            "condition_number": self.condition_number,
+            "rows": self.rows,
+            "notes": list(self.notes),
+            "recordings": [vars(source) for source in self.sources],
+            "model": {
+                "robot": description.text if description else None,
+                "joints": list(self.model.robot.names),
+                "gravity": [float(g) for g in self.model.robot.gravity],
+                "friction_width": self.model.friction_width,
+                "effects": [
+                    {
+                        "effect": effect.name,
+                        "joint": effect.joint,
+                        "source": effect.source,
+                        "shape": list(effect.shape),
+                    }
+                    for effect in self.model.effects
+                ],
+            },
+        }
+
+    def save(self, path: str | Path) -> Path:
+        """Write the estimate as JSON, with the robot description in it.
+
+        Raises
+        ------
+        FileError
+            If the file cannot be written; an old one is then untouched.
+        """
+        return files.write_text(path, json.dumps(self.to_dict(), indent=1, allow_nan=True) + "\n")
+
+    def write_robot(self, path: str | Path) -> Path:
+        """Write the robot description with the identified inertial parameters.
+
+        A patched copy of the given description; see `robot` for what the data cannot tell.
+
+        Raises
+        ------
+        RobotError
+            If the format cannot hold the parameters (a massless link with a first moment, say).
+        """
+        return self.robot.write(path)
+
+    def inconsistent_links(self) -> tuple[str, ...]:
+        """Moving bodies of `robot` whose inertial parameters no rigid body can have."""
+        theta = self.robot.theta.reshape(-1, 10)
+        bodies = (name.partition(".")[2] for name in self.robot.parameter_names[::10])
+        return tuple(
+            body for body, phi in zip(bodies, theta, strict=True) if not margins(phi).consistent
+        )
+
+
+def load_estimate(path: str | Path) -> Estimate:
+    """Read an estimate that `Estimate.save` wrote.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read.
+    FitError
+        If it is not an estimate of this version.
+    """
+    text = files.read_text(path)
+    try:
+        content = json.loads(text)
+        if content["format"] != FORMAT:
+            raise ValueError(f"format '{content['format']}'")
+        given = content["model"]
+        robot = Robot.from_text(given["robot"], str(path), given["joints"], given["gravity"])
+        known = catalogue()
+        effects = tuple(
+            known[e["effect"]](e["joint"], e["source"], tuple(e["shape"]))
+            for e in given["effects"]
+        )
+        model = Model(robot, effects, given["friction_width"])
+        return Estimate(
+            model,
+            np.array([p["value"] for p in content["parameters"]]),
+            np.array(content["covariance"]),
+            _basis_from_dict(content["basis"]),
+            np.array(content["torque_std"]),
+            np.array(content["joint_errors"]),
+            content["error"],
+            content["condition_number"],
+            content["rows"],
+            content["method"],
+            content["status"],
+            tuple(content["notes"]),
+            tuple(Source(**source) for source in content["recordings"]),
+        )
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        mend = "save one with Estimate.save"
+        raise FitError(f"is not a dynident estimate ({error})", str(path), mend) from None
+
+
+
+
+def _decision(basis: BaseParameters) -> str:
+    """How the rank was decided, in words."""
+    if basis.rank == len(basis.names):
+        least = float(basis.diagonal[-1] / basis.diagonal[0])
+        return f"full rank, smallest direction {least:.2g} of the largest"
+    return f"rank gap {basis.gap:.2g} at tolerance {basis.tolerance:.0e}"
+
+
+def _basis_to_dict(basis: BaseParameters) -> dict[str, Any]:
+    lists = {name: getattr(basis, name).tolist() for name in _ARRAYS}
+    plain = {name: list(getattr(basis, name)) for name in _TUPLES}
+    return {**plain, **lists, "tolerance": basis.tolerance}
+
+
+def _basis_from_dict(content: dict[str, Any]) -> BaseParameters:
+    arrays = {name: np.array(content[name], dtype=float) for name in _ARRAYS}
+    plain = {name: tuple(content[name]) for name in _TUPLES}
+    rank = len(plain["independent"])
+    arrays["K"] = arrays["K"].reshape(rank, len(plain["names"]) - rank)
+    return BaseParameters(**plain, **arrays, tolerance=content["tolerance"])
+
+
+_ARRAYS = ("K", "scale", "diagonal")
+_TUPLES = ("names", "independent", "dependent", "expressions")

@@ -1,0 +1,169 @@
+"""A recording as rows of a regression: filtered, differentiated, low-passed and decimated.
+
+Columns are evaluated at the full rate, where friction is what it is, and then pass the same
+low-pass as the torque; in blocks, so that a regressor at the full rate never exists as a whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dynident.effects import Block
+from dynident.errors import RecordingError
+from dynident.model import Model
+from dynident.recording import (
+    Dataset,
+    Filter,
+    FilterBlock,
+    Motion,
+    ParallelFilter,
+    Recording,
+    default_filter,
+    differentiate,
+    uniform,
+    within,
+)
+
+BLOCK = 16384
+"""Samples at the full rate that are evaluated at a time."""
+
+LEAST_ROWS = 20
+"""Rows below which a recording says too little."""
+
+Evaluate = Callable[[Block], list[np.ndarray]]
+"""Columns of a block, each (T, ...)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """A recording ready for evaluation.
+
+    Attributes
+    ----------
+    recording : on a uniform clock.
+    motion : at the full rate.
+    parallel : the low-pass and decimation of columns and torque.
+    kept : decimated rows that lie in the recording's window.
+    t, q, v, a, tau : decimated rows, (T,) and (T, n).
+    """
+
+    recording: Recording
+    motion: Motion
+    parallel: ParallelFilter
+    kept: slice
+    t: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    tau: np.ndarray
+
+    @property
+    def rate_hz(self) -> float:
+        """Rate of the decimated rows."""
+        return self.parallel.output_rate_hz
+
+    def blocks(
+        self, model: Model, evaluate: Evaluate, *, rigid: bool = True, size: int = BLOCK
+    ) -> Iterator[list[np.ndarray]]:
+        """Evaluate columns block by block; each as decimated rows.
+
+        Parameters
+        ----------
+        model : for the robot's regressor.
+        evaluate : columns of one block.
+        rigid : whether `evaluate` needs the rigid-body regressor.
+        size : samples at a time.
+        """
+        for plan in self.parallel.blocks(self.motion.samples, size):
+            columns = evaluate(self._block(model, plan.raw, rigid))
+            low, high = max(plan.kept.start, self.kept.start), min(plan.kept.stop, self.kept.stop)
+            if high <= low:
+                continue
+            rows = slice(low - plan.kept.start, high - plan.kept.start)
+            short = FilterBlock(plan.raw, plan.rows[rows], slice(low, high))
+            yield [self.parallel.apply_block(one, short) for one in columns]
+
+    def decimate(
+        self, model: Model, evaluate: Evaluate, *, rigid: bool = True
+    ) -> list[np.ndarray]:
+        """All decimated rows of some columns; see `blocks`."""
+        parts = list(self.blocks(model, evaluate, rigid=rigid))
+        return [np.concatenate(pieces) for pieces in zip(*parts, strict=True)]
+
+    def full_rate(
+        self, model: Model, evaluate: Callable[[Block], np.ndarray], *, rigid: bool = True
+    ) -> np.ndarray:
+        """Evaluate at the full rate, neither filtered nor decimated, (T, ...)."""
+        starts = range(0, self.motion.samples, BLOCK)
+        return np.concatenate(
+            [evaluate(self._block(model, slice(i, i + BLOCK), rigid)) for i in starts]
+        )
+
+    def _block(self, model: Model, raw: slice, rigid: bool) -> Block:
+        motion = self.motion
+        t = motion.t[raw] + self.recording.start
+        q, v, a = motion.q[raw], motion.v[raw], motion.a[raw]
+        return model.block(
+            t, q, v, a, carries_payload=bool(self.recording.payload), rigid=rigid
+        )
+
+
+def sample(recording: Recording, settings: Filter | None) -> Sampled:
+    """Prepare a recording for evaluation.
+
+    Parameters
+    ----------
+    recording : resampled here if its clock is jittered.
+    settings : None for `default_filter` at the recording's rate.
+
+    Raises
+    ------
+    RecordingError
+        If fewer than `LEAST_ROWS` rows are left, or the filter does not suit the recording.
+    """
+    recording = uniform(recording)
+    settings = settings or default_filter(recording.rate_hz)
+    motion = differentiate(recording, settings)
+    parallel = ParallelFilter(settings, motion.rate_hz, recording.period, recording.where)
+    times = parallel.times(motion.t)
+    kept = slice(0, len(times))
+    if recording.window is not None:
+        inside = np.flatnonzero(within(times, *recording.window, recording.where))
+        kept = slice(int(inside[0]), int(inside[-1]) + 1)
+    count = kept.stop - kept.start
+    if count < LEAST_ROWS:
+        what = f"only {count} rows are left after filtering and decimation"
+        mend = f"at least {LEAST_ROWS} are needed: record longer, or raise rate_hz in [filter]"
+        raise RecordingError(what, recording.where, mend)
+    q, v, a, tau = (parallel.apply(x)[kept] for x in (motion.q, motion.v, motion.a, motion.tau))
+    return Sampled(recording, motion, parallel, kept, times[kept], q, v, a, tau)
+
+
+def flagged(sampled: Sampled, payload: bool) -> Sampled:
+    """Return the recording with or without the payload on board."""
+    return replace(sampled, recording=sampled.recording.replace(payload=payload))
+
+
+def rows(
+    model: Model, dataset: Dataset, values: np.ndarray | None = None
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Rows of the regression of all recordings, in blocks.
+
+    Parameters
+    ----------
+    values : (p,) parameters at which columns that depend on the predicted torque are taken.
+
+    Yields
+    ------
+    columns (T, n, p) and torque (T, n)
+    """
+    for recording in dataset.recordings:
+        sampled = sample(recording, dataset.filter)
+        start = 0
+        for (columns,) in sampled.blocks(model, lambda block: [model.columns(block, values)]):
+            stop = start + len(columns)
+            yield columns, sampled.tau[start:stop]
+            start = stop

@@ -1,0 +1,98 @@
+"""A table of results, to be shown in a terminal, in a notebook or in the report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of text with a title, and notes in plain words below them.
+
+    Attributes
+    ----------
+    title : above the table.
+    columns : headings; columns whose cells are numbers are set flush right.
+    rows : cells as they are to be read.
+    notes : sentences that belong to the table.
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...] = ()
+
+    def show(self) -> None:
+        """Print the table to the terminal."""
+        print_tables(self)
+
+    def _repr_html_(self) -> str:
+        head = "".join(f"<th>{escape(c)}</th>" for c in self.columns)
+        body = "".join(
+            "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>"
+            for row in self.rows
+        )
+        notes = "".join(f"<p>{escape(note)}</p>" for note in self.notes)
+        title = escape(self.title)
+        return f"<table><caption>{title}</caption><tr>{head}</tr>{body}</table>{notes}"
+
+    def __str__(self) -> str:
+        from rich.console import Console
+
+        console = Console(width=110, color_system=None, force_terminal=False)
+        with console.capture() as capture:
+            _print(console, self)
+        return capture.get()
+
+
+def print_tables(*tables: Table | str) -> None:
+    """Print tables and sentences to standard output, one after another."""
+    from rich.console import Console
+
+    console = Console(highlight=False)
+    for table in tables:
+        if isinstance(table, str):
+            console.print(table, markup=False)
+        else:
+            _print(console, table)
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """A number in a table: `digits` significant ones, a dash where there is none."""
+    if value is None or value != value:
+        return "-"
+    return f"{value:.{digits}g}"
+
+
+def percent(value: float | None, digits: int = 2) -> str:
+    """A fraction as a percentage with `digits` decimals, a dash where there is none."""
+    if value is None or value != value:
+        return "-"
+    return f"{100 * value:.{digits}f} %"
+
+
+def _print(console, table: Table) -> None:
+    from rich import box
+    from rich.table import Table as RichTable
+    from rich.text import Text
+
+    shown = RichTable(
+        title=Text(table.title, style="bold"), title_justify="left", box=box.SIMPLE_HEAD
+    )
+    for index, column in enumerate(table.columns):
+        cells: Sequence[str] = [row[index] for row in table.rows]
+        numeric = bool(cells) and all(_is_number(cell) for cell in cells)
+        shown.add_column(Text(column), justify="right" if numeric else "left")
+    for row in table.rows:
+        shown.add_row(*(Text(cell) for cell in row))
+    console.print(shown)
+    for note in table.notes:
+        console.print(Text(f"  {note}"))
+    if table.notes:
+        console.print()
+
+
+def _is_number(cell: str) -> bool:
+    return not cell or cell[0] in "-+.0123456789"
