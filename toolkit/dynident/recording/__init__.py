@@ -1,1 +1,54 @@
-"""TODO"""
+"""Recordings: what a robot did and which torques it took.
+
+`read` and `write` exchange them with CSV, NPZ, MAT and Parquet files (other names and units
+through `Column`), `Recording` checks them. `uniform` puts jittered time stamps on a uniform clock.
+`differentiate` turns positions into a `Motion`; `ParallelFilter` passes regressor columns and
+torque through one low-pass and decimation, in blocks if asked; both follow a `Filter`.
+`within`, `away_from_edges` and `moving` pick rows; `periods` lays repetitions side by side.
+"""
+
+from dynident.recording.columns import Column
+from dynident.recording.dataset import Dataset, Noise
+from dynident.recording.filters import (
+    Filter,
+    Motion,
+    central_difference,
+    default_filter,
+    differentiate,
+    lowpass,
+)
+from dynident.recording.masks import away_from_edges, moving, within
+from dynident.recording.parallel import FilterBlock, ParallelFilter, choose_factor
+from dynident.recording.periods import Periods, mismatch, periods, require_repetition
+from dynident.recording.read import SUFFIXES, read
+from dynident.recording.recording import Provenance, Recording
+from dynident.recording.uniform import uniform
+from dynident.recording.write import write
+
+__all__ = [
+    "SUFFIXES",
+    "Column",
+    "Dataset",
+    "Filter",
+    "FilterBlock",
+    "Motion",
+    "Noise",
+    "ParallelFilter",
+    "Periods",
+    "Provenance",
+    "Recording",
+    "away_from_edges",
+    "central_difference",
+    "choose_factor",
+    "default_filter",
+    "differentiate",
+    "lowpass",
+    "mismatch",
+    "moving",
+    "periods",
+    "read",
+    "require_repetition",
+    "uniform",
+    "within",
+    "write",
+]

@@ -1,0 +1,61 @@
+"""Recordings that belong together, with their filter and the noise that is stated of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynident.errors import RecordingError
+from dynident.recording.filters import Filter
+from dynident.recording.recording import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Stated noise per raw sample, independent from sample to sample.
+
+    Attributes
+    ----------
+    position_std : (n,) rad or m.
+    torque_std : (n,) N m or N.
+    """
+
+    position_std: np.ndarray
+    torque_std: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Dataset:
+    """Recordings of the same joints, and how to filter them.
+
+    Attributes
+    ----------
+    recordings : in any number.
+    filter : None for `default_filter` at each recording's rate.
+    noise : needed for a noise floor where nothing repeats; None where it is unknown.
+
+    Raises
+    ------
+    RecordingError
+        If the recordings differ in their joints.
+    """
+
+    recordings: tuple[Recording, ...]
+    filter: Filter | None = None
+    noise: Noise | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "recordings", tuple(self.recordings))
+        for recording in self.recordings[1:]:
+            if recording.joints != self.recordings[0].joints:
+                ours = ", ".join(self.recordings[0].joints)
+                what = f"joints {', '.join(recording.joints)} where the others have {ours}"
+                raise RecordingError(what, recording.where, "use `Recording.select`")
+
+    def __len__(self) -> int:
+        return len(self.recordings)
+
+    def __add__(self, other: Dataset) -> Dataset:
+        """Recordings of both, with this one's filter and noise."""
+        return Dataset(self.recordings + other.recordings, self.filter, self.noise)

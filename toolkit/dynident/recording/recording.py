@@ -1,0 +1,298 @@
+"""A recording: what a robot did and which torques it took."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from dataclasses import replace as _replace
+from typing import Any, Literal
+
+import numpy as np
+
+from dynident.errors import RecordingError
+from dynident.recording.masks import within
+
+USES = ("train", "test")
+TORQUES = ("measured", "held_command")
+SIGNALS = ("q", "tau", "v", "a", "q_ref")
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where the numbers of a recording come from.
+
+    Attributes
+    ----------
+    file : path of the file as it was given; empty for a recording made in memory.
+    sha256 : hexadecimal digits of the file's content; empty likewise.
+    filter : what was done to the numbers since, in words; empty if nothing.
+    """
+
+    file: str = ""
+    sha256: str = ""
+    filter: str = ""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording:
+    """Samples of a robot's motion and torques, checked and read-only.
+
+    Attributes
+    ----------
+    t : (T,) s, strictly increasing.
+    q : (T, n) rad, or m for prismatic joints.
+    tau : (T, n) N m, or N for prismatic joints.
+    joints : n names, the order of the columns.
+    v, a : (T, n) recorded velocity and acceleration, or None.
+    q_ref : (T, n) reference position, or None.
+    period : s after which the excitation repeats, or None.
+    start : s, when the recording began in the session (for effects of warm-up).
+    window : (t0, t1) s on the clock of `t`, or None: what to use of it once the whole is filtered.
+    use : "train" or "test".
+    payload : whether the payload under study was on board; None where there is none.
+    torque : "measured", or "held_command" where the torque of sample k acts until sample k + 1.
+    name : for tables; the file's name without its suffix by default.
+    provenance : file, hash, filter.
+
+    Raises
+    ------
+    RecordingError
+        If a shape does not fit, a value is not finite, time does not strictly increase, a joint's
+        name is missing or repeated, or a setting is out of its range. The message names the
+        joint's column and the row (the first sample is row 1).
+    """
+
+    t: np.ndarray
+    q: np.ndarray
+    tau: np.ndarray
+    joints: tuple[str, ...]
+    v: np.ndarray | None = None
+    a: np.ndarray | None = None
+    q_ref: np.ndarray | None = None
+    period: float | None = None
+    start: float = 0.0
+    window: tuple[float, float] | None = None
+    use: Literal["train", "test"] = "train"
+    payload: bool | None = None
+    torque: Literal["measured", "held_command"] = "measured"
+    name: str = ""
+    provenance: Provenance = field(default_factory=Provenance)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "joints", _joint_names(self.joints, self.where))
+        object.__setattr__(self, "t", self._numbers("t", self.t))
+        if self.t.ndim != 1:
+            raise RecordingError(f"t has the shape {self.t.shape}", self.where, "make it (T,)")
+        if len(self.t) < 2:
+            raise RecordingError(
+                f"holds {len(self.t)} sample{'s' * (len(self.t) != 1)}",
+                self.where,
+                "a recording needs at least 2; is the file complete?",
+            )
+        for signal in SIGNALS:
+            value = getattr(self, signal)
+            if value is not None or signal in ("q", "tau"):
+                object.__setattr__(self, signal, self._signal(signal, value))
+        self._check_finite()
+        self._check_time()
+        self._check_settings()
+
+    # --- what it says --------------------------------------------------------------------------
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.joints)
+
+    @property
+    def samples(self) -> int:
+        """Number of samples, T."""
+        return len(self.t)
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last sample, s."""
+        return float(self.t[-1] - self.t[0])
+
+    @property
+    def rate_hz(self) -> float:
+        """Mean sampling rate, (T - 1) / (t[-1] - t[0])."""
+        return (self.samples - 1) / self.duration
+
+    @property
+    def jitter(self) -> float:
+        """Largest departure of a time step from the mean one, relative to the mean one."""
+        mean = self.duration / (self.samples - 1)
+        return float(np.max(np.abs(np.diff(self.t) - mean)) / mean)
+
+    @property
+    def where(self) -> str:
+        """How messages call this recording: its file, else its name."""
+        return self.provenance.file or self.name or "recording"
+
+    def row(self, index: int) -> str:
+        """How messages call a sample, given its index from 0: file and row (and line, in CSV)."""
+        line = f" (line {index + 2})" if self.where.lower().endswith(".csv") else ""
+        return f"{self.where}, row {index + 1}{line}"
+
+    def __repr__(self) -> str:
+        joints = ", ".join(self.joints)
+        size = f"{self.samples} samples at {self.rate_hz:.4g} Hz, {self.duration:.4g} s"
+        return f"<Recording {self.name or self.where}: {joints}; {size}; {self.use}>"
+
+    # --- with changes --------------------------------------------------------------------------
+
+    def replace(self, **changes: Any) -> Recording:
+        """Return the recording with other values of some attributes, checked anew."""
+        return _replace(self, **changes)
+
+    def select(self, joints: Sequence[str]) -> Recording:
+        """Return the recording of these joints only, in this order.
+
+        Raises
+        ------
+        RecordingError
+            If one of them is not in the recording.
+        """
+        missing = [joint for joint in joints if joint not in self.joints]
+        if missing:
+            raise RecordingError(
+                f"no joint '{missing[0]}'", self.where, f"joints: {', '.join(self.joints)}"
+            )
+        picked = [self.joints.index(joint) for joint in joints]
+        return self.replace(joints=tuple(joints), **self._mapped(lambda x: x[:, picked]))
+
+    def cut(self, t0: float | None = None, t1: float | None = None) -> Recording:
+        """Return the samples with t0 <= t < t1 (s, as in `t`); None leaves that side open.
+
+        Raises
+        ------
+        RecordingError
+            If fewer than 2 samples are left.
+        """
+        kept = within(self.t, t0, t1, self.where)
+        return self.replace(t=self.t[kept], **self._mapped(lambda x: x[kept]))
+
+    def _mapped(self, change: Callable[[np.ndarray], np.ndarray]) -> dict[str, Any]:
+        """Each signal changed alike, those that are absent left absent."""
+        present = {signal: getattr(self, signal) for signal in SIGNALS}
+        return {signal: None if x is None else change(x) for signal, x in present.items()}
+
+    # --- checks --------------------------------------------------------------------------------
+
+    def _numbers(self, column: str, value: Any) -> np.ndarray:
+        """Value as a read-only array of doubles; an array that is one already is shared."""
+        if (
+            isinstance(value, np.ndarray)
+            and value.dtype == np.float64
+            and not value.flags.writeable
+            and value.base is None
+        ):
+            return value
+        try:
+            if np.iscomplexobj(value):
+                raise ValueError
+            array = np.array(value, dtype=np.float64)
+        except (TypeError, ValueError):
+            mend = "give an array of real numbers"
+            raise RecordingError(f"{column} does not hold numbers", self.where, mend) from None
+        array.setflags(write=False)
+        return array
+
+    def _signal(self, signal: str, value: Any) -> np.ndarray:
+        array = self._numbers(signal, value)
+        if array.shape == (self.samples,) and self.n == 1:
+            array = self._numbers(signal, array[:, None])
+        if array.shape != (self.samples, self.n):
+            raise RecordingError(
+                f"{signal} has the shape {array.shape} where {self.samples} time stamps and "
+                f"{self.n} joint{'s' * (self.n != 1)} ask for {(self.samples, self.n)}",
+                self.where,
+                "give one row a sample and one column a joint",
+            )
+        return array
+
+    def _check_finite(self) -> None:
+        if not np.isfinite(self.t).all():
+            row = int(np.argmax(~np.isfinite(self.t)))
+            self._not_finite("t", row, self.t[row])
+        for signal in SIGNALS:
+            x = getattr(self, signal)
+            if x is None or np.isfinite(x).all():
+                continue
+            row, joint = (int(i) for i in np.argwhere(~np.isfinite(x))[0])
+            self._not_finite(f"{signal}.{self.joints[joint]}", row, x[row, joint])
+
+    def _not_finite(self, column: str, row: int, value: float) -> None:
+        raise RecordingError(
+            f"{value} is not a finite number",
+            f"{self.row(row)}, column {column}",
+            "repair or cut the gap; a recording has a number in every cell",
+        )
+
+    def _check_time(self) -> None:
+        late = np.flatnonzero(np.diff(self.t) <= 0)
+        if not len(late):
+            return
+        row = int(late[0]) + 1
+        before, here = float(self.t[row - 1]), float(self.t[row])
+        if before == here:
+            what, mend = f"the time stamp {here!r} s is there twice", "drop one of the two rows"
+        else:
+            what, mend = f"time goes back from {before!r} to {here!r} s", "sort the rows by time"
+        more = f" ({len(late)} such rows)" if len(late) > 1 else ""
+        raise RecordingError(what + more, f"{self.row(row)}, column t", mend)
+
+    def _check_settings(self) -> None:
+        def positive(name: str, unit: str, value: Any, least: float) -> float:
+            number = _number(value)
+            if not (math.isfinite(number) and number > least):
+                mend = f"choose it above {least:.4g} {unit}"
+                raise RecordingError(f"{name} = {value!r}", self.where, mend)
+            return number
+
+        if self.period is not None:
+            # Two samples a period is the least that can show any motion at all.
+            step = self.duration / (self.samples - 1)
+            object.__setattr__(self, "period", positive("period", "s", self.period, 2 * step))
+        if not math.isfinite(_number(self.start)):
+            raise RecordingError(f"start = {self.start!r}", self.where, "give a time in s")
+        if self.window is not None:
+            window = tuple(_number(limit) for limit in self.window)
+            if len(window) != 2 or not window[0] < window[1]:
+                mend = "give two times in s, the earlier one first"
+                raise RecordingError(f"window = {self.window!r}", self.where, mend)
+            object.__setattr__(self, "window", window)
+        for key, valid in (("use", USES), ("torque", TORQUES)):
+            if getattr(self, key) not in valid:
+                choices = " or ".join(f'"{one}"' for one in valid)
+                raise RecordingError(
+                    f"{key} = {getattr(self, key)!r}", self.where, f"write {choices}"
+                )
+        if self.payload not in (None, True, False):
+            raise RecordingError(f"payload = {self.payload!r}", self.where, "write true or false")
+
+
+def _number(value: Any) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        return math.nan
+
+
+def _joint_names(joints: Any, where: str) -> tuple[str, ...]:
+    if isinstance(joints, str):
+        raise RecordingError(
+            f"joints = {joints!r} is one text", where, f'write a list: ["{joints}"]'
+        )
+    names = tuple(joints)
+    if not names:
+        raise RecordingError("no joints are named", where, "name at least one")
+    for name in names:
+        if not isinstance(name, str) or name != name.strip() or not (name and name.isprintable()):
+            mend = "a joint is named by one line of text without blanks around it"
+            raise RecordingError(f"{name!r} is no name of a joint", where, mend)
+        if names.count(name) > 1:
+            raise RecordingError(f"the joint '{name}' is named twice", where, "name it once")
+    return names
