@@ -59,7 +59,16 @@ def assemble(
 ) -> Tree:
     """Walk the tree from the world; joints that are not wanted are locked at zero."""
     below: dict[str, list[Connection]] = {}
+    parented: set[str] = set()
     for connection in kinematics.connections:
+        if connection.child in parented:
+            raise RobotError(
+                f"has a second parent, by joint '{connection.name}': "
+                "closed chains are not supported",
+                f"{where}: link '{connection.child}'",
+                "cut the loop by removing one of the joints",
+            )
+        parented.add(connection.child)
         below.setdefault(connection.parent, []).append(connection)
     roots = kinematics.roots
     attached = WORLD in below
@@ -90,6 +99,13 @@ def assemble(
                 place = _Place(place.joint, X)
             places[connection.child] = place
             waiting.append(connection.child)
+    for name in kinematics.bodies:
+        if name not in places:
+            raise RobotError(
+                "is its own ancestor: closed chains are not supported",
+                f"{where}: link '{name}'",
+                "cut the loop by removing one of the joints",
+            )
     return Tree(
         tuple(joints[index] for index in range(len(wanted))),
         tuple(_links(contents, kinematics, places)),
@@ -119,7 +135,7 @@ def _joint(connection: Connection, parent: int, X: Array, contents: Contents) ->
 def _links(contents: Contents, kinematics: Kinematics, places: dict[str, _Place]) -> list[Link]:
     links = []
     for name in (*contents.inertials, *kinematics.bodies):
-        if any(link.name == name for link in links) or name not in places:
+        if any(link.name == name for link in links):
             continue
         place = places[name]
         inertial = contents.inertials.get(name, absent())

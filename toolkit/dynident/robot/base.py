@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import qr, solve_triangular
 
 from dynident.errors import FitError
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 _ZERO = 1e-13
 # A coefficient of a combination this small (in units of column norms) is rounding.
 _NEGLIGIBLE = 1e-8
+# How much the first of two equal columns is preferred as a pivot.
+_FAVOUR = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,8 +164,10 @@ def base_parameters(
     scale = np.linalg.norm(X, axis=0)
     scale[scale <= _ZERO * np.max(scale, initial=0.0)] = 0.0
     shown = np.flatnonzero(scale)
-    R, pivots = qr(X[:, shown] / scale[shown], mode="r", pivoting=True)
-    R = R[: min(R.shape)]
+    # Columns that say the same tie; the first in order wins, not the last bit of their norms.
+    favour = 1.0 - _FAVOUR * np.arange(len(shown)) / max(len(shown), 1)
+    norms = scale[shown] / favour
+    R, pivots = _pivoted_r(X[:, shown] / norms)
     diagonal = np.abs(np.diag(R))
     rank = int(np.count_nonzero(diagonal > tolerance * np.max(diagonal, initial=0.0)))
     # In unit columns first: there a coefficient can be compared with 1.
@@ -171,7 +175,7 @@ def base_parameters(
     unit[np.abs(unit) < _NEGLIGIBLE] = 0.0
     kept, rest = shown[pivots[:rank]], shown[pivots[rank:]]
     full = np.zeros((len(names), len(names)))
-    full[np.ix_(kept, rest)] = unit * scale[rest] / scale[kept][:, None]
+    full[np.ix_(kept, rest)] = unit * norms[pivots[rank:]] / norms[pivots[:rank]][:, None]
     independent = np.sort(kept)
     dependent = np.setdiff1d(np.arange(len(names)), independent)
     K = full[np.ix_(independent, dependent)]
@@ -190,6 +194,15 @@ def base_parameters(
         diagonal=diagonal,
         tolerance=tolerance,
     )
+
+
+def _pivoted_r(X: Array) -> tuple[Array, NDArray[np.int_]]:
+    """Return the R of the pivoted QR of X, without zero rows, and the pivots."""
+    if 0 in X.shape:
+        return np.zeros((0, X.shape[1])), np.arange(X.shape[1])
+    factors: Any = qr(X, mode="r", pivoting=True)
+    R, pivots = factors
+    return R[: min(R.shape)], pivots
 
 
 def structural_base(robot: Robot, seed: int = 0) -> BaseParameters:

@@ -5,16 +5,19 @@ Pinocchio is given joints and inertias by us, never a file: its parsers change b
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
+import pinocchio
 
 from dynident.errors import RobotError
 from dynident.robot.tree import Array
 
 if TYPE_CHECKING:
     from dynident.robot.robot import Robot
+
+# The bindings carry no types.
+pin: Any = pinocchio
 
 _AXES = np.eye(3)
 _ALIGNED = {
@@ -27,7 +30,7 @@ _TILTED = {
 }
 
 
-def _kinematics(robot: Robot) -> tuple[pin.Model, list[int]]:
+def _kinematics(robot: Robot) -> tuple[Any, list[int]]:
     """Return a massless model and, for each of its joints, the index in `robot.joints`."""
     model = pin.Model()
     model.name = robot.name
@@ -58,11 +61,11 @@ def _joint_model(kind: str, axis: Array):
     return _TILTED[kind](np.array(axis))
 
 
-def _inertia(phi: Array) -> pin.Inertia:
+def _inertia(phi: Array) -> Any:
     return pin.Inertia.FromDynamicParameters(np.array(phi))
 
 
-def pinocchio_model(robot: Robot, theta: Array) -> pin.Model:
+def pinocchio_model(robot: Robot, theta: Array) -> Any:
     """Return the Pinocchio model of a robot; see `Robot.pinocchio`."""
     model, order = _kinematics(robot)
     for pin_id, index in enumerate(order, start=1):

@@ -91,8 +91,8 @@ def parse(copy: str, suffix: str, where: str) -> Kinematics:
     bodies = [plant.get_body(i) for i in _indices(plant) if i != world]
     connections = tuple(_connection(plant.get_joint(i), where) for i in plant.GetJointIndices())
     attached = {connection.child for connection in connections}
-    roots = {
-        body.name(): plant.GetDefaultFloatingBaseBodyPose(body).GetAsMatrix4()
+    roots: dict[str, Array] = {
+        body.name(): np.array(plant.GetDefaultFloatingBaseBodyPose(body).GetAsMatrix4())
         for body in bodies
         if body.name() not in attached
     }

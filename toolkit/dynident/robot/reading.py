@@ -7,13 +7,17 @@ from collections.abc import Sequence
 from numpy.typing import ArrayLike
 
 from dynident.errors import RobotError
-from dynident.robot import assemble, kinematics, urdf
+from dynident.robot import assemble, kinematics, mjcf, sdf, urdf
 from dynident.robot.contents import Contents
 from dynident.robot.robot import GRAVITY, Robot
 from dynident.robot.tree import Description
 from dynident.robot.xmltree import Document, parse
 
-_READERS = {"robot": ("urdf", urdf.read)}
+_READERS = {
+    "robot": ("urdf", urdf.read),
+    "sdf": ("sdf", sdf.read),
+    "mujoco": ("mjcf", mjcf.read),
+}
 
 
 def take_apart(text: str, where: str) -> tuple[Document, str, Contents]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike
 from dynident import files
 from dynident.errors import RobotError
 from dynident.inertia import PARAMETERS, UNITS, frame_change
-from dynident.robot import dynamics
+from dynident.robot.motion import random_motion
 from dynident.robot.tree import Array, Description, Joint, Link, frozen
 
 if TYPE_CHECKING:
-    import pinocchio
+    from dynident.robot.dynamics import Dynamics
 
 GRAVITY = (0.0, 0.0, -9.81)
 
@@ -77,7 +77,8 @@ class Robot:
 
         Parameters
         ----------
-        path : path
+        path : str or Path
+            The description.
         joints : sequence of str, optional
             Joints to keep, in the order of the columns; default: every moving joint in the order
             of the file. The others are locked at zero.
@@ -125,7 +126,7 @@ class Robot:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """ "revolute" or "prismatic" for each joint."""
+        """Kind of each joint, "revolute" or "prismatic"."""
         return tuple(joint.kind for joint in self.joints)
 
     @property
@@ -216,8 +217,8 @@ class Robot:
         """Return the same robot under another gravity (3,), m/s^2 in the world's axes."""
         return replace(self, gravity=frozen(gravity, (3,), "gravity"))
 
-    def pinocchio(self) -> pinocchio.Model:
-        """Return a fresh Pinocchio model: this tree, `theta` and gravity.
+    def pinocchio(self) -> Any:
+        """Return a fresh `pinocchio.Model`: this tree, `theta` and gravity.
 
         Its joints are in depth-first order and carry the names of `names`.
 
@@ -227,11 +228,16 @@ class Robot:
             If a moving body has no mass but a first moment, or is not finite: Pinocchio cannot
             hold it (`regressor` and `inverse_dynamics` can).
         """
-        return dynamics.pinocchio_model(self, self.theta)
+        from dynident.robot.dynamics import pinocchio_model
+
+        return pinocchio_model(self, self.theta)
 
     @cached_property
-    def _dynamics(self) -> dynamics.Dynamics:
-        return dynamics.Dynamics(self)
+    def _dynamics(self) -> Dynamics:
+        # Imported where it is used: Pinocchio is slow to load.
+        from dynident.robot.dynamics import Dynamics
+
+        return Dynamics(self)
 
     def regressor(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
         """Return Y (T, n, 10 n) with tau = Y theta.
@@ -260,6 +266,7 @@ class Robot:
         Parameters
         ----------
         q, v, a : (T, n) array_like
+            rad or m, and their first and second derivatives by s.
         theta : (10 n,) array_like, optional
             Default: the robot's own.
         """
@@ -272,21 +279,7 @@ class Robot:
         Where a limit is missing (or leaves no room) q is within pi rad or 1 m, the speed within
         3 rad/s or 1 m/s; accelerations are within 10 rad/s^2 or m/s^2.
         """
-        rng = np.random.default_rng(seed)
-        reach = np.array([np.pi if kind == "revolute" else 1.0 for kind in self.kinds])
-        fast = np.array([3.0 if kind == "revolute" else 1.0 for kind in self.kinds])
-        lower = np.array([joint.lower for joint in self.joints])
-        upper = np.array([joint.upper for joint in self.joints])
-        lower = np.where(np.isfinite(lower), lower, np.minimum(-reach, upper - 2.0 * reach))
-        lower = np.where(np.isfinite(lower), lower, -reach)
-        upper = np.where(np.isfinite(upper), upper, np.maximum(reach, lower + 2.0 * reach))
-        narrow = upper - lower < 1e-3 * reach
-        lower, upper = np.where(narrow, -reach, lower), np.where(narrow, reach, upper)
-        speed = np.minimum(fast, [joint.velocity for joint in self.joints])
-        q = rng.uniform(lower, upper, (samples, self.n))
-        v = rng.uniform(-speed, speed, (samples, self.n))
-        a = rng.uniform(-10.0, 10.0, (samples, self.n))
-        return q, v, a
+        return random_motion(self.joints, seed, samples)
 
     def _vector(self, theta: ArrayLike) -> Array:
         array = np.asarray(theta, dtype=float)
