@@ -60,13 +60,19 @@ class ParallelFilter:
     where: str | None = None
 
     @cached_property
-    def step(self) -> float:
-        """Samples from one kept row to the next; whole, unless no whole step divides a period."""
+    def _ratio(self) -> tuple[int, int]:
+        """So many samples give so many kept rows."""
         if self.filter.rate_hz is None:
-            return 1.0
+            return 1, 1
         factor = choose_factor(self.rate_hz, self.filter.rate_hz, self.period)
         samples = round(self.period * self.rate_hz) if self.period else 0
-        return samples / round(samples / factor) if samples > factor else float(factor)
+        return (samples, round(samples / factor)) if samples > factor else (factor, 1)
+
+    @property
+    def step(self) -> float:
+        """Samples from one kept row to the next; whole, unless no whole step divides a period."""
+        samples, rows = self._ratio
+        return samples / rows
 
     @property
     def factor(self) -> int:
@@ -108,8 +114,9 @@ class ParallelFilter:
 
     def rows(self, samples: int) -> np.ndarray:
         """Which of so many samples are kept, increasing; the last one is."""
-        count = math.floor((samples - 1) / self.step + 1e-9) + 1
-        back = np.floor(np.arange(count) * self.step + 0.5).astype(int)
+        # In whole numbers: rounding must fall alike in every period.
+        above, below = self._ratio
+        back = (2 * above * np.arange(samples * below // above + 2) + below) // (2 * below)
         back = back[back < samples]
         return (samples - 1 - back)[::-1]
 
