@@ -1,1 +1,99 @@
-"""dynident: robot model identification that tells you what physics your model lacks."""
+"""dynident: robot model identification that tells you what physics your model lacks.
+
+    import dynident as di
+
+    study = di.load("problems/emps/study.toml")
+    fit = di.fit(study.model, study.train)
+    di.compare(fit, study.test).show()
+    d = di.diagnose(fit, study.train, study.test)
+    d.show()
+    better = di.fit(study.model + d.best.effect, study.train)
+    di.compare({"before": fit, "after": better}, study.test).show()
+    di.report(d, to="report.html")
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import types
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+# Where each public name lives; it is imported when it is first asked for, so that
+# `import dynident` and `dynident --help` cost nothing.
+_HOME = {
+    "BaseParameters": "robot",
+    "Comparison": "diagnose",
+    "Controller": "closed_loop",
+    "Dataset": "recording",
+    "Diagnosis": "diagnose",
+    "DynidentError": "errors",
+    "DynidentWarning": "errors",
+    "Effect": "effects",
+    "Estimate": "fit",
+    "Experiment": "closed_loop",
+    "Filter": "recording",
+    "LeastSquares": "fit",
+    "Model": "model",
+    "Noise": "recording",
+    "Recording": "recording",
+    "Robot": "robot",
+    "Study": "study",
+    "catalogue": "effects",
+    "compare": "diagnose",
+    "diagnose": "diagnose",
+    "effects_of": "effects",
+    "fit": "fit",
+    "load": "study",
+    "load_estimate": "fit",
+    "load_experiment": "closed_loop",
+    "read": "recording",
+    "report": "report",
+    "write": "recording",
+    "write_experiment": "closed_loop",
+}
+
+__all__ = sorted(_HOME)
+
+if TYPE_CHECKING:
+    from dynident.closed_loop import Controller, Experiment, load_experiment, write_experiment
+    from dynident.diagnose import Comparison, Diagnosis, compare, diagnose
+    from dynident.effects import Effect, catalogue, effects_of
+    from dynident.errors import DynidentError, DynidentWarning
+    from dynident.fit import Estimate, LeastSquares, fit, load_estimate
+    from dynident.model import Model
+    from dynident.recording import Dataset, Filter, Noise, Recording, read, write
+    from dynident.report import report
+    from dynident.robot import BaseParameters, Robot
+    from dynident.study import Study, load
+
+
+# Verbs that share their name with the room they live in.
+_VERBS = ("diagnose", "fit", "report")
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'dynident' has no attribute '{name}'")
+    value = getattr(importlib.import_module(f"dynident.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOME])
+
+
+def _verb(name: str) -> property:
+    # Importing the room `dynident.fit` binds the name `fit` to the module; users mean the verb.
+    return property(
+        lambda module: getattr(importlib.import_module(f"dynident.{name}"), name),
+        lambda module, value: None,
+    )
+
+
+sys.modules[__name__].__class__ = type(
+    "DynidentModule", (types.ModuleType,), {name: _verb(name) for name in _VERBS}
+)

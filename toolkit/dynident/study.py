@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import tomlkit
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
 from dynident import files
 from dynident.closed_loop import Controller, ControllerFile
@@ -20,15 +18,12 @@ from dynident.model import Model
 from dynident.places import find_data
 from dynident.recording import Column, Dataset, Filter, Noise, Recording, read
 from dynident.robot import Robot
+from dynident.settings import Table, read_toml
 
 Positive = Field(default=None, gt=0)
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-
-
-class _RecordingEntry(_Table):
+class _RecordingEntry(Table):
     file: str
     use: Literal["train", "test"] = "train"
     period: float | None = Positive
@@ -37,7 +32,7 @@ class _RecordingEntry(_Table):
     payload: bool | None = None
 
 
-class _FilterEntry(_Table):
+class _FilterEntry(Table):
     position_cutoff_hz: float | None = Positive
     cutoff_hz: float | None = Positive
     rate_hz: float | None = Positive
@@ -45,17 +40,17 @@ class _FilterEntry(_Table):
     edge_s: tuple[float, float] = (0.0, 0.0)
 
 
-class _NoiseEntry(_Table):
+class _NoiseEntry(Table):
     position_std: float | list[float]
     torque_std: float | list[float]
 
 
-class _ColumnEntry(_Table):
+class _ColumnEntry(Table):
     name: str
     scale: float = 1.0
 
 
-class _StudyFile(_Table):
+class _StudyFile(Table):
     robot: str
     joints: list[str] | None = None
     effects: list[str] = []
@@ -105,7 +100,7 @@ def load(path: str | Path) -> Study:
         If the robot or a recording that it names is unusable.
     """
     path = Path(path)
-    said = _StudyFile.model_validate(parse_toml(path, _StudyFile))
+    said = read_toml(path, _StudyFile)
     if not said.recordings:
         raise StudyError("no [[recordings]]", str(path), "add at least one")
     robot = Robot.from_file(path.parent / said.robot, said.joints)
@@ -135,26 +130,6 @@ def load(path: str | Path) -> Study:
     if said.controller:
         controller = said.controller.controller(robot, f"{path}: controller")
     return Study(path, model, sets["train"], sets["test"], controller)
-
-
-def parse_toml(path: Path, schema: type[BaseModel]) -> dict[str, Any]:
-    """Read a TOML file and check it against a schema.
-
-    Raises
-    ------
-    StudyError
-        If it is not TOML, or a key is unknown, missing or of the wrong kind; the first such key is
-        named, with the nearest valid one.
-    """
-    try:
-        content = tomllib.loads(files.read_text(path))
-    except tomllib.TOMLDecodeError as error:
-        raise StudyError(f"is not TOML: {error}", str(path)) from None
-    try:
-        schema.model_validate(content)
-    except ValidationError as error:
-        raise _first_complaint(error, path, schema) from None
-    return content
 
 
 def add_effects(path: str | Path, effects: tuple[Effect, ...], payload: dict[str, bool]) -> None:
@@ -213,36 +188,3 @@ def _per_joint(value: float | list[float], robot: Robot, where: str) -> np.ndarr
     if not np.all(values > 0):
         raise StudyError("a standard deviation is not positive", where)
     return values
-
-
-def _first_complaint(error: ValidationError, path: Path, schema: type[BaseModel]) -> StudyError:
-    first = error.errors(include_url=False)[0]
-    key = ".".join(str(part) for part in first["loc"])
-    if first["type"] == "extra_forbidden":
-        names = _keys_at(schema, first["loc"][:-1])
-        close = difflib.get_close_matches(str(first["loc"][-1]), names, n=1)
-        mend = f"did you mean '{close[0]}'?" if close else f"keys: {', '.join(names)}"
-        return StudyError(f"unknown key '{key}'", str(path), mend)
-    if first["type"] == "missing":
-        return StudyError(f"key '{key}' is missing", str(path), "add it")
-    return StudyError(f"{key}: {first['msg'][:1].lower()}{first['msg'][1:]}", str(path))
-
-
-def _keys_at(schema: Any, where: tuple[Any, ...]) -> list[str]:
-    """Valid keys of the table at a place in a file."""
-    for part in where:
-        if isinstance(part, int):
-            continue
-        field = schema.model_fields.get(part)
-        if field is None:
-            return []
-        inner = [t for t in _types_in(field.annotation) if hasattr(t, "model_fields")]
-        if not inner:
-            return []
-        schema = inner[0]
-    return list(schema.model_fields)
-
-
-def _types_in(annotation: Any) -> list[Any]:
-    arguments = getattr(annotation, "__args__", ())
-    return [annotation, *(t for a in arguments for t in _types_in(a))]

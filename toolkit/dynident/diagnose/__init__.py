@@ -1,6 +1,6 @@
 """Where a model fails, and which physical effects it lacks."""
 
-from dynident.diagnose.compare import Comparison, compare
+from dynident.diagnose.compare import Comparison, compare, compare_models
 from dynident.diagnose.diagnosis import Candidate, Diagnosis, JointResult, ResidualMap, Step
 from dynident.diagnose.procedure import diagnose
 
@@ -12,5 +12,6 @@ __all__ = [
     "ResidualMap",
     "Step",
     "compare",
+    "compare_models",
     "diagnose",
 ]

@@ -8,10 +8,12 @@ from typing import Any
 
 
 from dynident.diagnose.evidence import ColumnStore, gather
-from dynident.diagnose.held_out import HeldOut, on_recordings
+from dynident.diagnose.held_out import HeldOut, on_blocks, on_recordings
 from dynident.diagnose.maps import residual_maps
+from dynident.diagnose.present import fit_present
 from dynident.errors import FitError
 from dynident.fit.estimate import Estimate
+from dynident.fit.shapes import refine_shapes, shaped_effects
 from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.tables import Table, percent, print_tables
@@ -107,3 +109,32 @@ def compare(estimates: Estimate | Mapping[str, Estimate], dataset: Dataset) -> C
         store.prepare(estimate.model.effects)
         results.append(on_recordings(store, estimate))
     return Comparison(tuple(named), tuple(e.model for e in named.values()), tuple(results))
+
+
+def compare_models(models: Mapping[str, Model], train: Dataset, test: Dataset) -> Comparison:
+    """Fit models as the diagnosis does, and compare them on data that they have not seen.
+
+    Parameters
+    ----------
+    models : by name.
+    train : recordings to fit.
+    test : recordings to judge by; where it is empty, blocks of time of the training recordings
+        are held out.
+    """
+    runs = gather(train)
+    held = gather(test) if len(test) else None
+    results, fitted = [], []
+    for model in models.values():
+        if shaped_effects(model):
+            model = refine_shapes(model, train).model
+        store = ColumnStore(model, runs)
+        store.prepare(model.effects)
+        present = fit_present(store, model)
+        if held is None:
+            results.append(on_blocks(store, present))
+        else:
+            judge = ColumnStore(model, held)
+            judge.prepare(model.effects)
+            results.append(on_recordings(judge, present))
+        fitted.append(model)
+    return Comparison(tuple(models), tuple(fitted), tuple(results))

@@ -17,7 +17,7 @@ from dynident.diagnose.noise import ORDER, NoiseModel
 from dynident.effects import Block, Effect, JointEffect
 from dynident.fit.sampling import Sampled, sample
 from dynident.model import Model
-from dynident.recording import Dataset, Noise, Recording, periods, require_repetition
+from dynident.recording import Dataset, Noise, Recording, periods, require_repetition, uniform
 
 COPIES = 4
 """Noisy copies of each recording where the noise is stated and nothing repeats."""
@@ -77,6 +77,8 @@ def gather(dataset: Dataset, seed: int = 0) -> tuple[Run, ...]:
     streams = np.random.default_rng(seed).spawn(len(dataset.recordings))
     repeats = any(r.period for r in dataset.recordings)
     for recording, stream in zip(dataset.recordings, streams, strict=True):
+        # Noise on top would hide the signs of a jittered clock: straighten it before.
+        recording = uniform(recording)
         first = sample(recording, dataset.filter)
         usable = np.arange(ORDER, len(first.t))
         if recording.period:

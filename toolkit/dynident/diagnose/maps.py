@@ -115,7 +115,7 @@ def _sentence(against: str, at: np.ndarray, mean: np.ndarray, sigma: np.ndarray)
         if explained > share:
             best, share = words, explained
     if share < _SHARE:
-        return "" if against == "time" else "beyond the noise, without a simple shape"
+        return ""
     return f"{best} ({100 * share:.0f} % of what is seen here)"
 
 

@@ -100,6 +100,7 @@ def diagnose(
         _carry(store, chosen.score)
         present = _refitted(store, present.model + chosen.score.effect)
         rounds.append(rank(store, present, len(found), tell))
+        found[-1] = _alternatives_only(chosen, rounds[-1])
     present, found = _without_superfluous(store, given, present, found, tell)
     return _told(given, train, store, held, start, present, found, rounds)
 
@@ -121,6 +122,17 @@ def _choose(ranking: Ranking) -> _Found | None:
         # Its constant is the same whoever it belongs to: both are named.
         return _Found(simpler[0], ranking.corrected(simpler[0]), (best.effect,))
     return _Found(best, ranking.corrected(best), indistinguishable(ranking, best))
+
+
+def _alternatives_only(one: _Found, following: Ranking) -> _Found:
+    """Leave out effects that stay material beside the one added: they are more, not instead."""
+    still = {s.effect.label for s in following.material}
+    alternatives = tuple(
+        e
+        for e in one.indistinguishable
+        if e.label not in still or one.score.effect.name in e.contains
+    )
+    return replace(one, indistinguishable=alternatives)
 
 
 def _carry(store: ColumnStore, score: Score) -> None:

@@ -16,6 +16,7 @@ from dynident.errors import FitError
 from dynident.inertia import margins
 from dynident.model import Model
 from dynident.robot import BaseParameters, Robot
+from dynident.robot.write import write
 from dynident.tables import Table, number, percent, print_tables
 
 FORMAT = "dynident-estimate-1"
@@ -242,7 +243,7 @@ class Estimate:
         RobotError
             If the format cannot hold the parameters (a massless link with a first moment, say).
         """
-        return self.robot.write(path)
+        return write(self.robot, path)
 
     def inconsistent_links(self) -> tuple[str, ...]:
         """Moving bodies of `robot` whose inertial parameters no rigid body can have."""

@@ -1,0 +1,356 @@
+"""The command `dynident`.
+
+Standard output carries the answer (one JSON object under `--json`), standard error everything
+else. Exit status: 0 done, 2 unusable input.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from dynident.errors import DynidentError, DynidentWarning, FileError, StudyError
+
+if TYPE_CHECKING:
+    from dynident.diagnose import Diagnosis
+    from dynident.study import Study
+
+_JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+_STUDY = click.argument("study", type=click.Path(path_type=Path))
+
+
+class _Group(click.Group):
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(self.commands)  # in the order of use, not of the alphabet
+
+
+@click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="dynident")
+def commands() -> None:
+    """Robot model identification that tells you what physics your model lacks.
+
+    \b
+    dynident explain study.toml        where it fails, what is missing, and the error falling
+    dynident add study.toml EFFECT     write the effect into the study
+    """
+
+
+@commands.command()
+@_STUDY
+@_JSON
+@click.option("--report", type=click.Path(path_type=Path), help="Also write this HTML report.")
+def explain(study: Path, as_json: bool, report: Path | None) -> None:
+    """Run the whole loop: compare, diagnose, add, refit, compare. The study stays as it is.
+
+    Example: dynident explain problems/hidden_effect/study.toml --report report.html
+    """
+    diagnosis = _diagnosis(_load(study))
+    _write_report(diagnosis, report)
+    if as_json:
+        _print_json(diagnosis.to_dict())
+    else:
+        _show(*diagnosis.tables(), diagnosis.after.parameter_table())
+
+
+@commands.command()
+@_STUDY
+@_JSON
+def diagnose(study: Path, as_json: bool) -> None:
+    """Say where the model fails and which effects it lacks.
+
+    Example: dynident diagnose study.toml --json
+    """
+    diagnosis = _diagnosis(_load(study))
+    if as_json:
+        _print_json(diagnosis.to_dict())
+    else:
+        _show(*diagnosis.tables())
+
+
+@commands.command()
+@_STUDY
+@_JSON
+@click.option("--out", type=click.Path(path_type=Path), help="Also save the estimate as JSON.")
+@click.option(
+    "--robot", type=click.Path(path_type=Path), help="Also write the robot description identified."
+)
+@click.option("--ordinary", is_flag=True, help="Ordinary least squares: joints not weighted.")
+@click.option("--essential", is_flag=True, help="Also list the essential parameters.")
+def fit(
+    study: Path, as_json: bool, out: Path | None, robot: Path | None, ordinary: bool, essential: bool
+) -> None:
+    """Identify the parameters from the training recordings.
+
+    Example: dynident fit study.toml --out estimate.json --robot identified.urdf
+    """
+    from dynident.fit import LeastSquares, essential_parameters, factorise, rows
+    from dynident.fit import fit as fit_model
+
+    loaded = _load(study)
+    with _progress("fitting"):
+        method = LeastSquares("none" if ordinary else "joint")
+        estimate = fit_model(loaded.model, loaded.train, method)
+        tables = list(estimate.tables())
+        if essential:
+            factors = factorise(rows(estimate.model, loaded.train, estimate.values))
+            tables.append(essential_parameters(estimate.model, factors).table())
+    if out:
+        estimate.save(out)
+    if robot:
+        estimate.write_robot(robot)
+        broken = estimate.inconsistent_links()
+        if broken:
+            tables.append(
+                "No rigid body can have these parameters: "
+                f"{', '.join(broken)}. What the data cannot tell was left as given."
+            )
+    if as_json:
+        _print_json(estimate.to_dict())
+    else:
+        _show(*tables)
+
+
+@commands.command()
+@_STUDY
+@_JSON
+@click.option(
+    "--with",
+    "additions",
+    multiple=True,
+    metavar="EFFECT[@JOINT]",
+    help="Compare with the model that has this effect too; may be repeated.",
+)
+def compare(study: Path, as_json: bool, additions: tuple[str, ...]) -> None:
+    """Compare the model with measurements that it was not fitted to.
+
+    Example: dynident compare study.toml --with stribeck_friction@elbow
+    """
+    loaded = _load(study)
+    comparison = _comparison(loaded, additions)
+    if as_json:
+        _print_json(comparison.to_dict())
+    else:
+        _show(*comparison.tables())
+
+
+@commands.command()
+@_STUDY
+@click.argument("effect", metavar="EFFECT[@JOINT[:SOURCE]]")
+@_JSON
+def add(study: Path, effect: str, as_json: bool) -> None:
+    """Write an effect into the study file; print the error before and after.
+
+    Example: dynident add study.toml stribeck_friction@elbow
+    """
+    from dynident.effects import effects_of
+    from dynident.study import add_effects
+
+    loaded = _load(study)
+    effects = effects_of(effect, loaded.robot)
+    fresh = tuple(one for one in effects if one not in loaded.model)
+    if not fresh:
+        raise StudyError(f"has {effect} already", str(study), "nothing was changed")
+    comparison = _comparison(loaded, (effect,))
+    payload = {}
+    if any("payload" in one.needs for one in fresh):
+        recordings = (loaded.train + loaded.test).recordings
+        if not any(r.payload for r in recordings):
+            mend = "set payload = true in the [[recordings]] that carry it"
+            raise StudyError("no recording carries a payload", str(study), mend)
+    add_effects(study, fresh, payload)
+    result = comparison.to_dict()
+    if as_json:
+        _print_json({"added": [one.label for one in fresh], **result})
+    else:
+        _show(*comparison.tables()[:1], f"Written into {study}.")
+
+
+@commands.command()
+@click.argument("experiment", type=click.Path(path_type=Path))
+@click.option(
+    "--out", type=click.Path(path_type=Path), required=True, help="Folder for what is written."
+)
+@_JSON
+def simulate(experiment: Path, out: Path, as_json: bool) -> None:
+    """Make virtual measurements: recordings and a study that hides what is hidden.
+
+    Example: dynident simulate experiment.toml --out virtual/
+    """
+    from dynident.closed_loop import load_experiment, write_experiment
+
+    loaded = load_experiment(experiment)
+    with _progress("simulating") as tell:
+        written = write_experiment(loaded, out, progress=tell)
+    if as_json:
+        _print_json({"written": [str(path) for path in written]})
+    else:
+        for path in written:
+            click.echo(str(path))
+
+
+@commands.command()
+@_STUDY
+@_JSON
+@click.option(
+    "--to", type=click.Path(path_type=Path), default=Path("report.html"), show_default=True
+)
+def report(study: Path, as_json: bool, to: Path) -> None:
+    """Diagnose, and write the HTML report.
+
+    Example: dynident report study.toml --to report.html
+    """
+    diagnosis = _diagnosis(_load(study))
+    _write_report(diagnosis, to)
+    if as_json:
+        _print_json({"report": str(to), **diagnosis.to_dict()})
+    else:
+        click.echo(diagnosis.sentence)
+
+
+@commands.command()
+@_JSON
+@click.option(
+    "--to", type=click.Path(path_type=Path), default=Path("demo.report.html"), show_default=True
+)
+def demo(as_json: bool, to: Path) -> None:
+    """Find the effect hidden in the data of an embedded two-link arm.
+
+    Example: dynident demo
+    """
+    diagnosis = _diagnosis(_load(_demo_study()))
+    _write_report(diagnosis, to)
+    if as_json:
+        _print_json(diagnosis.to_dict())
+    else:
+        _show(*diagnosis.tables(), f"The report to open: {to.resolve()}")
+
+
+def main() -> None:
+    """Run the command; one line and an exit status for everything that can go wrong."""
+    warnings.showwarning = _show_warning
+    warnings.simplefilter("always", DynidentWarning)
+    try:
+        commands(standalone_mode=False)
+    except click.exceptions.Exit as stop:
+        sys.exit(stop.exit_code)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(2)
+    except DynidentError as error:
+        click.echo(f"error: {error}", err=True)
+        sys.exit(2)
+    except (KeyboardInterrupt, click.Abort):
+        click.echo("interrupted; nothing was left half written", err=True)
+        sys.exit(130)
+    except BrokenPipeError:
+        # Whoever read us has gone: nothing to say, and nobody to say it to.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+
+
+def _load(path: Path) -> Study:
+    from dynident.study import load
+
+    with _progress("reading"):
+        return load(path)
+
+
+def _diagnosis(study: Study) -> Diagnosis:
+    from dynident.diagnose import diagnose as search
+
+    with _progress("diagnosing") as tell:
+        return search(study.model, study.train, study.test, tell=tell)
+
+
+def _comparison(study: Study, additions: tuple[str, ...]):
+    from dynident.diagnose import compare_models
+
+    models = {"study": study.model}
+    for label in additions:
+        model = study.model
+        for effect in _missing(label, study):
+            model = model + effect
+        models[f"+ {label}"] = model
+    with _progress("comparing"):
+        return compare_models(models, study.train, study.test)
+
+
+def _missing(label: str, study: Study):
+    from dynident.effects import effects_of
+
+    return [effect for effect in effects_of(label, study.robot) if effect not in study.model]
+
+
+def _write_report(diagnosis: Diagnosis, to: Path | None) -> None:
+    if to is None:
+        return
+    from dynident.report import report as write
+
+    write(diagnosis, to=to)
+    click.echo(f"report: {to}", err=True)
+
+
+def _demo_study() -> Path:
+    here = Path(__file__).resolve().parent
+    places = (here / "demo", here.parents[1] / "problems" / "hidden_effect")
+    for place in places:
+        if (place / "study.toml").is_file():
+            return place / "study.toml"
+    raise FileError("the embedded example is not installed", str(places[0]), "run it from a clone")
+
+
+def _show(*parts: Any) -> None:
+    from dynident.tables import print_tables
+
+    print_tables(*parts)
+
+
+def _print_json(content: dict[str, Any]) -> None:
+    click.echo(json.dumps(_plain(content), allow_nan=False))
+
+
+def _plain(value: Any) -> Any:
+    """Values as JSON has them: numbers that are not finite become null."""
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return value
+
+
+@contextmanager
+def _progress(title: str) -> Iterator[Callable[..., None]]:
+    """Show a progress bar while standard error is a terminal, nothing otherwise."""
+    if not sys.stderr.isatty():
+        yield lambda *_: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(title, total=None)
+
+        def tell(doing: object = "", done: float | None = None, total: float | None = None) -> None:
+            bar.update(task, description=f"{title}: {doing}", completed=done, total=total)
+
+        yield tell
+
+
+def _show_warning(message, category, filename, lineno, file=None, line=None) -> None:
+    click.echo(f"warning: {message}", err=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,83 @@
+"""TOML files checked against a schema, with complaints that name the key and the mend."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from dynident import files
+from dynident.errors import StudyError
+
+
+class Table(BaseModel):
+    """A table of a settings file: unknown keys and numbers that are not finite are refused."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+T = TypeVar("T", bound=Table)
+
+
+def read_toml(path: str | Path, schema: type[T]) -> T:
+    """Read a TOML file into its schema.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read.
+    StudyError
+        If it is not TOML, or a key is unknown, missing or of the wrong kind; the first such key is
+        named, with the nearest valid one.
+    """
+    path = Path(path)
+    try:
+        return schema.model_validate(tomllib.loads(files.read_text(path)))
+    except tomllib.TOMLDecodeError as error:
+        raise StudyError(f"is not TOML: {error}", str(path)) from None
+    except ValidationError as error:
+        raise _complaint(error, path, schema) from None
+
+
+def nearest(word: str, valid: tuple[str, ...] | list[str], kind: str) -> str:
+    """Return a mend for a misspelt word: the valid word that it resembles, else all of them."""
+    close = difflib.get_close_matches(word, valid, n=1)
+    return f"did you mean '{close[0]}'?" if close else f"{kind}: {', '.join(valid)}"
+
+
+def _complaint(error: ValidationError, path: Path, schema: type[BaseModel]) -> StudyError:
+    first = error.errors(include_url=False)[0]
+    key = ".".join(str(part) for part in first["loc"])
+    if first["type"] == "extra_forbidden":
+        names = _keys_at(schema, first["loc"][:-1])
+        return StudyError(
+            f"unknown key '{key}'", str(path), nearest(str(first["loc"][-1]), names, "keys")
+        )
+    if first["type"] == "missing":
+        return StudyError(f"key '{key}' is missing", str(path), "add it")
+    return StudyError(f"{key}: {first['msg'][:1].lower()}{first['msg'][1:]}", str(path))
+
+
+def _keys_at(schema: Any, where: tuple[Any, ...]) -> list[str]:
+    """Return the valid keys of the table at a place in a file."""
+    for part in where:
+        if isinstance(part, int):
+            continue
+        field = schema.model_fields.get(part)
+        inner = [] if field is None else [t for t in _types(field.annotation) if _is_table(t)]
+        if not inner:
+            return []
+        schema = inner[0]
+    return list(schema.model_fields)
+
+
+def _is_table(annotation: Any) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+
+
+def _types(annotation: Any) -> list[Any]:
+    arguments = getattr(annotation, "__args__", ())
+    return [annotation, *(one for a in arguments for one in _types(a))]
