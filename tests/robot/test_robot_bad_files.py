@@ -85,6 +85,8 @@ def sdf(old="", new=""):
 
 SDF = {
     "no model": ('<sdf version="1.9"/>', "has no <model>"),
+    "no version": (sdf(' version="1.9"'), "has version ''"),
+    "future version": (sdf("1.9", "77.0"), "cannot be understood"),
     "two models": (
         sdf("<model", '<model name="k"><link name="x"/></model><model'),
         r"models \(k, m",

@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio
 
 from dynident.errors import RobotError
+from dynident.inertia import inertia_matrix
 from dynident.robot.tree import Array
 
 if TYPE_CHECKING:
@@ -73,13 +74,15 @@ def pinocchio_model(robot: Robot, theta: Array) -> Any:
         where = f"body '{robot.bodies[index]}'"
         if not np.all(np.isfinite(phi)):
             raise RobotError("has inertial values that are not finite", where)
-        if phi[0] == 0.0 and np.any(phi[1:]):
+        if phi[0] == 0.0 and np.any(phi[1:4]):
             raise RobotError(
-                "has no mass but a first moment or an inertia, which Pinocchio cannot hold",
+                "has a first moment but no mass, which Pinocchio cannot hold",
                 where,
                 "lift base parameters onto a prior with mass (BaseParameters.lift)",
             )
-        model.inertias[pin_id] = pin.Inertia.Zero() if phi[0] == 0.0 else _inertia(phi)
+        model.inertias[pin_id] = (
+            pin.Inertia(0.0, np.zeros(3), inertia_matrix(phi)) if phi[0] == 0.0 else _inertia(phi)
+        )
     return model
 
 

@@ -7,6 +7,10 @@ unresolvable reaches it; what it says about an inertia is used for MJCF geometry
 
 from __future__ import annotations
 
+import logging
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +20,8 @@ from dynident.robot.tree import Array
 
 _KINDS = {"revolute": "revolute", "prismatic": "prismatic", "weld": "fixed"}
 WORLD = "world"
+# Of a message in Drake's words, which may quote the whole file.
+_LONGEST = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,11 +88,10 @@ def parse(copy: str, suffix: str, where: str) -> Kinematics:
 
     plant = MultibodyPlant(0.0)
     try:
-        Parser(plant).AddModelsFromString(copy, suffix)
-    except RuntimeError as error:
-        lines = str(error).strip().splitlines() or ["no reason given"]
-        reason = lines[0].replace("<literal-string>.", "").strip()
-        raise RobotError(f"cannot be understood: {reason}", where) from None
+        with _quiet():
+            Parser(plant).AddModelsFromString(copy, suffix)
+    except Exception as error:  # the bindings raise whatever the parser's libraries throw
+        raise RobotError(f"cannot be understood: {_reason(error)}", where) from None
     world = plant.world_body().index()
     bodies = [plant.get_body(i) for i in _indices(plant) if i != world]
     connections = tuple(_connection(plant.get_joint(i), where) for i in plant.GetJointIndices())
@@ -98,6 +103,28 @@ def parse(copy: str, suffix: str, where: str) -> Kinematics:
     }
     phi = {body.name(): _phi(body.default_spatial_inertia()) for body in bodies}
     return Kinematics(tuple(body.name() for body in bodies), connections, roots, phi)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep Drake's log from the terminal: what is wrong is said once, in our error."""
+    logger = logging.getLogger("drake")
+
+    def drop(record: logging.LogRecord) -> bool:
+        return False
+
+    logger.addFilter(drop)
+    try:
+        yield
+    finally:
+        logger.removeFilter(drop)
+
+
+def _reason(error: Exception) -> str:
+    """Return the first line of the parser's words, without places in a copy nobody sees."""
+    lines = str(error).strip().splitlines() or ["no reason given"]
+    reason = re.sub(r"<(literal|data)-string>\S*\s*|\berror:\s*", "", lines[0]).strip()
+    return reason if len(reason) <= _LONGEST else f"{reason[:_LONGEST]} ..."
 
 
 def _indices(plant):

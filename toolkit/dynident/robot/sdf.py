@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from dynident.errors import RobotError
+from dynident.robot.chains import Chains
 from dynident.robot.contents import Contents, Inertial, absent, keep, stated, symmetric, to_text
 from dynident.robot.rotations import from_quaternion, from_rpy
 from dynident.robot.tree import Array
@@ -25,6 +28,11 @@ def read(document: Document, where: str) -> Contents:
         Naming the link or joint that is broken or not supported.
     """
     root = document.root
+    version = root.get("version") or ""
+    if not re.fullmatch(r"\d+\.\d+", version):
+        raise RobotError(
+            f"has version '{version}'", where, 'state the SDF version, as in <sdf version="1.9">'
+        )
     copy = keep(root, ("version",))
     worlds = root.findall("world")
     home, target, gravity = root, copy, None
@@ -35,7 +43,7 @@ def read(document: Document, where: str) -> Contents:
         gravity = _gravity(home, where)
         target.extend(_frame(frame, where) for frame in home.findall("frame"))
     model = _one_model(root, worlds, home, where)
-    name = model.get("name") or "robot"
+    name = _name(model, "model", where)
     clean = keep(model, ("name", "canonical_link", "placement_frame"))
     target.append(clean)
     _pose(model, clean, where)
@@ -61,14 +69,19 @@ def read(document: Document, where: str) -> Contents:
     joints = model.findall("joint")
     require_unique((_name(joint, "joint", where) for joint in joints), "joint", where)
     moving, efforts = [], {}
+    chains = Chains(where)
     for joint in joints:
         joint_name = _name(joint, "joint", where)
-        clean.append(_joint(joint, f"{where}: joint '{joint_name}'"))
+        clean_joint = _joint(joint, f"{where}: joint '{joint_name}'")
+        clean.append(clean_joint)
+        parent, child = (clean_joint.findtext(tag) or "" for tag in ("parent", "child"))
+        chains.attach(joint_name, parent, child)
         if joint.get("type") in _MOVING:
             moving.append(joint_name)
             effort = float(joint.findtext("axis/limit/effort") or "0")
             if 0.0 < effort < _NO_LIMIT:
                 efforts[joint_name] = effort
+    chains.refuse_loops()
     return Contents(
         name, "sdf", to_text(copy), inertials, elements, tuple(moving), efforts, gravity
     )
@@ -239,7 +252,8 @@ def _axis(axis: Element, kind: str, where: str) -> Element:
             and not (key == "velocity" and values[key] <= 0.0)
         ):
             entry = Element(key)
-            entry.text = repr(values[key])
+            # The parser refuses denormal numbers.
+            entry.text = repr(values[key] if abs(values[key]) > 1e-300 else 0.0)
             limits.append(entry)
     clean.append(limits)
     return clean

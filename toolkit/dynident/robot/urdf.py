@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.errors import RobotError
+from dynident.robot.chains import Chains
 from dynident.robot.contents import Contents, Inertial, absent, keep, stated, symmetric, to_text
 from dynident.robot.rotations import from_rpy
 from dynident.robot.tree import Array
@@ -49,6 +50,8 @@ def read(document: Document, where: str) -> Contents:
     inertials: dict[str, Inertial] = {}
     elements: dict[str, Element] = {}
     links = root.findall("link")
+    if not links:
+        raise RobotError("has no links", where)
     require_unique((_name(link, "link", where) for link in links), "link", where)
     for link in links:
         link_name = _name(link, "link", where)
@@ -58,19 +61,22 @@ def read(document: Document, where: str) -> Contents:
     joints = root.findall("joint")
     require_unique((_name(joint, "joint", where) for joint in joints), "joint", where)
     moving, efforts = [], {}
-    parents: dict[str, str] = {}
+    chains = Chains(where)
     for joint in joints:
         joint_name = _name(joint, "joint", where)
         clean = _joint(joint, f"{where}: joint '{joint_name}'", inertials)
         copy.append(clean)
-        _attach(parents, joint_name, clean, where)
+        parent, child = (clean.find(tag) for tag in ("parent", "child"))
+        assert parent is not None and child is not None
+        chains.attach(joint_name, parent.attrib["link"], child.attrib["link"])
         if joint.get("type") in _MOVING:
             moving.append(joint_name)
             limit = joint.find("limit")
             effort = float(limit.get("effort", "0")) if limit is not None else 0.0
             if effort > 0.0:
                 efforts[joint_name] = effort
-    _one_root(list(inertials), parents, where)
+    chains.refuse_loops()
+    _one_root(list(inertials), chains.parents, where)
     return Contents(name, "urdf", to_text(copy), inertials, elements, tuple(moving), efforts)
 
 
@@ -158,44 +164,24 @@ def _limit(limit: Element, where: str, kind: str) -> Element:
     for key in ("lower", "upper", "velocity", "effort"):
         if key in limit.attrib and np.isnan(attribute(limit, key, "limit", where)):
             raise RobotError(f"limit {key} is NaN", where)
-    # A continuous joint has no position limits, whatever the element says.
-    clean = keep(limit, () if kind == "continuous" else ("lower", "upper"))
+    # A continuous joint has no position limits, whatever the element says; an infinite limit or a
+    # speed of zero is none.
+    clean = Element("limit")
     lower, upper = float(limit.get("lower", "-inf")), float(limit.get("upper", "inf"))
-    if kind != "continuous" and lower > upper:
-        raise RobotError("has a lower limit above its upper limit", where, "swap them")
-    if float(limit.get("velocity", "0")) > 0.0:
-        clean.set("velocity", limit.attrib["velocity"])
+    if kind != "continuous":
+        if lower > upper:
+            raise RobotError("has a lower limit above its upper limit", where, "swap them")
+        for key, value in (("lower", lower), ("upper", upper)):
+            if np.isfinite(value):
+                clean.set(key, repr(value))
+    velocity = float(limit.get("velocity", "0"))
+    if 0.0 < velocity < np.inf:
+        clean.set("velocity", repr(velocity))
     return clean
-
-
-def _attach(parents: dict[str, str], joint: str, clean: Element, where: str) -> None:
-    parent, child = (clean.find(tag) for tag in ("parent", "child"))
-    assert parent is not None and child is not None
-    name = child.attrib["link"]
-    if name in parents:
-        raise RobotError(
-            f"has a second parent, by joint '{joint}': closed chains are not supported",
-            f"{where}: link '{name}'",
-            "cut the loop by removing one of the joints",
-        )
-    parents[name] = parent.attrib["link"]
 
 
 def _one_root(links: list[str], parents: dict[str, str], where: str) -> None:
     roots = [name for name in links if name not in parents]
-    if not links:
-        raise RobotError("has no links", where)
-    for name in links:
-        seen = {name}
-        while name in parents:
-            name = parents[name]
-            if name in seen:
-                raise RobotError(
-                    "is its own ancestor: closed chains are not supported",
-                    f"{where}: link '{name}'",
-                    "cut the loop by removing one of the joints",
-                )
-            seen.add(name)
     if "world" in parents.values() and "world" not in roots:
         roots.append("world")
     if len(roots) > 1:
