@@ -234,7 +234,8 @@ class JointEffect(Effect):
 
     def columns(self, block: Block) -> np.ndarray:
         here = self.at_joint(block)
-        full = np.zeros((len(block.t), len(block.names), here.shape[1]))
+        # Of the same type, so that the columns can also be taken of symbols (see closed_loop).
+        full = np.zeros((len(block.t), len(block.names), here.shape[1]), dtype=here.dtype)
         full[:, block.index(self.joint)] = here
         return full
 

@@ -1,0 +1,185 @@
+"""A robot as it truly is: bodies, and effects with their values, acting in four ways."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from dynident.effects import FRICTION_WIDTH, Block, Effect, effects_of
+from dynident.errors import EffectError, SimulationError
+from dynident.robot import Robot
+from dynident.settings import nearest
+
+
+@dataclass(frozen=True)
+class TrueEffect:
+    """An effect that a simulated robot really has.
+
+    Attributes
+    ----------
+    effect : with its place and shape.
+    values : of its parameters, in their order.
+    hidden : whether the user of the recordings is to find it: it is left out of the study.
+    """
+
+    effect: Effect
+    values: tuple[float, ...]
+    hidden: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        label: str,
+        robot: Robot,
+        values: Mapping[str, float] | Sequence[float],
+        shape: Mapping[str, float] | Sequence[float] = (),
+        *,
+        hidden: bool = False,
+    ) -> tuple[TrueEffect, ...]:
+        """Return the effects of a label: `name@joint` one, `name` one per place.
+
+        Parameters
+        ----------
+        label : as in a study file.
+        robot : on which they sit.
+        values, shape : by name (parameters left out are 0, shape parameters at their default) or
+            all in order.
+        hidden : see the class.
+
+        Raises
+        ------
+        EffectError
+            If the label, a name or a number of values does not fit, or a value is out of bounds.
+        """
+        return tuple(
+            cls(effect, _ordered(effect, robot, values), hidden)
+            for effect in (_shaped(one, robot, shape) for one in effects_of(label, robot))
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Mechanism:
+    """A robot and its true effects, ready to compute torques.
+
+    Attributes
+    ----------
+    robot : with the bodies that effects put on board.
+    effects : that act.
+    friction_width : rad/s or m/s, see `dynident.effects.FRICTION_WIDTH`.
+    carries_payload : whether the payload is on board.
+    """
+
+    robot: Robot
+    effects: tuple[TrueEffect, ...] = ()
+    friction_width: float = FRICTION_WIDTH
+    carries_payload: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        robot: Robot,
+        effects: Sequence[TrueEffect] = (),
+        friction_width: float = FRICTION_WIDTH,
+        *,
+        carries_payload: bool = False,
+    ) -> Mechanism:
+        """Return the mechanism of a robot without effects and the effects that it has.
+
+        Raises
+        ------
+        EffectError
+            If an effect does not fit the robot, or is there twice.
+        SimulationError
+            If a torque gain is not positive.
+        """
+        acting = []
+        for one in effects:
+            effect = one.effect.on(robot)
+            if effect.label in (other.effect.label for other in acting):
+                raise EffectError("is there twice", effect.label, "name it once")
+            if "payload" in effect.needs and not carries_payload:
+                continue
+            values = _ordered(effect, robot, one.values)
+            acting.append(TrueEffect(effect, values, one.hidden))
+            robot = effect.simulated_robot(values, robot)
+        made = cls(robot, tuple(acting), friction_width, carries_payload)
+        for joint, gain in zip(robot.names, made.gain, strict=True):
+            if not (gain > 0 and np.isfinite(gain)):
+                what, mend = f"torque gain {gain:g}", "choose a gain error above -1"
+                raise SimulationError(what, f"joint '{joint}'", mend)
+        return made
+
+    @cached_property
+    def inertia(self) -> np.ndarray:
+        """Joint-space inertia on top of the bodies', (n, n); not always symmetric."""
+        total = np.zeros((self.robot.n, self.robot.n))
+        for one in self.effects:
+            total += one.effect.simulated_inertia(one.values, self.robot)
+        return total
+
+    @cached_property
+    def gain(self) -> np.ndarray:
+        """Recorded torque per torque that acts, (n,)."""
+        total = np.ones(self.robot.n)
+        for one in self.effects:
+            total *= one.effect.simulated_gain(one.values, self.robot)
+        return total
+
+    def block(self, t: np.ndarray, q: np.ndarray, v: np.ndarray) -> Block:
+        """Return samples as effects see them; no force depends on the acceleration."""
+        return Block(
+            t,
+            q,
+            v,
+            np.zeros_like(q),
+            self.robot.names,
+            self.friction_width,
+            self.carries_payload,
+        )
+
+    def force(self, t: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Return what effects take from the torque that acts, from t (T,), q and v (T, n)."""
+        block = self.block(t, q, v)
+        total = np.zeros(q.shape)
+        for one in self.effects:
+            total = total + one.effect.simulated_force(one.values, block)
+        return total
+
+    def command(self, t: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """Return the recorded torque that a motion takes, (T, n) N m or N."""
+        rigid = self.robot.inverse_dynamics(q, v, a)
+        return self.gain * (rigid + a @ self.inertia.T + self.force(t, q, v))
+
+
+def _ordered(effect: Effect, robot: Robot, values) -> tuple[float, ...]:
+    parameters = effect.parameters(robot)
+    if isinstance(values, Mapping):
+        names = tuple(parameter.name for parameter in parameters)
+        for name in values:
+            if name not in names:
+                mend = nearest(name, names, "parameters")
+                raise EffectError(f"no parameter '{name}'", effect.label, mend)
+        values = [values.get(name, 0.0) for name in names]
+    if len(values) != len(parameters):
+        names = ", ".join(parameter.name for parameter in parameters)
+        raise EffectError(f"{len(values)} values", effect.label, f"give {names}")
+    for value, parameter in zip(values, parameters, strict=True):
+        if not (np.isfinite(value) and parameter.lower <= value <= parameter.upper):
+            limits = f"between {parameter.lower:g} and {parameter.upper:g} {parameter.unit}"
+            mend = f"choose it {limits}"
+            raise EffectError(f"{parameter.name} = {value:g}", effect.label, mend)
+    return tuple(float(value) for value in values)
+
+
+def _shaped(effect: Effect, robot: Robot, shape) -> Effect:
+    if isinstance(shape, Mapping):
+        names = tuple(one.name for one in effect.shape_parameters(robot))
+        for name in shape:
+            if name not in names:
+                mend = nearest(name, names, "shape parameters")
+                raise EffectError(f"no shape parameter '{name}'", effect.label, mend)
+        shape = [shape.get(name, own) for name, own in zip(names, effect.shape, strict=True)]
+    return effect.shaped(*shape).on(robot) if len(shape) else effect
