@@ -1,0 +1,194 @@
+import json
+import re
+from dataclasses import replace
+from html import escape, unescape
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from report.fabricated import diagnosis, effect
+
+from dynident.diagnose.diagnosis import Candidate, Diagnosis, Step
+from dynident.errors import DynidentError
+from dynident.report import report
+from dynident.report.html import page
+from dynident.tables import percent
+
+
+@pytest.fixture(scope="module")
+def found() -> Diagnosis:
+    return diagnosis()
+
+
+@pytest.fixture(scope="module")
+def html(found) -> str:
+    return page(found, command="dynident explain study.toml")
+
+
+class Elements(HTMLParser):
+    """Elements with their attributes, and the text outside scripts and styles."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict]] = []
+        self.words: list[str] = []
+        self.figures = ""
+        self._open = ("", {})
+        self.feed(html)
+
+    def handle_starttag(self, tag, attrs):
+        self._open = (tag, dict(attrs))
+        self.elements.append(self._open)
+
+    def handle_endtag(self, tag):
+        self._open = ("", {})
+
+    def handle_data(self, data):
+        tag, attributes = self._open
+        if tag == "script" and attributes.get("id") == "figures":
+            self.figures += data
+        elif tag not in ("script", "style"):
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return re.sub(r"\s+", " ", " ".join(self.words))
+
+
+def test_nothing_is_loaded_from_elsewhere(html):
+    for tag, attributes in Elements(html).elements:
+        assert tag not in ("link", "iframe", "base", "object", "embed")
+        for key in ("src", "href", "srcset", "data", "action", "poster"):
+            assert key not in attributes, (tag, attributes)
+    style = html.split("<style>")[1].split("</style>")[0]
+    assert "url(" not in style and "@import" not in style
+    assert "default-src 'none'" in html
+
+
+def test_plotly_is_inlined_once_and_the_file_is_small(found, tmp_path):
+    path = report(found, tmp_path / "report.html")
+    assert path == tmp_path / "report.html"
+    assert path.stat().st_size < 6e6
+    assert path.read_text(encoding="utf-8").count("* plotly.js v") == 1
+
+
+def test_seven_joints_and_long_traces_stay_small():
+    many = diagnosis(tuple(f"joint{i}" for i in range(7)), samples=1500)
+    again = [replace(t, recording=f"{k}-{t.recording}") for k in range(3) for t in many.traces]
+    assert len(page(replace(many, traces=tuple(again)))) < 8e6
+
+
+def test_it_says_what_the_diagnosis_says(found, html):
+    text = Elements(html).text
+    assert found.sentence in text
+    for note in found.notes:
+        assert note in text
+    for step in found.steps:
+        assert step.effect.title in text and step.effect.label in text
+        for other in step.indistinguishable:
+            assert other.title in text
+    for one in found.maps:
+        if one.sentence:
+            assert one.sentence[1:] in text
+    absorbed = [c for c in found.candidates if c.status == "absorbed"]
+    assert absorbed
+    for candidate in absorbed:
+        assert candidate.effect.title in text and candidate.remark in text
+
+
+def test_numbers_are_those_of_the_diagnosis(found, html):
+    text = Elements(html).text
+    for error in (found.test_error.before, found.test_error.after, found.test_error.noise_floor):
+        assert percent(error) in text
+    for joint in found.joints:
+        assert percent(joint.error_before) in text and percent(joint.error_after) in text
+        assert joint.noise_rms is not None
+        assert percent(joint.noise_rms / joint.torque_rms) in text
+    step = found.steps[0]
+    assert f"Fs = {step.values[0]:.4g} N m" in text and "vs = 0.16 rad/s" in text
+    for candidate in found.candidates:
+        if candidate.status != "absorbed":
+            assert f"{100 * candidate.test_gain:.2f}" in text
+    for row in found.after.parameter_table().rows:
+        assert all(cell in text for cell in row)
+
+
+def test_provenance(found, html):
+    text = Elements(html).text
+    source = found.after.sources[0]
+    for word in (source.file, source.sha256, source.filter, "arms/bench.urdf", "numpy", "drake"):
+        assert word in text
+    assert "dynident explain study.toml" in text
+    assert np.__version__ in text
+    assert "dynident explain" not in Elements(page(found)).text
+
+
+def test_every_plot_has_its_figure(found, html):
+    parsed = Elements(html)
+    figures = json.loads(parsed.figures)
+    wanted = [a["data-figure"] for _, a in parsed.elements if "data-figure" in a]
+    wanted += [a["value"] for t, a in parsed.elements if t == "option" and "torque" in a["value"]]
+    assert set(wanted) == set(figures)
+    assert len(figures) == 2 + len(found.maps) + len(found.traces)
+
+
+def test_hostile_names_are_text():
+    names = ("<script>alert(1)</script>", '"$x$" </script><img src=x onerror=alert(2)>')
+    bad = diagnosis(names)
+    bad = replace(bad, notes=("<b onclick=alert(3)>note</b>",))
+    html = page(bad, command="dynident </script><script>alert(4)</script>")
+    parsed = Elements(html)
+    assert {tag for tag, _ in parsed.elements}.isdisjoint({"img", "b"})
+    assert sum(tag == "script" for tag, _ in parsed.elements) == 3
+    assert not any(key.startswith("on") for _, a in parsed.elements for key in a)
+    for name in names:
+        assert name in parsed.text
+    figures = parsed.figures
+    assert "<" not in figures and ">" not in figures
+    labels = json.loads(figures)["waterfall"]["layout"]["yaxis"]["ticktext"]
+    assert "<img" not in labels[1] and "$" not in labels[1]
+    assert names[1] in unescape(labels[1])
+
+
+@pytest.mark.parametrize("noise", [True, False], ids=["noise known", "noise unknown"])
+@pytest.mark.parametrize("steps", [True, False], ids=["something added", "nothing added"])
+@pytest.mark.parametrize("joints", [("slide",), ("shoulder", "elbow")], ids=["one", "two"])
+def test_every_kind_of_diagnosis(joints, steps, noise):
+    found = diagnosis(joints, steps=steps, noise=noise, samples=200)
+    bare = replace(found, candidates=(), remaining=(), maps=(), traces=(), notes=())
+    for one in (found, bare, replace(found, verdict="unexplained")):
+        html = page(one)
+        assert escape(one.sentence) in html
+        assert ("unknown" in Elements(html).text) == (not noise)
+        json.loads(Elements(html).figures)
+
+
+def test_absorbed_without_a_remark_names_its_experiment(found):
+    hidden = effect("rotor_inertia", "shoulder")
+    only = replace(found, candidates=(Candidate(hidden, "absorbed", None, 0.0),))
+    assert hidden.advice in Elements(page(only)).text
+
+
+def test_several_steps_and_effects_of_the_whole_robot(found):
+    whole = effect("payload")
+    count = len(whole.parameters(found.after.model.robot))
+    steps = (
+        *found.steps,
+        Step(whole, (0.5,) * count, 0.0095, 0.0094, (), 1e-5),
+    )
+    text = Elements(page(replace(found, steps=steps))).text
+    assert "payload" in text and "with 2 effects added" in text
+
+
+def test_a_missing_folder_is_named_and_nothing_is_written(found, tmp_path):
+    with pytest.raises(DynidentError, match="cannot be written"):
+        report(found, tmp_path / "absent" / "report.html")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_old_report_is_replaced(found, tmp_path):
+    path = tmp_path / "report.html"
+    path.write_text("old")
+    report(found, path)
+    assert path.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    assert list(tmp_path.iterdir()) == [path]

@@ -1,0 +1,139 @@
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+import pytest
+from matplotlib.figure import Figure
+from report.fabricated import RECORDINGS, diagnosis, effect
+
+from dynident.diagnose.diagnosis import Step
+from dynident.errors import DynidentError
+from dynident.report import pictures, plots
+from dynident.report.content import bars, seen, thinned
+
+
+def traces(figure: go.Figure) -> list[Any]:
+    return list(figure.data)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return diagnosis()
+
+
+@pytest.fixture(scope="module")
+def unknown():
+    return diagnosis(("slide",), noise=False, steps=False, samples=200)
+
+
+def test_the_waterfall_goes_from_the_given_error_to_the_final_one(found):
+    second = Step(effect("torque_offset", "elbow"), (0.1,), 0.0095, 0.009, (), 1e-4)
+    error = replace(found.test_error, after=0.009)
+    more = replace(found, steps=(*found.steps, second), test_error=error)
+    rows = bars(more)
+    assert [row.kind for row in rows] == ["given", "added", "added", "final"]
+    assert rows[0].stop == 100 * error.before
+    assert rows[1].stop == rows[0].stop
+    assert rows[2].start == rows[-1].stop == pytest.approx(0.9)
+    (bar,) = traces(pictures.waterfall(more))
+    assert np.asarray(bar.base) + np.asarray(bar.x) == pytest.approx([row.stop for row in rows])
+
+
+def test_the_waterfall_names_the_whole_set(found):
+    label = " ".join(bars(found)[1].lines)
+    assert "stribeck friction at elbow" in label and "or asymmetric friction" in label
+
+
+def test_an_unknown_floor_is_said(unknown, found):
+    def words(one):
+        return " ".join(a.text for a in pictures.waterfall(one).layout.annotations)
+
+    assert "unknown" in words(unknown)
+    assert f"{100 * found.test_error.noise_floor:.2f} %" in words(found)
+
+
+def test_axes_have_units(found):
+    figure = pictures.residual_maps(found, "elbow")
+    titles = [axis.title.text for axis in figure.select_xaxes()]
+    assert titles == [
+        "velocity (rad/s)",
+        "position (rad)",
+        "acceleration (rad/s\u00b2)",
+        "load (N m)",
+        "time (s)",
+        "cycles per revolution",
+    ]
+    assert {axis.title.text for axis in figure.select_yaxes()} == {
+        "mean residual (N m)",
+        "amplitude (N m)",
+    }
+    legend = [trace.name for trace in traces(figure) if trace.showlegend is not False]
+    assert legend == ["noise band", "model as given", "with stribeck friction at elbow added"]
+
+
+def test_without_noise_there_is_no_band(unknown):
+    figure = pictures.residual_maps(unknown, "slide")
+    assert {trace.name for trace in traces(figure)} == {"model as given"}
+
+
+def test_torques_of_a_recording(found):
+    first = traces(pictures.measured_and_predicted(found, "elbow"))
+    second = traces(pictures.measured_and_predicted(found, "elbow", RECORDINGS[1]))
+    trace = next(t for t in found.traces if (t.recording, t.joint) == (RECORDINGS[1], "elbow"))
+    assert np.allclose(second[0].y, trace.measured, atol=1e-5)
+    assert not np.allclose(first[0].y, second[0].y)
+
+
+@pytest.mark.parametrize("draw", [pictures.residual_maps, plots.residual_maps])
+def test_unknown_joints_and_recordings_list_the_valid_ones(found, draw):
+    with pytest.raises(DynidentError, match="shoulder, elbow"):
+        draw(found, "wrist")
+    with pytest.raises(DynidentError, match="no residual map"):
+        draw(replace(found, maps=()), "elbow")
+    with pytest.raises(DynidentError, match=RECORDINGS[1]):
+        pictures.measured_and_predicted(found, "elbow", "run9.csv")
+
+
+def test_thinning_keeps_every_extreme(found):
+    trace = diagnosis(("slide",), samples=5000).traces[0]
+    measured = trace.measured.copy()
+    measured[1234] += 50.0
+    trace = replace(trace, measured=measured)
+    kept = thinned(trace, 600)
+    assert len(kept) <= 600 and np.all(np.diff(kept) > 0)
+    assert kept[0] == 0 and kept[-1] == 4999 and 1234 in kept
+    for model in (trace.before, trace.after):
+        left = trace.measured - model
+        assert left[kept].min() == left.min() and left[kept].max() == left.max()
+    assert np.array_equal(thinned(found.traces[0], 4000), np.arange(800))
+
+
+def test_a_map_without_a_sentence_is_put_into_words(found, unknown):
+    quiet = replace(found.maps[1], sentence="")
+    assert seen(replace(quiet, before=0 * quiet.before)) == "Within the noise."
+    assert "Beyond the noise" in seen(replace(quiet, before=9 * quiet.band))
+    assert seen(replace(unknown.maps[1], sentence="")) == "No simple shape stands out."
+
+
+def test_candidates_are_ranked_and_the_set_is_bracketed(found):
+    figure = pictures.ranking(found)
+    assert "quadratic drag<br>at elbow" in figure.layout.yaxis.ticktext
+    assert len(figure.layout.yaxis.ticktext) == 5  # the absorbed one is not ranked
+    assert [a.text for a in figure.layout.annotations] == ["cannot be<br>told apart"]
+    alone = replace(found, steps=(replace(found.steps[0], indistinguishable=()),))
+    assert not pictures.ranking(alone).layout.annotations
+
+
+@pytest.mark.parametrize("names", [("shoulder", "elbow"), ("a$b$", "<i>")])
+def test_static_pictures(names, tmp_path):
+    found = diagnosis(names, samples=200)
+    for one in (found, diagnosis(names, noise=False, steps=False, samples=200)):
+        for figure in (plots.waterfall(one), plots.residual_maps(one, names[1])):
+            assert isinstance(figure, Figure)
+            figure.savefig(tmp_path / "picture.png")
+
+
+def test_figures_are_plotly_figures(found):
+    for figure in (pictures.waterfall(found), pictures.residual_maps(found, "elbow")):
+        assert isinstance(figure, go.Figure)
