@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from joblib import Parallel, delayed
 
-from dynident.closed_loop import ClosedLoop, Controller, Fourier, Mechanism, Sensors, TrueEffect
+from dynident.closed_loop import Controller, Experiment, Fourier, Run, Sensors, TrueEffect
 from dynident.diagnose import diagnose
 from dynident.effects import catalogue
 from dynident.model import Model
@@ -62,7 +62,9 @@ UNIT: dict[str, tuple[tuple[float, ...], tuple[tuple[float, float], ...]]] = {
 }
 """Values of each effect at strength one, up to a factor, and ranges of its shape parameters."""
 
-CONTROLLER = Controller("pd", 1000.0, (1500.0, 600.0), (80.0, 30.0))
+CONTROLLER = Controller(
+    "pd", 1000.0, (1500.0, 600.0), (80.0, 30.0), derivative_cutoff_hz=80.0
+)
 SENSORS = Sensors(position_std=2e-5, torque_std=0.1)
 PERIOD, DURATION, RUNS, TESTS = 8.0, 16.0, 4, 2
 
@@ -94,12 +96,6 @@ class Outcome:
     cpu_s: float
 
 
-class Foreign:
-    """A viscosity that varies with position: in no catalogue."""
-
-    label = "position-dependent viscosity"
-
-
 def robot_case(case: Case) -> tuple[Model, Dataset, Dataset]:
     """Simulate a case: the model that lacks the effect, training and test recordings."""
     robot = Robot.from_text(ARM)
@@ -116,8 +112,8 @@ def robot_case(case: Case) -> tuple[Model, Dataset, Dataset]:
     if hidden is not None:
         hidden = _scaled(case, robot, known, hidden)
     truth = [*known, hidden] if hidden is not None else known
-    recordings = [_record(case, robot, truth, run, SENSORS) for run in range(RUNS + TESTS)]
-    return model, Dataset(tuple(recordings[:RUNS])), Dataset(tuple(recordings[RUNS:]))
+    recordings = _recordings(case, robot, truth, RUNS + TESTS)
+    return model, Dataset(recordings[:RUNS]), Dataset(recordings[RUNS:])
 
 
 def _hidden(case: Case, robot: Robot, rng: np.random.Generator) -> TrueEffect | None:
@@ -129,30 +125,19 @@ def _hidden(case: Case, robot: Robot, rng: np.random.Generator) -> TrueEffect | 
     return TrueEffect(effect.shaped(*shape).on(robot), values, hidden=True)
 
 
-def _record(
-    case: Case, robot: Robot, truth: list[TrueEffect], run: int, sensors: Sensors | None
-) -> Recording:
-    carries = case.effect == "payload" and run % 2 == 1
-    mechanism = Mechanism.of(robot, truth, carries_payload=carries)
-    trajectory = Fourier.random(
-        robot, PERIOD, [case.seed, run], 5, amplitude=[1.6, 1.8], speed=[2.5, 3.0]
+def _recordings(
+    case: Case, robot: Robot, truth: list[TrueEffect], runs: int
+) -> tuple[Recording, ...]:
+    made = tuple(
+        Run(
+            Fourier.random(robot, PERIOD, [case.seed, r], 5, amplitude=[1.6, 1.8], speed=[2.5, 3.0]),
+            DURATION,
+            f"run{r + 1}.csv",
+            payload=r % 2 == 1,
+        )
+        for r in range(runs)
     )
-    rng = np.random.default_rng([case.seed, run, 5]) if sensors else None
-    rollout = ClosedLoop(mechanism, CONTROLLER).run(
-        trajectory, DURATION, sensors=sensors, rng=rng, lead_in=1.0
-    )
-    tau = rollout.u
-    if rng is not None and sensors is not None:
-        tau = tau + sensors.each("torque_std", robot.n) * rng.standard_normal(tau.shape)
-    return Recording(
-        rollout.t,
-        rollout.q_measured,
-        tau,
-        robot.names,
-        period=PERIOD,
-        torque="held_command",
-        name=f"run{run + 1}",
-    )
+    return Experiment(robot, CONTROLLER, made, tuple(truth), SENSORS, seed=case.seed).run()
 
 
 def _scaled(case: Case, robot: Robot, known: list[TrueEffect], hidden: TrueEffect) -> TrueEffect:
@@ -163,9 +148,7 @@ def _scaled(case: Case, robot: Robot, known: list[TrueEffect], hidden: TrueEffec
 
     model = Model(robot, tuple(one.effect for one in known))
     for _ in range(3):
-        truth = [*known, hidden]
-        noisy = Dataset(tuple(_record(case, robot, truth, run, SENSORS) for run in range(2)))
-        store = ColumnStore(model, gather(noisy))
+        store = ColumnStore(model, gather(Dataset(_recordings(case, robot, [*known, hidden], 2))))
         store.prepare(model.effects)
         judged = on_recordings(store, fit_present(store, model))
         assert judged.ratio is not None

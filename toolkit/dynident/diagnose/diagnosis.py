@@ -18,7 +18,16 @@ NoiseSource = Literal["replicates", "given", "unknown"]
 _VERDICTS: dict[Verdict, str] = {
     "nothing_missing": "Nothing is missing: what remains is within the noise.",
     "explained": "Explained: {effects} added, and what remains is within the noise.",
-    "unexplained": "None of these explains it: a material residual remains{whatever}.",
+    "unexplained": "None of these explains it: a residual beyond the noise remains, and no effect "
+    "in the catalogue takes it away.",
+}
+
+_VERDICTS_WITHOUT_NOISE: dict[Verdict, str] = {
+    "nothing_missing": "No effect in the catalogue is material; the noise is unknown, so whether "
+    "something else is missing cannot be said.",
+    "explained": "Added: {effects}. No further effect is material; the noise is unknown, so "
+    "whether something else is missing cannot be said.",
+    "unexplained": "Added: {effects}. More effects are material; the noise is unknown.",
 }
 
 
@@ -179,8 +188,16 @@ class Diagnosis:
     def sentence(self) -> str:
         """The verdict in plain words."""
         effects = ", ".join(step.effect.title for step in self.steps)
-        whatever = f" after adding {effects}" if effects else ""
-        return _VERDICTS[self.verdict].format(effects=effects, whatever=whatever)
+        if self.noise_source == "unknown":
+            return _VERDICTS_WITHOUT_NOISE[self.verdict].format(effects=effects)
+        if self.verdict == "unexplained" and effects:
+            before, after = percent(self.test_error.before), percent(self.test_error.after)
+            return (
+                f"Explained in part: adding {effects} brings the error from {before} to {after}. A "
+                "residual beyond the noise remains, and none of the effects in the catalogue "
+                "explains it."
+            )
+        return _VERDICTS[self.verdict].format(effects=effects)
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON of `diagnose --json` and `explain --json`."""

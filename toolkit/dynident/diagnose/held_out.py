@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
 from dynident.diagnose.evidence import ColumnStore
 from dynident.diagnose.moments import solve
 from dynident.diagnose.noise import differences, inflation, systematic_square
 from dynident.diagnose.present import Present, model_columns
 from dynident.fit.estimate import Estimate
+
+_PARTS = 10  # stretches of a recording whose systematic squares count as independent
 
 
 @dataclass(frozen=True)
@@ -40,12 +43,14 @@ class HeldOut:
     runs : with predictions.
     noise_std : (n,) N m or N; None where the noise is unknown.
     ratio : (n,) systematic residual over noise (root mean squares); None likewise.
+    least_ratio : (n,) what that ratio is at least, with 99 % confidence; None likewise.
     inflation : (n,) variance of a mean of consecutive noise over that of white noise.
     """
 
     runs: tuple[HeldOutRun, ...]
     noise_std: np.ndarray | None
     ratio: np.ndarray | None
+    least_ratio: np.ndarray | None
     inflation: np.ndarray
 
     @property
@@ -145,12 +150,20 @@ def _judged(
         (run.kind, e) for run, e in zip(store.runs, folded, strict=True) if run.kind != "single"
     ]
     if not pairs:
-        return HeldOut(runs, None, None, np.ones(n))
+        return HeldOut(runs, None, None, None, np.ones(n))
     noise = [[differences(e[..., j], kind) for kind, e in pairs] for j in range(n)]
     power = np.array([np.mean(np.concatenate([d.ravel() for d in ds]) ** 2) for ds in noise])
-    lengths = [e.shape[1] for _, e in pairs]
-    systematic = [[systematic_square(e[..., j], kind) for kind, e in pairs] for j in range(n)]
-    excess = np.average(systematic, axis=1, weights=lengths)
-    ratio = np.sqrt(np.clip(excess, 0.0, None) / np.where(power > 0, power, 1.0))
+    parts = [
+        (kind, part) for kind, e in pairs for part in np.array_split(e, _PARTS, axis=1)
+    ]
+    squares = np.array(
+        [[systematic_square(part[..., j], kind) for j in range(n)] for kind, part in parts]
+    )
+    sizes = np.array([part.shape[1] for _, part in parts])
+    excess = np.average(squares, axis=0, weights=sizes)
+    error = squares.std(axis=0, ddof=1) / np.sqrt(len(squares))
+    least = excess - stats.t.ppf(0.99, len(squares) - 1) * error
+    safe = np.where(power > 0, power, 1.0)
+    ratio, at_least = (np.sqrt(np.clip(x, 0.0, None) / safe) for x in (excess, least))
     grown = np.array([inflation([row for d in ds for row in d]) for ds in noise])
-    return HeldOut(runs, np.sqrt(power), ratio, grown)
+    return HeldOut(runs, np.sqrt(power), ratio, at_least, grown)

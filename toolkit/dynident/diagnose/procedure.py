@@ -42,7 +42,8 @@ MOST_EFFECTS = 8
 """Effects that are added at most."""
 
 WITHIN_NOISE = 0.3
-"""Systematic residual over noise up to which nothing is said to be missing."""
+"""Systematic residual over noise that must be surpassed, with 99 % confidence, before anything is
+said to be missing."""
 
 _FIRST_SHARE = 0.75  # of an effect's drop that a simpler one in it explains, to be named first
 _STANDS = 3.0  # standard deviations from zero of a parameter that stands on its own
@@ -222,11 +223,11 @@ def _told(given, train, store, held, start, present, found, rounds) -> Diagnosis
 
 
 def _verdict(before: HeldOut, after: HeldOut, steps, last: Ranking) -> Verdict:
-    if after.ratio is None:
+    if after.least_ratio is None:
         if last.material:
             return "unexplained"
         return "explained" if steps else "nothing_missing"
-    if float(after.ratio.max()) <= WITHIN_NOISE:
+    if float(after.least_ratio.max()) <= WITHIN_NOISE:
         return "explained" if steps else "nothing_missing"
     return "unexplained"
 

@@ -149,7 +149,7 @@ def score(
     drop = float(part.values @ moment)
     covariance = directions @ part.covariance @ directions.T
     penalised = drop - part.rank * np.log(present.rows) - 2.0 * np.log(grid)
-    blocks = _block_scores(present, with_model, back) @ directions @ part.basis
+    blocks = _block_scores(present, with_model, with_self, back, values) @ directions @ part.basis
     return Score(
         effect,
         carriers,
@@ -157,7 +157,7 @@ def score(
         rank=part.rank,
         drop=drop,
         share=drop / present.error_total,
-        p_value=_block_p_value(blocks),
+        p_value=_block_p_value(part.basis.T @ moment, blocks),
         penalised=float(penalised),
         values=tuple(float(v) for v in values),
         sigma=tuple(float(s) for s in np.sqrt(np.clip(np.diag(covariance), 0.0, None))),
@@ -201,24 +201,29 @@ def _joined(model: np.ndarray, cross: np.ndarray, own: np.ndarray) -> np.ndarray
     return np.concatenate([top, middle, bottom], axis=1)
 
 
-def _block_scores(present: Present, with_model: Moments, back: np.ndarray) -> np.ndarray:
-    """Each block's share of the moment of residual and cleared columns, (B, k)."""
+def _block_scores(
+    present: Present, with_model: Moments, with_self: Moments, back: np.ndarray, values: np.ndarray
+) -> np.ndarray:
+    """Each block's moment of cleared columns and the residual with the effect in, (B, k)."""
     p = len(present.values)
-    combination = np.append(-present.values, 1.0)
-    plain = np.einsum("i,bik->bk", combination, with_model.signal)
+    combination = np.append(-present.values + back @ values, 1.0)
+    plain = np.einsum("i,bik->bk", combination, with_model.signal) - with_self.signal @ values
     model = np.einsum("i,bij->bj", combination, present.moments.signal)[:, :p]
+    model -= np.einsum("bik,k->bi", with_model.signal[:, :p], values)
     return plain - model @ back
 
 
-def _block_p_value(scores: np.ndarray) -> float:
-    """Hotelling's test that the mean of the blocks' scores is zero."""
+def _block_p_value(moment: np.ndarray, scores: np.ndarray) -> float:
+    """Wald test that an effect has no part, with blocks of time as the sampling units.
+
+    Parameters
+    ----------
+    moment : (k,) of residual without the effect and cleared columns, over all blocks.
+    scores : (B, k) the same of each block with the effect in; they sum to zero.
+    """
     blocks, k = scores.shape
     if blocks <= k + 1:
         return 1.0
-    mean = scores.mean(axis=0)
-    spread = np.atleast_2d(np.cov(scores, rowvar=False)) / blocks
-    try:
-        statistic = float(mean @ np.linalg.solve(spread, mean))
-    except np.linalg.LinAlgError:
-        return 1.0
+    spread = scores.T @ scores * blocks / (blocks - 1)
+    statistic = float(moment @ np.linalg.lstsq(spread, moment, rcond=1e-12)[0])
     return float(stats.f.sf(statistic * (blocks - k) / (k * (blocks - 1)), k, blocks - k))
