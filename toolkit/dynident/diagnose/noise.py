@@ -17,7 +17,7 @@ from dynident.diagnose.moments import Kind
 ORDER = 8
 """Order of the autoregression that describes the colour of the noise."""
 
-_BINS = 6
+_BINS = 10
 _RIDGE = 1e-3  # share of white noise assumed, so that a band without power is not blown up
 _SCALE_LIMITS = (0.3, 4.0)  # of the local standard deviation over the overall one
 

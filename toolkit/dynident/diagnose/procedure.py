@@ -115,12 +115,12 @@ def _choose(ranking: Ranking) -> _Found | None:
     simpler = [
         s
         for s in material
-        if s.effect.name in best.effect.contains
+        if s.effect.name in best.effect.stands_in_for
         and s.effect.joint == best.effect.joint
         and s.drop >= _FIRST_SHARE * best.drop
     ]
     if simpler:
-        # Its constant is the same whoever it belongs to: both are named.
+        # The column that they share is the same whoever it belongs to: both are named.
         return _Found(simpler[0], ranking.corrected(simpler[0]), (best.effect,))
     return _Found(best, ranking.corrected(best), indistinguishable(ranking, best))
 

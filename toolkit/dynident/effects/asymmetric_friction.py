@@ -21,6 +21,7 @@ class AsymmetricFriction(JointEffect):
     confounded_with = ("torque_offset", "quadratic_drag")
     experiment = "move {joint} at several constant speeds in both directions"
     contains = ("torque_offset",)
+    stands_in_for = ("torque_offset",)
 
     def parameters(self, robot):
         force, motion = force_unit(robot, self.joint), motion_unit(robot, self.joint)

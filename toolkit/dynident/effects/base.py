@@ -117,6 +117,9 @@ class Effect(ABC):
     """The experiment that shows it: a sentence in which {joint} and {source} are filled in."""
     contains: ClassVar[tuple[str, ...]] = ()
     """Simpler effects whose columns are among this one's."""
+    stands_in_for: ClassVar[tuple[str, ...]] = ()
+    """Those of `contains` whose column may belong to either: they are named first where they do
+    most of the work."""
     needs: ClassVar[frozenset[str]] = frozenset()
     """What `Block` must carry: "rigid", "torque"; "payload" where runs with and without differ."""
 

@@ -1,0 +1,209 @@
+"""The whole diagnosis on recordings of known truth."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from synthetic import arm, synthetic, true_values
+
+from dynident import compare
+from dynident import diagnose as find
+from dynident import fit as fit_model
+from dynident.diagnose import Diagnosis, compare_models
+from dynident.effects import effects_of
+from dynident.errors import FitError, RecordingError
+from dynident.model import Model
+from dynident.recording import Dataset, Noise
+
+FRICTION = {"Fv__shoulder": 1.2, "Fv__elbow": 0.5, "Fc__shoulder": 1.5, "Fc__elbow": 0.6}
+NOISE = {"position_std": 2e-5, "torque_std": 0.3}
+STATED = Noise(np.array([2e-5, 2e-5]), np.array([0.3, 0.3]))
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    return Model(arm()) + "viscous_friction" + "coulomb_friction"
+
+
+def recordings(model: Model, hidden: str | None, values: dict[str, float], **options):
+    """Three runs to train on and one to test on; a payload is carried in every other one."""
+    full = model if hidden is None else model + hidden
+    truth = true_values(full, **FRICTION, **values)
+    loaded = hidden == "payload"
+    made = [
+        synthetic(
+            full, truth, seed, rate_hz=250.0, payload=bool(seed % 2) if loaded else None, **options
+        )
+        for seed in range(4)
+    ]
+    silent = [one.replace(payload=None) for one in made]
+    return tuple(silent[:3]), tuple(silent[3:])
+
+
+def diagnosed(model: Model, hidden: str | None, values: dict[str, float]) -> Diagnosis:
+    train, test = recordings(model, hidden, values, **NOISE)
+    return find(model, Dataset(train), Dataset(test))
+
+
+@pytest.mark.parametrize(
+    ("hidden", "values"),
+    [
+        ("torque_offset@elbow", {"offset__elbow": 0.3}),
+        ("asymmetric_friction@elbow", {"dFv__elbow": 0.3, "dFc__elbow": 0.2}),
+        ("stribeck_friction@elbow", {"Fs__elbow": 0.6}),
+        ("quadratic_drag@shoulder", {"Fq__shoulder": 0.3}),
+        ("joint_spring@shoulder", {"k__shoulder": 0.8, "c__shoulder": -0.2}),
+        ("torque_ripple@elbow", {"As__elbow": 0.2, "Ac__elbow": 0.1}),
+        ("rotor_inertia@elbow", {"Ia__elbow": 0.1}),
+        ("payload", {"payload.mass": 0.3, "payload.mx": 0.06, "payload.Izz": 0.02}),
+        ("drive_gain@shoulder", {"e__shoulder": 0.1}),
+        ("joint_coupling@elbow:shoulder", {"cv__elbow:shoulder": 0.3}),
+    ],
+)
+def test_a_hidden_effect_is_found_and_the_error_falls_to_the_floor(
+    model: Model, hidden: str, values: dict[str, float]
+) -> None:
+    found = diagnosed(model, hidden, values)
+    best = found.best
+    assert best is not None
+    names = {best.effect.label, *(e.label for e in best.indistinguishable)}
+    assert hidden in names
+    assert len(names) <= 3
+    assert found.verdict == "explained"
+    assert found.test_error.noise_floor is not None
+    assert found.test_error.before > 1.05 * found.test_error.after
+    assert found.test_error.after < 1.15 * found.test_error.noise_floor
+    assert best.test_error_after < best.test_error_before
+
+
+@pytest.mark.parametrize("name", ["viscous_friction", "coulomb_friction"])
+def test_plain_friction_is_found_where_the_model_has_none(model: Model, name: str) -> None:
+    train, test = recordings(model, None, {}, **NOISE)
+    found = find(model - f"{name}@elbow", Dataset(train), Dataset(test))
+    assert found.best is not None
+    assert f"{name}@elbow" in {
+        found.best.effect.label,
+        *(e.label for e in found.best.indistinguishable),
+    }
+
+
+def test_which_recordings_carry_the_payload_is_found_too(model: Model) -> None:
+    found = diagnosed(
+        model, "payload", {"payload.mass": 0.3, "payload.mx": 0.06, "payload.Izz": 0.02}
+    )
+    assert any("Payload carried in: synthetic 1, synthetic 3" in note for note in found.notes)
+
+
+def test_nothing_is_found_where_nothing_is_missing(model: Model) -> None:
+    found = diagnosed(model, None, {})
+    assert (found.verdict, found.steps) == ("nothing_missing", ())
+    assert found.test_error.before == found.test_error.after
+    assert not any(c.status == "material" for c in found.candidates)
+
+
+def test_an_effect_outside_the_catalogue_is_called_unknown(model: Model) -> None:
+    """A viscosity that varies with the position of the other joint."""
+    train, test = recordings(model, None, {}, **NOISE)
+
+    def strange(recording):
+        v = np.gradient(recording.q, 1 / 250.0, axis=0)
+        extra = np.zeros_like(v)
+        extra[:, 1] = 0.8 * v[:, 1] * np.sin(3 * recording.q[:, 0]) * np.sin(5 * recording.q[:, 1])
+        return recording.replace(tau=recording.tau + extra)
+
+    found = find(
+        model, Dataset(tuple(map(strange, train))), Dataset(tuple(map(strange, test)))
+    )
+    assert found.verdict == "unexplained"
+    assert "beyond the noise" in found.sentence
+
+
+def test_absorbed_effects_come_with_their_experiment(model: Model) -> None:
+    found = diagnosed(model, None, {})
+    absorbed = {c.effect.label: c for c in found.candidates if c.status == "absorbed"}
+    assert "rotor_inertia@shoulder" in absorbed
+    assert absorbed["rotor_inertia@shoulder"].p_value is None
+    assert "shoulder" in absorbed["rotor_inertia@shoulder"].remark
+
+
+def test_without_repetition_or_stated_noise_the_verdict_says_so(model: Model) -> None:
+    train, test = recordings(model, "stribeck_friction@elbow", {"Fs__elbow": 0.8}, **NOISE)
+    blind = [Dataset(tuple(r.replace(period=None) for r in part)) for part in (train, test)]
+    found = find(model, *blind)
+    assert found.noise_source == "unknown"
+    assert found.test_error.noise_floor is None
+    assert all(j.noise_rms is None and j.ratio_before is None for j in found.joints)
+    assert "noise is unknown" in found.sentence
+    assert any("plain least squares" in note for note in found.notes)
+    assert found.best is not None
+    assert found.best.effect.name == "stribeck_friction"
+
+
+def test_stated_noise_gives_a_floor_and_a_mark(model: Model) -> None:
+    train, test = recordings(model, None, {}, **NOISE)
+    told = [
+        Dataset(tuple(r.replace(period=None) for r in part), None, STATED)
+        for part in (train, test)
+    ]
+    found = find(model, *told)
+    measured = diagnosed(model, None, {})
+    assert found.noise_source == "given"
+    assert found.verdict == "nothing_missing"
+    assert any("not measured" in note for note in found.notes)
+    assert found.test_error.noise_floor is not None
+    assert measured.test_error.noise_floor is not None
+    assert found.test_error.noise_floor == pytest.approx(measured.test_error.noise_floor, rel=0.1)
+
+
+def test_without_test_recordings_blocks_are_held_out(model: Model) -> None:
+    train, test = recordings(model, "torque_offset@elbow", {"offset__elbow": 0.3}, **NOISE)
+    found = find(model, Dataset(train + test))
+    assert any("blocks of time" in note for note in found.notes)
+    assert found.best is not None
+    assert found.best.effect.label == "torque_offset@elbow"
+    assert found.test_error.after < 1.15 * (found.test_error.noise_floor or 0)
+
+
+def test_units_of_torque_do_not_change_the_answer(model: Model) -> None:
+    train, test = recordings(model, "quadratic_drag@shoulder", {"Fq__shoulder": 0.3}, **NOISE)
+    plain = find(model, Dataset(train), Dataset(test))
+    scaled = [Dataset(tuple(r.replace(tau=1e3 * r.tau) for r in part)) for part in (train, test)]
+    found = find(model, *scaled)
+    assert [s.effect.label for s in found.steps] == [s.effect.label for s in plain.steps]
+    assert found.test_error.after == pytest.approx(plain.test_error.after, rel=1e-6)
+    assert found.steps[0].values[0] == pytest.approx(1e3 * plain.steps[0].values[0], rel=1e-5)
+
+
+def test_the_answer_is_the_same_every_time_and_fits_json(model: Model) -> None:
+    one, two = (
+        diagnosed(model, "torque_offset@elbow", {"offset__elbow": 0.3}).to_dict() for _ in range(2)
+    )
+    assert json.dumps(one, allow_nan=False) == json.dumps(two, allow_nan=False)
+
+
+def test_compare_puts_models_side_by_side(model: Model) -> None:
+    train, test = recordings(model, "torque_offset@elbow", {"offset__elbow": 0.5}, **NOISE)
+    effect = effects_of("torque_offset@elbow", model.robot)
+    estimates = {
+        "before": fit_model(model, Dataset(train)),
+        "after": fit_model(model + effect, Dataset(train)),
+    }
+    result = compare(estimates, Dataset(test))
+    errors = [one.error for one in result.results]
+    assert errors[0] > 1.5 * errors[1]
+    assert result.results[1].floor == pytest.approx(errors[1], rel=0.1)
+    text = "\n".join(str(table) for table in result.tables())
+    assert "before" in text and "after" in text and "noise floor" in text
+    both = compare_models({"b": model, "a": model + effect}, Dataset(train), Dataset(test))
+    assert [r.error for r in both.results] == pytest.approx(errors, rel=0.05)
+
+
+def test_compare_needs_recordings_and_a_period_must_repeat(model: Model) -> None:
+    train, _ = recordings(model, None, {}, **NOISE)
+    with pytest.raises(FitError, match="no recording to compare"):
+        compare(fit_model(model, Dataset(train)), Dataset(()))
+    wrong = Dataset(tuple(r.replace(period=5.0) for r in train))
+    with pytest.raises(RecordingError, match="do not repeat"):
+        find(model, wrong)
