@@ -192,3 +192,9 @@ def test_an_old_report_is_replaced(found, tmp_path):
     report(found, path)
     assert path.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_an_unknown_noise_is_no_tick():
+    for noise, mark in ((True, "\u2713"), (False, "?")):
+        text = Elements(page(diagnosis(("slide",), noise=noise, samples=200))).text
+        assert text.split("What the model of bench arm lacks")[1].strip().startswith(mark)

@@ -4,6 +4,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 import pytest
+from IPython.core.formatters import PNGFormatter
 from matplotlib.figure import Figure
 from report.fabricated import RECORDINGS, diagnosis, effect
 
@@ -132,6 +133,7 @@ def test_static_pictures(names, tmp_path):
         for figure in (plots.waterfall(one), plots.residual_maps(one, names[1])):
             assert isinstance(figure, Figure)
             figure.savefig(tmp_path / "picture.png")
+            assert PNGFormatter()(figure)  # as a notebook shows it
 
 
 def test_figures_are_plotly_figures(found):

@@ -21,11 +21,6 @@ from dynident.report import pictures
 from dynident.report.content import after_name, first_set, ranked, seen, x_title
 from dynident.tables import Table, number, percent
 
-_VERDICTS = {
-    "nothing_missing": ("\u2713", "nothing missing"),
-    "explained": ("\u2713", "explained"),
-    "unexplained": ("?", "unexplained"),
-}
 _TRACE_BYTES = 2_400_000
 """What all torque traces together may take in the page."""
 _BYTES_PER_POINT = 54
@@ -87,10 +82,9 @@ def page(diagnosis: Diagnosis, *, command: str = "") -> str:
     return _template().render(
         d=diagnosis,
         robot=diagnosis.after.model.robot.name,
-        icon=_VERDICTS[diagnosis.verdict][0],
-        verdict=_VERDICTS[diagnosis.verdict][1],
+        sure=diagnosis.verdict != "unexplained" and diagnosis.noise_source != "unknown",
         added=after_name(diagnosis) if diagnosis.steps else "",
-        label=shlex.quote(diagnosis.best.effect.label) if diagnosis.best else "",
+        labels=[shlex.quote(step.effect.label) for step in diagnosis.steps],
         joints=_joint_table(diagnosis),
         steps=_step_table(diagnosis),
         torques=[(names[i], diagnosis.traces[i]) for i in order],
@@ -218,7 +212,7 @@ def _step_table(diagnosis: Diagnosis) -> Table:
     columns = (
         "effect added",
         "torque",
-        "values",
+        "values when added",
         "error before",
         "error after",
         "p",

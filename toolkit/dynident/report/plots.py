@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from io import BytesIO
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -22,10 +24,19 @@ from dynident.report.content import (
 )
 
 
+class _Picture(Figure):
+    """A figure that notebooks show without pyplot and its global state."""
+
+    def _repr_png_(self) -> bytes:
+        buffer = BytesIO()
+        self.savefig(buffer, format="png")
+        return buffer.getvalue()
+
+
 def waterfall(diagnosis: Diagnosis) -> Figure:
     """Held-out torque error as effects are added, down to the noise floor."""
     rows = bars(diagnosis)
-    figure = Figure(figsize=(7.0, 1.1 + 0.55 * len(rows)), layout="constrained")
+    figure = _Picture(figsize=(7.0, 1.1 + 0.55 * len(rows)), layout="constrained")
     axes = figure.subplots()
     for i, row in enumerate(rows):
         added = row.kind == "added"
@@ -66,7 +77,7 @@ def residual_maps(diagnosis: Diagnosis, joint: str) -> Figure:
     maps = maps_of(diagnosis, joint)
     columns = min(len(maps), 3)
     rows = -(-len(maps) // columns)
-    figure = Figure(figsize=(3.6 * columns, 0.5 + 2.6 * rows), layout="constrained")
+    figure = _Picture(figsize=(3.6 * columns, 0.5 + 2.6 * rows), layout="constrained")
     grid = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes in grid[len(maps) :]:
         axes.set_visible(False)
