@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from html import escape
-
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
@@ -28,24 +26,7 @@ from dynident.report.content import (
     x_title,
     y_title,
 )
-
-_FAINT = "rgba(128,128,128,0.25)"
-_AXIS = {
-    "gridcolor": _FAINT,
-    "zerolinecolor": "rgba(128,128,128,0.7)",
-    "title": {"standoff": 8, "font": {"size": 13}},
-}
-_LOOK = go.layout.Template(
-    layout={
-        "xaxis": _AXIS,
-        "yaxis": _AXIS,
-        "font": {"size": 13},
-        "paper_bgcolor": "rgba(0,0,0,0)",
-        "plot_bgcolor": "rgba(0,0,0,0)",
-        "legend": {"orientation": "h", "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"},
-        "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": GREY, "activecolor": AFTER_COLOUR},
-    }
-)
+from dynident.report.look import FAINT, dressed, plain
 
 
 def waterfall(diagnosis: Diagnosis) -> go.Figure:
@@ -84,11 +65,11 @@ def waterfall(diagnosis: Diagnosis) -> go.Figure:
         head = f"noise floor {100 * floor:.2f} %"
         place = {"x": 100 * floor, "xanchor": "left", "xshift": 4}
         figure.add_vrect(
-            x0=0, x1=100 * floor, fillcolor=_FAINT, line_width=0, layer="below"
+            x0=0, x1=100 * floor, fillcolor=FAINT, line_width=0, layer="below"
         ).add_vline(x=100 * floor, line={"color": GREY, "width": 2, "dash": "dash"})
     figure.add_annotation(text=head, y=1, yref="paper", yanchor="bottom", showarrow=False, **place)
     top = max(*(max(row.start, row.stop) for row in rows), 100 * (floor or 0.0), 1e-9)
-    ticks = ["<br>".join(_text(line) for line in row.lines) for row in rows]
+    ticks = ["<br>".join(plain(line) for line in row.lines) for row in rows]
     figure.update_xaxes(title="held-out torque error (%)", range=[0, 1.22 * top], fixedrange=True)
     figure.update_yaxes(
         tickvals=list(range(len(rows))),
@@ -101,7 +82,7 @@ def waterfall(diagnosis: Diagnosis) -> go.Figure:
         ticklabelstandoff=6,
     )
     height = 90 + sum(30 + 16 * len(row.lines) for row in rows)
-    return _dressed(figure, height, top=28)
+    return dressed(figure, height, top=28)
 
 
 def ranking(diagnosis: Diagnosis, most: int = 10) -> go.Figure:
@@ -140,14 +121,14 @@ def ranking(diagnosis: Diagnosis, most: int = 10) -> go.Figure:
     )
     figure.update_yaxes(
         tickvals=list(range(len(shown))),
-        ticktext=["<br>".join(_text(line) for line in wrapped(c.effect.title)) for c in shown],
+        ticktext=["<br>".join(plain(line) for line in wrapped(c.effect.title)) for c in shown],
         range=[len(shown) - 0.4, -0.6],
         automargin=True,
         fixedrange=True,
         zeroline=False,
         ticklabelstandoff=6,
     )
-    return _dressed(figure, 110 + 36 * max(len(shown), 1), right=60 if len(members) > 1 else 16)
+    return dressed(figure, 110 + 36 * max(len(shown), 1), right=60 if len(members) > 1 else 16)
 
 
 def residual_map(diagnosis: Diagnosis, one: ResidualMap) -> go.Figure:
@@ -157,7 +138,7 @@ def residual_map(diagnosis: Diagnosis, one: ResidualMap) -> go.Figure:
         "yaxis": {"title": {"text": y_title(one)}, **_map_zero(one)},
         "dragmode": False,
     }
-    return _dressed(go.Figure(_map_traces(diagnosis, one), layout), 310, top=30)
+    return dressed(go.Figure(_map_traces(diagnosis, one), layout), 310, top=30)
 
 
 def residual_maps(diagnosis: Diagnosis, joint: str) -> go.Figure:
@@ -184,7 +165,7 @@ def residual_maps(diagnosis: Diagnosis, joint: str) -> go.Figure:
             figure.add_trace(trace.update(legendgroup=trace.name), row=row, col=col)
         figure.update_xaxes(title=x_title(one), row=row, col=col)
         figure.update_yaxes(title=y_title(one), row=row, col=col, **_map_zero(one))
-    return _dressed(figure, 90 + 260 * count)
+    return dressed(figure, 90 + 260 * count)
 
 
 def measured_and_predicted(
@@ -228,7 +209,7 @@ def torques(diagnosis: Diagnosis, trace: Trace, points: int) -> go.Figure:
         figure.add_trace(_band(ends, edge, f"{BAND} (2 rms)"), row=2, col=1)
     for name, predicted, colour, dash in models:
         line = {"color": colour, "width": 1.8, "dash": dash}
-        group = {"name": _text(name), "legendgroup": name}
+        group = {"name": plain(name), "legendgroup": name}
         figure.add_trace(go.Scatter(x=t, y=_small(predicted), line=line, **group), row=1, col=1)
         line = {"color": colour, "width": 1.2}
         left = _small(measured - predicted)
@@ -240,7 +221,7 @@ def torques(diagnosis: Diagnosis, trace: Trace, points: int) -> go.Figure:
     figure.update_yaxes(title=f"torque ({trace.torque_unit})", row=1, col=1)
     figure.update_yaxes(title=f"residual ({trace.torque_unit})", row=2, col=1)
     # Below, where the buttons do not cover it.
-    return _dressed(figure, 580, top=34).update_layout(legend={"y": -0.13, "yanchor": "top"})
+    return dressed(figure, 580, top=34).update_layout(legend={"y": -0.13, "yanchor": "top"})
 
 
 def _map_traces(diagnosis: Diagnosis, one: ResidualMap) -> list[go.Scatter]:
@@ -262,7 +243,7 @@ def _map_traces(diagnosis: Diagnosis, one: ResidualMap) -> list[go.Scatter]:
                 x=at,
                 y=np.asarray(values, dtype=float),
                 mode=mode,
-                name=_text(name),
+                name=plain(name),
                 line={"color": colour, "width": 2},
                 marker={"symbol": symbol, "size": 6},
                 hovertemplate="%{x:.4g}: %{y:.4g}<extra></extra>",
@@ -280,7 +261,7 @@ def _band(x: np.ndarray, y: np.ndarray, name: str) -> go.Scatter:
         x=x,
         y=y,
         fill="toself",
-        fillcolor=_FAINT,
+        fillcolor=FAINT,
         mode="lines",
         line={"width": 0},
         hoverinfo="skip",
@@ -312,16 +293,6 @@ def _bracket(figure: go.Figure, members: list[int]) -> None:
     )
 
 
-def _text(words: str) -> str:
-    # Plotly reads tags, and mathematics between dollar signs.
-    return escape(words).replace("$", "&#36;")
-
-
 def _small(values: np.ndarray) -> np.ndarray:
     # Single precision is finer than any screen, and halves the page.
     return np.asarray(values, dtype=np.float32)
-
-
-def _dressed(figure: go.Figure, height: int, top: int = 10, right: int = 16) -> go.Figure:
-    margin = {"l": 62, "r": right, "t": top, "b": 46}
-    return figure.update_layout(template=_LOOK, height=height, margin=margin)
