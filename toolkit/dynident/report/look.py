@@ -33,6 +33,6 @@ def plain(words: str) -> str:
 
 
 def dressed(figure: go.Figure, height: int, top: int = 10, right: int = 16) -> go.Figure:
-    """Give a figure the package's look, a height and margins in pixels; the width is the screen's."""
+    """Give a figure the package's look; sizes in pixels, the width is the screen's."""
     margin = {"l": 62, "r": right, "t": top, "b": 46}
     return figure.update_layout(template=_LOOK, height=height, margin=margin)
