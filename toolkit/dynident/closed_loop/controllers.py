@@ -195,29 +195,31 @@ class ControllerFile(Table):
             If it does not fit the robot; `where` is the place in the file.
         """
 
-        def spread(value: float | Sequence[float] | None) -> tuple[float, ...]:
+        def spread(name: str) -> tuple[float, ...]:
+            value = getattr(self, name)
             if value is None:
                 return ()
-            many = isinstance(value, Sequence)
-            return tuple(value) if many else (float(value),) * robot.n
+            if not isinstance(value, Sequence):
+                return (float(value),) * robot.n
+            if len(value) != robot.n:
+                what, mend = f"{len(value)} values for {robot.n} joints", "give one per joint"
+                raise StudyError(what, f"{where}.{name}", mend)
+            return tuple(value)
 
+        kp, kd, kv, ki = (spread(name) for name in ("kp", "kd", "kv", "ki"))
         try:
-            controller = Controller(
+            return Controller(
                 self.kind,
                 self.rate_hz,
-                spread(self.kp),
-                spread(self.kd),
-                spread(self.kv),
-                spread(self.ki),
+                kp,
+                kd,
+                kv,
+                ki,
                 self.velocity_reference,
                 self.derivative_cutoff_hz,
-                None if self.limit is None else spread(self.limit),
+                spread("limit") or None,
                 self.delay_s,
             )
         except DynidentError as error:
-            raise StudyError(error.what, where, error.mend) from None
-        if controller.n != robot.n:
-            raise StudyError(
-                f"{controller.n} gains for {robot.n} joints", f"{where}.kp", "give one per joint"
-            )
-        return controller
+            key = (error.where or "").partition(".")[2]
+            raise StudyError(error.what, f"{where}.{key}".rstrip("."), error.mend) from None

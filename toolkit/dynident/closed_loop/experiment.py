@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import PurePosixPath
 from typing import Literal
 
@@ -108,6 +108,8 @@ class Experiment:
         if self.nominal is not None and self.nominal.names != self.robot.names:
             mend = f"the true robot has {', '.join(self.robot.names)}"
             raise SimulationError("the nominal robot has other joints", self.nominal.name, mend)
+        for part in fields(self.sensors):
+            self.sensors.each(part.name, self.robot.n)
         # Effects that do not fit the robot are refused here, before anything is simulated.
         checked = [replace(one, effect=one.effect.on(self.robot)) for one in self.effects]
         object.__setattr__(self, "effects", tuple(checked))

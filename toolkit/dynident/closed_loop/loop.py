@@ -18,10 +18,11 @@ from dynident.closed_loop.rollout import Task
 from dynident.errors import SimulationError
 from dynident.robot.drake import add_to_plant
 
-_SMALLEST_STEP = 1e-9
+_SMALLEST_STEP = 1e-4
+"""Of a sample; a motion that needs smaller ones is on its way to infinity."""
 _WINDOW = 200
 """Samples between looks at the whole motion."""
-_RUNAWAY = 1e3
+_RUNAWAY = 100.0
 """A state this many times beyond the reference's has left the earth."""
 
 
@@ -121,7 +122,7 @@ class Loop:
         ResetIntegratorFromFlags(simulator, "runge_kutta3", 2.0 / self._rate)
         integrator = simulator.get_mutable_integrator()
         integrator.set_target_accuracy(self._accuracy)
-        integrator.set_requested_minimum_step_size(_SMALLEST_STEP)
+        integrator.set_requested_minimum_step_size(_SMALLEST_STEP / self._rate)
         context = simulator.get_mutable_context()
         context.SetTime(time[0])
         held: Any = self._diagram.get_input_port().FixValue(context, np.zeros(size))

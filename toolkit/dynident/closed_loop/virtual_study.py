@@ -47,6 +47,7 @@ def write_experiment(
     if nominal.description is None:
         mend = "start from Robot.from_file or Robot.from_text"
         raise SimulationError("has no description that could be written", nominal.name, mend)
+    files.require_folder(folder)
     recordings = experiment.run(progress)
     try:
         folder.mkdir(parents=True, exist_ok=True)
