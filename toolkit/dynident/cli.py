@@ -11,13 +11,14 @@ import math
 import os
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
+from dynident import files
 from dynident.errors import DynidentError, DynidentWarning, FileError, StudyError
 
 if TYPE_CHECKING:
@@ -33,7 +34,9 @@ class _Group(click.Group):
         return list(self.commands)  # in the order of use, not of the alphabet
 
 
-@click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    cls=_Group, context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=False
+)
 @click.version_option(package_name="dynident")
 def commands() -> None:
     """Robot model identification that tells you what physics your model lacks.
@@ -41,7 +44,7 @@ def commands() -> None:
     \b
     dynident explain study.toml        where it fails, what is missing, and the error falling
     dynident add study.toml EFFECT     write the effect into the study
-    """
+    """  # noqa: D301
 
 
 @commands.command()
@@ -53,6 +56,7 @@ def explain(study: Path, as_json: bool, report: Path | None) -> None:
 
     Example: dynident explain problems/hidden_effect/study.toml --report report.html
     """
+    _require_places(study, report)
     diagnosis = _diagnosis(_load(study))
     _write_report(diagnosis, report)
     if as_json:
@@ -86,7 +90,12 @@ def diagnose(study: Path, as_json: bool) -> None:
 @click.option("--ordinary", is_flag=True, help="Ordinary least squares: joints not weighted.")
 @click.option("--essential", is_flag=True, help="Also list the essential parameters.")
 def fit(
-    study: Path, as_json: bool, out: Path | None, robot: Path | None, ordinary: bool, essential: bool
+    study: Path,
+    as_json: bool,
+    out: Path | None,
+    robot: Path | None,
+    ordinary: bool,
+    essential: bool,
 ) -> None:
     """Identify the parameters from the training recordings.
 
@@ -95,6 +104,7 @@ def fit(
     from dynident.fit import LeastSquares, essential_parameters, factorise, rows
     from dynident.fit import fit as fit_model
 
+    _require_places(study, out, robot)
     loaded = _load(study)
     with _progress("fitting"):
         method = LeastSquares("none" if ordinary else "joint")
@@ -159,17 +169,15 @@ def add(study: Path, effect: str, as_json: bool) -> None:
     fresh = tuple(one for one in effects if one not in loaded.model)
     if not fresh:
         raise StudyError(f"has {effect} already", str(study), "nothing was changed")
-    comparison = _comparison(loaded, (effect,))
-    payload = {}
     if any("payload" in one.needs for one in fresh):
         recordings = (loaded.train + loaded.test).recordings
         if not any(r.payload for r in recordings):
             mend = "set payload = true in the [[recordings]] that carry it"
             raise StudyError("no recording carries a payload", str(study), mend)
-    add_effects(study, fresh, payload)
-    result = comparison.to_dict()
+    comparison = _comparison(loaded, (effect,))
+    add_effects(study, fresh)
     if as_json:
-        _print_json({"added": [one.label for one in fresh], **result})
+        _print_json({"added": [one.label for one in fresh], **comparison.to_dict()})
     else:
         _show(*comparison.tables()[:1], f"Written into {study}.")
 
@@ -208,6 +216,7 @@ def report(study: Path, as_json: bool, to: Path) -> None:
 
     Example: dynident report study.toml --to report.html
     """
+    _require_places(study, to)
     diagnosis = _diagnosis(_load(study))
     _write_report(diagnosis, to)
     if as_json:
@@ -226,7 +235,9 @@ def demo(as_json: bool, to: Path) -> None:
 
     Example: dynident demo
     """
-    diagnosis = _diagnosis(_load(_demo_study()))
+    study = _demo_study()
+    _require_places(study, to)
+    diagnosis = _diagnosis(_load(study))
     _write_report(diagnosis, to)
     if as_json:
         _print_json(diagnosis.to_dict())
@@ -234,27 +245,53 @@ def demo(as_json: bool, to: Path) -> None:
         _show(*diagnosis.tables(), f"The report to open: {to.resolve()}")
 
 
-def main() -> None:
-    """Run the command; one line and an exit status for everything that can go wrong."""
-    warnings.showwarning = _show_warning
-    warnings.simplefilter("always", DynidentWarning)
-    try:
-        commands(standalone_mode=False)
-    except click.exceptions.Exit as stop:
-        sys.exit(stop.exit_code)
-    except click.ClickException as error:
-        error.show()
-        sys.exit(2)
-    except DynidentError as error:
-        click.echo(f"error: {error}", err=True)
-        sys.exit(2)
-    except (KeyboardInterrupt, click.Abort):
-        click.echo("interrupted; nothing was left half written", err=True)
-        sys.exit(130)
-    except BrokenPipeError:
-        # Whoever read us has gone: nothing to say, and nobody to say it to.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(0)
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command; one line and an exit status for everything that can go wrong.
+
+    Parameters
+    ----------
+    arguments : by default those of the process.
+    """
+    with warnings.catch_warnings():
+        warnings.showwarning = _show_warning
+        warnings.simplefilter("always", DynidentWarning)
+        try:
+            # With standalone_mode, click would word and print the errors its own way.
+            sys.exit(commands(arguments, "dynident", standalone_mode=False) or 0)
+        except click.exceptions.Exit as stop:
+            sys.exit(stop.exit_code)
+        except click.UsageError as error:
+            command = error.ctx.command_path if error.ctx else "dynident"
+            message = error.format_message()
+            end = " " if message.endswith(("?", ".")) else ". "
+            _fail(f"{message}{end}See `{command} --help`")
+        except click.ClickException as error:
+            _fail(error.format_message())
+        except DynidentError as error:
+            _fail(str(error))
+        except (KeyboardInterrupt, click.Abort):
+            click.echo("interrupted; nothing was left half written", err=True)
+            sys.exit(130)
+        except BrokenPipeError:
+            # Whoever read us has gone: nothing to say, and nobody to say it to.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            sys.exit(0)
+
+
+def _fail(message: str) -> NoReturn:
+    """Say on one line why the input is unusable, and end."""
+    click.echo(f"error: {' '.join(message.splitlines())}", err=True)
+    sys.exit(2)
+
+
+def _require_places(study: Path, *paths: Path | None) -> None:
+    """Refuse files that could not be written, before the work that they are to hold is done."""
+    for path in paths:
+        if path is None:
+            continue
+        files.require_place(path)
+        if path.resolve() == study.resolve():
+            raise FileError("is the study itself", str(path), "write to another file")
 
 
 def _load(path: Path) -> Study:

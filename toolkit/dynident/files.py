@@ -46,6 +46,45 @@ def read_text(path: str | Path) -> str:
         ) from None
 
 
+def require_place(path: str | Path) -> Path:
+    """Refuse a file that could not be written, before the work that it is to hold is done.
+
+    Raises
+    ------
+    FileError
+        If its folder is missing or may not be written, or a folder is there in its place.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise FileError("is a folder, not a file", str(path), "name a file in it")
+    if not path.parent.is_dir():
+        what = "is a file" if path.parent.exists() else "no such folder"
+        raise FileError(what, str(path.parent), "name a file in a folder that is there")
+    _require_writable(path.parent)
+    return path
+
+
+def require_folder(path: str | Path) -> Path:
+    """Refuse a folder that could neither be used nor made, before the work is done.
+
+    Raises
+    ------
+    FileError
+        If a file is in its place or in its way, or the folder above may not be written.
+    """
+    path = Path(path)
+    above = next(one for one in (path, *path.absolute().parents) if one.exists())
+    if not above.is_dir():
+        raise FileError("is a file, not a folder", str(above), "name another folder")
+    _require_writable(above)
+    return path
+
+
+def _require_writable(folder: Path) -> None:
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise FileError("may not be written", str(folder), "choose another folder")
+
+
 def write_bytes(path: str | Path, data: bytes) -> Path:
     """Write a file in one step: to a temporary neighbour first, then renamed.
 

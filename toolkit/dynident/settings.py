@@ -56,8 +56,14 @@ def _complaint(error: ValidationError, path: Path, schema: type[BaseModel]) -> S
         return StudyError(
             f"unknown key '{key}'", str(path), nearest(str(first["loc"][-1]), names, "keys")
         )
+    if first["type"] == "missing" and isinstance(first["loc"][-1], int):
+        return StudyError(f"{key.rpartition('.')[0]}: too few values", str(path), "add the rest")
     if first["type"] == "missing":
         return StudyError(f"key '{key}' is missing", str(path), "add it")
+    if first["type"] == "model_type":
+        return StudyError(
+            f"{key}: a table is needed here", str(path), "write [name] or { key = 1 }"
+        )
     return StudyError(f"{key}: {first['msg'][:1].lower()}{first['msg'][1:]}", str(path))
 
 

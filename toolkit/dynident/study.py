@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import re
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -13,10 +18,19 @@ from pydantic import Field
 from dynident import files
 from dynident.closed_loop import Controller, ControllerFile
 from dynident.effects import FRICTION_WIDTH, Effect, effects_of
-from dynident.errors import DynidentError, StudyError
+from dynident.errors import DynidentError, RobotError, StudyError
 from dynident.model import Model
 from dynident.places import find_data
-from dynident.recording import Column, Dataset, Filter, Noise, Recording, read
+from dynident.recording import (
+    Column,
+    Dataset,
+    Filter,
+    Noise,
+    Recording,
+    read,
+    require_motion,
+    require_torque,
+)
 from dynident.robot import Robot
 from dynident.settings import Table, read_toml
 
@@ -53,7 +67,7 @@ class _ColumnEntry(Table):
 class _StudyFile(Table):
     robot: str
     joints: list[str] | None = None
-    effects: list[str] = []
+    effects: list[str] = Field(default_factory=list)
     torque: Literal["measured", "held_command"] = "measured"
     friction_width: float = Field(default=FRICTION_WIDTH, gt=0)
     gravity: tuple[float, float, float] | None = None
@@ -61,7 +75,7 @@ class _StudyFile(Table):
     filter: _FilterEntry | None = None
     noise: _NoiseEntry | None = None
     controller: ControllerFile | None = None
-    columns: dict[str, str | _ColumnEntry] = {}
+    columns: dict[str, str | _ColumnEntry] = Field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -103,16 +117,15 @@ def load(path: str | Path) -> Study:
     said = read_toml(path, _StudyFile)
     if not said.recordings:
         raise StudyError("no [[recordings]]", str(path), "add at least one")
-    robot = Robot.from_file(path.parent / said.robot, said.joints)
-    if said.gravity is not None:
-        robot = robot.with_gravity(np.array(said.gravity))
+    robot = _robot(said, path)
     try:
         effects = tuple(effect for label in said.effects for effect in effects_of(label, robot))
         model = Model(robot, effects, said.friction_width)
     except DynidentError as error:
         raise StudyError(str(error), f"{path}: effects") from None
     recordings = _recordings(said, path, robot)
-    settings = Filter(**said.filter.model_dump()) if said.filter else None
+    with _in(path, "filter"):
+        settings = Filter(**said.filter.model_dump()) if said.filter else None
     noise = None
     if said.noise:
         noise = Noise(
@@ -126,41 +139,101 @@ def load(path: str | Path) -> Study:
     if not sets["train"].recordings:
         mend = 'set use = "train" for some of them'
         raise StudyError("no recording is for training", str(path), mend)
+    for dataset in sets.values():
+        require_torque(dataset.recordings)
+    require_motion(sets["train"].recordings, robot.kinds)
     controller = None
     if said.controller:
         controller = said.controller.controller(robot, f"{path}: controller")
     return Study(path, model, sets["train"], sets["test"], controller)
 
 
-def add_effects(path: str | Path, effects: tuple[Effect, ...], payload: dict[str, bool]) -> None:
+def add_effects(path: str | Path, effects: tuple[Effect, ...]) -> None:
     """Write effects into a study file, comments and order untouched.
 
     Parameters
     ----------
     path : the study file.
     effects : to add to its list.
-    payload : file of a recording -> whether it carries the payload; written where not empty.
+
+    Raises
+    ------
+    StudyError
+        If there is no way to do so that leaves all else in the file as it is.
     """
     path = Path(path)
-    document = tomlkit.parse(files.read_text(path))
-    labels = document.get("effects")
-    if labels is None:
-        labels = tomlkit.array()
-        # Top-level keys come before the first table.
-        document.insert(0, tomlkit.key("effects"), labels)  # type: ignore[attr-defined]
-    for effect in effects:
-        labels.append(effect.label)  # type: ignore[union-attr]
-    for entry in document.get("recordings", []):
-        if entry["file"] in payload:
-            entry["payload"] = payload[entry["file"]]
-    files.write_text(path, tomlkit.dumps(document))
+    text = files.read_text(path)
+    labels = [effect.label for effect in effects]
+    wanted = tomllib.loads(text)
+    wanted["effects"] = sorted([*wanted.get("effects", []), *labels])
+    for candidate in _with_effects(text, labels):
+        try:
+            said = tomllib.loads(candidate)
+        except tomllib.TOMLDecodeError:
+            continue
+        if {**said, "effects": sorted(said.get("effects", []))} == wanted:
+            files.write_text(path, candidate)
+            return
+    mend = f"write them into it: {', '.join(labels)}"
+    raise StudyError("the effects cannot be added to this file", str(path), mend)
+
+
+def _with_effects(text: str, labels: list[str]) -> Iterator[str]:
+    """Yield texts of a study with more effects, nicest first; not every one need be valid."""
+    document = tomlkit.parse(text)
+    if "effects" not in document:
+        # A top-level key comes before the first table; `robot` is always there.
+        line = f"effects = {json.dumps(labels)}"
+        newline = "\r\n" if "\r\n" in text else "\n"
+        yield re.sub(
+            r"^[ \t]*robot[ \t]*=[^\r\n]*",
+            lambda found: found[0] + newline + line,
+            text,
+            count=1,
+            flags=re.MULTILINE,
+        )
+        yield line + newline + text
+        return
+    document["effects"].extend(labels)  # type: ignore[union-attr]
+    yield tomlkit.dumps(document)
+    # tomlkit 0.15 forgets the comma after a last item with a comment behind it.
+    document = tomlkit.parse(text)
+    for label in reversed(labels):
+        document["effects"].insert(0, label)  # type: ignore[union-attr]
+    yield tomlkit.dumps(document)
+
+
+@contextmanager
+def _in(path: Path, key: str) -> Iterator[None]:
+    """Name the file in complaints about one of its tables."""
+    try:
+        yield
+    except DynidentError as error:
+        raise StudyError(error.what, f"{path}: {key}", error.mend) from None
+
+
+def _robot(said: _StudyFile, path: Path) -> Robot:
+    file = path.parent / said.robot
+    try:
+        robot = Robot.from_file(file, said.joints, said.gravity)
+    except RobotError as error:
+        if said.joints is None:
+            raise
+        Robot.from_file(file)  # it is either unusable, or it is the choice of joints
+        raise StudyError(str(error), f"{path}: joints") from None
+    for link in robot.links:
+        if not np.all(np.isfinite(link.phi)):
+            what, mend = "its inertia is not finite", "mend the numbers of its inertial element"
+            raise RobotError(what, f"{file}: link '{link.name}'", mend)
+    return robot
 
 
 def _recordings(said: _StudyFile, path: Path, robot: Robot) -> list[Recording]:
-    columns = {
-        ours: Column(theirs, 1.0) if isinstance(theirs, str) else Column(**theirs.model_dump())
-        for ours, theirs in said.columns.items()
-    }
+    with _in(path, "columns"):
+        columns = {
+            ours: Column(theirs, 1.0) if isinstance(theirs, str) else Column(**theirs.model_dump())
+            for ours, theirs in said.columns.items()
+        }
     known: dict[Path, Recording] = {}
     found = []
     for entry in said.recordings:

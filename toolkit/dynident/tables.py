@@ -6,6 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
+WIDTH = 110
+"""Characters of a line where no terminal says how wide it is."""
+
 
 @dataclass(frozen=True)
 class Table:
@@ -41,7 +44,7 @@ class Table:
     def __str__(self) -> str:
         from rich.console import Console
 
-        console = Console(width=110, color_system=None, force_terminal=False)
+        console = Console(width=WIDTH, color_system=None, force_terminal=False)
         with console.capture() as capture:
             _print(console, self)
         return capture.get()
@@ -49,9 +52,16 @@ class Table:
 
 def print_tables(*tables: Table | str) -> None:
     """Print tables and sentences to standard output, one after another."""
+    import sys
+
     from rich.console import Console
 
-    console = Console(highlight=False)
+    class Terminal(Console):
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError  # for the command to handle; rich would end the process
+
+    # A file or a pipe has no width of its own: wide enough for every column.
+    console = Terminal(highlight=False, width=None if sys.stdout.isatty() else WIDTH)
     for table in tables:
         if isinstance(table, str):
             console.print(table, markup=False)
@@ -84,7 +94,9 @@ def _print(console, table: Table) -> None:
     for index, column in enumerate(table.columns):
         cells: Sequence[str] = [row[index] for row in table.rows]
         numeric = bool(cells) and all(_is_number(cell) for cell in cells)
-        shown.add_column(Text(column), justify="right" if numeric else "left")
+        # The first column names things that a user types: never shortened.
+        justify = "right" if numeric else "left"
+        shown.add_column(Text(column), justify=justify, no_wrap=index == 0, overflow="fold")
     for row in table.rows:
         shown.add_row(*(Text(cell) for cell in row))
     console.print(shown)

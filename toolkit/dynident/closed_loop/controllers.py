@@ -16,12 +16,13 @@ from dynident.settings import Table
 if TYPE_CHECKING:
     from dynident.robot import Robot
 
-Kind = Literal["pd", "pid", "cascade"]
+Kind = Literal["pd", "pid", "cascade", "computed_torque"]
 KINDS: tuple[str, ...] = get_args(Kind)
 GAINS: dict[str, tuple[str, ...]] = {
     "pd": ("kp", "kd"),
     "pid": ("kp", "ki", "kd"),
     "cascade": ("kp", "kv"),
+    "computed_torque": ("kp", "kd"),
 }
 """The gains of each kind."""
 
@@ -35,20 +36,25 @@ class Controller:
     - "pd": u = kp e + kd (v_ref - v)
     - "pid": u = kp e + ki (integral of e) + kd (v_ref - v)
     - "cascade": u = kv (kp e - v)
+    - "computed_torque": u = M(q) (a_ref + kp e + kd (v_ref - v)) + h(q, v), M and h of the given
+      robot; it can be stated, and is not simulated yet
 
     v is the backward difference of the measured position, through a first-order low-pass where
     `derivative_cutoff_hz` is given. The integral stands still while the torque is at its limit.
 
     Attributes
     ----------
-    kind : "pd", "pid" or "cascade".
-    rate_hz : samples per second; each command is held from its sample to the next.
+    kind : "pd", "pid", "cascade" or "computed_torque".
+    rate_hz : samples per second; each command is held from its sample to the next. None where it
+        is not stated: such a loop cannot be simulated.
     kp, ki, kd, kv : (n,) gains of each joint, none negative. kp, ki, kd in N m/rad, N m/(rad s)
-        and N m s/rad (N/m, ... for prismatic joints); of a cascade, kp in 1/s and kv in N m s/rad.
+        and N m s/rad (N/m, ... for prismatic joints); of a cascade, kp in 1/s and kv in N m s/rad;
+        of a computed torque, kp in 1/s^2 and kd in 1/s.
     velocity_reference : False sets v_ref = 0 (a cascade has no v_ref).
     derivative_cutoff_hz : Hz, or None for the bare difference.
     limit : (n,) N m or N, greatest magnitude of the command, or None.
     delay_s : s from a sample to its command. Stated for the record; it is not simulated yet.
+    feedforward : whether the torque of the given robot along the reference is added. Likewise.
 
     Raises
     ------
@@ -57,7 +63,7 @@ class Controller:
     """
 
     kind: Kind
-    rate_hz: float
+    rate_hz: float | None
     kp: tuple[float, ...]
     kd: tuple[float, ...] = ()
     kv: tuple[float, ...] = ()
@@ -66,6 +72,7 @@ class Controller:
     derivative_cutoff_hz: float | None = None
     limit: tuple[float, ...] | None = None
     delay_s: float = 0.0
+    feedforward: bool = False
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -97,6 +104,29 @@ class Controller:
         """Number of joints."""
         return len(self.kp)
 
+    def simulated_rate(self) -> float:
+        """Return `rate_hz`, if this controller can be simulated.
+
+        Raises
+        ------
+        SimulationError
+            If `rate_hz` is not stated, or something is that cannot be simulated yet.
+        """
+        if self.kind == "computed_torque":
+            mend = "simulate a pd, pid or cascade controller"
+            what = "a computed torque cannot be simulated yet"
+            raise SimulationError(what, "controller.kind", mend)
+        if self.feedforward:
+            what = "feedforward cannot be simulated yet"
+            raise SimulationError(what, "controller.feedforward", "leave it out")
+        if self.delay_s > 0:
+            what = f"a delay of {self.delay_s:g} s cannot be simulated yet"
+            raise SimulationError(what, "controller.delay_s", "leave it out")
+        if self.rate_hz is None:
+            what = "the controller's rate is not stated"
+            raise SimulationError(what, "controller.rate_hz", "give its samples per second")
+        return self.rate_hz
+
     def _check_gain(self, name: str, value: tuple[float, ...]) -> None:
         where, wanted = f"controller.{name}", name in GAINS[self.kind]
         if bool(value) != wanted:
@@ -121,13 +151,7 @@ class Drive:
     """
 
     def __init__(self, controller: Controller, q: np.ndarray, v: np.ndarray) -> None:
-        if controller.delay_s > 0:
-            raise SimulationError(
-                f"a delay of {controller.delay_s:g} s cannot be simulated yet",
-                "controller.delay_s",
-                "leave it out",
-            )
-        n, self._rate = controller.n, controller.rate_hz
+        n, self._rate = controller.n, controller.simulated_rate()
         self._kp = np.array(controller.kp)
         if controller.kind == "cascade":
             # kv (kp e - v) is a PD law without reference velocity.
@@ -176,7 +200,7 @@ class ControllerFile(Table):
     """The table [controller] of a study or an experiment file."""
 
     kind: Kind
-    rate_hz: float = Field(gt=0)
+    rate_hz: float | None = Field(default=None, gt=0)
     kp: float | list[float]
     kd: float | list[float] | None = None
     kv: float | list[float] | None = None
@@ -185,6 +209,7 @@ class ControllerFile(Table):
     derivative_cutoff_hz: float | None = Field(default=None, gt=0)
     limit: float | list[float] | None = None
     delay_s: float = Field(default=0.0, ge=0)
+    feedforward: bool = False
 
     def controller(self, robot: Robot, where: str) -> Controller:
         """Return the controller of a robot; a single number stands for every joint.
@@ -219,6 +244,7 @@ class ControllerFile(Table):
                 self.derivative_cutoff_hz,
                 spread("limit") or None,
                 self.delay_s,
+                self.feedforward,
             )
         except DynidentError as error:
             key = (error.where or "").partition(".")[2]

@@ -110,6 +110,7 @@ class Experiment:
             raise SimulationError("the nominal robot has other joints", self.nominal.name, mend)
         for part in fields(self.sensors):
             self.sensors.each(part.name, self.robot.n)
+        self.controller.simulated_rate()
         # Effects that do not fit the robot are refused here, before anything is simulated.
         checked = [replace(one, effect=one.effect.on(self.robot)) for one in self.effects]
         object.__setattr__(self, "effects", tuple(checked))

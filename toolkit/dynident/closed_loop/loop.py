@@ -30,7 +30,7 @@ class Loop:
     """The diagram of some tasks; all vectors are stacked task by task (N joints in all)."""
 
     def __init__(self, tasks: Sequence[Task], controller: Controller, accuracy: float) -> None:
-        self._tasks, self._accuracy, self._rate = tasks, accuracy, controller.rate_hz
+        self._tasks, self._accuracy, self._rate = tasks, accuracy, controller.simulated_rate()
         self._joints = [
             (task.name, name, unit)
             for task in tasks

@@ -64,7 +64,7 @@ def simulate(
     n = tasks[0].mechanism.robot.n
     for task in tasks:
         _check(task, n, controller)
-    rate = controller.rate_hz
+    rate = controller.simulated_rate()
     before = _samples(lead_in, rate, "lead_in", 0)
     kept = [_samples(task.duration, rate, "duration", 2) for task in tasks]
     total = before + max(kept)

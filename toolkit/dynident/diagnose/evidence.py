@@ -17,7 +17,15 @@ from dynident.diagnose.noise import ORDER, NoiseModel
 from dynident.effects import Block, Effect, JointEffect
 from dynident.fit.sampling import Sampled, sample
 from dynident.model import Model
-from dynident.recording import Dataset, Noise, Recording, periods, require_repetition, uniform
+from dynident.recording import (
+    Dataset,
+    Noise,
+    Recording,
+    periods,
+    require_repetition,
+    require_torque,
+    uniform,
+)
 
 COPIES = 4
 """Noisy copies of each recording where the noise is stated and nothing repeats."""
@@ -70,8 +78,10 @@ def gather(dataset: Dataset, seed: int = 0) -> tuple[Run, ...]:
     Raises
     ------
     RecordingError
-        If a recording is too short for its filter, or for two of its periods.
+        If a recording is too short for its filter, or for two of its periods, or there is no
+        torque at all.
     """
+    require_torque(dataset.recordings)
     per_run = max(3, -(-BLOCKS // len(dataset.recordings)))
     runs = []
     streams = np.random.default_rng(seed).spawn(len(dataset.recordings))

@@ -4,7 +4,8 @@
 through `Column`), `Recording` checks them. `uniform` puts jittered time stamps on a uniform clock.
 `differentiate` turns positions into a `Motion`; `ParallelFilter` passes regressor columns and
 torque through one low-pass and decimation, in blocks if asked; both follow a `Filter`.
-`within`, `away_from_edges` and `moving` pick rows; `periods` lays repetitions side by side.
+`within`, `away_from_edges` and `moving` pick rows; `periods` lays repetitions side by side;
+`require_motion` and `require_torque` refuse recordings that show nothing.
 """
 
 from dynident.recording.columns import Column
@@ -18,6 +19,7 @@ from dynident.recording.filters import (
     lowpass,
 )
 from dynident.recording.masks import away_from_edges, moving, within
+from dynident.recording.motion_check import require_motion, require_torque
 from dynident.recording.parallel import FilterBlock, ParallelFilter, choose_factor
 from dynident.recording.periods import Periods, mismatch, periods, require_repetition
 from dynident.recording.read import SUFFIXES, read
@@ -47,7 +49,9 @@ __all__ = [
     "moving",
     "periods",
     "read",
+    "require_motion",
     "require_repetition",
+    "require_torque",
     "uniform",
     "within",
     "write",

@@ -1,0 +1,61 @@
+"""The command `dynident` in this process, with everything that it says."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from study_files import STUDY, write_study
+
+from dynident.cli import main
+
+
+@dataclass(frozen=True)
+class Done:
+    """What a run of the command left behind."""
+
+    status: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> dict[str, Any]:
+        """The one JSON object on standard output, and nothing beside it."""
+        found = json.loads(self.out)
+        assert isinstance(found, dict)
+        assert self.out.count("\n") == 1 and self.out.endswith("\n")
+        return found
+
+
+Run = Callable[..., Done]
+
+
+@pytest.fixture
+def run(capfd, tmp_path, monkeypatch) -> Run:
+    """Run the command as the shell would, in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("DYNIDENT_DATA", raising=False)
+
+    def call(*arguments: str | Path) -> Done:
+        capfd.readouterr()
+        with pytest.raises(SystemExit) as stop:
+            main([os.fspath(one) for one in arguments])
+        said = capfd.readouterr()
+        return Done(int(stop.value.code or 0), said.out, said.err)
+
+    return call
+
+
+@pytest.fixture
+def study(tmp_path) -> Callable[..., Path]:
+    """Write a study with its robot and recordings; return its path."""
+
+    def make(text: str = STUDY) -> Path:
+        return write_study(tmp_path, text)
+
+    return make
