@@ -62,9 +62,7 @@ UNIT: dict[str, tuple[tuple[float, ...], tuple[tuple[float, float], ...]]] = {
 }
 """Values of each effect at strength one, up to a factor, and ranges of its shape parameters."""
 
-CONTROLLER = Controller(
-    "pd", 1000.0, (1500.0, 600.0), (80.0, 30.0), derivative_cutoff_hz=80.0
-)
+CONTROLLER = Controller("pd", 1000.0, (1500.0, 600.0), (80.0, 30.0), derivative_cutoff_hz=80.0)
 SENSORS = Sensors(position_std=2e-5, torque_std=0.1)
 PERIOD, DURATION, RUNS, TESTS = 8.0, 16.0, 4, 2
 
@@ -130,7 +128,7 @@ def _recordings(
 ) -> tuple[Recording, ...]:
     made = tuple(
         Run(
-            Fourier.random(robot, PERIOD, [case.seed, r], 5, amplitude=[1.6, 1.8], speed=[2.5, 3.0]),
+            Fourier.random(robot, PERIOD, [case.seed, r], amplitude=[1.6, 1.8], speed=[2.5, 3.0]),
             DURATION,
             f"run{r + 1}.csv",
             payload=r % 2 == 1,
@@ -216,7 +214,7 @@ def cases(strengths: list[float], healthy: int, seed: int = 0) -> list[Case]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--strengths", type=float, nargs="*", default=[1.0, 3.0, 10.0])
     parser.add_argument("--healthy", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
@@ -227,12 +225,13 @@ def main() -> None:
     todo = cases(options.strengths, options.healthy, options.seed)
     if options.effects is not None:
         todo = [c for c in todo if c.effect in options.effects]
-    outcomes = []
+    outcomes: list[Outcome] = []
     stream = Parallel(n_jobs=options.jobs, return_as="generator")(
         delayed(run_case)(case) for case in todo
     )
     print(f"{'hidden':38s} {'ratio':>6s} {'right':>5s}  first suggestion [cannot be told from]")
     for outcome in stream:
+        assert outcome is not None
         outcomes.append(outcome)
         others = f" [{', '.join(outcome.alternatives)}]" if outcome.alternatives else ""
         print(

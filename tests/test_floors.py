@@ -13,7 +13,7 @@ PACKAGE = Path(__file__).parents[1] / "toolkit" / "dynident"
 FLOORS = [
     ("errors",),
     ("files", "tables"),
-    ("settings", "places"),
+    ("settings", "places", "threads"),
     ("inertia",),
     ("recording",),
     ("robot",),
@@ -93,9 +93,6 @@ def test_every_file_has_a_docstring_and_most_are_short() -> None:
 
 def test_importing_the_package_loads_nothing_heavy() -> None:
     heavy = ("pydrake", "pinocchio", "plotly", "matplotlib", "casadi", "scipy", "pandas", "numpy")
-    code = (
-        "import sys, dynident, dynident.cli; "
-        f"print([m for m in {heavy!r} if m in sys.modules])"
-    )
+    code = f"import sys, dynident, dynident.cli; print([m for m in {heavy!r} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

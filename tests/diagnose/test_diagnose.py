@@ -6,7 +6,6 @@ import json
 
 import numpy as np
 import pytest
-from synthetic import arm, synthetic, true_values
 
 from dynident import compare
 from dynident import diagnose as find
@@ -16,6 +15,7 @@ from dynident.effects import effects_of
 from dynident.errors import FitError, RecordingError
 from dynident.model import Model
 from dynident.recording import Dataset, Noise
+from synthetic import arm, synthetic, true_values
 
 FRICTION = {"Fv__shoulder": 1.2, "Fv__elbow": 0.5, "Fc__shoulder": 1.5, "Fc__elbow": 0.6}
 NOISE = {"position_std": 2e-5, "torque_std": 0.3}
@@ -113,9 +113,7 @@ def test_an_effect_outside_the_catalogue_is_called_unknown(model: Model) -> None
         extra[:, 1] = 0.8 * v[:, 1] * np.sin(3 * recording.q[:, 0]) * np.sin(5 * recording.q[:, 1])
         return recording.replace(tau=recording.tau + extra)
 
-    found = find(
-        model, Dataset(tuple(map(strange, train))), Dataset(tuple(map(strange, test)))
-    )
+    found = find(model, Dataset(tuple(map(strange, train))), Dataset(tuple(map(strange, test))))
     assert found.verdict == "unexplained"
     assert "beyond the noise" in found.sentence
 
@@ -144,8 +142,7 @@ def test_without_repetition_or_stated_noise_the_verdict_says_so(model: Model) ->
 def test_stated_noise_gives_a_floor_and_a_mark(model: Model) -> None:
     train, test = recordings(model, None, {}, **NOISE)
     told = [
-        Dataset(tuple(r.replace(period=None) for r in part), None, STATED)
-        for part in (train, test)
+        Dataset(tuple(r.replace(period=None) for r in part), None, STATED) for part in (train, test)
     ]
     found = find(model, *told)
     measured = diagnosed(model, None, {})

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from synthetic import arm, smooth_motion, synthetic, true_values
 
 from dynident import fit as fit_model
 from dynident.errors import FitError, RecordingError
@@ -12,6 +11,7 @@ from dynident.fit import LeastSquares, essential_parameters, factorise, load_est
 from dynident.model import Model
 from dynident.recording import Dataset, Filter
 from dynident.robot import Robot
+from synthetic import arm, smooth_motion, synthetic, true_values
 
 QUIET = Filter(None, None, 100.0, edge_s=(0.02, 0.02))
 
@@ -28,9 +28,7 @@ def truth(model: Model) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def noisy(model: Model, truth: np.ndarray) -> Dataset:
-    return Dataset(
-        tuple(synthetic(model, truth, s, torque_std=0.2) for s in range(3)), QUIET
-    )
+    return Dataset(tuple(synthetic(model, truth, s, torque_std=0.2) for s in range(3)), QUIET)
 
 
 def test_factors_of_any_blocks_give_the_same_answer_as_one_dense_solve() -> None:
@@ -86,18 +84,14 @@ def test_units_of_torque_and_order_of_joints_do_not_matter(
     model: Model, truth: np.ndarray, noisy: Dataset
 ) -> None:
     plain = fit_model(model, noisy)
-    thousand = Dataset(
-        tuple(r.replace(tau=1000 * r.tau) for r in noisy.recordings), noisy.filter
-    )
+    thousand = Dataset(tuple(r.replace(tau=1000 * r.tau) for r in noisy.recordings), noisy.filter)
     scaled = fit_model(model, thousand)
     assert np.allclose(scaled.values, 1000 * plain.values, rtol=1e-8)
     assert scaled.error == pytest.approx(plain.error, rel=1e-10)
     swapped = arm()
     swapped = Robot.from_text(swapped.description.text, joints=["elbow", "shoulder"])  # type: ignore[union-attr]
     other = Model(swapped, model.effects)
-    turned = Dataset(
-        tuple(r.select(["elbow", "shoulder"]) for r in noisy.recordings), noisy.filter
-    )
+    turned = Dataset(tuple(r.select(["elbow", "shoulder"]) for r in noisy.recordings), noisy.filter)
     found = fit_model(other, turned)
     assert found.error == pytest.approx(plain.error, rel=1e-9)
     for name in ("Fv@elbow", "Fc@shoulder"):

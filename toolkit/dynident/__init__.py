@@ -1,15 +1,15 @@
 """dynident: robot model identification that tells you what physics your model lacks.
 
-    import dynident as di
+import dynident as di
 
-    study = di.load("problems/emps/study.toml")
-    fit = di.fit(study.model, study.train)
-    di.compare(fit, study.test).show()
-    d = di.diagnose(fit, study.train, study.test)
-    d.show()
-    better = di.fit(study.model + d.best.effect, study.train)
-    di.compare({"before": fit, "after": better}, study.test).show()
-    di.report(d, to="report.html")
+study = di.load("problems/emps/study.toml")
+fit = di.fit(study.model, study.train)
+di.compare(fit, study.test).show()
+d = di.diagnose(fit, study.train, study.test)
+d.show()
+better = di.fit(study.model + d.best.effect, study.train)
+di.compare({"before": fit, "after": better}, study.test).show()
+di.report(d, to="report.html")
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ _HOME = {
     "write_experiment": "closed_loop",
 }
 
-__all__ = sorted(_HOME)
+__all__ = list(_HOME)  # pyright: ignore[reportUnsupportedDunderAll]
 
 if TYPE_CHECKING:
     from dynident.closed_loop import Controller, Experiment, load_experiment, write_experiment

@@ -41,10 +41,8 @@ class _Group(click.Group):
 def commands() -> None:
     """Robot model identification that tells you what physics your model lacks.
 
-    \b
-    dynident explain study.toml        where it fails, what is missing, and the error falling
-    dynident add study.toml EFFECT     write the effect into the study
-    """  # noqa: D301
+    Example: dynident explain study.toml --report report.html
+    """
 
 
 @commands.command()
@@ -54,7 +52,7 @@ def commands() -> None:
 def explain(study: Path, as_json: bool, report: Path | None) -> None:
     """Run the whole loop: compare, diagnose, add, refit, compare. The study stays as it is.
 
-    Example: dynident explain problems/hidden_effect/study.toml --report report.html
+    Example: dynident explain study.toml --report report.html
     """
     _require_places(study, report)
     diagnosis = _diagnosis(_load(study))
@@ -109,22 +107,26 @@ def fit(
     with _progress("fitting"):
         method = LeastSquares("none" if ordinary else "joint")
         estimate = fit_model(loaded.model, loaded.train, method)
-        tables = list(estimate.tables())
+        tables, result = list(estimate.tables()), estimate.to_dict()
         if essential:
             factors = factorise(rows(estimate.model, loaded.train, estimate.values))
-            tables.append(essential_parameters(estimate.model, factors).table())
+            found = essential_parameters(estimate.model, factors)
+            tables.append(found.table())
+            result["essential"] = list(found.names)
     if out:
         estimate.save(out)
     if robot:
         estimate.write_robot(robot)
         broken = estimate.inconsistent_links()
         if broken:
-            tables.append(
-                "No rigid body can have these parameters: "
-                f"{', '.join(broken)}. What the data cannot tell was left as given."
+            warnings.warn(
+                f"{robot}: no rigid body can have the parameters of {', '.join(broken)}. What the "
+                "data cannot tell was left as given",
+                DynidentWarning,
+                stacklevel=1,
             )
     if as_json:
-        _print_json(estimate.to_dict())
+        _print_json(result)
     else:
         _show(*tables)
 

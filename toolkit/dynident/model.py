@@ -144,7 +144,8 @@ class Model:
         """
         assert block.rigid is not None
         full = np.zeros((len(block.t), self.robot.n, self.size))
-        full[:, :, : len(self.base.independent)] = block.rigid[:, :, self.base.independent]
+        rigid = len(self.base.independent)
+        full[:, :, :rigid] = np.take(block.rigid, self.base.independent, axis=2)
         for effect in self.effects:
             if "torque" not in effect.needs:
                 full[:, :, self.slices[effect.label]] = effect.columns(block)
@@ -192,4 +193,3 @@ class Model:
                     head = f"{effect.name}.{head}"
                 found.append(head + tail)
         return tuple(found)
-

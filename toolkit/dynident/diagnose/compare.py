@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-
 from dynident.diagnose.evidence import ColumnStore, gather
 from dynident.diagnose.held_out import HeldOut, on_blocks, on_recordings
 from dynident.diagnose.maps import residual_maps
@@ -17,6 +16,7 @@ from dynident.fit.shapes import refine_shapes, shaped_effects
 from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.tables import Table, percent, print_tables
+from dynident.threads import single_threaded
 
 
 @dataclass(frozen=True)
@@ -85,6 +85,7 @@ class Comparison:
         print_tables(*self.tables())
 
 
+@single_threaded
 def compare(estimates: Estimate | Mapping[str, Estimate], dataset: Dataset) -> Comparison:
     """Compare estimates with measurements that they were not fitted to.
 
@@ -111,6 +112,7 @@ def compare(estimates: Estimate | Mapping[str, Estimate], dataset: Dataset) -> C
     return Comparison(tuple(named), tuple(e.model for e in named.values()), tuple(results))
 
 
+@single_threaded
 def compare_models(models: Mapping[str, Model], train: Dataset, test: Dataset) -> Comparison:
     """Fit models as the diagnosis does, and compare them on data that they have not seen.
 

@@ -192,9 +192,7 @@ class ColumnStore:
             found.append(version.parallel.apply(columns)[version.kept])
         return found
 
-    def _predicted(
-        self, run: int, model: Model, values: np.ndarray | None
-    ) -> list[np.ndarray]:
+    def _predicted(self, run: int, model: Model, values: np.ndarray | None) -> list[np.ndarray]:
         """Torque at the full rate that the model predicts with these parameters."""
         values = np.zeros(model.size) if values is None else values
         key = (values.tobytes(), run)
@@ -203,9 +201,7 @@ class ColumnStore:
                 self._torque.clear()
             rigid = any("rigid" in one.needs for one in model.effects)
             self._torque[key] = [
-                v.full_rate(
-                    model, lambda b: model.torque_without_loads(b, values), rigid=rigid
-                )
+                v.full_rate(model, lambda b: model.torque_without_loads(b, values), rigid=rigid)
                 for v in self.runs[run].versions
             ]
         return self._torque[key]

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import stats
 
 from dynident.diagnose.evidence import ColumnStore
-from dynident.diagnose.moments import solve
+from dynident.diagnose.moments import Kind, solve
 from dynident.diagnose.noise import differences, inflation, systematic_square
 from dynident.diagnose.present import Present, model_columns
 from dynident.fit.estimate import Estimate
@@ -101,9 +101,7 @@ def on_recordings(store: ColumnStore, present: Present | Estimate) -> HeldOut:
                 first.tau - residual,
             )
         )
-        folded.append(
-            np.stack([run.fold([v @ combination for v in c]) for c in joints], axis=-1)
-        )
+        folded.append(np.stack([run.fold([v @ combination for v in c]) for c in joints], axis=-1))
     return _judged(store, tuple(runs), folded)
 
 
@@ -141,19 +139,17 @@ def on_blocks(store: ColumnStore, present: Present) -> HeldOut:
     return _judged(store, tuple(runs), folded)
 
 
-def _judged(
-    store: ColumnStore, runs: tuple[HeldOutRun, ...], folded: list[np.ndarray]
-) -> HeldOut:
+def _judged(store: ColumnStore, runs: tuple[HeldOutRun, ...], folded: list[np.ndarray]) -> HeldOut:
     """Split the residual into what repeats and what does not."""
     n = runs[0].measured.shape[1]
-    pairs = [
+    pairs: list[tuple[Kind, np.ndarray]] = [
         (run.kind, e) for run, e in zip(store.runs, folded, strict=True) if run.kind != "single"
     ]
     if not pairs:
         return HeldOut(runs, None, None, None, np.ones(n))
     noise = [[differences(e[..., j], kind) for kind, e in pairs] for j in range(n)]
     power = np.array([np.mean(np.concatenate([d.ravel() for d in ds]) ** 2) for ds in noise])
-    parts = [
+    parts: list[tuple[Kind, np.ndarray]] = [
         (kind, part) for kind, e in pairs for part in np.array_split(e, _PARTS, axis=1)
     ]
     squares = np.array(

@@ -77,8 +77,15 @@ def _of_joint(robot: Robot, j: int, before: HeldOut, after: HeldOut) -> Iterator
         sigma = (noise if noise is not None else float(np.std(old))) * spread
         sentence = _sentence(against, at, means[:, 0], sigma)
         yield ResidualMap(
-            robot.names[j], robot.torque_units[j], against, unit, at, means[:, 0], means[:, 1],
-            band, sentence,
+            robot.names[j],
+            robot.torque_units[j],
+            against,
+            unit,
+            at,
+            means[:, 0],
+            means[:, 1],
+            band,
+            sentence,
         )
     yield _spectrum(robot, j, before, old, new, noise)
 
@@ -94,9 +101,7 @@ def _binned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
     kept = counts >= 10
     safe = np.maximum(counts, 1)
     at = np.bincount(bins, weights=x, minlength=BINS) / safe
-    means = np.column_stack(
-        [np.bincount(bins, weights=c, minlength=BINS) / safe for c in y.T]
-    )
+    means = np.column_stack([np.bincount(bins, weights=c, minlength=BINS) / safe for c in y.T])
     return at[kept], means[kept], counts[kept]
 
 
@@ -130,9 +135,7 @@ def _spectrum(
     sentence = ""
     if noise is not None:
         # Each amplitude is Rayleigh: one in a thousand of all lines exceeds this by chance.
-        level[:] = noise * np.sqrt(
-            4.0 * np.log(size / _LEVEL) * before.inflation[j] / len(q)
-        )
+        level[:] = noise * np.sqrt(4.0 * np.log(size / _LEVEL) * before.inflation[j] / len(q))
         peak = int(np.argmax(amplitudes[0]))
         others = np.delete(amplitudes[0], [i for i in (peak - 1, peak, peak + 1) if 0 <= i < size])
         stands_out = amplitudes[0][peak] > max(level[peak], 3.0 * float(np.median(others)))
@@ -140,6 +143,13 @@ def _spectrum(
             sentence = f"a line at {HARMONICS[peak]} cycles per revolution: ripple"
     unit = "cycles per revolution" if robot.kinds[j] == "revolute" else "cycles per 2 pi m"
     return ResidualMap(
-        robot.names[j], robot.torque_units[j], "cycles per revolution", unit,
-        HARMONICS.astype(float), amplitudes[0], amplitudes[1], level, sentence,
+        robot.names[j],
+        robot.torque_units[j],
+        "cycles per revolution",
+        unit,
+        HARMONICS.astype(float),
+        amplitudes[0],
+        amplitudes[1],
+        level,
+        sentence,
     )

@@ -12,6 +12,7 @@ such moments, block of time by block of time:
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -67,7 +68,7 @@ def moments(left: np.ndarray, right: np.ndarray, edges: np.ndarray, kind: Kind) 
         What the versions are.
     """
     signal, total = [], []
-    for start, stop in zip(edges[:-1], edges[1:], strict=True):
+    for start, stop in pairwise(edges):
         one, two = left[:, start:stop], right[:, start:stop]
         if kind == "perturbed":
             plain = one[0].T @ two[0]

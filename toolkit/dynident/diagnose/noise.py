@@ -79,7 +79,7 @@ class NoiseModel:
             Velocity of the joint, rad/s or m/s.
         """
         local = np.interp(np.abs(speed), self.speeds, self.scales) * self.std
-        return lfilter(self.colour, [1.0], signals / local[:, None], axis=0)
+        return np.asarray(lfilter(self.colour, [1.0], signals / local[:, None], axis=0))
 
 
 def flat_noise(std: float) -> NoiseModel:

@@ -91,9 +91,7 @@ def fit_present(store: ColumnStore, model: Model) -> Present:
     summed = _moments(store, white)
     values, solution = _solve(summed)
     rows = sum(part.shape[0] * part.shape[1] for run in white for part in run)
-    return Present(
-        model, values, solution.covariance, solution, noise, known, white, summed, rows
-    )
+    return Present(model, values, solution.covariance, solution, noise, known, white, summed, rows)
 
 
 def model_columns(

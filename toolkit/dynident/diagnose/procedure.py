@@ -12,6 +12,7 @@ from dynident.diagnose.diagnosis import (
     Diagnosis,
     JointResult,
     NoiseSource,
+    Status,
     Step,
     TestError,
     Trace,
@@ -37,6 +38,7 @@ from dynident.fit.sampling import flagged
 from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.robot import base_parameters
+from dynident.threads import single_threaded
 
 MOST_EFFECTS = 8
 """Effects that are added at most."""
@@ -58,6 +60,7 @@ class _Found:
     indistinguishable: tuple[Effect, ...]
 
 
+@single_threaded
 def diagnose(
     model: Model | Estimate,
     train: Dataset,
@@ -264,10 +267,7 @@ def _candidates(ranking: Ranking, error: float, present: Present) -> tuple[Candi
     total = present.error_total
     found = []
     for score, refusal in zip(ranking.scores, ranking.refusals, strict=True):
-        if score.absorbed:
-            status = "absorbed"
-        else:
-            status = "not_material" if refusal else "material"
+        status: Status = "absorbed" if score.absorbed else "not_material" if refusal else "material"
         # Held out where it was cross-validated, else the drop less its price.
         gain = score.gains.sum() if score.gains is not None else score.penalised
         share = min(max(float(gain) / total, -1.0), 1.0) if np.isfinite(gain) else 0.0
@@ -318,7 +318,13 @@ def _traces(given: Model, before: HeldOut, after: HeldOut) -> tuple[Trace, ...]:
     robot = given.robot
     return tuple(
         Trace(
-            old.name, name, unit, old.t, old.measured[:, j], old.predicted[:, j], new.predicted[:, j]
+            old.name,
+            name,
+            unit,
+            old.t,
+            old.measured[:, j],
+            old.predicted[:, j],
+            new.predicted[:, j],
         )
         for old, new in zip(before.runs, after.runs, strict=True)
         for j, (name, unit) in enumerate(zip(robot.names, robot.torque_units, strict=True))

@@ -14,7 +14,7 @@ from dynident.diagnose.present import Present
 from dynident.effects import Effect
 
 ABSORBED = 2e-3
-"""An effect of whose columns less than this share (in norm) is left beside the model is absorbed."""
+"""Share of an effect's columns (in norm) left beside the model, below which it is absorbed."""
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,8 @@ def _joined(model: np.ndarray, cross: np.ndarray, own: np.ndarray) -> np.ndarray
     """Moments of [model columns, effect columns, torque], from their parts."""
     p = model.shape[1] - 1
     top = np.concatenate([model[:, :p, :p], cross[:, :p], model[:, :p, p:]], axis=2)
-    middle = np.concatenate([cross[:, :p].transpose(0, 2, 1), own, cross[:, p:].transpose(0, 2, 1)], axis=2)
+    turned = cross.transpose(0, 2, 1)
+    middle = np.concatenate([turned[:, :, :p], own, turned[:, :, p:]], axis=2)
     bottom = np.concatenate([model[:, p:, :p], cross[:, p:], model[:, p:, p:]], axis=2)
     return np.concatenate([top, middle, bottom], axis=1)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from scipy.optimize import minimize, minimize_scalar
+from scipy.optimize import fminbound, minimize
 
 from dynident.diagnose.evidence import ColumnStore, Run
 from dynident.diagnose.present import Present
@@ -117,7 +117,8 @@ def indistinguishable(ranking: Ranking, winner: Score) -> tuple[Effect, ...]:
     for other in ranking.material:
         if other.effect == winner.effect or other.losses is None:
             continue
-        if winner.effect.name in other.effect.contains and other.effect.joint == winner.effect.joint:
+        same_place = other.effect.joint == winner.effect.joint
+        if same_place and winner.effect.name in other.effect.contains:
             continue
         difference = other.losses - winner.losses
         error = difference.std(ddof=1) * np.sqrt(len(difference))
@@ -146,9 +147,8 @@ def refined(store: ColumnStore, present: Present, one: Score) -> Score:
 
     if len(shapes) == 1:
         low, high = _neighbours(shapes[0], one.effect.shape[0])
-        found = minimize_scalar(
-            loss, bounds=(np.log(low), np.log(high)), method="bounded", options={"xatol": 2e-3}
-        ).x
+        span = (float(np.log(low)), float(np.log(high)))
+        found = np.atleast_1d(np.asarray(fminbound(loss, *span, xtol=2e-3)))
     else:
         bounds = [(np.log(s.lower), np.log(s.upper)) for s in shapes]
         start = np.log(one.effect.shape)

@@ -13,6 +13,7 @@ from dynident.fit.sampling import Sampled, rows, sample
 from dynident.fit.shapes import refine_shapes, shaped_effects
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
+from dynident.threads import single_threaded
 
 
 class Method(Protocol):
@@ -23,6 +24,7 @@ class Method(Protocol):
         ...
 
 
+@single_threaded
 def fit(model: Model, data: Dataset | Recording, method: Method | None = None) -> Estimate:
     """Identify the parameters of a model.
 

@@ -48,7 +48,8 @@ class EssentialParameters:
             f"Dropped: {', '.join(self.dropped) or 'nothing'}. Relative error "
             f"{percent(self.error_before)} with all, {percent(self.error_after)} with these."
         )
-        return Table("Essential parameters", ("parameter", "value", "sigma", "relative"), rows, (note,))
+        columns = ("parameter", "value", "sigma", "relative")
+        return Table("Essential parameters", columns, rows, (note,))
 
 
 def essential_parameters(

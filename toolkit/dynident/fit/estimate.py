@@ -1,4 +1,4 @@
-"""What a fit returns: values with units, uncertainties, what they rest on, and what to make of it."""
+"""What a fit returns: values with units, uncertainties, and what they rest on."""
 
 from __future__ import annotations
 
@@ -174,8 +174,8 @@ class Estimate:
             f"{self.method}; {self.rows} equations, {len(self.basis.independent)} of "
             f"{self.model.size} parameters identified ({_decision(self.basis)}), "
             f"condition number {self.condition_number:.6g}; {self.status}.",
-            "sigma is that of least squares with independent errors: what the model lacks, or noise "
-            "in the positions, is not in it.",
+            "sigma takes the errors of the equations as independent: what the model lacks is not "
+            "in it.",
         )
 
     # --- files ---------------------------------------------------------------------------------
@@ -273,8 +273,7 @@ def load_estimate(path: str | Path) -> Estimate:
         robot = Robot.from_text(given["robot"], str(path), given["joints"], given["gravity"])
         known = catalogue()
         effects = tuple(
-            known[e["effect"]](e["joint"], e["source"], tuple(e["shape"]))
-            for e in given["effects"]
+            known[e["effect"]](e["joint"], e["source"], tuple(e["shape"])) for e in given["effects"]
         )
         model = Model(robot, effects, given["friction_width"])
         return Estimate(
@@ -297,8 +296,6 @@ def load_estimate(path: str | Path) -> Estimate:
         raise FitError(f"is not a dynident estimate ({error})", str(path), mend) from None
 
 
-
-
 def _decision(basis: BaseParameters) -> str:
     """How the rank was decided, in words."""
     if basis.rank == len(basis.names):
@@ -314,8 +311,8 @@ def _basis_to_dict(basis: BaseParameters) -> dict[str, Any]:
 
 
 def _basis_from_dict(content: dict[str, Any]) -> BaseParameters:
-    arrays = {name: np.array(content[name], dtype=float) for name in _ARRAYS}
-    plain = {name: tuple(content[name]) for name in _TUPLES}
+    arrays: dict[str, Any] = {name: np.array(content[name], dtype=float) for name in _ARRAYS}
+    plain: dict[str, Any] = {name: tuple(content[name]) for name in _TUPLES}
     rank = len(plain["independent"])
     arrays["K"] = arrays["K"].reshape(rank, len(plain["names"]) - rank)
     return BaseParameters(**plain, **arrays, tolerance=content["tolerance"])

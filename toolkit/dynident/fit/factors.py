@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+_ROWS = 512  # factorised at a time: few enough to stay in the cache
+
 
 @dataclass(frozen=True)
 class Factors:
@@ -60,10 +62,12 @@ def factorise(blocks: Iterable[tuple[np.ndarray, np.ndarray]]) -> Factors:
         rows, n, p = columns.shape
         if R is None:
             R, counts = np.zeros((n, p + 1, p + 1)), np.zeros(n, dtype=int)
-        for j in range(n):
-            block = np.column_stack([columns[:, j], torque[:, j]])
-            R[j] = _triangle(np.vstack([R[j], block]))
-            counts[j] += rows
+        for start in range(0, rows, _ROWS):
+            part = slice(start, start + _ROWS)
+            for j in range(n):
+                block = np.column_stack([columns[part, j], torque[part, j]])
+                R[j] = _triangle(np.vstack([R[j], block]))
+        counts += rows
     if R is None:
         raise ValueError("no rows")
     return Factors(R, counts)
@@ -73,4 +77,4 @@ def _triangle(rows: np.ndarray) -> np.ndarray:
     size = rows.shape[1]
     if len(rows) < size:
         rows = np.vstack([rows, np.zeros((size - len(rows), size))])
-    return np.linalg.qr(rows, mode="r")
+    return np.asarray(np.linalg.qr(rows, mode="r"))

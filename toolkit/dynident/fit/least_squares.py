@@ -15,6 +15,7 @@ from dynident.fit.sampling import rows
 from dynident.model import Model
 from dynident.recording import Dataset, default_filter
 from dynident.robot import BaseParameters, base_parameters
+from dynident.threads import single_threaded
 
 RANK_TOLERANCE = 1e-8
 """Share of the largest diagonal of R (unit columns) below which data do not excite a direction."""
@@ -37,6 +38,7 @@ class LeastSquares:
     weighting: Literal["joint", "none"] = "joint"
     name: ClassVar[str] = "least squares"
 
+    @single_threaded
     def fit(self, model: Model, dataset: Dataset) -> Estimate:
         """Fit a model whose shape parameters are what they are.
 

@@ -86,9 +86,7 @@ class Sampled:
             short = FilterBlock(plan.raw, plan.rows[rows], slice(low, high))
             yield [self.parallel.apply_block(one, short) for one in columns]
 
-    def decimate(
-        self, model: Model, evaluate: Evaluate, *, rigid: bool = True
-    ) -> list[np.ndarray]:
+    def decimate(self, model: Model, evaluate: Evaluate, *, rigid: bool = True) -> list[np.ndarray]:
         """All decimated rows of some columns; see `blocks`."""
         parts = list(self.blocks(model, evaluate, rigid=rigid))
         return [np.concatenate(pieces) for pieces in zip(*parts, strict=True)]
@@ -106,9 +104,7 @@ class Sampled:
         motion = self.motion
         t = motion.t[raw] + self.recording.start
         q, v, a = motion.q[raw], motion.v[raw], motion.a[raw]
-        return model.block(
-            t, q, v, a, carries_payload=bool(self.recording.payload), rigid=rigid
-        )
+        return model.block(t, q, v, a, carries_payload=bool(self.recording.payload), rigid=rigid)
 
 
 def sample(recording: Recording, settings: Filter | None) -> Sampled:

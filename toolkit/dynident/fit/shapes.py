@@ -70,9 +70,7 @@ def refine_shapes(model: Model, dataset: Dataset) -> Shaped:
 
     start = np.log([s for effect in shaped for s in effect.shape])
     # One weighting throughout, or the weights would be minimised instead of the residual.
-    first = solve_factors(
-        model, factorise(zip(fixed, (s.tau for s in samples), strict=True))
-    )
+    first = solve_factors(model, factorise(zip(fixed, (s.tau for s in samples), strict=True)))
     weights = first.torque_std
     grids = [shape.grid for shape in parameters]
     if np.prod([len(g) for g in grids]) <= _SCREEN_MOST:
