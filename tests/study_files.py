@@ -7,10 +7,10 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from synthetic import ARM, arm, synthetic, true_values
 
 from dynident.model import Model
 from dynident.recording import Recording, write
+from synthetic import ARM, arm, synthetic, true_values
 
 STUDY = """\
 # The arm of the tests.

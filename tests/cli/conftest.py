@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from study_files import STUDY, write_study
 
 from dynident.cli import main
+from study_files import STUDY, write_study
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_files import CONTROLLER, STUDY, csv_text, edited, listing, recording
-from synthetic import ARM
 
 from dynident.recording import write
+from study_files import CONTROLLER, STUDY, csv_text, edited, listing, recording
+from synthetic import ARM
 
 TEST_ENTRY = STUDY[STUDY.index('[[recordings]]\nfile = "test.csv"') :]
 NOISE = "\n[noise]\nposition_std = {}\ntorque_std = 0.05\n"

@@ -203,8 +203,7 @@ def simulate(experiment: Path, out: Path, as_json: bool) -> None:
     if as_json:
         _print_json({"written": [str(path) for path in written]})
     else:
-        for path in written:
-            click.echo(str(path))
+        _say(*map(str, written))
 
 
 @commands.command()
@@ -224,7 +223,7 @@ def report(study: Path, as_json: bool, to: Path) -> None:
     if as_json:
         _print_json({"report": str(to), **diagnosis.to_dict()})
     else:
-        click.echo(diagnosis.sentence)
+        _say(diagnosis.sentence)
 
 
 @commands.command()
@@ -274,7 +273,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         except (KeyboardInterrupt, click.Abort):
             click.echo("interrupted; nothing was left half written", err=True)
             sys.exit(130)
-        except BrokenPipeError:
+        except _ReaderGone:
             # Whoever read us has gone: nothing to say, and nobody to say it to.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             sys.exit(0)
@@ -350,11 +349,33 @@ def _demo_study() -> Path:
 def _show(*parts: Any) -> None:
     from dynident.tables import print_tables
 
-    print_tables(*parts)
+    with _reader():
+        print_tables(*parts)
 
 
 def _print_json(content: dict[str, Any]) -> None:
-    click.echo(json.dumps(_plain(content), allow_nan=False))
+    _say(json.dumps(_plain(content), allow_nan=False))
+
+
+def _say(*lines: str) -> None:
+    """Print lines as they are, whatever the width of the terminal."""
+    with _reader():
+        for line in lines:
+            click.echo(line)
+
+
+class _ReaderGone(Exception):
+    """Whoever reads our standard output has closed it."""
+
+
+@contextmanager
+def _reader() -> Iterator[None]:
+    """Tell a closed pipe from other failures; click would end with status 1."""
+    try:
+        yield
+        sys.stdout.flush()
+    except BrokenPipeError:
+        raise _ReaderGone from None
 
 
 def _plain(value: Any) -> Any:

@@ -1,0 +1,131 @@
+"""The command in a process of its own: start, pipes, terminals and Ctrl-C."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import resource
+import select
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from study_files import STUDY, edited, listing, write_study
+
+COMMANDS = ("explain", "diagnose", "fit", "compare", "add", "simulate", "report", "demo")
+DYNIDENT = (sys.executable, "-m", "dynident.cli")
+ENTRY = STUDY[STUDY.index("[[recordings]]") : STUDY.rindex("[[recordings]]")]
+LIMIT = 120.0
+
+
+def shell(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    words = [*DYNIDENT, *map(str, arguments)]
+    return subprocess.run(words, capture_output=True, text=True, cwd=cwd, timeout=LIMIT)
+
+
+def cpu_of_children() -> float:
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
+
+
+def test_help_answers_at_once_with_an_example():
+    """Under 0.3 s of CPU time; the better of two tries, since a busy machine inflates it."""
+    for command in ((), *((name,) for name in COMMANDS)):
+        taken = []
+        for _ in range(2):
+            before = cpu_of_children()
+            done = shell(*command, "--help")
+            taken.append(cpu_of_children() - before)
+            assert done.returncode == 0 and done.stderr == ""
+            text = " ".join(done.stdout.split())
+            start = " ".join(("Example: dynident", *(command or ("explain",))))
+            assert start in text and "\\b" not in text
+            if taken[-1] < 0.3:
+                break
+        assert min(taken) < 0.3, (command, taken)
+    for name in COMMANDS:
+        assert re.search(rf"^  {name} ", shell("--help").stdout, re.MULTILINE)
+
+
+def test_errors_reach_the_shell(tmp_path):
+    path = write_study(tmp_path, edited(('"viscous_friction"', '"viscous"')))
+    before = listing(tmp_path)
+    done = shell("explain", path)
+    assert done.returncode == 2 and done.stdout == ""
+    assert done.stderr.startswith("error: ") and done.stderr.count("\n") == 1
+    assert "did you mean 'viscous_friction'" in done.stderr
+    assert listing(tmp_path) == before
+
+
+def test_a_pipe_gets_json_alone_and_no_progress(tmp_path):
+    done = shell("compare", write_study(tmp_path), "--json")
+    assert done.returncode == 0 and done.stderr == ""
+    assert json.loads(done.stdout)["models"]
+
+
+@pytest.mark.parametrize(("flag", "reader"), [("", "head -1"), ("--json", "true")])
+def test_broken_pipe(tmp_path, flag, reader):
+    path = write_study(tmp_path)
+    command = f"{shlex.join(DYNIDENT)} compare {shlex.quote(str(path))} {flag} | {reader}"
+    script = f"{command}; echo ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, timeout=LIMIT)
+    assert done.stderr == ""
+    lines = done.stdout.splitlines()
+    assert lines[-1] == "0"
+    assert len(lines) == (2 if reader == "head -1" else 1)
+
+
+def read_until(terminal: int, words: bytes, limit: float = LIMIT) -> bytes:
+    """Read what a process writes to its terminal until some words appear, or it ends."""
+    seen, end = b"", time.monotonic() + limit
+    while words not in seen and time.monotonic() < end:
+        ready, _, _ = select.select([terminal], [], [], 0.5)
+        if not ready:
+            continue
+        try:
+            piece = os.read(terminal, 4096)
+        except OSError:  # Linux: the other side is closed
+            break
+        if not piece:
+            break
+        seen += piece
+    return seen
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="no pseudo-terminals here")
+def test_interrupt_during_a_diagnosis(tmp_path):
+    """A terminal shows progress; Ctrl-C ends it with one line, status 130, and no files."""
+    # The same recording many times: enough work to be interrupted in the middle of it.
+    path = write_study(tmp_path, STUDY + "\n" + ENTRY * 12)
+    (tmp_path / "old.html").write_text("an older report")
+    before = listing(tmp_path)
+    terminal, other = os.openpty()
+    words = [*DYNIDENT, "explain", str(path), "--report", str(tmp_path / "old.html")]
+    process = subprocess.Popen(
+        words, stdout=subprocess.PIPE, stderr=other, env={**os.environ, "TERM": "xterm"}
+    )
+    os.close(other)
+    try:
+        assert b"diagnosing" in read_until(terminal, b"diagnosing")
+        process.send_signal(signal.SIGINT)
+        said = read_until(terminal, b"half written")
+        said += read_until(terminal, b"nothing more comes")
+        assert process.wait(LIMIT) == 130
+        assert process.stdout is not None and process.stdout.read() == b""
+    finally:
+        process.kill()
+        process.wait()
+        os.close(terminal)
+        assert process.stdout is not None
+        process.stdout.close()
+    text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", said.decode())
+    assert "Traceback" not in text and "KeyboardInterrupt" not in text
+    lines = [line for line in re.split(r"[\r\n]+", text) if "interrupted" in line]
+    assert lines == ["interrupted; nothing was left half written"]
+    assert listing(tmp_path) == before
