@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 import tomllib
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,6 +21,7 @@ class Table(BaseModel):
 
 
 T = TypeVar("T", bound=Table)
+_TRIED = re.compile(r"str|float|int|bool|list\[\w+\]|_\w+")
 
 
 def read_toml(path: str | Path, schema: type[T]) -> T:
@@ -50,7 +52,8 @@ def nearest(word: str, valid: tuple[str, ...] | list[str], kind: str) -> str:
 
 def _complaint(error: ValidationError, path: Path, schema: type[BaseModel]) -> StudyError:
     first = error.errors(include_url=False)[0]
-    key = ".".join(str(part) for part in first["loc"])
+    # Where a key takes several types, pydantic appends the one that it tried first.
+    key = ".".join(str(p) for p in first["loc"] if not _TRIED.fullmatch(str(p)))
     if first["type"] == "extra_forbidden":
         names = _keys_at(schema, first["loc"][:-1])
         return StudyError(

@@ -9,11 +9,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import tomlkit
-from pydantic import Field
+from pydantic import Field, field_validator
+from pydantic_core import PydanticCustomError
 
 from dynident import files
 from dynident.closed_loop import Controller, ControllerFile
@@ -76,6 +77,17 @@ class _StudyFile(Table):
     noise: _NoiseEntry | None = None
     controller: ControllerFile | None = None
     columns: dict[str, str | _ColumnEntry] = Field(default_factory=dict)
+
+    @field_validator("columns", mode="before")
+    @classmethod
+    def _quoted(cls, columns: Any) -> Any:
+        """Refuse `q.elbow = ...` without quotes, which TOML reads as a table `q`."""
+        for ours, theirs in columns.items() if isinstance(columns, dict) else ():
+            if isinstance(theirs, dict) and "name" not in theirs:
+                inner = next(iter(theirs), "joint")
+                what = f'a name with a dot needs quotes: "{ours}.{inner}" = ...'
+                raise PydanticCustomError("quotes", what)  # pyright: ignore
+        return columns
 
 
 @dataclass(frozen=True)

@@ -75,7 +75,7 @@ class Comparison:
         columns = ("joint", *self.names, "noise floor")
         errors = Table("Relative torque error on held-out recordings", columns, tuple(rows), notes)
         last = self.results[-1]
-        seen = residual_maps(robot, last, last)
+        seen = residual_maps(self.models[-1], last, last)
         where = tuple((m.joint, m.against, m.sentence) for m in seen if m.sentence)
         title = f"Where '{self.names[-1]}' fails"
         return (errors, Table(title, ("joint", "against", "what is seen"), where))

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from dynident.effects import Effect
-from dynident.fit.estimate import Estimate
+from dynident.fit.estimate import Estimate, Source
 from dynident.tables import Table, number, percent, print_tables
 
 Verdict = Literal["nothing_missing", "explained", "unexplained"]
@@ -164,6 +164,7 @@ class Diagnosis:
     before, after : the estimates of the model as given and of the final one.
     maps, traces : for pictures.
     notes : caveats that belong to the verdict, in plain words.
+    test_sources : the test recordings; empty where blocks of time were held out.
     """
 
     verdict: Verdict
@@ -178,6 +179,7 @@ class Diagnosis:
     maps: tuple[ResidualMap, ...] = ()
     traces: tuple[Trace, ...] = ()
     notes: tuple[str, ...] = ()
+    test_sources: tuple[Source, ...] = ()
 
     @property
     def best(self) -> Step | None:
@@ -187,7 +189,7 @@ class Diagnosis:
     @property
     def sentence(self) -> str:
         """The verdict in plain words."""
-        effects = ", ".join(step.effect.title for step in self.steps)
+        effects = ", ".join(self._named(step) for step in self.steps)
         if self.noise_source == "unknown":
             return _VERDICTS_WITHOUT_NOISE[self.verdict].format(effects=effects)
         if self.verdict == "unexplained" and effects:
@@ -198,6 +200,12 @@ class Diagnosis:
                 "explains it."
             )
         return _VERDICTS[self.verdict].format(effects=effects)
+
+    def _named(self, step: Step) -> str:
+        """A step with everything that the data cannot tell it from: never one alone."""
+        added = {one.effect.label for one in self.steps}
+        others = [e.title for e in step.indistinguishable if e.label not in added]
+        return step.effect.title + (f" (or {' or '.join(others)})" if others else "")
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON of `diagnose --json` and `explain --json`."""
@@ -261,7 +269,7 @@ class Diagnosis:
                 j.name,
                 percent(j.error_before),
                 percent(j.error_after),
-                number(j.noise_rms, 3) + (f" {j.torque_unit}" if j.noise_rms is not None else ""),
+                percent(None if j.noise_rms is None else j.noise_rms / (j.torque_rms or 1.0)),
                 number(j.ratio_before, 3),
                 number(j.ratio_after, 3),
             )
@@ -271,8 +279,8 @@ class Diagnosis:
         floor = percent(overall.noise_floor)
         total = ("all", percent(overall.before), percent(overall.after), floor, "", "")
         return Table(
-            "Torque error on the test recordings",
-            ("joint", "before", "after", "noise floor", "systematic / noise", "after"),
+            "Relative torque error on held-out data",
+            ("joint", "before", "after", "noise floor", "systematic / noise", "and after"),
             (*rows, total),
             (f"Noise floor: {self._noise_in_words()}.",),
         )
@@ -307,12 +315,20 @@ class Diagnosis:
                 step.effect.label,
                 percent(step.test_error_before),
                 percent(step.test_error_after),
-                ", ".join(effect.label for effect in step.indistinguishable) or "none",
+                ", ".join(self._alternatives(step)) or "none",
             )
             for step in self.steps
         )
-        columns = ("effect added", "test error before", "after", "cannot be told from")
+        columns = ("effect added", "held-out error before", "after", "cannot be told from")
         return Table("Effects added", columns, rows)
+
+    def _alternatives(self, step: Step) -> list[str]:
+        # Two effects that share a column may both be added: then only that column is in doubt.
+        added = {one.effect.label for one in self.steps}
+        return [
+            e.label + (" (its constant)" if e.label in added else "")
+            for e in step.indistinguishable
+        ]
 
     def _noise_in_words(self) -> str:
         return {

@@ -12,10 +12,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from dynident.diagnose.moments import Kind, Moments, moments
+from dynident.diagnose.moments import Kind
 from dynident.diagnose.noise import ORDER, NoiseModel
 from dynident.effects import Block, Effect, JointEffect
-from dynident.fit.sampling import Sampled, sample
+from dynident.fit.sampling import Sampled, flagged, sample
 from dynident.model import Model
 from dynident.recording import (
     Dataset,
@@ -207,6 +207,11 @@ class ColumnStore:
         return self._torque[key]
 
 
+def flagged_run(run: Run, carries: bool) -> Run:
+    """Return a run marked as carrying the payload, or not."""
+    return replace(run, versions=tuple(flagged(v, carries) for v in run.versions))
+
+
 def joints_of(effect: Effect, model: Model) -> tuple[int, ...]:
     """Joints whose torque an effect changes."""
     if isinstance(effect, JointEffect):
@@ -219,12 +224,3 @@ def acting(effect: Effect, block: Block) -> np.ndarray:
     if isinstance(effect, JointEffect):
         return effect.at_joint(block)[:, None, :]
     return effect.columns(block)
-
-
-def total_moments(parts: Iterable[Moments]) -> Moments:
-    """Sum moments of the same blocks, of several joints."""
-    parts = list(parts)
-    return Moments(sum(p.signal for p in parts), sum(p.total for p in parts))  # type: ignore[arg-type]
-
-
-__all__ = ["ColumnStore", "Run", "Signals", "acting", "gather", "joints_of", "moments", "noisy"]

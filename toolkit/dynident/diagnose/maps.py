@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import stats
 
 from dynident.diagnose.diagnosis import ResidualMap
 from dynident.diagnose.held_out import HeldOut
+from dynident.model import Model
 from dynident.robot import Robot
 
 BINS = 24
@@ -18,44 +20,71 @@ HARMONICS = np.arange(1, 61)
 _LEVEL = 1e-3  # of the tests behind a sentence
 _SHARE = 0.5  # of a map's variance that a shape must explain to be named
 
-# A shape in a map, what it looks like, and which physics shows so (METHODS: at a glance).
-_SHAPES = {
-    "velocity": {
-        "a step at zero velocity: dry (Coulomb) friction": lambda x, s: np.tanh(x / (0.02 * s)),
-        "a slope against velocity: viscous friction": lambda x, s: x,
-        "spikes beside zero velocity: Stribeck friction, or presliding": lambda x, s: (
-            np.sign(x) * np.exp(-((x / (0.1 * s)) ** 2))
+
+@dataclass(frozen=True)
+class _Shape:
+    """What an effect looks like in a map: `of(x, largest x)`."""
+
+    effect: str
+    words: str
+    of: Callable[[np.ndarray, float], np.ndarray]
+
+
+def _spikes(width: float) -> _Shape:
+    words = "spikes beside zero velocity: Stribeck friction, or presliding"
+    return _Shape(
+        "stribeck_friction", words, lambda x, s: np.sign(x) * np.exp(-((x / (width * s)) ** 2))
+    )
+
+
+_SHAPES: dict[str, tuple[_Shape, ...]] = {
+    "velocity": (
+        _Shape(
+            "coulomb_friction",
+            "a step at zero velocity: dry (Coulomb) friction",
+            lambda x, s: np.tanh(x / (0.02 * s)),
         ),
-        "a curve, steeper at speed: drag": lambda x, s: x * np.abs(x),
-        "slopes that differ between the directions: asymmetric friction": lambda x, s: np.abs(x),
-        "a constant at all velocities: an offset": lambda x, s: np.ones_like(x),
-    },
-    "position": {
-        "a ramp against position: a spring": lambda x, s: x,
-    },
-    "acceleration": {
-        "a slope against acceleration: an inertia (of a rotor, say)": lambda x, s: x,
-    },
-    "load": {
-        "a tilted line against load: a drive gain": lambda x, s: x,
-    },
-    "time": {
-        "a ramp over time: a drift": lambda x, s: x,
-    },
+        _Shape("viscous_friction", "a slope against velocity: viscous friction", lambda x, s: x),
+        _spikes(0.05),
+        _spikes(0.15),
+        _Shape("quadratic_drag", "a curve, steeper at speed: drag", lambda x, s: x * np.abs(x)),
+        _Shape(
+            "asymmetric_friction",
+            "slopes that differ between the directions: asymmetric friction",
+            lambda x, s: np.abs(x),
+        ),
+        _Shape(
+            "torque_offset", "a constant at all velocities: an offset", lambda x, s: np.ones_like(x)
+        ),
+    ),
+    "position": (_Shape("joint_spring", "a ramp against position: a spring", lambda x, s: x),),
+    "acceleration": (
+        _Shape(
+            "rotor_inertia",
+            "a slope against acceleration: an inertia (of a rotor, say)",
+            lambda x, s: x,
+        ),
+    ),
+    "load": (_Shape("drive_gain", "a tilted line against load: a drive gain", lambda x, s: x),),
+    "time": (_Shape("torque_drift", "a ramp over time: a drift", lambda x, s: x),),
 }
 
 
-def residual_maps(robot: Robot, before: HeldOut, after: HeldOut) -> tuple[ResidualMap, ...]:
+def residual_maps(model: Model, before: HeldOut, after: HeldOut) -> tuple[ResidualMap, ...]:
     """Residual maps of every joint on held-out data.
 
     Parameters
     ----------
+    model : as given: what its effects can fit is cleared away before a shape is named.
     before, after : of the model as given and of the final one, on the same recordings.
     """
-    return tuple(one for joint in range(robot.n) for one in _of_joint(robot, joint, before, after))
+    joints = range(model.robot.n)
+    return tuple(one for joint in joints for one in _of_joint(model, joint, before, after))
 
 
-def _of_joint(robot: Robot, j: int, before: HeldOut, after: HeldOut) -> Iterator[ResidualMap]:
+def _of_joint(model: Model, j: int, before: HeldOut, after: HeldOut) -> Iterator[ResidualMap]:
+    robot = model.robot
+    fitted = {e.name for e in model.effects if e.joint == robot.names[j]}
     old = np.concatenate([run.residual[:, j] for run in before.runs])
     new = np.concatenate([run.residual[:, j] for run in after.runs])
     motion = robot.units[j]
@@ -69,13 +98,13 @@ def _of_joint(robot: Robot, j: int, before: HeldOut, after: HeldOut) -> Iterator
     }
     for against, (unit, parts) in quantities.items():
         x = np.concatenate(parts)
-        at, means, count = _binned(x, np.column_stack([old, new]))
+        at, means, count = _binned(x, np.column_stack([old, new]), fine=against == "velocity")
         if len(at) < 4:
             continue
         spread = np.sqrt(before.inflation[j] / count)
         band = np.full(len(at), np.nan) if noise is None else 2.0 * noise * spread
         sigma = (noise if noise is not None else float(np.std(old))) * spread
-        sentence = _sentence(against, at, means[:, 0], sigma)
+        sentence = _sentence(against, at, means[:, 0], sigma, fitted)
         yield ResidualMap(
             robot.names[j],
             robot.torque_units[j],
@@ -90,12 +119,23 @@ def _of_joint(robot: Robot, j: int, before: HeldOut, after: HeldOut) -> Iterator
     yield _spectrum(robot, j, before, old, new, noise)
 
 
-def _binned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Centres, means and counts in bins of equal width that hold at least ten samples."""
+def _binned(
+    x: np.ndarray, y: np.ndarray, *, fine: bool
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Centres, means and counts in bins that hold at least ten samples.
+
+    Of equal width; or, if `fine`, of equal width in the root of abs(x), finer towards zero, where
+    friction does what tells one kind from another.
+    """
     low, high = np.quantile(x, [0.002, 0.998])
     if not high > low:
         return np.zeros(0), np.zeros((0, y.shape[1])), np.zeros(0)
-    edges = np.linspace(low, high, BINS + 1)
+    if fine:
+        start, stop = np.sign(low) * np.sqrt(abs(low)), np.sign(high) * np.sqrt(abs(high))
+        roots = np.linspace(start, stop, BINS + 1)
+        edges = np.sign(roots) * roots**2
+    else:
+        edges = np.linspace(low, high, BINS + 1)
     bins = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, BINS - 1)
     counts = np.bincount(bins, minlength=BINS)
     kept = counts >= 10
@@ -105,23 +145,36 @@ def _binned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
     return at[kept], means[kept], counts[kept]
 
 
-def _sentence(against: str, at: np.ndarray, mean: np.ndarray, sigma: np.ndarray) -> str:
+def _sentence(
+    against: str, at: np.ndarray, mean: np.ndarray, sigma: np.ndarray, fitted: set[str]
+) -> str:
     """The shape that a map shows, if it shows one beyond the noise."""
     weight = 1.0 / sigma
     power = float(np.sum((mean * weight) ** 2))
     if stats.chi2.sf(power, len(at)) > _LEVEL:
         return ""
     scale = float(np.abs(at).max()) or 1.0
+    shapes = _SHAPES[against]
+    # The fit has taken out of the map what its own columns can explain: out of the shapes too.
+    known = [shape.of(at, scale) * weight for shape in shapes if shape.effect in fitted]
+    clear = _clearing(np.array(known).T) if known else np.eye(len(at))
+    seen = clear @ (mean * weight)
     best, share = "", 0.0
-    for words, shape in _SHAPES[against].items():
-        column = shape(at, scale) * weight
+    for shape in shapes:
+        if shape.effect in fitted:
+            continue
+        column = clear @ (shape.of(at, scale) * weight)
         norm = float(column @ column)
-        explained = float(column @ (mean * weight)) ** 2 / (norm * power) if norm > 0 else 0.0
+        explained = float(column @ seen) ** 2 / (norm * power) if norm > 0 else 0.0
         if explained > share:
-            best, share = words, explained
-    if share < _SHARE:
-        return ""
-    return f"{best} ({100 * share:.0f} % of what is seen here)"
+            best, share = shape.words, explained
+    return f"{best} ({100 * share:.0f} % of what is seen here)" if share >= _SHARE else ""
+
+
+def _clearing(columns: np.ndarray) -> np.ndarray:
+    """Projection onto what columns (B, k) cannot explain, (B, B)."""
+    basis = np.linalg.qr(columns)[0]
+    return np.eye(len(columns)) - basis @ basis.T
 
 
 def _spectrum(

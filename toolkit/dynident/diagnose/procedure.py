@@ -5,23 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from dynident.diagnose.diagnosis import (
-    Candidate,
-    Diagnosis,
-    JointResult,
-    NoiseSource,
-    Status,
-    Step,
-    TestError,
-    Trace,
-    Verdict,
-)
-from dynident.diagnose.evidence import ColumnStore, Run, gather
-from dynident.diagnose.held_out import HeldOut, on_blocks, on_recordings
-from dynident.diagnose.maps import residual_maps
-from dynident.diagnose.present import Present, fit_present, residuals
+from dynident.diagnose.diagnosis import Diagnosis
+from dynident.diagnose.evidence import ColumnStore, flagged_run, gather
+from dynident.diagnose.present import Present, fit_present
 from dynident.diagnose.scoring import Score
 from dynident.diagnose.search import (
     Ranking,
@@ -31,33 +17,17 @@ from dynident.diagnose.search import (
     refined,
     variants,
 )
+from dynident.diagnose.telling import Found, Search, told
 from dynident.effects import Effect
 from dynident.fit.estimate import Estimate
-from dynident.fit.least_squares import RANK_TOLERANCE, sources_of
-from dynident.fit.sampling import flagged
 from dynident.model import Model
 from dynident.recording import Dataset
-from dynident.robot import base_parameters
 from dynident.threads import single_threaded
 
 MOST_EFFECTS = 8
 """Effects that are added at most."""
 
-WITHIN_NOISE = 0.3
-"""Systematic residual over noise that must be surpassed, with 99 % confidence, before anything is
-said to be missing."""
-
 _FIRST_SHARE = 0.75  # of an effect's drop that a simpler one in it explains, to be named first
-_STANDS = 3.0  # standard deviations from zero of a parameter that stands on its own
-
-
-@dataclass(frozen=True)
-class _Found:
-    """An effect that the search has added, with what was said of it then."""
-
-    score: Score
-    p_value: float
-    indistinguishable: tuple[Effect, ...]
 
 
 @single_threaded
@@ -105,11 +75,14 @@ def diagnose(
         present = _refitted(store, present.model + chosen.score.effect)
         rounds.append(rank(store, present, len(found), tell))
         found[-1] = _alternatives_only(chosen, rounds[-1])
-    present, found = _without_superfluous(store, given, present, found, tell)
-    return _told(given, train, store, held, start, present, found, rounds)
+    kept = _without_superfluous(store, present, found, tell)
+    if len(kept.found) < len(found):
+        rounds.append(rank(store, kept.final, len(kept.found), tell))
+    search = Search(store, start, kept.final, tuple(kept.found), tuple(rounds))
+    return told(search, train, test, held)
 
 
-def _choose(ranking: Ranking) -> _Found | None:
+def _choose(ranking: Ranking) -> Found | None:
     """The best material effect; or the simpler one in it, where that does most of the work."""
     material = ranking.material
     if not material:
@@ -124,11 +97,11 @@ def _choose(ranking: Ranking) -> _Found | None:
     ]
     if simpler:
         # The column that they share is the same whoever it belongs to: both are named.
-        return _Found(simpler[0], ranking.corrected(simpler[0]), (best.effect,))
-    return _Found(best, ranking.corrected(best), indistinguishable(ranking, best))
+        return Found(simpler[0], ranking.corrected(simpler[0]), (best.effect,))
+    return Found(best, ranking.corrected(best), indistinguishable(ranking, best))
 
 
-def _alternatives_only(one: _Found, following: Ranking) -> _Found:
+def _alternatives_only(one: Found, following: Ranking) -> Found:
     """Leave out effects that stay material beside the one added: they are more, not instead."""
     still = {s.effect.label for s in following.material}
     alternatives = tuple(
@@ -143,12 +116,9 @@ def _carry(store: ColumnStore, score: Score) -> None:
     """Mark the runs that carry the payload, once that is known."""
     if score.carriers is not None:
         store.runs = tuple(
-            _flagged(run, carries) for run, carries in zip(store.runs, score.carriers, strict=True)
+            flagged_run(run, carries)
+            for run, carries in zip(store.runs, score.carriers, strict=True)
         )
-
-
-def _flagged(run: Run, carries: bool) -> Run:
-    return replace(run, versions=tuple(flagged(v, carries) for v in run.versions))
 
 
 def _refitted(store: ColumnStore, model: Model) -> Present:
@@ -164,7 +134,17 @@ def _refitted(store: ColumnStore, model: Model) -> Present:
     return present
 
 
-def _without_superfluous(store, given: Model, present: Present, found: list[_Found], tell):
+@dataclass(frozen=True)
+class _Kept:
+    """What is left when superfluous effects are dropped."""
+
+    final: Present
+    found: list[Found]
+
+
+def _without_superfluous(
+    store: ColumnStore, present: Present, found: list[Found], tell: Callable[[str], None]
+) -> _Kept:
     """Drop every added effect that the others have made superfluous."""
     kept = list(found)
     for one in found:
@@ -176,193 +156,10 @@ def _without_superfluous(store, given: Model, present: Present, found: list[_Fou
         if not rank(store, rest, len(kept) - 1, only=(effect,)).material:
             kept.remove(one)
             present = rest
-    return present, kept
+    return _Kept(present, kept)
 
 
-def _belongs(effect: Effect, found: list[_Found]) -> bool:
+def _belongs(effect: Effect, found: list[Found]) -> bool:
     """Whether an effect is part of another one: without it the other would bring it back."""
     others = (one.score.effect for one in found)
     return any(effect.name in o.contains and effect.joint == o.joint for o in others)
-
-
-def _told(given, train, store, held, start, present, found, rounds) -> Diagnosis:
-    """Put everything into words and numbers."""
-    by_label = {e.label: e for e in present.model.effects}
-    stages = [start]
-    for one in found:
-        stages.append(fit_present(store, stages[-1].model + by_label[one.score.effect.label]))
-    if held is not None:
-        held.prepare(present.model.effects)
-        _decide_payload(held, stages[-1])
-    judged = [on_recordings(held, s) if held else on_blocks(store, s) for s in stages]
-    before, after = judged[0], judged[-1]
-    steps = tuple(
-        Step(
-            by_label[one.score.effect.label],
-            tuple(stage.values[stage.model.slices[one.score.effect.label]]),
-            old.error,
-            new.error,
-            one.indistinguishable,
-            one.p_value,
-        )
-        for one, stage, old, new in zip(found, stages[1:], judged[:-1], judged[1:], strict=True)
-    )
-    source = _noise_source(store)
-    verdict = _verdict(before, after, steps, rounds[-1])
-    return Diagnosis(
-        verdict,
-        source,
-        _joint_results(given, before, after),
-        TestError(before.error, after.error, after.floor),
-        steps,
-        _candidates(rounds[0], before.error, start),
-        _candidates(rounds[-1], after.error, stages[-1]),
-        _estimate(start, train, before),
-        _estimate(stages[-1], train, after),
-        residual_maps(given.robot, before, after),
-        _traces(given, before, after),
-        _notes(store, held, stages[-1], source),
-    )
-
-
-def _verdict(before: HeldOut, after: HeldOut, steps, last: Ranking) -> Verdict:
-    if after.least_ratio is None:
-        if last.material:
-            return "unexplained"
-        return "explained" if steps else "nothing_missing"
-    if float(after.least_ratio.max()) <= WITHIN_NOISE:
-        return "explained" if steps else "nothing_missing"
-    return "unexplained"
-
-
-def _noise_source(store: ColumnStore) -> NoiseSource:
-    kinds = {run.kind for run in store.runs}
-    if "repeated" in kinds:
-        return "replicates"
-    return "given" if "perturbed" in kinds else "unknown"
-
-
-def _joint_results(given: Model, before: HeldOut, after: HeldOut) -> tuple[JointResult, ...]:
-    def at(values: np.ndarray | None, j: int) -> float | None:
-        return None if values is None else float(values[j])
-
-    return tuple(
-        JointResult(
-            name,
-            unit,
-            float(before.joint_errors[j]),
-            float(after.joint_errors[j]),
-            float(before.torque_rms[j]),
-            at(after.noise_std, j),
-            at(before.ratio, j),
-            at(after.ratio, j),
-        )
-        for j, (name, unit) in enumerate(
-            zip(given.robot.names, given.robot.torque_units, strict=True)
-        )
-    )
-
-
-def _candidates(ranking: Ranking, error: float, present: Present) -> tuple[Candidate, ...]:
-    total = present.error_total
-    found = []
-    for score, refusal in zip(ranking.scores, ranking.refusals, strict=True):
-        status: Status = "absorbed" if score.absorbed else "not_material" if refusal else "material"
-        # Held out where it was cross-validated, else the drop less its price.
-        gain = score.gains.sum() if score.gains is not None else score.penalised
-        share = min(max(float(gain) / total, -1.0), 1.0) if np.isfinite(gain) else 0.0
-        found.append(
-            Candidate(
-                score.effect,
-                status,
-                None if score.absorbed else ranking.corrected(score),
-                error * (1.0 - float(np.sqrt(1.0 - share))),
-                score.values,
-                refusal,
-            )
-        )
-    return tuple(found)
-
-
-def _estimate(present: Present, train: Dataset, judged: HeldOut) -> Estimate:
-    """The fit of the diagnosis as an `Estimate`."""
-    total = present.moments.sums()[1][:-1, :-1]
-    size, directions = np.linalg.eigh(total)
-    root = np.sqrt(np.clip(size, 0.0, None))[:, None] * directions.T
-    # A root of squares: half of the digits are gone.
-    basis = base_parameters(root, present.model.names, max(RANK_TOLERANCE, 1e-6))
-    kept = list(basis.independent)
-    how = {
-        "repeated": "instrumental variables from the repeated periods",
-        "perturbed": "least squares corrected for the stated noise",
-        "single": "least squares",
-    }
-    return Estimate(
-        present.model,
-        present.values,
-        present.covariance,
-        basis,
-        judged.residual_rms,
-        judged.joint_errors,
-        judged.error,
-        float(np.linalg.cond(root[:, kept])),
-        present.rows,
-        f"{how['repeated' if present.noise_known else 'single']}, noise whitened",
-        "solved",
-        (),
-        sources_of(train),
-    )
-
-
-def _traces(given: Model, before: HeldOut, after: HeldOut) -> tuple[Trace, ...]:
-    robot = given.robot
-    return tuple(
-        Trace(
-            old.name,
-            name,
-            unit,
-            old.t,
-            old.measured[:, j],
-            old.predicted[:, j],
-            new.predicted[:, j],
-        )
-        for old, new in zip(before.runs, after.runs, strict=True)
-        for j, (name, unit) in enumerate(zip(robot.names, robot.torque_units, strict=True))
-    )
-
-
-def _decide_payload(held: ColumnStore, present: Present) -> None:
-    """Decide which test recordings carry a payload of known inertia, where the study is silent."""
-    if not any("payload" in effect.needs for effect in present.model.effects):
-        return
-    stated = [run.recording.payload is not None for run in held.runs]
-    sums = []
-    for carries in (False, True):
-        held.runs = tuple(
-            run if said else _flagged(run, carries)
-            for run, said in zip(held.runs, stated, strict=True)
-        )
-        misfits = residuals(held, present.model, present.values)
-        sums.append([float(np.sum(e**2)) for e in misfits])
-    held.runs = tuple(
-        run if said else _flagged(run, with_load < without)
-        for run, said, without, with_load in zip(held.runs, stated, *sums, strict=True)
-    )
-
-
-def _notes(store, held, present: Present, source: NoiseSource) -> tuple[str, ...]:
-    notes = []
-    if held is None:
-        notes.append("No test recordings: errors are those of held-out blocks of time.")
-    if source == "given":
-        notes.append("The noise is the study's word, not measured: record a repeated motion.")
-    if source == "unknown":
-        notes.append(
-            "Nothing repeats and no noise is stated: plain least squares, whose columns carry "
-            "noise, and no noise floor. Small effects may be false; record a repeated motion."
-        )
-    if any("payload" in effect.needs for effect in present.model.effects):
-        carriers = [r.recording.name for r in store.runs if r.recording.payload]
-        carriers += [r.recording.name for r in (held.runs if held else ()) if r.recording.payload]
-        notes.append(f"Payload carried in: {', '.join(carriers)}.")
-    return tuple(notes)

@@ -1,0 +1,22 @@
+"""Run the benchmarks at the size in which they are quoted.
+
+    python benchmarks/run.py
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+
+
+def main() -> None:
+    for script in ("hidden_effects.py", "least_squares_memory.py"):
+        print(f"--- {script}", flush=True)
+        subprocess.run([sys.executable, str(HERE / script)], check=True)
+
+
+if __name__ == "__main__":
+    main()

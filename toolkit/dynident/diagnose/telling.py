@@ -1,0 +1,250 @@
+"""A search put into words and numbers: the `Diagnosis`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynident.diagnose.diagnosis import (
+    Candidate,
+    Diagnosis,
+    JointResult,
+    NoiseSource,
+    Status,
+    Step,
+    TestError,
+    Trace,
+    Verdict,
+)
+from dynident.diagnose.evidence import ColumnStore, flagged_run
+from dynident.diagnose.held_out import HeldOut, on_blocks, on_recordings
+from dynident.diagnose.maps import residual_maps
+from dynident.diagnose.present import Present, fit_present, residuals
+from dynident.diagnose.scoring import Score
+from dynident.diagnose.search import Ranking
+from dynident.effects import Effect
+from dynident.fit.estimate import Estimate
+from dynident.fit.least_squares import RANK_TOLERANCE, sources_of
+from dynident.model import Model
+from dynident.recording import Dataset
+from dynident.robot import base_parameters
+
+WITHIN_NOISE = 0.3
+"""Systematic residual over noise that must be surpassed, with 99 % confidence, before anything is
+said to be missing."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """An effect that the search has added, with what was said of it then."""
+
+    score: Score
+    p_value: float
+    indistinguishable: tuple[Effect, ...]
+
+
+@dataclass(frozen=True)
+class Search:
+    """What a search did: the evidence, the fits, the effects added, the ranking of each round."""
+
+    store: ColumnStore
+    start: Present
+    final: Present
+    found: tuple[Found, ...]
+    rounds: tuple[Ranking, ...]
+
+
+def told(
+    search: Search, train: Dataset, test: Dataset | None, held: ColumnStore | None
+) -> Diagnosis:
+    """Put what a search found into words and numbers.
+
+    Parameters
+    ----------
+    search : the search.
+    train, test : the recordings, for their provenance.
+    held : evidence of the test recordings; None where blocks of time are held out.
+    """
+    store, start, present = search.store, search.start, search.final
+    found, rounds, given = search.found, search.rounds, search.start.model
+    by_label = {e.label: e for e in present.model.effects}
+    stages = [start]
+    for one in found:
+        stages.append(fit_present(store, stages[-1].model + by_label[one.score.effect.label]))
+    if held is not None:
+        held.prepare(present.model.effects)
+        _decide_payload(held, stages[-1])
+    judged = [on_recordings(held, s) if held else on_blocks(store, s) for s in stages]
+    before, after = judged[0], judged[-1]
+    steps = tuple(
+        Step(
+            by_label[one.score.effect.label],
+            tuple(stage.values[stage.model.slices[one.score.effect.label]]),
+            old.error,
+            new.error,
+            one.indistinguishable,
+            one.p_value,
+        )
+        for one, stage, old, new in zip(found, stages[1:], judged[:-1], judged[1:], strict=True)
+    )
+    source = _noise_source(store)
+    verdict = _verdict(before, after, steps, rounds[-1])
+    return Diagnosis(
+        verdict,
+        source,
+        _joint_results(given, before, after),
+        TestError(before.error, after.error, after.floor),
+        steps,
+        _candidates(rounds[0], before.error, start),
+        _candidates(rounds[-1], after.error, stages[-1]),
+        _estimate(start, train, before),
+        _estimate(stages[-1], train, after),
+        residual_maps(given, before, after),
+        _traces(given, before, after),
+        _notes(store, held, stages[-1], source),
+        sources_of(test) if test is not None else (),
+    )
+
+
+def _verdict(before: HeldOut, after: HeldOut, steps, last: Ranking) -> Verdict:
+    if after.least_ratio is None:
+        if last.material:
+            return "unexplained"
+        return "explained" if steps else "nothing_missing"
+    if float(after.least_ratio.max()) <= WITHIN_NOISE:
+        return "explained" if steps else "nothing_missing"
+    return "unexplained"
+
+
+def _noise_source(store: ColumnStore) -> NoiseSource:
+    kinds = {run.kind for run in store.runs}
+    if "repeated" in kinds:
+        return "replicates"
+    return "given" if "perturbed" in kinds else "unknown"
+
+
+def _joint_results(given: Model, before: HeldOut, after: HeldOut) -> tuple[JointResult, ...]:
+    def at(values: np.ndarray | None, j: int) -> float | None:
+        return None if values is None else float(values[j])
+
+    return tuple(
+        JointResult(
+            name,
+            unit,
+            float(before.joint_errors[j]),
+            float(after.joint_errors[j]),
+            float(before.torque_rms[j]),
+            at(after.noise_std, j),
+            at(before.ratio, j),
+            at(after.ratio, j),
+        )
+        for j, (name, unit) in enumerate(
+            zip(given.robot.names, given.robot.torque_units, strict=True)
+        )
+    )
+
+
+def _candidates(ranking: Ranking, error: float, present: Present) -> tuple[Candidate, ...]:
+    total = present.error_total
+    found = []
+    for score, refusal in zip(ranking.scores, ranking.refusals, strict=True):
+        status: Status = "absorbed" if score.absorbed else "not_material" if refusal else "material"
+        # Held out where it was cross-validated, else the drop less its price.
+        gain = score.gains.sum() if score.gains is not None else score.penalised
+        share = min(max(float(gain) / total, -1.0), 1.0) if np.isfinite(gain) else 0.0
+        found.append(
+            Candidate(
+                score.effect,
+                status,
+                None if score.absorbed else ranking.corrected(score),
+                error * (1.0 - float(np.sqrt(1.0 - share))),
+                score.values,
+                refusal,
+            )
+        )
+    return tuple(found)
+
+
+def _estimate(present: Present, train: Dataset, judged: HeldOut) -> Estimate:
+    """The fit of the diagnosis as an `Estimate`."""
+    total = present.moments.sums()[1][:-1, :-1]
+    size, directions = np.linalg.eigh(total)
+    root = np.sqrt(np.clip(size, 0.0, None))[:, None] * directions.T
+    # A root of squares: half of the digits are gone.
+    basis = base_parameters(root, present.model.names, max(RANK_TOLERANCE, 1e-6))
+    kept = list(basis.independent)
+    how = {
+        "repeated": "instrumental variables from the repeated periods",
+        "perturbed": "least squares corrected for the stated noise",
+        "single": "least squares",
+    }
+    return Estimate(
+        present.model,
+        present.values,
+        present.covariance,
+        basis,
+        judged.residual_rms,
+        judged.joint_errors,
+        judged.error,
+        float(np.linalg.cond(root[:, kept])),
+        present.rows,
+        f"{how['repeated' if present.noise_known else 'single']}, noise whitened",
+        "solved",
+        (),
+        sources_of(train),
+    )
+
+
+def _traces(given: Model, before: HeldOut, after: HeldOut) -> tuple[Trace, ...]:
+    robot = given.robot
+    return tuple(
+        Trace(
+            old.name,
+            name,
+            unit,
+            old.t,
+            old.measured[:, j],
+            old.predicted[:, j],
+            new.predicted[:, j],
+        )
+        for old, new in zip(before.runs, after.runs, strict=True)
+        for j, (name, unit) in enumerate(zip(robot.names, robot.torque_units, strict=True))
+    )
+
+
+def _decide_payload(held: ColumnStore, present: Present) -> None:
+    """Decide which test recordings carry a payload of known inertia, where the study is silent."""
+    if not any("payload" in effect.needs for effect in present.model.effects):
+        return
+    stated = [run.recording.payload is not None for run in held.runs]
+    sums = []
+    for carries in (False, True):
+        held.runs = tuple(
+            run if said else flagged_run(run, carries)
+            for run, said in zip(held.runs, stated, strict=True)
+        )
+        misfits = residuals(held, present.model, present.values)
+        sums.append([float(np.sum(e**2)) for e in misfits])
+    held.runs = tuple(
+        run if said else flagged_run(run, with_load < without)
+        for run, said, without, with_load in zip(held.runs, stated, *sums, strict=True)
+    )
+
+
+def _notes(store, held, present: Present, source: NoiseSource) -> tuple[str, ...]:
+    notes = []
+    if held is None:
+        notes.append("No test recordings: errors are those of held-out blocks of time.")
+    if source == "given":
+        notes.append("The noise is the study's word, not measured: record a repeated motion.")
+    if source == "unknown":
+        notes.append(
+            "Nothing repeats and no noise is stated: plain least squares, whose columns carry "
+            "noise, and no noise floor. Small effects may be false; record a repeated motion."
+        )
+    if any("payload" in effect.needs for effect in present.model.effects):
+        carriers = [r.recording.name for r in store.runs if r.recording.payload]
+        carriers += [r.recording.name for r in (held.runs if held else ()) if r.recording.payload]
+        notes.append(f"Payload carried in: {', '.join(carriers)}.")
+    return tuple(notes)
