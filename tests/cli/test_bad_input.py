@@ -170,6 +170,18 @@ STUDIES = {
         STUDY + '\n[columns]\n"q.elbow" = "angle"\n',
         r"no column 'angle' \(for q.elbow\)",
     ),
+    "column without quotes": (
+        STUDY + '\n[columns]\nq.elbow = "angle"\n',
+        r'study.toml: columns: a name with a dot needs quotes: "q.elbow" = ',
+    ),
+    "column of a wrong type": (
+        STUDY + '\n[columns]\n"q.elbow" = 3\n',
+        r"study.toml: columns.q.elbow: input should be a valid string",
+    ),
+    "noise of a wrong type": (
+        STUDY + NOISE.format('"small"'),
+        r"study.toml: noise.position_std: input should be a valid number",
+    ),
     "column of scale zero": (
         STUDY + '\n[columns]\n"q.elbow" = { name = "q.elbow", scale = 0 }\n',
         r"study.toml: columns: scale = 0.0 of 'q.elbow'",

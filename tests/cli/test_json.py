@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,7 @@ VERDICTS = {"nothing_missing", "explained", "unexplained"}
 
 
 def number(value: Any, low: float = -np.inf, high: float = np.inf) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool) and low <= value <= high
+    return isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high
 
 
 def is_place(said: dict[str, Any]) -> bool:
