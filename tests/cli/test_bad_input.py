@@ -270,6 +270,13 @@ RECORDINGS = {
         csv(lambda lines: lines.insert(3, lines[3])),
         r"row 4 \(line 5\), column t: the time stamp 0.02 s is there twice",
     ),
+    "number beyond measure": (cell(7, 3, "1e200"), r"column tau.shoulder: 1e\+200 is beyond any"),
+    "clock of another unit": (
+        "\n".join(
+            [LINES[0], *(f"{k}e-9,{line.partition(',')[2]}" for k, line in enumerate(LINES[1:]))]
+        ),
+        r"train.csv: samples at 1e\+09 Hz are too many for .*are the time stamps in s\?",
+    ),
     "one sample": ("\n".join(LINES[:2]), r"holds 1 sample. a recording needs at least 2"),
     "too short": ("\n".join(LINES[:10]), r"train.csv: .*(few|nothing is left)"),
     "shorter than the filter": ("\n".join(LINES[:40]), r"train.csv: "),
@@ -365,6 +372,19 @@ def test_a_joint_at_rest_is_named(run, study, tmp_path):
         done = run(command, path, "--json")
         assert done.status == 0 and "elbow stands still" in done.err
         assert done.json
+
+
+def test_a_joint_without_torque_is_named(run, study, tmp_path):
+    path = study()
+    for name in ("train.csv", "test.csv"):
+        lines = [line.rpartition(",")[0] for line in (tmp_path / name).read_text().splitlines()]
+        (tmp_path / name).write_text(
+            "\n".join([lines[0] + ",tau.elbow"] + [f"{x},0" for x in lines[1:]])
+        )
+    done = run("compare", path, "--json")
+    assert done.status == 0 and done.err.count("\n") == 1
+    assert re.search(r"^warning: .*train.csv: the torque of elbow is zero throughout", done.err)
+    assert [joint["error"] for joint in done.json["models"][0]["joints"]][1] is None
 
 
 def test_massless_robot(run, study, tmp_path):

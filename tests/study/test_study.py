@@ -150,6 +150,18 @@ def test_an_effect_without_joint_stands_for_every_joint(study):
     assert [effect.label for effect in one.model.effects] == ["viscous_friction@elbow", "payload"]
 
 
+def test_names_of_joints_may_hold_colons(tmp_path):
+    path = write_study(tmp_path)
+    labels = '"viscous_friction@arm::elbow", "joint_coupling@arm::elbow:shoulder"'
+    path.write_text(edited(('"viscous_friction"', labels), ('"elbow"', '"arm::elbow"')))
+    for name in ("arm.urdf", "train.csv", "test.csv"):
+        file = tmp_path / name
+        file.write_text(file.read_text().replace("elbow", "arm::elbow"))
+    viscous, coupling = load(path).model.effects
+    assert (viscous.joint, viscous.source) == ("arm::elbow", None)
+    assert (coupling.joint, coupling.source) == ("arm::elbow", "shoulder")
+
+
 def test_the_order_of_joints_is_only_an_order(study, tmp_path):
     """Columns of the file, joints of the study, joints of the robot: three orders, one answer."""
     straight = study()

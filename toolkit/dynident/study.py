@@ -31,6 +31,7 @@ from dynident.recording import (
     read,
     require_motion,
     require_torque,
+    warn_of_missing_torque,
 )
 from dynident.robot import Robot
 from dynident.settings import Table, read_toml
@@ -153,6 +154,7 @@ def load(path: str | Path) -> Study:
         raise StudyError("no recording is for training", str(path), mend)
     for dataset in sets.values():
         require_torque(dataset.recordings)
+    warn_of_missing_torque(recordings)
     require_motion(sets["train"].recordings, robot.kinds)
     controller = None
     if said.controller:

@@ -61,7 +61,7 @@ def print_tables(*tables: Table | str) -> None:
             raise BrokenPipeError  # for the command to handle; rich would end the process
 
     # A file or a pipe has no width of its own: wide enough for every column.
-    console = Terminal(highlight=False, width=None if sys.stdout.isatty() else WIDTH)
+    console = Terminal(highlight=False, emoji=False, width=None if sys.stdout.isatty() else WIDTH)
     for table in tables:
         if isinstance(table, str):
             console.print(table, markup=False)

@@ -72,5 +72,16 @@ def effects_of(label: str, robot) -> tuple[Effect, ...]:
     effect = known[name]
     if not place:
         return tuple(one.on(robot) for one in effect.candidates(robot))
+    joint, source = _joints(place, robot.names)
+    return (effect(joint, source).on(robot),)
+
+
+def _joints(place: str, names: tuple[str, ...]) -> tuple[str, str | None]:
+    """Split `joint` or `joint:source`; names of joints may hold colons of their own."""
+    if place in names:
+        return place, None
+    for joint in names:
+        if place.startswith(f"{joint}:") and place[len(joint) + 1 :] in names:
+            return joint, place[len(joint) + 1 :]
     joint, _, source = place.partition(":")
-    return (effect(joint, source or None).on(robot),)
+    return joint, source or None

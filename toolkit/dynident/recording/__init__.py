@@ -19,7 +19,11 @@ from dynident.recording.filters import (
     lowpass,
 )
 from dynident.recording.masks import away_from_edges, moving, within
-from dynident.recording.motion_check import require_motion, require_torque
+from dynident.recording.motion_check import (
+    require_motion,
+    require_torque,
+    warn_of_missing_torque,
+)
 from dynident.recording.parallel import FilterBlock, ParallelFilter, choose_factor
 from dynident.recording.periods import Periods, mismatch, periods, require_repetition
 from dynident.recording.read import SUFFIXES, read
@@ -53,6 +57,7 @@ __all__ = [
     "require_repetition",
     "require_torque",
     "uniform",
+    "warn_of_missing_torque",
     "within",
     "write",
 ]

@@ -12,6 +12,9 @@ from scipy import signal
 from dynident.errors import RecordingError
 from dynident.recording.recording import Recording
 
+_LEAST_SHARE = 1e-6
+"""Cut-off over sampling rate below which a filter's coefficients run out of digits."""
+
 
 @dataclass(frozen=True)
 class Filter:
@@ -148,6 +151,9 @@ def butterworth(
     RecordingError
         If the cut-off is not between 0 and half the sampling rate.
     """
+    if 0 < cutoff_hz < _LEAST_SHARE * rate_hz:
+        what = f"samples at {rate_hz:.6g} Hz are too many for a cut-off of {cutoff_hz:g} Hz"
+        raise RecordingError(what, where, "are the time stamps in s?")
     if not 0 < cutoff_hz < rate_hz / 2:
         raise RecordingError(
             f"a cut-off of {cutoff_hz:g} Hz does not suit samples at {rate_hz:.6g} Hz",

@@ -28,6 +28,21 @@ def require_torque(recordings: Sequence[Recording]) -> None:
         raise RecordingError("the torque is zero throughout", where, "is it the right column?")
 
 
+def warn_of_missing_torque(recordings: Sequence[Recording]) -> None:
+    """Warn of single joints whose torque is zero in every recording.
+
+    Warns
+    -----
+    DynidentWarning
+        Naming the joints.
+    """
+    some = np.any([np.any(recording.tau != 0, axis=0) for recording in recordings], axis=0)
+    missing = [name for name, there in zip(recordings[0].joints, some, strict=True) if not there]
+    if missing:
+        what = f"{recordings[0].where}: the torque of {', '.join(missing)} is zero throughout"
+        warnings.warn(f"{what}. Is it the right column?", DynidentWarning, stacklevel=3)
+
+
 def require_motion(recordings: Sequence[Recording], kinds: Sequence[str]) -> None:
     """Refuse recordings of a robot at rest; warn of single joints at rest.
 

@@ -15,6 +15,8 @@ from dynident.recording.masks import within
 
 USES = ("train", "test")
 TORQUES = ("measured", "held_command")
+LARGEST = 1e100
+"""Magnitude beyond which a number can be no measurement, and squares overflow."""
 SIGNALS = ("q", "tau", "v", "a", "q_ref")
 
 
@@ -219,14 +221,15 @@ class Recording:
             self._not_finite("t", row, self.t[row])
         for signal in SIGNALS:
             x = getattr(self, signal)
-            if x is None or np.isfinite(x).all():
+            if x is None or (np.abs(x) < LARGEST).all():
                 continue
-            row, joint = (int(i) for i in np.argwhere(~np.isfinite(x))[0])
+            row, joint = (int(i) for i in np.argwhere(~(np.abs(x) < LARGEST))[0])
             self._not_finite(f"{signal}.{self.joints[joint]}", row, x[row, joint])
 
     def _not_finite(self, column: str, row: int, value: float) -> None:
+        what = "is beyond any unit" if np.isfinite(value) else "is not a finite number"
         raise RecordingError(
-            f"{value} is not a finite number",
+            f"{value} {what}",
             f"{self.row(row)}, column {column}",
             "repair or cut the gap; a recording has a number in every cell",
         )
