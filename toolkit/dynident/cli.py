@@ -333,7 +333,7 @@ def _write_report(diagnosis: Diagnosis, to: Path | None) -> None:
         return
     from dynident.report import report as write
 
-    write(diagnosis, to=to)
+    write(diagnosis, to=to, command=" ".join(["dynident", *sys.argv[1:]]))
     click.echo(f"report: {to}", err=True)
 
 

@@ -299,7 +299,7 @@ class Diagnosis:
                 c.effect.label,
                 c.status.replace("_", " "),
                 number(c.p_value, 2),
-                f"{100 * c.test_gain:.2f}",
+                f"{round(100 * c.test_gain, 2) + 0.0:.2f}",
                 c.remark,
             )
             for c in shown

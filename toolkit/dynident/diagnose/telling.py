@@ -98,8 +98,8 @@ def told(
         steps,
         _candidates(rounds[0], before.error, start),
         _candidates(rounds[-1], after.error, stages[-1]),
-        _estimate(start, train, before),
-        _estimate(stages[-1], train, after),
+        _estimate(store, start, train),
+        _estimate(store, stages[-1], train),
         residual_maps(given, before, after),
         _traces(given, before, after),
         _notes(store, held, stages[-1], source),
@@ -166,8 +166,9 @@ def _candidates(ranking: Ranking, error: float, present: Present) -> tuple[Candi
     return tuple(found)
 
 
-def _estimate(present: Present, train: Dataset, judged: HeldOut) -> Estimate:
+def _estimate(store: ColumnStore, present: Present, train: Dataset) -> Estimate:
     """The fit of the diagnosis as an `Estimate`."""
+    fitted = on_recordings(store, present)
     total = present.moments.sums()[1][:-1, :-1]
     size, directions = np.linalg.eigh(total)
     root = np.sqrt(np.clip(size, 0.0, None))[:, None] * directions.T
@@ -184,9 +185,9 @@ def _estimate(present: Present, train: Dataset, judged: HeldOut) -> Estimate:
         present.values,
         present.covariance,
         basis,
-        judged.residual_rms,
-        judged.joint_errors,
-        judged.error,
+        fitted.residual_rms,
+        fitted.joint_errors,
+        fitted.error,
         float(np.linalg.cond(root[:, kept])),
         present.rows,
         f"{how['repeated' if present.noise_known else 'single']}, noise whitened",

@@ -265,8 +265,9 @@ def _provenance(diagnosis: Diagnosis, command: str) -> tuple[Table, Table]:
     if description is not None:
         digest = hashlib.sha256(description.text.encode()).hexdigest()
         rows.append((description.path, "robot description", digest, ""))
-    for source in diagnosis.after.sources:
-        rows.append((source.file, "training", source.sha256, source.filter))
+    used = (("training", diagnosis.after.sources), ("test", diagnosis.test_sources))
+    for use, sources in used:
+        rows += [(s.file, use, s.sha256, s.filter) for s in sources]
     columns = ("file", "used as", "SHA-256", "filter")
     versions = [("Python", platform.python_version())]
     for package in ("dynident", "pin", "drake", "numpy", "scipy", "plotly"):
