@@ -1,6 +1,6 @@
 """Run the benchmarks at the size in which they are quoted.
 
-    python benchmarks/run.py
+python benchmarks/run.py
 """
 
 from __future__ import annotations
