@@ -6,9 +6,9 @@ import shutil
 import subprocess
 
 import pytest
-from report.fabricated import diagnosis
 
 from dynident.report import report
+from report.fabricated import diagnosis
 
 BROWSER = (
     shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")

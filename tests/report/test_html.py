@@ -6,13 +6,13 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from report.fabricated import diagnosis, effect
 
 from dynident.diagnose.diagnosis import Candidate, Diagnosis, Step
 from dynident.errors import DynidentError
 from dynident.report import report
 from dynident.report.html import page
 from dynident.tables import percent
+from report.fabricated import diagnosis, effect
 
 
 @pytest.fixture(scope="module")

@@ -6,12 +6,12 @@ import plotly.graph_objects as go
 import pytest
 from IPython.core.formatters import PNGFormatter
 from matplotlib.figure import Figure
-from report.fabricated import RECORDINGS, diagnosis, effect
 
 from dynident.diagnose.diagnosis import Step
 from dynident.errors import DynidentError
 from dynident.report import pictures, plots
 from dynident.report.content import bars, seen, thinned
+from report.fabricated import RECORDINGS, diagnosis, effect
 
 
 def traces(figure: go.Figure) -> list[Any]:
