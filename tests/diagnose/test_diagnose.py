@@ -154,6 +154,14 @@ def test_stated_noise_gives_a_floor_and_a_mark(model: Model) -> None:
     assert found.test_error.noise_floor == pytest.approx(measured.test_error.noise_floor, rel=0.1)
 
 
+def test_test_recordings_that_do_not_repeat_take_the_floor_of_the_others(model: Model) -> None:
+    train, test = recordings(model, "torque_offset@elbow", {"offset__elbow": 0.3}, **NOISE)
+    found = find(model, Dataset(train), Dataset(tuple(r.replace(period=None) for r in test)))
+    assert (found.noise_source, found.verdict) == ("replicates", "explained")
+    assert found.test_error.after < 1.15 * (found.test_error.noise_floor or 0)
+    assert any("do not repeat" in note for note in found.notes)
+
+
 def test_without_test_recordings_blocks_are_held_out(model: Model) -> None:
     train, test = recordings(model, "torque_offset@elbow", {"offset__elbow": 0.3}, **NOISE)
     found = find(model, Dataset(train + test))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -75,7 +75,10 @@ def told(
     if held is not None:
         held.prepare(present.model.effects)
         _decide_payload(held, stages[-1])
-    judged = [on_recordings(held, s) if held else on_blocks(store, s) for s in stages]
+    judged = [
+        _with_floor(on_recordings(held, s), store, s) if held else on_blocks(store, s)
+        for s in stages
+    ]
     before, after = judged[0], judged[-1]
     steps = tuple(
         Step(
@@ -104,6 +107,20 @@ def told(
         _traces(given, before, after),
         _notes(store, held, stages[-1], source),
         sources_of(test) if test is not None else (),
+    )
+
+
+def _with_floor(judged: HeldOut, store: ColumnStore, present: Present) -> HeldOut:
+    """Take the noise from the training recordings where the test recordings do not tell it."""
+    if judged.noise_std is not None or not present.noise_known:
+        return judged
+    own = on_recordings(store, present)
+    return replace(
+        judged,
+        noise_std=own.noise_std,
+        ratio=own.ratio,
+        least_ratio=own.least_ratio,
+        inflation=own.inflation,
     )
 
 
@@ -237,6 +254,8 @@ def _notes(store, held, present: Present, source: NoiseSource) -> tuple[str, ...
     notes = []
     if held is None:
         notes.append("No test recordings: errors are those of held-out blocks of time.")
+    elif source != "unknown" and all(run.kind == "single" for run in held.runs):
+        notes.append("The test recordings do not repeat: the noise is that of the training ones.")
     if source == "given":
         notes.append("The noise is the study's word, not measured: record a repeated motion.")
     if source == "unknown":
