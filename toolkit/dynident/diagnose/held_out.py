@@ -13,7 +13,8 @@ from dynident.diagnose.noise import differences, inflation, systematic_square
 from dynident.diagnose.present import Present, model_columns
 from dynident.fit.estimate import Estimate
 
-_PARTS = 10  # stretches of a recording whose systematic squares count as independent
+_QUANTILE = float(stats.norm.ppf(0.99))
+_LARGEST = float(stats.chi2.ppf(0.99, 1))  # of a square over its mean, in the worst of cases
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,8 @@ class HeldOut:
     runs : with predictions.
     noise_std : (n,) N m or N; None where the noise is unknown.
     ratio : (n,) systematic residual over noise (root mean squares); None likewise.
-    least_ratio : (n,) what that ratio is at least, with 99 % confidence; None likewise.
+    least_ratio : (n,) what that ratio is at least, with 99 % confidence, the uncertainty of the
+        parameters accounted for; None likewise.
     inflation : (n,) variance of a mean of consecutive noise over that of white noise.
     """
 
@@ -85,7 +87,7 @@ def on_recordings(store: ColumnStore, present: Present | Estimate) -> HeldOut:
     """Judge a fitted model on the recordings of a store, which it has not seen."""
     combination = np.append(-present.values, 1.0)
     n = present.model.robot.n
-    runs, folded = [], []
+    runs, folded, doubt = [], [], []
     for r, run in enumerate(store.runs):
         first = run.versions[0]
         joints = [model_columns(store, present.model, r, j, present.values) for j in range(n)]
@@ -102,13 +104,14 @@ def on_recordings(store: ColumnStore, present: Present | Estimate) -> HeldOut:
             )
         )
         folded.append(np.stack([run.fold([v @ combination for v in c]) for c in joints], axis=-1))
-    return _judged(store, tuple(runs), folded)
+        doubt.append(np.array([_doubt(c[0], present) for c in joints]))
+    return _judged(store, tuple(runs), folded, doubt)
 
 
 def on_blocks(store: ColumnStore, present: Present) -> HeldOut:
     """Judge a model on blocks of time, each predicted by the fit to all others."""
     n = present.model.robot.n
-    runs, folded, block = [], [], 0
+    runs, folded, doubt, block = [], [], [], 0
     for r, run in enumerate(store.runs):
         joints = [model_columns(store, present.model, r, j, present.values) for j in range(n)]
         columns = np.stack([run.fold(c) for c in joints], axis=2)  # (P, S, n, p + 1)
@@ -136,11 +139,49 @@ def on_blocks(store: ColumnStore, present: Present) -> HeldOut:
             )
         )
         folded.append(residual)
-    return _judged(store, tuple(runs), folded)
+        doubt.append(np.array([_doubt(c[0], present) for c in joints]))
+    return _judged(store, tuple(runs), folded, doubt)
 
 
-def _judged(store: ColumnStore, runs: tuple[HeldOutRun, ...], folded: list[np.ndarray]) -> HeldOut:
-    """Split the residual into what repeats and what does not."""
+def _doubt(columns: np.ndarray, present: Present | Estimate) -> float:
+    """Mean square of the torque that the covariance of the parameters makes uncertain."""
+    used = columns[:, :-1]
+    return float(np.mean(np.sum((used @ present.covariance) * used, axis=1)))
+
+
+def _variance(residual: np.ndarray, kind: Kind) -> float:
+    """Variance of `systematic_square` (P, S), by the noise alone: what is missing is no chance.
+
+    With noise of variance s^2, which may change in time, and what the versions have in common
+    being m: mean (2 s^4 / (P (P - 1)) + 4 m^2 s^2 / P) / S, times what the colour of the noise
+    costs.
+    """
+    noise = differences(residual, kind)
+    count = len(residual) if kind == "repeated" else 1
+    common = residual.mean(axis=0) if kind == "repeated" else residual[0]
+    freedom = len(residual) - 1
+    local = np.mean(noise**2, axis=0)
+    fourth = float(np.mean(local**2)) / (1.0 + 2.0 / freedom)
+    mixed = max(float(np.mean(common**2 * local)) - fourth / count, 0.0)
+    per_instant = 2.0 * fourth / max(count * (count - 1), 1) + 4.0 * mixed / count
+    rows = list(noise)
+    return per_instant * max(inflation(rows), inflation(rows, power=2)) / residual.shape[1]
+
+
+def _judged(
+    store: ColumnStore,
+    runs: tuple[HeldOutRun, ...],
+    folded: list[np.ndarray],
+    doubt: list[np.ndarray],
+) -> HeldOut:
+    """Split the residual into what repeats and what does not.
+
+    Parameters
+    ----------
+    folded : residual of each run, (P, S, n).
+    doubt : mean square of the prediction's error that the parameters' covariance stands for, of
+        each run, (n,).
+    """
     n = runs[0].measured.shape[1]
     pairs: list[tuple[Kind, np.ndarray]] = [
         (run.kind, e) for run, e in zip(store.runs, folded, strict=True) if run.kind != "single"
@@ -149,16 +190,13 @@ def _judged(store: ColumnStore, runs: tuple[HeldOutRun, ...], folded: list[np.nd
         return HeldOut(runs, None, None, None, np.ones(n))
     noise = [[differences(e[..., j], kind) for kind, e in pairs] for j in range(n)]
     power = np.array([np.mean(np.concatenate([d.ravel() for d in ds]) ** 2) for ds in noise])
-    parts: list[tuple[Kind, np.ndarray]] = [
-        (kind, part) for kind, e in pairs for part in np.array_split(e, _PARTS, axis=1)
-    ]
-    squares = np.array(
-        [[systematic_square(part[..., j], kind) for j in range(n)] for kind, part in parts]
-    )
-    sizes = np.array([part.shape[1] for _, part in parts])
+    sizes = np.array([e.shape[1] for _, e in pairs])
+    squares = [[systematic_square(e[..., j], kind) for j in range(n)] for kind, e in pairs]
     excess = np.average(squares, axis=0, weights=sizes)
-    error = squares.std(axis=0, ddof=1) / np.sqrt(len(squares))
-    least = excess - stats.t.ppf(0.99, len(squares) - 1) * error
+    spread = np.array([[_variance(e[..., j], kind) for j in range(n)] for kind, e in pairs])
+    error = np.sqrt((sizes**2 @ spread) / sizes.sum() ** 2)
+    fitted = _LARGEST * np.average(doubt, axis=0, weights=[e.shape[1] for e in folded])
+    least = excess - _QUANTILE * error - fitted
     safe = np.where(power > 0, power, 1.0)
     ratio, at_least = (np.sqrt(np.clip(x, 0.0, None) / safe) for x in (excess, least))
     grown = np.array([inflation([row for d in ds for row in d]) for ds in noise])

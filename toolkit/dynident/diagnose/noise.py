@@ -106,7 +106,7 @@ def measure_noise(
     everything, speeds = np.concatenate(noise), np.abs(np.concatenate(speed))
     std = float(np.sqrt(np.mean(everything**2)))
     if not std > 0:
-        return flat_noise(1.0)
+        return flat_noise(misfit or 1.0)
     edges = np.quantile(speeds, np.linspace(0.0, 1.0, _BINS + 1))
     bins = np.clip(np.searchsorted(edges, speeds, side="right") - 1, 0, _BINS - 1)
     centres, scales = [], []
@@ -145,11 +145,14 @@ def _whitening_filter(stretches: list[np.ndarray], white: float) -> np.ndarray:
     return np.concatenate([[1.0], -coefficients]) / np.sqrt(max(innovation, 1e-12))
 
 
-def inflation(noise: list[np.ndarray]) -> float:
-    """Variance of a mean of consecutive noise over that of independent noise, at least one."""
+def inflation(noise: list[np.ndarray], power: int = 1) -> float:
+    """Variance of a mean of consecutive noise over that of independent noise, at least one.
+
+    With `power` 2, of a mean of products of two such noises.
+    """
     total = sum(float(x @ x) for x in noise)
     if not total > 0:
         return 1.0
     lags = range(1, 11)
     correlations = [sum(float(x[:-k] @ x[k:]) for x in noise if len(x) > k) / total for k in lags]
-    return max(1.0, 1.0 + 2.0 * sum(correlations))
+    return max(1.0, 1.0 + 2.0 * sum(c**power for c in correlations))
