@@ -124,6 +124,7 @@ class Model:
             self.robot.names,
             self.friction_width,
             carries_payload,
+            self.robot.tip,
             rigid=self.robot.regressor(q, v, a) if rigid else None,
         )
 

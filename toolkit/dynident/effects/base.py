@@ -66,6 +66,7 @@ class Block:
     names : the joints, in the order of the columns of q.
     friction_width : rad/s or m/s, see `FRICTION_WIDTH`.
     carries_payload : whether the payload under study is on the robot.
+    tip : column of the joint that carries the last link, where a payload is mounted.
     rigid : (T, n, 10 n) the rigid-body regressor; None where no effect in use needs it.
     torque : (T, n) N m or N, torque that the present model predicts; None where none needs it.
     """
@@ -77,6 +78,7 @@ class Block:
     names: tuple[str, ...]
     friction_width: float = FRICTION_WIDTH
     carries_payload: bool = False
+    tip: int = -1
     rigid: np.ndarray | None = None
     torque: np.ndarray | None = None
 

@@ -15,7 +15,8 @@ class Payload(Effect):
     """Inertial parameters added to the last link while the payload is carried.
 
     Mass and first moment (mx, my, mz), and the second moments that any real load brings with
-    them, about the origin of the last joint's frame.
+    them, about the origin of the last joint's frame. The last joint is the one with the most
+    joints between it and the base.
     """
 
     name = "payload"
@@ -37,12 +38,13 @@ class Payload(Effect):
     def columns(self, block: Block) -> np.ndarray:
         if block.rigid is None:
             raise EffectError("needs the rigid-body regressor in the block", self.label)
-        return block.rigid[:, :, -10:] * float(block.carries_payload)
+        tip = block.tip % len(block.names)
+        return block.rigid[:, :, 10 * tip : 10 * tip + 10] * float(block.carries_payload)
 
     def simulated_force(self, values, block):
         return np.zeros_like(block.q)
 
     def simulated_robot(self, values, robot):
-        theta = np.array(robot.theta, dtype=float)
-        theta[-10:] += np.asarray(values, dtype=float)
-        return robot.with_theta(theta)
+        theta = np.array(robot.theta, dtype=float).reshape(robot.n, 10)
+        theta[robot.tip] += np.asarray(values, dtype=float)
+        return robot.with_theta(theta.ravel())

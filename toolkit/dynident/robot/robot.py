@@ -152,6 +152,17 @@ class Robot:
         return tuple(found)
 
     @property
+    def tip(self) -> int:
+        """Index of the joint with the most joints between it and the world; the last such one."""
+        depths = []
+        for joint in self.joints:
+            depth = 0
+            while joint.parent != -1:
+                joint, depth = self.joints[joint.parent], depth + 1
+            depths.append(depth)
+        return max(range(self.n), key=lambda index: (depths[index], index))
+
+    @property
     def bodies(self) -> tuple[str, ...]:
         """Name of each joint's moving body: the link that the joint drives."""
         return tuple(self.links[index].name for index in self.driven)
