@@ -39,3 +39,15 @@ def test_a_short_disturbance_that_returns_is_not_called_noise(model: Model, size
     found = find(model, Dataset(runs[:3]), Dataset(runs[3:]))
     assert found.verdict == "unexplained"
     assert "beyond the noise" in found.sentence
+
+
+def test_the_shape_of_an_effect_in_the_given_model_is_sought_too(model: Model) -> None:
+    """A study names Stribeck friction, but not its speed: a wrong one would look like more."""
+    given = model + "stribeck_friction@elbow"
+    slow = tuple(e.shaped(0.03) if e.shape else e for e in given.effects)
+    runs = recordings(given.with_shapes(slow), Fs__elbow=1.2)
+    found = find(given, Dataset(runs[:3]), Dataset(runs[3:]))
+    assert (found.verdict, found.steps) == ("nothing_missing", ())
+    (speed,) = next(e.shape for e in found.before.model.effects if e.shape)
+    assert speed == pytest.approx(0.03, rel=0.3)
+    assert found.test_error.after < 1.1 * (found.test_error.noise_floor or 0.0)

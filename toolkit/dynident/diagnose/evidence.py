@@ -7,7 +7,7 @@ noise; or the bare record where neither is known.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -127,7 +127,7 @@ class ColumnStore:
     runs: tuple[Run, ...]
     _rigid: list[Signals] = field(default_factory=list)
     _known: dict[Effect, list[Signals]] = field(default_factory=dict)
-    _torque: dict[tuple[bytes, int], list[np.ndarray]] = field(default_factory=dict)
+    _torque: dict[tuple[Hashable, int], list[np.ndarray]] = field(default_factory=dict)
 
     def prepare(self, effects: Iterable[Effect]) -> None:
         """Compute the rigid body's columns and those of many effects in one pass."""
@@ -195,7 +195,8 @@ class ColumnStore:
     def _predicted(self, run: int, model: Model, values: np.ndarray | None) -> list[np.ndarray]:
         """Torque at the full rate that the model predicts with these parameters."""
         values = np.zeros(model.size) if values is None else values
-        key = (values.tobytes(), run)
+        carries = tuple(bool(one.recording.payload) for one in self.runs)
+        key = ((model.effects, values.tobytes(), carries), run)
         if key not in self._torque:
             if key[0] not in {known for known, _ in self._torque}:
                 self._torque.clear()

@@ -34,7 +34,7 @@ class Present:
     noise_known : whether `noise` was measured or given; otherwise it is the residual.
     white : per run and joint, whitened columns and torque, (P, S, p + 1).
     moments : (B, p + 1, p + 1) of columns and torque, over all joints.
-    rows : number of whitened rows, over all repetitions and joints.
+    rows : number of whitened rows, over all repetitions and joints; noisy copies do not count.
     """
 
     model: Model
@@ -90,7 +90,11 @@ def fit_present(store: ColumnStore, model: Model) -> Present:
     white = _whiten(store, columns, noise)
     summed = _moments(store, white)
     values, solution = _solve(summed)
-    rows = sum(part.shape[0] * part.shape[1] for run in white for part in run)
+    rows = sum(
+        part.shape[1] * (1 if run.kind == "perturbed" else part.shape[0])
+        for run, joints in zip(store.runs, white, strict=True)
+        for part in joints
+    )
     return Present(model, values, solution.covariance, solution, noise, known, white, summed, rows)
 
 

@@ -11,6 +11,7 @@ from dynident.diagnose.present import Present, fit_present
 from dynident.diagnose.scoring import Score
 from dynident.diagnose.search import (
     Ranking,
+    best_shape,
     candidates,
     indistinguishable,
     rank,
@@ -62,7 +63,7 @@ def diagnose(
     tell("evaluating every effect")
     everything = [v for effect in candidates(given) for v in variants(effect, given)]
     store.prepare([*given.effects, *everything])
-    start = fit_present(store, given)
+    start = _shaped(store, given)
     rounds = [rank(store, start, 0, tell)]
     present, found = start, []
     while len(found) < most:
@@ -119,6 +120,17 @@ def _carry(store: ColumnStore, score: Score) -> None:
             flagged_run(run, carries)
             for run, carries in zip(store.runs, score.carriers, strict=True)
         )
+
+
+def _shaped(store: ColumnStore, model: Model) -> Present:
+    """Fit a model as it was given, each shape parameter sought on its grid."""
+    present = fit_present(store, model)
+    for effect in present.model.effects:
+        if effect.shape_parameters(model.robot):
+            others = fit_present(store, present.model - effect)
+            better = best_shape(store, others, effect)
+            present = fit_present(store, present.model.with_shapes((better,)))
+    return _refitted(store, present.model)
 
 
 def _refitted(store: ColumnStore, model: Model) -> Present:

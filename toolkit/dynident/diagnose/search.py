@@ -62,7 +62,7 @@ def candidates(model: Model) -> list[Effect]:
     found = []
     for effect in catalogue().values():
         found += [e.on(model.robot) for e in effect.candidates(model.robot) if e not in model]
-    return [e for e in found if e.label not in {one.label for one in model.effects}]
+    return found
 
 
 def variants(effect: Effect, model: Model) -> Iterator[Effect]:
@@ -155,6 +155,18 @@ def refined(store: ColumnStore, present: Present, one: Score) -> Score:
         found = minimize(loss, start, bounds=bounds, method="Nelder-Mead").x
     better = at(found)
     return better if better.drop > one.drop else one
+
+
+def best_shape(store: ColumnStore, present: Present, effect: Effect) -> Effect:
+    """Return an effect at the shape at which it explains most; as it is where it explains nothing.
+
+    `present` is the model without it.
+    """
+    tried = [effect, *variants(effect, present.model)]
+    found = candidate_moments(store, present, tried)
+    scores = (score(present, one, *parts, 1) for one, parts in zip(tried, found, strict=True))
+    best = max(scores, key=lambda one: one.drop)
+    return refined(store, present, best).effect if best.drop > 0 else effect
 
 
 def carrier_choices(runs: tuple[Run, ...]) -> list[tuple[bool, ...]]:

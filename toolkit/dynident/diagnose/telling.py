@@ -71,7 +71,8 @@ def told(
     by_label = {e.label: e for e in present.model.effects}
     stages = [start]
     for one in found:
-        stages.append(fit_present(store, stages[-1].model + by_label[one.score.effect.label]))
+        wider = stages[-1].model + by_label[one.score.effect.label]
+        stages.append(fit_present(store, wider.with_shapes(present.model.effects)))
     if held is not None:
         held.prepare(present.model.effects)
         _decide_payload(held, stages[-1])
