@@ -20,8 +20,10 @@ def model() -> Model:
 
 def recordings(model: Model, **values: float) -> tuple[Recording, ...]:
     truth = true_values(model, **FRICTION, **values)
-    noise = {"position_std": 2e-5, "torque_std": 0.3}
-    return tuple(synthetic(model, truth, seed, rate_hz=250.0, **noise) for seed in range(4))
+    return tuple(
+        synthetic(model, truth, seed, rate_hz=250.0, position_std=2e-5, torque_std=0.3)
+        for seed in range(4)
+    )
 
 
 def with_contact(recording: Recording, size: float) -> Recording:

@@ -162,6 +162,21 @@ class Model:
         """Predicted torque, (T, n) in N m or N."""
         return self.columns(block, values) @ values
 
+    def settled(self, at: np.ndarray, found: np.ndarray) -> np.ndarray:
+        """Values at which to take columns that depend on the predicted torque next.
+
+        Where a share e is added to the torque, the plain repetition (at `found`) shrinks its error
+        by -e only, and grows it from e = 1 on. This step shrinks it by e / (2 + e) at worst.
+
+        Parameters
+        ----------
+        at : (p,) values at which these columns were taken.
+        found : (p,) values fitted with them.
+        """
+        loads = (found[self.slices[e.label]] for e in self.effects if "torque" in e.needs)
+        shares = np.concatenate([np.zeros(1), *loads])
+        return at + 2.0 / max(2.0 + shares.min() + shares.max(), 0.1) * (found - at)
+
     def torque_without_loads(self, block: Block, values: np.ndarray | None) -> np.ndarray:
         """Predicted torque, but for effects that scale with it, (T, n) in N m or N.
 

@@ -18,6 +18,8 @@ from dynident.diagnose.noise import (
 from dynident.model import Model
 
 _ROUNDS = 3  # fit, measure the noise, fit again: the noise model settles at once
+_LOAD_ROUNDS = 30  # at most, until columns that depend on the predicted torque settle as well
+_LOAD_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,7 @@ def fit_present(store: ColumnStore, model: Model) -> Present:
         If the columns are not finite.
     """
     n = model.robot.n
-    values: np.ndarray | None = np.zeros(model.size) if model.needs_torque else None
+    at = np.zeros(model.size)
     torque_std = [
         float(np.sqrt(np.mean(np.concatenate([r.versions[0].tau[:, j] for r in store.runs]) ** 2)))
         for j in range(n)
@@ -77,16 +79,18 @@ def fit_present(store: ColumnStore, model: Model) -> Present:
     noise = tuple(flat_noise(std or 1.0) for std in torque_std)
     known = any(run.kind != "single" for run in store.runs)
     columns = []
-    for _ in range(_ROUNDS):
+    for round in range(_LOAD_ROUNDS if model.needs_torque else _ROUNDS):
         if not columns or model.needs_torque:
             columns = [
-                [model_columns(store, model, r, j, values) for j in range(n)]
+                [model_columns(store, model, r, j, at) for j in range(n)]
                 for r in range(len(store.runs))
             ]
-        white = _whiten(store, columns, noise)
-        summed = _moments(store, white)
-        values, solution = _solve(summed)
+        values, _ = _solve(_moments(store, _whiten(store, columns, noise)))
         noise = tuple(_noise(store, columns, values, j) for j in range(n))
+        change = float(np.linalg.norm(values - at))
+        if round >= _ROUNDS and change <= _LOAD_TOLERANCE * np.linalg.norm(values):
+            break
+        at = model.settled(at, values)
     white = _whiten(store, columns, noise)
     summed = _moments(store, white)
     values, solution = _solve(summed)

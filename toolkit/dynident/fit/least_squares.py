@@ -20,7 +20,7 @@ from dynident.threads import single_threaded
 RANK_TOLERANCE = 1e-8
 """Share of the largest diagonal of R (unit columns) below which data do not excite a direction."""
 
-_LOAD_ROUNDS = 8  # of columns that depend on the predicted torque, until they settle
+_LOAD_ROUNDS = 30  # of columns that depend on the predicted torque, until they settle
 _LOAD_TOLERANCE = 1e-9
 
 
@@ -49,17 +49,17 @@ class LeastSquares:
         """
         if not dataset.recordings:
             raise FitError("no recording to fit", mend='mark some recordings use = "train"')
-        values = None
         factors = factorise(rows(model, dataset))
         solution = solve_factors(model, factors, self.weighting)
         if model.needs_torque:
+            values = solution.values
             for _ in range(_LOAD_ROUNDS):
-                values = solution.values
                 factors = factorise(rows(model, dataset, values))
                 solution = solve_factors(model, factors, self.weighting)
                 change = np.linalg.norm(solution.values - values)
                 if change <= _LOAD_TOLERANCE * np.linalg.norm(values):
                     break
+                values = model.settled(values, solution.values)
         return estimate_of(self.name, self.weighting, model, dataset, factors, solution)
 
 
