@@ -60,8 +60,16 @@ def print_tables(*tables: Table | str) -> None:
         def on_broken_pipe(self) -> None:
             raise BrokenPipeError  # for the command to handle; rich would end the process
 
-    # A file or a pipe has no width of its own: wide enough for every column.
-    console = Terminal(highlight=False, emoji=False, width=None if sys.stdout.isatty() else WIDTH)
+    # A file, a pipe or a notebook has no width of its own: wide enough for every column. No colours
+    # either: notebooks ask for them, but text reads the same wherever the page is shown.
+    terminal = sys.stdout.isatty()
+    console = Terminal(
+        highlight=False,
+        emoji=False,
+        width=None if terminal else WIDTH,
+        color_system="auto" if terminal else None,
+        force_jupyter=False,
+    )
     for table in tables:
         if isinstance(table, str):
             console.print(table, markup=False)

@@ -36,10 +36,9 @@ class Comparison:
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON of `compare --json`."""
-        first = self.results[0]
-        robot = self.models[0].robot
+        robot, last = self.models[0].robot, self.results[-1]
         return {
-            "noise": {"floor": first.floor},
+            "noise": {"floor": last.floor},
             "models": [
                 {
                     "name": name,
@@ -55,8 +54,8 @@ class Comparison:
             "joints": [
                 {
                     "name": joint,
-                    "noise_rms": None if first.noise_std is None else float(first.noise_std[j]),
-                    "torque_rms": float(first.torque_rms[j]),
+                    "noise_rms": None if last.noise_std is None else float(last.noise_std[j]),
+                    "torque_rms": float(last.torque_rms[j]),
                 }
                 for j, joint in enumerate(robot.names)
             ],
@@ -64,19 +63,21 @@ class Comparison:
 
     def tables(self) -> tuple[Table | str, ...]:
         """Everything that `show` prints, in its order."""
-        robot, first = self.models[0].robot, self.results[0]
+        # Noise of the positions comes through a model's columns: the floor is the last one's.
+        robot, last = self.models[0].robot, self.results[-1]
         rows = []
         for j, joint in enumerate(robot.names):
-            noise = None if first.noise_std is None else first.noise_std[j] / first.torque_rms[j]
+            noise = None if last.noise_std is None else last.noise_std[j] / last.torque_rms[j]
             errors = (percent(float(r.joint_errors[j])) for r in self.results)
             rows.append((joint, *errors, percent(noise)))
-        rows.append(("all", *(percent(r.error) for r in self.results), percent(first.floor)))
-        notes = () if first.floor is not None else ("The noise floor is unknown.",)
+        rows.append(("all", *(percent(r.error) for r in self.results), percent(last.floor)))
+        notes = () if last.floor is not None else ("The noise floor is unknown.",)
         columns = ("joint", *self.names, "noise floor")
         errors = Table("Relative torque error on held-out recordings", columns, tuple(rows), notes)
-        last = self.results[-1]
         seen = residual_maps(self.models[-1], last, last)
         where = tuple((m.joint, m.against, m.sentence) for m in seen if m.sentence)
+        if not where:
+            return (errors, f"Where '{self.names[-1]}' fails: no simple shape stands out.")
         title = f"Where '{self.names[-1]}' fails"
         return (errors, Table(title, ("joint", "against", "what is seen"), where))
 

@@ -66,8 +66,13 @@ def waterfall(diagnosis: Diagnosis) -> Figure:
     return figure
 
 
-def residual_maps(diagnosis: Diagnosis, joint: str) -> Figure:
+def residual_maps(diagnosis: Diagnosis, joint: str, given: str = GIVEN) -> Figure:
     """All residual maps of a joint side by side.
+
+    Parameters
+    ----------
+    diagnosis, joint : which maps.
+    given : what the legend calls the model that was diagnosed.
 
     Raises
     ------
@@ -82,19 +87,20 @@ def residual_maps(diagnosis: Diagnosis, joint: str) -> Figure:
     for axes in grid[len(maps) :]:
         axes.set_visible(False)
     for axes, one in zip(grid, maps, strict=False):
-        _draw(axes, diagnosis, one)
+        _draw(axes, diagnosis, one, given)
     handles, labels = grid[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper left", ncols=3, frameon=False)
     return figure
 
 
-def _draw(axes: Axes, diagnosis: Diagnosis, one: ResidualMap) -> None:
+def _draw(axes: Axes, diagnosis: Diagnosis, one: ResidualMap, given: str) -> None:
     marks = ("", "") if is_spectrum(one) else ("o", "D")
     if np.isfinite(one.band).any():
         lower = np.zeros_like(one.band) if is_spectrum(one) else -one.band
         axes.fill_between(one.at, lower, one.band, color=GREY, alpha=0.3, lw=0, label=BAND)
+    name = _plain(given)
     axes.plot(
-        one.at, one.before, color=BEFORE_COLOUR, marker=marks[0], mfc="white", ms=4, label=GIVEN
+        one.at, one.before, color=BEFORE_COLOUR, marker=marks[0], mfc="white", ms=4, label=name
     )
     if diagnosis.steps:
         name = _plain(after_name(diagnosis))
