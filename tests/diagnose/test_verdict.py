@@ -7,7 +7,7 @@ import pytest
 
 from dynident import diagnose as find
 from dynident.model import Model
-from dynident.recording import Dataset, Recording
+from dynident.recording import Dataset, Noise, Recording
 from synthetic import arm, synthetic, true_values
 
 FRICTION = {"Fv__shoulder": 1.2, "Fv__elbow": 0.5, "Fc__shoulder": 1.5, "Fc__elbow": 0.6}
@@ -53,3 +53,42 @@ def test_the_shape_of_an_effect_in_the_given_model_is_sought_too(model: Model) -
     (speed,) = next(e.shape for e in found.before.model.effects if e.shape)
     assert speed == pytest.approx(0.03, rel=0.3)
     assert found.test_error.after < 1.1 * (found.test_error.noise_floor or 0.0)
+
+
+def test_what_the_data_do_not_tell_keeps_its_given_value_and_has_no_sigma(model: Model) -> None:
+    """The elbow is at rest: its speed is noise, and so is every friction found from it."""
+    truth = true_values(model, **FRICTION)
+    runs = []
+    for seed in range(3):
+        one = synthetic(model, truth, seed, rate_hz=250.0)
+        q = np.column_stack([one.q[:, 0], np.full(one.samples, 0.3)])
+        v = np.gradient(q, 1 / 250.0, axis=0)
+        a = np.gradient(v, 1 / 250.0, axis=0)
+        rng = np.random.default_rng(seed)
+        tau = model.torque(model.block(one.t, q, v, a), truth) + 0.1 * rng.normal(size=q.shape)
+        runs.append(one.replace(q=q, tau=tau))
+    after = find(model, Dataset(tuple(runs[:2])), Dataset(tuple(runs[2:]))).after
+    lost = {name for name, known in zip(after.names, after.identified, strict=True) if not known}
+    assert lost == {"Fv@elbow", "Fc@elbow"}
+    assert after.value("Fv@elbow") == after.value("Fc@elbow") == 0.0
+    assert np.all(np.isnan(after.sigma[~after.identified]))
+    assert np.all(
+        np.abs(after.values - truth)[after.identified] < 5 * after.sigma[after.identified]
+    )
+
+
+def test_the_estimate_names_the_method_that_was_used(model: Model) -> None:
+    runs = recordings(model)[:2]
+    noise = Noise(np.full(2, 2e-5), np.full(2, 0.3))
+    bare = tuple(one.replace(period=None) for one in runs)
+    methods = {
+        "instrumental variables": Dataset(runs),
+        "corrected for the stated noise": Dataset(bare, None, noise),
+        "weighted per joint": Dataset(bare),
+    }
+    rows = set()
+    for words, data in methods.items():
+        estimate = find(model, data, most=0).before
+        assert words in estimate.method
+        rows.add(round(estimate.rows, -3))
+    assert len(rows) == 1  # noisy copies are no new equations

@@ -25,7 +25,7 @@ from dynident.diagnose.scoring import Score
 from dynident.diagnose.search import Ranking
 from dynident.effects import Effect
 from dynident.fit.estimate import Estimate
-from dynident.fit.least_squares import RANK_TOLERANCE, sources_of
+from dynident.fit.least_squares import sources_of
 from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.robot import base_parameters
@@ -33,6 +33,15 @@ from dynident.robot import base_parameters
 WITHIN_NOISE = 0.3
 """Systematic residual over noise that must be surpassed, with 99 % confidence, before anything is
 said to be missing."""
+
+
+_RANK_TOLERANCE = 1e-6  # of what comes from squares, in which half of the digits are gone
+
+_METHODS: dict[NoiseSource, str] = {
+    "replicates": "instrumental variables from the repeated periods, noise whitened",
+    "given": "least squares corrected for the stated noise, noise whitened",
+    "unknown": "least squares, weighted per joint",
+}
 
 
 @dataclass(frozen=True)
@@ -187,28 +196,24 @@ def _candidates(ranking: Ranking, error: float, present: Present) -> tuple[Candi
 def _estimate(store: ColumnStore, present: Present, train: Dataset) -> Estimate:
     """The fit of the diagnosis as an `Estimate`."""
     fitted = on_recordings(store, present)
-    total = present.moments.sums()[1][:-1, :-1]
-    size, directions = np.linalg.eigh(total)
-    root = np.sqrt(np.clip(size, 0.0, None))[:, None] * directions.T
-    # A root of squares: half of the digits are gone.
-    basis = base_parameters(root, present.model.names, max(RANK_TOLERANCE, 1e-6))
-    kept = list(basis.independent)
-    how = {
-        "repeated": "instrumental variables from the repeated periods",
-        "perturbed": "least squares corrected for the stated noise",
-        "single": "least squares",
-    }
+    model = present.model
+    # Rows that span what the data tell: directions in which the columns are noise are not told.
+    told = present.solution.basis.T @ present.moments.sums()[1][:-1, :-1]
+    basis = base_parameters(told, model.names, _RANK_TOLERANCE)
+    kept, combination = list(basis.independent), basis.combination
+    covariance = np.zeros((model.size, model.size))
+    covariance[np.ix_(kept, kept)] = combination @ present.covariance @ combination.T
     return Estimate(
-        present.model,
-        present.values,
-        present.covariance,
+        model,
+        basis.lift(basis.coordinates(present.values), model.given_values()),
+        covariance,
         basis,
         fitted.residual_rms,
         fitted.joint_errors,
         fitted.error,
-        float(np.linalg.cond(root[:, kept])),
+        float(np.linalg.cond(told[:, kept])),
         present.rows,
-        f"{how['repeated' if present.noise_known else 'single']}, noise whitened",
+        _METHODS[_noise_source(store)],
         "solved",
         (),
         sources_of(train),

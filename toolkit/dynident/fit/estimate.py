@@ -122,10 +122,10 @@ class Estimate:
 
     def parameter_table(self) -> Table:
         """Values, standard deviations and what each parameter is a combination of."""
-        heads = {
-            index: text
-            for index, text in zip(self.basis.independent, self.basis.expressions, strict=True)
-        }
+        heads = dict(zip(self.basis.independent, self.basis.expressions, strict=True))
+        # What is identified is the combination: its value and sigma, not those of its head.
+        values, sigma = np.array(self.values), self.sigma
+        values[list(self.basis.independent)] = self.basis.coordinates(self.values)
         rows = []
         for i, name in enumerate(self.names):
             expression = heads.get(i, "not identified on its own; see the combinations")
@@ -134,9 +134,9 @@ class Estimate:
             rows.append(
                 (
                     name,
-                    number(self.values[i], 6),
-                    number(self.sigma[i], 3),
-                    percent(self.relative_sigma[i], 1),
+                    number(values[i], 6),
+                    number(sigma[i], 3),
+                    percent(float(sigma[i] / abs(values[i])) if values[i] else None, 1),
                     self.model.units[i],
                     "" if expression == name else expression,
                 )
