@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
 from dynident import diagnose as find
+from dynident.diagnose import compare_models
 from dynident.model import Model
 from dynident.recording import Dataset, Noise, Recording
 from synthetic import arm, synthetic, true_values
@@ -92,3 +95,18 @@ def test_the_estimate_names_the_method_that_was_used(model: Model) -> None:
         assert words in estimate.method
         rows.add(round(estimate.rows, -3))
     assert len(rows) == 1  # noisy copies are no new equations
+
+
+def test_a_joint_without_torque_has_no_error_and_no_nan_in_json(model: Model) -> None:
+    runs = []
+    for one in recordings(model)[:3]:
+        still = np.column_stack([one.q[:, 0], np.full(one.samples, 0.3)])
+        runs.append(one.replace(q=still, tau=one.tau * [1.0, 0.0]))
+    found = find(model, Dataset(tuple(runs[:2])), Dataset(tuple(runs[2:])), most=0)
+    text = json.dumps(found.to_dict(), allow_nan=False)
+    assert json.loads(text)["joints"][1]["error_after"] is None
+    elbow = found.joint_table().rows[1]
+    assert elbow[:4] == ("elbow", "-", "-", "-")
+    both = compare_models({"one": model}, Dataset(tuple(runs[:2])), Dataset(tuple(runs[2:])))
+    json.dumps(both.to_dict(), allow_nan=False)
+    assert both.tables()

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from dynident.diagnose.diagnosis import finite
 from dynident.diagnose.evidence import ColumnStore, gather
 from dynident.diagnose.held_out import HeldOut, on_blocks, on_recordings
 from dynident.diagnose.maps import residual_maps
@@ -45,7 +46,7 @@ class Comparison:
                     "effects": [effect.label for effect in model.effects],
                     "error": result.error,
                     "joints": [
-                        {"name": joint, "error": float(error)}
+                        {"name": joint, "error": finite(float(error))}
                         for joint, error in zip(robot.names, result.joint_errors, strict=True)
                     ],
                 }
@@ -67,7 +68,9 @@ class Comparison:
         robot, last = self.models[0].robot, self.results[-1]
         rows = []
         for j, joint in enumerate(robot.names):
-            noise = None if last.noise_std is None else last.noise_std[j] / last.torque_rms[j]
+            noise = None
+            if last.noise_std is not None and last.torque_rms[j] > 0:
+                noise = float(last.noise_std[j] / last.torque_rms[j])
             errors = (percent(float(r.joint_errors[j])) for r in self.results)
             rows.append((joint, *errors, percent(noise)))
         rows.append(("all", *(percent(r.error) for r in self.results), percent(last.floor)))

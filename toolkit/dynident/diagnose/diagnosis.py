@@ -83,7 +83,7 @@ class JointResult:
     Attributes
     ----------
     name, torque_unit : the joint, and N m or N.
-    error_before, error_after : norm of the residual over norm of the torque.
+    error_before, error_after : norm of the residual over norm of the torque; NaN without torque.
     torque_rms : N m or N.
     noise_rms : N m or N; None where the noise is unknown.
     ratio_before, ratio_after : systematic residual over noise (RNR); None likewise.
@@ -97,6 +97,13 @@ class JointResult:
     noise_rms: float | None
     ratio_before: float | None
     ratio_after: float | None
+
+    @property
+    def noise_share(self) -> float | None:
+        """The noise over the torque; None where either is unknown or there is no torque."""
+        if self.noise_rms is None or not self.torque_rms > 0:
+            return None
+        return self.noise_rms / self.torque_rms
 
 
 @dataclass(frozen=True)
@@ -215,8 +222,8 @@ class Diagnosis:
             "joints": [
                 {
                     "name": j.name,
-                    "error_before": j.error_before,
-                    "error_after": j.error_after,
+                    "error_before": finite(j.error_before),
+                    "error_after": finite(j.error_after),
                     "noise_rms": j.noise_rms,
                 }
                 for j in self.joints
@@ -269,7 +276,7 @@ class Diagnosis:
                 j.name,
                 percent(j.error_before),
                 percent(j.error_after),
-                percent(None if j.noise_rms is None else j.noise_rms / (j.torque_rms or 1.0)),
+                percent(j.noise_share),
                 number(j.ratio_before, 3),
                 number(j.ratio_after, 3),
             )
@@ -336,6 +343,11 @@ class Diagnosis:
             "given": "as the study states it, not measured",
             "unknown": "unknown (nothing repeats and no noise is stated), so the verdict is weaker",
         }[self.noise_source]
+
+
+def finite(value: float) -> float | None:
+    """A number as JSON has it: None where it is not finite."""
+    return value if np.isfinite(value) else None
 
 
 def place(effect: Effect) -> dict[str, str | None]:

@@ -149,6 +149,8 @@ def _sentence(
     against: str, at: np.ndarray, mean: np.ndarray, sigma: np.ndarray, fitted: set[str]
 ) -> str:
     """The shape that a map shows, if it shows one beyond the noise."""
+    if not np.all(sigma > 0):
+        return ""
     weight = 1.0 / sigma
     power = float(np.sum((mean * weight) ** 2))
     if stats.chi2.sf(power, len(at)) > _LEVEL:
