@@ -212,3 +212,23 @@ def test_compare_needs_recordings_and_a_period_must_repeat(model: Model) -> None
     wrong = Dataset(tuple(r.replace(period=5.0) for r in train))
     with pytest.raises(RecordingError, match="do not repeat"):
         find(model, wrong)
+
+
+def test_blunted_friction_is_a_nuisance_that_is_told_not_a_missing_effect(model: Model) -> None:
+    """The truth reverses its friction at the elbow over 0.04 rad/s where the model says 0.01."""
+    train, test = recordings(model, None, {}, **NOISE)
+
+    def blunt(recording):
+        v = np.gradient(recording.q, 1 / 250.0, axis=0)[:, 1]
+        tau = np.array(recording.tau)
+        tau[:, 1] += 3.0 * (np.tanh(v / 0.04) - np.tanh(v / 0.01))
+        return recording.replace(tau=tau)
+
+    def stiffer(recordings):
+        return Dataset(tuple(blunt(r) for r in recordings))
+
+    found = find(model, stiffer(train), stiffer(test))
+    assert (found.verdict, found.steps) == ("nothing_missing", ())
+    assert any("at elbow is blunter" in note for note in found.notes)
+    assert not any("at shoulder is blunter" in note for note in found.notes)
+    assert "blunted_friction" not in {c.effect.name for c in found.candidates}

@@ -199,6 +199,12 @@ class Diagnosis:
         effects = ", ".join(self._named(step) for step in self.steps)
         if self.noise_source == "unknown":
             return _VERDICTS_WITHOUT_NOISE[self.verdict].format(effects=effects)
+        left = max((j.ratio_after or 0.0 for j in self.joints), default=0.0)
+        if self.verdict == "explained" and left > 0.5:
+            return (
+                f"Explained: {effects} added, and what remains is smaller than the noise "
+                f"({left:.2g} of it), though not nothing."
+            )
         if self.verdict == "unexplained" and effects:
             before, after = percent(self.test_error.before), percent(self.test_error.after)
             return (

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from dynident.diagnose.blunting import blunted
 from dynident.diagnose.diagnosis import Diagnosis
 from dynident.diagnose.evidence import ColumnStore, flagged_run, gather
 from dynident.diagnose.present import Present, fit_present
@@ -63,7 +64,7 @@ def diagnose(
     tell("evaluating every effect")
     everything = [v for effect in candidates(given) for v in variants(effect, given)]
     store.prepare([*given.effects, *everything])
-    start = _shaped(store, given)
+    start = blunted(store, _shaped(store, given))
     rounds = [rank(store, start, 0, tell)]
     present, found = start, []
     while len(found) < most:
@@ -73,7 +74,7 @@ def diagnose(
         tell(f"adding {chosen.score.effect.label}")
         found.append(chosen)
         _carry(store, chosen.score)
-        present = _refitted(store, present.model + chosen.score.effect)
+        present = blunted(store, _refitted(store, present.model + chosen.score.effect))
         rounds.append(rank(store, present, len(found), tell))
         found[-1] = _alternatives_only(chosen, rounds[-1])
     kept = _without_superfluous(store, present, found, tell)

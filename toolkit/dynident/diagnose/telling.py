@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dynident.diagnose.blunting import blunting_notes
 from dynident.diagnose.diagnosis import (
     Candidate,
     Diagnosis,
@@ -42,6 +43,10 @@ _METHODS: dict[NoiseSource, str] = {
     "given": "least squares corrected for the stated noise, noise whitened",
     "unknown": "least squares, weighted per joint",
 }
+
+MOST_EXPLAINED = 0.8
+"""Share of the systematic square that the effects added must take away for the residual to count
+as explained although a part smaller than the noise is left of it."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +87,8 @@ def told(
     for one in found:
         wider = stages[-1].model + by_label[one.score.effect.label]
         stages.append(fit_present(store, wider.with_shapes(present.model.effects)))
+    if found:
+        stages[-1] = present  # with its dry friction blunted where that was called for later
     if held is not None:
         held.prepare(present.model.effects)
         _decide_payload(held, stages[-1])
@@ -135,12 +142,15 @@ def _with_floor(judged: HeldOut, store: ColumnStore, present: Present) -> HeldOu
 
 
 def _verdict(before: HeldOut, after: HeldOut, steps, last: Ranking) -> Verdict:
-    if after.least_ratio is None:
+    if after.least_ratio is None or after.ratio is None or before.ratio is None:
         if last.material:
             return "unexplained"
         return "explained" if steps else "nothing_missing"
     if float(after.least_ratio.max()) <= WITHIN_NOISE:
         return "explained" if steps else "nothing_missing"
+    explained = 1.0 - float(np.sum(after.ratio**2) / np.sum(before.ratio**2))
+    if steps and explained >= MOST_EXPLAINED and float(after.ratio.max()) <= 1.0:
+        return "explained"
     return "unexplained"
 
 
@@ -273,4 +283,4 @@ def _notes(store, held, present: Present, source: NoiseSource) -> tuple[str, ...
         carriers = [r.recording.name for r in store.runs if r.recording.payload]
         carriers += [r.recording.name for r in (held.runs if held else ()) if r.recording.payload]
         notes.append(f"Payload carried in: {', '.join(carriers)}.")
-    return tuple(notes)
+    return (*notes, *blunting_notes(present))

@@ -1,0 +1,68 @@
+"""Dry friction that reverses less sharply than its law: a nuisance, not a missing effect.
+
+A drive that feeds encoder noise into its torque dithers the joint, and dithered dry friction is
+blunter than friction at rest from noise; so is friction seen through noisy velocities. Without a
+word for it, healthy robots would be said to lack something. So the diagnosis lets a share of a
+joint's dry friction reverse over a wider range of speeds, where the data call for it by the same
+tests as for any effect, and says so.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.diagnose.evidence import ColumnStore
+from dynident.diagnose.present import Present, fit_present
+from dynident.diagnose.search import rank
+from dynident.effects import Block, JointEffect, Parameter, ShapeParameter
+
+
+class BluntedFriction(JointEffect):
+    """A share of the dry friction that reverses over k times the width: no loss at speed."""
+
+    name = "blunted_friction"
+    law = "Fb (tanh(v/(k w)) - tanh(v/w))"
+    sign_of = "opposite spikes on both sides of zero velocity"
+    experiment = "move {joint} with less noise in the drive"
+
+    def parameters(self, robot):
+        unit = robot.torque_units[robot.names.index(str(self.joint))]
+        return (Parameter("Fb", unit, 0.0),)
+
+    def shape_parameters(self, robot):
+        return (ShapeParameter("k", "1", (2.0, 4.0, 8.0), 1.5, 15.0),)
+
+    def at_joint(self, block: Block) -> np.ndarray:
+        v = block.v[:, [block.index(self.joint)]]
+        return block.sign(v / self.shape[0]) - block.sign(v)
+
+
+def blunted(store: ColumnStore, present: Present) -> Present:
+    """Return the fit with dry friction blunted at the joints where the data call for it."""
+    model = present.model
+    dry = [e.joint for e in model.effects if e.name == "coulomb_friction"]
+    wanted = tuple(BluntedFriction(joint).on(model.robot) for joint in dry)
+    wanted = tuple(effect for effect in wanted if effect not in model)
+    if not wanted:
+        return present
+    for score in rank(store, present, 0, only=wanted).material:
+        model = model + score.effect
+    return present if model is present.model else fit_present(store, model)
+
+
+def blunting_notes(present: Present) -> tuple[str, ...]:
+    """What was blunted, in plain words."""
+    model, notes = present.model, []
+    for effect in model.effects:
+        if isinstance(effect, BluntedFriction):
+            wide = effect.shape[0] * model.friction_width
+            unit = model.robot.units[model.robot.names.index(str(effect.joint))]
+            share = present.values[model.slices[effect.label]][0]
+            whole = present.values[model.slices[f"coulomb_friction@{effect.joint}"]][0]
+            part = f"{100 * share / whole:.0f} % of it" if whole > 0 else "a part of it"
+            notes.append(
+                f"Dry friction at {effect.joint} is blunter than tanh(v / {model.friction_width:g} "
+                f"{unit}/s): {part} reverses over {wide:.2g} {unit}/s. Noise that the drive feeds "
+                "into the joint does that, or a friction_width that is not the joint's."
+            )
+    return tuple(notes)
