@@ -112,7 +112,7 @@ def test_interrupt_during_a_diagnosis(tmp_path):
     )
     os.close(other)
     try:
-        assert b"diagnosing" in read_until(terminal, b"diagnosing")
+        assert b"evaluating" in read_until(terminal, b"evaluating")
         process.send_signal(signal.SIGINT)
         said = read_until(terminal, b"half written")
         said += read_until(terminal, b"nothing more comes")

@@ -110,3 +110,32 @@ def test_a_joint_without_torque_has_no_error_and_no_nan_in_json(model: Model) ->
     both = compare_models({"one": model}, Dataset(tuple(runs[:2])), Dataset(tuple(runs[2:])))
     json.dumps(both.to_dict(), allow_nan=False)
     assert both.tables()
+
+
+def test_test_recordings_that_do_not_repeat_are_judged_all_the_same(model: Model) -> None:
+    """Healthy training runs, and a drag in the test run only: something is missing there."""
+    healthy = recordings(model)[:3]
+    lacking = model + "quadratic_drag@elbow"
+    truth = true_values(lacking, **FRICTION, Fq__elbow=0.5)
+    other = synthetic(lacking, truth, 7, rate_hz=250.0, position_std=2e-5, torque_std=0.3)
+    found = find(model, Dataset(healthy), Dataset((other.replace(period=None),)))
+    assert found.test_error.noise_floor is not None
+    assert found.test_error.before > 1.5 * found.test_error.noise_floor
+    assert found.verdict == "unexplained"
+
+
+def test_test_recordings_that_repeat_give_the_floor_that_the_others_cannot(model: Model) -> None:
+    runs = recordings(model)
+    train = Dataset(tuple(r.replace(period=None) for r in runs[:3]))
+    found = find(model, train, Dataset(runs[3:]))
+    assert (found.noise_source, found.verdict) == ("replicates", "nothing_missing")
+    assert any("plain least squares" in note for note in found.notes)
+
+
+def test_what_differentiation_leaves_is_not_called_missing(model: Model) -> None:
+    """Without any noise the floor is zero, and rounding and truncation are all that is left."""
+    truth = true_values(model, **FRICTION)
+    runs = tuple(synthetic(model, truth, seed, rate_hz=500.0) for seed in range(3))
+    found = find(model, Dataset(runs[:2]), Dataset(runs[2:]))
+    assert (found.verdict, found.steps) == ("nothing_missing", ())
+    assert found.test_error.after < 1e-4

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from dynident.diagnose.blunting import blunted
 from dynident.diagnose.diagnosis import Diagnosis
 from dynident.diagnose.evidence import ColumnStore, flagged_run, gather
+from dynident.diagnose.held_out import on_recordings
 from dynident.diagnose.present import Present, fit_present
 from dynident.diagnose.scoring import Score
 from dynident.diagnose.search import (
@@ -19,7 +22,7 @@ from dynident.diagnose.search import (
     refined,
     variants,
 )
-from dynident.diagnose.telling import Found, Search, told
+from dynident.diagnose.telling import RESOLUTION, Found, Search, told
 from dynident.effects import Effect
 from dynident.fit.estimate import Estimate
 from dynident.model import Model
@@ -67,7 +70,7 @@ def diagnose(
     start = blunted(store, _shaped(store, given))
     rounds = [rank(store, start, 0, tell)]
     present, found = start, []
-    while len(found) < most:
+    while len(found) < most and not _resolved(store, present):
         chosen = _choose(rounds[-1])
         if chosen is None:
             break
@@ -82,6 +85,12 @@ def diagnose(
         rounds.append(rank(store, kept.final, len(kept.found), tell))
     search = Search(store, start, kept.final, tuple(kept.found), tuple(rounds))
     return told(search, train, test, held)
+
+
+def _resolved(store: ColumnStore, present: Present) -> bool:
+    """Whether what is left is too small a share of the torque for the processing to resolve."""
+    judged = on_recordings(store, present)
+    return bool(np.all(judged.residual_rms <= RESOLUTION * judged.torque_rms))
 
 
 def _choose(ranking: Ranking) -> Found | None:

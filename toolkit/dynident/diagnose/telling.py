@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from dynident.diagnose.diagnosis import (
     Verdict,
 )
 from dynident.diagnose.evidence import ColumnStore, flagged_run
-from dynident.diagnose.held_out import HeldOut, on_blocks, on_recordings
+from dynident.diagnose.held_out import HeldOut, on_blocks, on_recordings, with_noise_of
 from dynident.diagnose.maps import residual_maps
 from dynident.diagnose.present import Present, fit_present, residuals
 from dynident.diagnose.scoring import Score
@@ -43,6 +43,9 @@ _METHODS: dict[NoiseSource, str] = {
     "given": "least squares corrected for the stated noise, noise whitened",
     "unknown": "least squares, weighted per joint",
 }
+
+RESOLUTION = 1e-4
+"""Share of a joint's torque below which a residual is that of differentiation and filters."""
 
 MOST_EXPLAINED = 0.8
 """Share of the systematic square that the effects added must take away for the residual to count
@@ -93,7 +96,9 @@ def told(
         held.prepare(present.model.effects)
         _decide_payload(held, stages[-1])
     judged = [
-        _with_floor(on_recordings(held, s), store, s) if held else on_blocks(store, s)
+        with_noise_of(on_recordings(held, s), on_recordings(store, s))
+        if held
+        else on_blocks(store, s)
         for s in stages
     ]
     before, after = judged[0], judged[-1]
@@ -108,7 +113,7 @@ def told(
         )
         for one, stage, old, new in zip(found, stages[1:], judged[:-1], judged[1:], strict=True)
     )
-    source = _noise_source(store)
+    source = _noise_source(store, held)
     verdict = _verdict(before, after, steps, rounds[-1])
     return Diagnosis(
         verdict,
@@ -127,26 +132,12 @@ def told(
     )
 
 
-def _with_floor(judged: HeldOut, store: ColumnStore, present: Present) -> HeldOut:
-    """Take the noise from the training recordings where the test recordings do not tell it."""
-    if judged.noise_std is not None or not present.noise_known:
-        return judged
-    own = on_recordings(store, present)
-    return replace(
-        judged,
-        noise_std=own.noise_std,
-        ratio=own.ratio,
-        least_ratio=own.least_ratio,
-        inflation=own.inflation,
-    )
-
-
 def _verdict(before: HeldOut, after: HeldOut, steps, last: Ranking) -> Verdict:
     if after.least_ratio is None or after.ratio is None or before.ratio is None:
         if last.material:
             return "unexplained"
         return "explained" if steps else "nothing_missing"
-    if float(after.least_ratio.max()) <= WITHIN_NOISE:
+    if within_noise(after):
         return "explained" if steps else "nothing_missing"
     explained = 1.0 - float(np.sum(after.ratio**2) / np.sum(before.ratio**2))
     if steps and explained >= MOST_EXPLAINED and float(after.ratio.max()) <= 1.0:
@@ -154,8 +145,17 @@ def _verdict(before: HeldOut, after: HeldOut, steps, last: Ranking) -> Verdict:
     return "unexplained"
 
 
-def _noise_source(store: ColumnStore) -> NoiseSource:
-    kinds = {run.kind for run in store.runs}
+def within_noise(judged: HeldOut) -> bool:
+    """Whether nothing remains at any joint but noise, and what no processing can resolve."""
+    assert judged.least_ratio is not None and judged.noise_std is not None
+    systematic = judged.least_ratio * judged.noise_std
+    matters = systematic > RESOLUTION * judged.torque_rms
+    return not np.any(matters & (judged.least_ratio > WITHIN_NOISE))
+
+
+def _noise_source(store: ColumnStore, held: ColumnStore | None) -> NoiseSource:
+    """Where the noise floor that is reported comes from."""
+    kinds = {run.kind for run in (*store.runs, *(held.runs if held else ()))}
     if "repeated" in kinds:
         return "replicates"
     return "given" if "perturbed" in kinds else "unknown"
@@ -223,7 +223,7 @@ def _estimate(store: ColumnStore, present: Present, train: Dataset) -> Estimate:
         fitted.error,
         float(np.linalg.cond(told[:, kept])),
         present.rows,
-        _METHODS[_noise_source(store)],
+        _METHODS[_noise_source(store, None)],
         "solved",
         (),
         sources_of(train),
@@ -274,10 +274,12 @@ def _notes(store, held, present: Present, source: NoiseSource) -> tuple[str, ...
         notes.append("The test recordings do not repeat: the noise is that of the training ones.")
     if source == "given":
         notes.append("The noise is the study's word, not measured: record a repeated motion.")
-    if source == "unknown":
+    if _noise_source(store, None) == "unknown":
+        floor = ", and no noise floor" if source == "unknown" else ""
         notes.append(
-            "Nothing repeats and no noise is stated: plain least squares, whose columns carry "
-            "noise, and no noise floor. Small effects may be false; record a repeated motion."
+            "Nothing repeats in the training recordings and no noise is stated: plain least "
+            f"squares, whose columns carry noise{floor}. Small effects may be false; record a "
+            "repeated motion."
         )
     if any("payload" in effect.needs for effect in present.model.effects):
         carriers = [r.recording.name for r in store.runs if r.recording.payload]
