@@ -126,9 +126,10 @@ class Estimate:
         # What is identified is the combination: its value and sigma, not those of its head.
         values, sigma = np.array(self.values), self.sigma
         values[list(self.basis.independent)] = self.basis.coordinates(self.values)
+        values[~self.identified] = np.nan
         rows = []
         for i, name in enumerate(self.names):
-            expression = heads.get(i, "not identified on its own; see the combinations")
+            expression = heads.get(i, "not told on its own, only in combinations")
             if expression == name:
                 expression = self.model.expressions[i]
             rows.append(
