@@ -181,8 +181,13 @@ class ColumnStore:
         )[0]
 
     def _loaded(self, effect: Effect, run: int, model: Model, values: np.ndarray | None) -> Signals:
-        """Columns that depend on the predicted torque, at the full rate like all others."""
+        """Columns that depend on the predicted torque."""
         versions = self.runs[run].versions
+        if effect.linear_in_torque:
+            return [
+                acting(effect, replace(self._rows(v), torque=torque))
+                for v, torque in zip(versions, self._filtered(run, model, values), strict=True)
+            ]
         torques = self._predicted(run, model, values)
         found = []
         for version, torque in zip(versions, torques, strict=True):
@@ -190,6 +195,25 @@ class ColumnStore:
             block = self.model.block(motion.t, motion.q, motion.v, motion.a, rigid=False)
             columns = acting(effect, replace(block, torque=torque))
             found.append(version.parallel.apply(columns)[version.kept])
+        return found
+
+    def _rows(self, version: Sampled) -> Block:
+        return self.model.block(version.t, version.q, version.v, version.a, rigid=False)
+
+    def _filtered(self, run: int, model: Model, values: np.ndarray | None) -> list[np.ndarray]:
+        """Decimated rows of the torque that the model predicts, but for effects that scale it."""
+        values = np.zeros(model.size) if values is None else values
+        base = len(model.base.independent)
+        found = [rigid @ values[:base] for rigid in self.rigid(run)]
+        for effect in model.effects:
+            if "torque" in effect.needs:
+                continue
+            if "payload" in effect.needs and not self.runs[run].recording.payload:
+                continue
+            joints = list(joints_of(effect, model))
+            own = values[model.slices[effect.label]]
+            for torque, columns in zip(found, self.of(effect, run, model, values), strict=True):
+                torque[:, joints] += columns @ own
         return found
 
     def _predicted(self, run: int, model: Model, values: np.ndarray | None) -> list[np.ndarray]:

@@ -124,6 +124,9 @@ class Effect(ABC):
     most of the work."""
     needs: ClassVar[frozenset[str]] = frozenset()
     """What `Block` must carry: "rigid", "torque"; "payload" where runs with and without differ."""
+    linear_in_torque: ClassVar[bool] = False
+    """Whether its columns are linear in the predicted torque and depend on nothing else: then it
+    does not matter whether they are filtered or made of filtered torque, which is quicker."""
 
     # --- what it is ---------------------------------------------------------------------------
 

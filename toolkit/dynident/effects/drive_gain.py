@@ -21,6 +21,7 @@ class DriveGain(JointEffect):
     confounded_with = ("payload", "rotor_inertia")
     experiment = "move {joint} through loads that the other joints feel too, or weigh a known mass"
     needs = frozenset({"torque"})
+    linear_in_torque = True
 
     def parameters(self, robot):
         return (Parameter("e", "1", -0.9, 9.0),)
