@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from synthetic import arm, synthetic, true_values
 
 from dynident.diagnose.evidence import ColumnStore, gather
 from dynident.effects import catalogue
 from dynident.model import Model
 from dynident.recording import Dataset
+from synthetic import arm, synthetic, true_values
 
 
 def test_columns_linear_in_the_torque_may_be_made_of_filtered_torque() -> None:
