@@ -21,7 +21,7 @@ test: install
 	$(BIN)/python -m pytest
 
 lint: install
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt '.[lint]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[lint]'
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/pyright
