@@ -107,9 +107,14 @@ def test_interrupt_during_a_diagnosis(tmp_path):
     before = listing(tmp_path)
     terminal, other = os.openpty()
     words = [*DYNIDENT, "explain", str(path), "--report", str(tmp_path / "old.html")]
-    process = subprocess.Popen(
-        words, stdout=subprocess.PIPE, stderr=other, env={**os.environ, "TERM": "xterm"}
-    )
+    # A shell's background job ignores SIGINT, and its children would too.
+    inherited = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        process = subprocess.Popen(
+            words, stdout=subprocess.PIPE, stderr=other, env={**os.environ, "TERM": "xterm"}
+        )
+    finally:
+        signal.signal(signal.SIGINT, inherited)
     os.close(other)
     try:
         assert b"evaluating" in read_until(terminal, b"evaluating")
