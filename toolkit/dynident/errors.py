@@ -37,6 +37,14 @@ class RobotError(DynidentError):
     """A robot description is unusable."""
 
 
+class UnsupportedError(RobotError):
+    """A robot description says something that is sound, but not supported."""
+
+
+class ConsistencyError(DynidentError):
+    """A robot has inertial parameters, or friction, that nothing physical can have."""
+
+
 class EffectError(DynidentError):
     """An effect is unknown, or does not fit the robot."""
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynident.errors import RobotError
+from dynident.errors import RobotError, UnsupportedError
 from dynident.robot.contents import Contents, Inertial, absent
 from dynident.robot.kinematics import WORLD, Connection, Kinematics
 from dynident.robot.tree import Array, Joint, Link
@@ -39,7 +39,7 @@ def choose(contents: Contents, wanted: tuple[str, ...] | None, where: str) -> tu
         Naming a joint that does not exist or is given twice, or if none is left.
     """
     if not contents.joints:
-        raise RobotError(
+        raise UnsupportedError(
             "has no revolute or prismatic joint", where, "there is nothing to identify"
         )
     if wanted is None:
@@ -62,7 +62,7 @@ def assemble(
     parented: set[str] = set()
     for connection in kinematics.connections:
         if connection.child in parented:
-            raise RobotError(
+            raise UnsupportedError(
                 f"has a second parent, by joint '{connection.name}': "
                 "closed chains are not supported",
                 f"{where}: link '{connection.child}'",
@@ -74,7 +74,7 @@ def assemble(
     attached = WORLD in below
     if len(roots) + attached > 1:
         loose = ", ".join(roots)
-        raise RobotError(
+        raise UnsupportedError(
             f"has several roots: nothing attaches {loose}" + (" to the world" if attached else ""),
             where,
             "join them by a fixed joint, or put each robot in its own file",
@@ -101,7 +101,7 @@ def assemble(
             waiting.append(connection.child)
     for name in kinematics.bodies:
         if name not in places:
-            raise RobotError(
+            raise UnsupportedError(
                 "is its own ancestor: closed chains are not supported",
                 f"{where}: link '{name}'",
                 "cut the loop by removing one of the joints",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dynident.errors import RobotError
+from dynident.errors import UnsupportedError
 
 _MEND = "cut the loop by removing one of the joints"
 
@@ -29,7 +29,7 @@ class Chains:
             If the child has a parent already.
         """
         if child in self.parents:
-            raise RobotError(
+            raise UnsupportedError(
                 f"has a second parent, by joint '{joint}': closed chains are not supported",
                 f"{self.where}: link '{child}'",
                 _MEND,
@@ -43,7 +43,7 @@ class Chains:
             while name in self.parents:
                 name = self.parents[name]
                 if name in seen:
-                    raise RobotError(
+                    raise UnsupportedError(
                         "is its own ancestor: closed chains are not supported",
                         f"{self.where}: link '{name}'",
                         _MEND,

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynident.errors import RobotError
+from dynident.errors import RobotError, UnsupportedError
 from dynident.robot.tree import Array
 
 _KINDS = {"revolute": "revolute", "prismatic": "prismatic", "weld": "fixed"}
@@ -136,7 +136,7 @@ def _indices(plant):
 def _connection(joint, where: str) -> Connection:
     kind = _KINDS.get(joint.type_name())
     if kind is None:
-        raise RobotError(
+        raise UnsupportedError(
             f"is of type '{joint.type_name()}', which is not supported",
             f"{where}: joint '{joint.name()}'",
             "use revolute, prismatic and fixed joints",

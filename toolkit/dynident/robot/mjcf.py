@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynident.errors import RobotError
+from dynident.errors import RobotError, UnsupportedError
 from dynident.robot.contents import Contents, Inertial, absent, stated, to_text
 from dynident.robot.mjcf_defaults import Angles, Defaults
 from dynident.robot.tree import Array
@@ -77,7 +77,7 @@ class _Reader:
         """Refuse what would change the robot and is not supported."""
         for element in self.root.iter():
             if element.tag in _REFUSED:
-                raise RobotError(
+                raise UnsupportedError(
                     f"has a <{element.tag}> element, which is not supported",
                     self.where,
                     "save the compiled model from MuJoCo (mj_saveLastXML), which has none",
@@ -85,7 +85,7 @@ class _Reader:
         for section in self.root.findall("equality"):
             for constraint in section:
                 if constraint.get("active", "true") != "false":
-                    raise RobotError(
+                    raise UnsupportedError(
                         f"has an equality constraint <{constraint.tag}>: closed chains and "
                         "coupled joints are not supported",
                         self.where,
@@ -104,7 +104,7 @@ class _Reader:
                 self._refuse_compiler(key)
 
     def _refuse_compiler(self, key: str) -> None:
-        raise RobotError(
+        raise UnsupportedError(
             f'has compiler {key}="{self.compiler[key]}", which is not supported',
             self.where,
             "save the compiled model from MuJoCo (mj_saveLastXML), which has none",
@@ -116,9 +116,9 @@ class _Reader:
         if name in self.elements or name == "world":
             raise RobotError(f"has two bodies named '{name}'", self.where, "rename one of them")
         if body.get("mocap", "false") == "true":
-            raise RobotError("is a mocap body, which is not supported", where, "remove mocap")
+            raise UnsupportedError("is a mocap body, which is not supported", where, "remove mocap")
         if float(reals(body.get("gravcomp", "0"), 1, "gravcomp", where)[0]) != 0.0:
-            raise RobotError("has gravcomp, which is not supported", where, "remove it")
+            raise UnsupportedError("has gravcomp, which is not supported", where, "remove it")
         childclass = body.get("childclass") or childclass
         self.elements[name] = body
         pose = self._pose(dict(body.attrib), where)
@@ -161,7 +161,7 @@ class _Reader:
         return clean
 
     def _refuse_free(self, where: str) -> None:
-        raise RobotError(
+        raise UnsupportedError(
             "has a free joint: a floating base is not supported",
             where,
             "remove the joint to fix the base to the world",
@@ -172,11 +172,11 @@ class _Reader:
         if kind == "free":
             self._refuse_free(where)
         if kind not in ("hinge", "slide"):
-            raise RobotError(
+            raise UnsupportedError(
                 f"is of type '{kind}', which is not supported", where, "use hinge and slide joints"
             )
         if float(reals(attributes.get("ref", "0"), 1, "ref", where)[0]) != 0.0:
-            raise RobotError(
+            raise UnsupportedError(
                 f'has ref="{attributes["ref"]}", which is not supported',
                 where,
                 "turn the body so that its zero needs no ref",
@@ -233,7 +233,7 @@ class _Reader:
             if density == 0.0 or kind == "plane":
                 continue
             if kind not in _SHAPES or "mesh" in attributes or "shellinertia" in attributes:
-                raise RobotError(
+                raise UnsupportedError(
                     f"has no <inertial>, and its inertia would come from a geom of type '{kind}', "
                     "which is not supported",
                     where,

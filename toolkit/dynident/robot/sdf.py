@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from dynident.errors import RobotError
+from dynident.errors import RobotError, UnsupportedError
 from dynident.robot.chains import Chains
 from dynident.robot.contents import Contents, Inertial, absent, keep, stated, symmetric, to_text
 from dynident.robot.rotations import from_quaternion, from_rpy
@@ -57,7 +57,7 @@ def read(document: Document, where: str) -> Contents:
         link_name = _name(link, "link", where)
         link_where = f"{where}: link '{link_name}'"
         if (link.findtext("gravity") or "true").strip() in ("false", "0"):
-            raise RobotError(
+            raise UnsupportedError(
                 "is without gravity, which is not supported", link_where, "remove its <gravity>"
             )
         inertials[link_name] = _inertial(link, link_where)
@@ -96,17 +96,17 @@ def _one_model(root: Element, worlds: list[Element], home: Element, where: str) 
     if not models:
         raise RobotError("has no <model>", where)
     if len(models) > 1 or len(worlds) > 1:
-        raise RobotError(f"has several models ({names})", where, "keep one model in the file")
+        raise UnsupportedError(f"has several models ({names})", where, "keep one model in the file")
     if worlds and home.find("joint") is not None:
         raise RobotError("has a joint outside its model", where, "move it into the model")
     if models[0].find("model") is not None:
         nested = models[0].find("model")
         assert nested is not None
-        raise RobotError(
+        raise UnsupportedError(
             f"has a nested model '{nested.get('name')}'", where, "merge it into the outer model"
         )
     if (models[0].findtext("static") or "false").strip() in ("true", "1"):
-        raise RobotError("is static: nothing of it moves", where, "remove <static>")
+        raise UnsupportedError("is static: nothing of it moves", where, "remove <static>")
     return models[0]
 
 
@@ -144,13 +144,13 @@ def _inertial(link: Element, where: str) -> Inertial:
     if inertial is None:
         return absent()
     if inertial.get("auto", "false") in ("true", "1"):
-        raise RobotError(
+        raise UnsupportedError(
             "asks for its inertia to be computed from collisions, which is not supported",
             where,
             "state mass and inertia",
         )
     if inertial.find("fluid_added_mass") is not None:
-        raise RobotError("has <fluid_added_mass>, which is not supported", where, "remove it")
+        raise UnsupportedError("has <fluid_added_mass>, which is not supported", where, "remove it")
     com, R = np.zeros(3), np.eye(3)
     pose = only(inertial, "pose", where)
     if pose is not None and (pose.text or "").strip():
@@ -188,7 +188,7 @@ def _read_pose(pose: Element, where: str) -> tuple[Array, Array]:
 def _joint(joint: Element, where: str) -> Element:
     kind = joint.get("type", "")
     if kind not in (*_MOVING, "fixed"):
-        raise RobotError(
+        raise UnsupportedError(
             f"is of type '{kind}', which is not supported",
             where,
             f"use joints of type {', '.join((*_MOVING, 'fixed'))}",
@@ -208,7 +208,7 @@ def _joint(joint: Element, where: str) -> Element:
     if axis is None:
         raise RobotError("has no <axis>", where, "add <axis><xyz>0 0 1</xyz></axis>")
     if axis.find("mimic") is not None:
-        raise RobotError(
+        raise UnsupportedError(
             "mimics another joint, which is not supported",
             where,
             "remove <mimic> to make it independent, or make the joint fixed",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynident.errors import RobotError
+from dynident.errors import RobotError, UnsupportedError
 from dynident.robot.chains import Chains
 from dynident.robot.contents import Contents, Inertial, absent, keep, stated, symmetric, to_text
 from dynident.robot.rotations import from_rpy
@@ -115,13 +115,13 @@ def _inertial(link: Element, where: str) -> Inertial:
 def _joint(joint: Element, where: str, links: dict[str, Inertial]) -> Element:
     kind = joint.get("type", "")
     if kind in _MENDS:
-        raise RobotError(f"is of type '{kind}', which is not supported", where, _MENDS[kind])
+        raise UnsupportedError(f"is of type '{kind}', which is not supported", where, _MENDS[kind])
     if kind not in (*_MOVING, "fixed"):
         raise RobotError(
             f"is of unknown type '{kind}'", where, f"use one of {', '.join((*_MOVING, 'fixed'))}"
         )
     if joint.find("mimic") is not None:
-        raise RobotError(
+        raise UnsupportedError(
             "mimics another joint, which is not supported",
             where,
             "remove <mimic> to make it independent, or make the joint fixed",
@@ -185,7 +185,7 @@ def _one_root(links: list[str], parents: dict[str, str], where: str) -> None:
     if "world" in parents.values() and "world" not in roots:
         roots.append("world")
     if len(roots) > 1:
-        raise RobotError(
+        raise UnsupportedError(
             f"has several roots ({', '.join(roots)}); one robot has one root",
             where,
             "join them by a fixed joint, or put each robot in its own file",
