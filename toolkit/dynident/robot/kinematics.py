@@ -88,7 +88,7 @@ def parse(copy: str, suffix: str, where: str) -> Kinematics:
 
     plant = MultibodyPlant(0.0)
     try:
-        with _quiet():
+        with quiet():
             Parser(plant).AddModelsFromString(copy, suffix)
     except Exception as error:  # the bindings raise whatever the parser's libraries throw
         raise RobotError(f"cannot be understood: {_reason(error)}", where) from None
@@ -106,7 +106,7 @@ def parse(copy: str, suffix: str, where: str) -> Kinematics:
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def quiet() -> Iterator[None]:
     """Keep Drake's log from the terminal: what is wrong is said once, in our error."""
     logger = logging.getLogger("drake")
 

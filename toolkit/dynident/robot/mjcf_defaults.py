@@ -11,7 +11,7 @@ from dynident.robot.rotations import about, from_axis_angle, from_quaternion
 from dynident.robot.tree import Array
 from dynident.robot.xmltree import Element, closest, reals
 
-_TAGS = ("joint", "geom")
+_TAGS = ("joint", "geom", "mesh")
 _ORIENTATIONS = {"quat": 4, "axisangle": 4, "xyaxes": 6, "zaxis": 3, "euler": 3}
 
 

@@ -29,6 +29,11 @@ def take_apart(text: str, where: str) -> tuple[Document, str, Contents]:
         If it is not XML, not a robot description, or not a supported one.
     """
     document = parse(text, where)
+    return document, *contents_of(document, where)
+
+
+def contents_of(document: Document, where: str) -> tuple[str, Contents]:
+    """Return the format of a document and its contents; see `take_apart`."""
     tag = document.root.tag
     if tag not in _READERS:
         raise RobotError(
@@ -37,7 +42,7 @@ def take_apart(text: str, where: str) -> tuple[Document, str, Contents]:
             "URDF has <robot>, SDF <sdf>, MJCF <mujoco>",
         )
     format_, reader = _READERS[tag]
-    return document, format_, reader(document, where)
+    return format_, reader(document, where)
 
 
 def read(text: str, where: str, joints: Sequence[str] | None, gravity: ArrayLike | None) -> Robot:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -222,6 +222,31 @@ class Robot:
             link = links[driven]
             back = frame_change(link.R.T, -link.R.T @ link.p)
             links[driven] = replace(link, phi=back @ rest, source="set")
+        return replace(self, links=tuple(links))
+
+    def with_links(self, phis: Mapping[str, ArrayLike]) -> Robot:
+        """Return a robot in which these links have these inertial parameters.
+
+        Parameters
+        ----------
+        phis : link name -> (10,) array_like
+            In the link's own frame; links that are not named stay as they are.
+
+        Raises
+        ------
+        RobotError
+            If there is no such link, or a shape is wrong.
+        """
+        names = [link.name for link in self.links]
+        for name in phis:
+            if name not in names:
+                raise RobotError(f"has no link '{name}'", self.name, f"links: {', '.join(names)}")
+        links = (
+            replace(link, phi=np.asarray(phis[link.name], dtype=float), source="set")
+            if link.name in phis and not np.array_equal(phis[link.name], link.phi)
+            else link
+            for link in self.links
+        )
         return replace(self, links=tuple(links))
 
     def with_gravity(self, gravity: ArrayLike) -> Robot:
