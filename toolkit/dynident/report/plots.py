@@ -24,7 +24,7 @@ from dynident.report.content import (
 )
 
 
-class _Picture(Figure):
+class Picture(Figure):
     """A figure that notebooks show without pyplot and its global state."""
 
     def _repr_png_(self) -> bytes:
@@ -36,7 +36,7 @@ class _Picture(Figure):
 def waterfall(diagnosis: Diagnosis) -> Figure:
     """Held-out torque error as effects are added, down to the noise floor."""
     rows = bars(diagnosis)
-    figure = _Picture(figsize=(7.0, 1.1 + 0.55 * len(rows)), layout="constrained")
+    figure = Picture(figsize=(7.0, 1.1 + 0.55 * len(rows)), layout="constrained")
     axes = figure.subplots()
     for i, row in enumerate(rows):
         added = row.kind == "added"
@@ -58,7 +58,7 @@ def waterfall(diagnosis: Diagnosis) -> Figure:
         axes.axvspan(0.0, 100 * floor, color=GREY, alpha=0.25, zorder=0)
         axes.axvline(100 * floor, color=GREY, linestyle="--")
         axes.set_title(f"noise floor {100 * floor:.2f} %", fontsize="medium", loc="left")
-    axes.set_yticks(range(len(rows)), ["\n".join(map(_plain, row.lines)) for row in rows])
+    axes.set_yticks(range(len(rows)), ["\n".join(map(plain, row.lines)) for row in rows])
     axes.invert_yaxis()
     axes.set_xlabel("held-out torque error (%)")
     axes.set_xlim(0.0, 1.18 * max(axes.get_xlim()[1], 1e-9))
@@ -82,7 +82,7 @@ def residual_maps(diagnosis: Diagnosis, joint: str, given: str = GIVEN) -> Figur
     maps = maps_of(diagnosis, joint)
     columns = min(len(maps), 3)
     rows = -(-len(maps) // columns)
-    figure = _Picture(figsize=(3.6 * columns, 0.5 + 2.6 * rows), layout="constrained")
+    figure = Picture(figsize=(3.6 * columns, 0.5 + 2.6 * rows), layout="constrained")
     grid = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes in grid[len(maps) :]:
         axes.set_visible(False)
@@ -98,19 +98,19 @@ def _draw(axes: Axes, diagnosis: Diagnosis, one: ResidualMap, given: str) -> Non
     if np.isfinite(one.band).any():
         lower = np.zeros_like(one.band) if is_spectrum(one) else -one.band
         axes.fill_between(one.at, lower, one.band, color=GREY, alpha=0.3, lw=0, label=BAND)
-    name = _plain(given)
+    name = plain(given)
     axes.plot(
         one.at, one.before, color=BEFORE_COLOUR, marker=marks[0], mfc="white", ms=4, label=name
     )
     if diagnosis.steps:
-        name = _plain(after_name(diagnosis))
+        name = plain(after_name(diagnosis))
         axes.plot(one.at, one.after, color=AFTER_COLOUR, marker=marks[1], ms=4, label=name)
     axes.axhline(0.0, color=GREY, linewidth=0.8)
-    axes.set_xlabel(_plain(x_title(one)))
-    axes.set_ylabel(_plain(y_title(one)))
+    axes.set_xlabel(plain(x_title(one)))
+    axes.set_ylabel(plain(y_title(one)))
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _plain(text: str) -> str:
-    # A dollar sign in a joint's name is not mathematics.
+def plain(text: str) -> str:
+    """Words as matplotlib shows them: a dollar sign in a joint's name is not mathematics."""
     return text.replace("$", r"\$")
