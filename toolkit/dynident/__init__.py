@@ -25,7 +25,11 @@ __version__ = "0.1.0"
 # `import dynident` and `dynident --help` cost nothing.
 _HOME = {
     "BaseParameters": "robot",
+    "Bounds": "nlp",
+    "CentreInBox": "nlp",
+    "CentreInEllipsoid": "nlp",
     "Comparison": "diagnose",
+    "Constrained": "fit",
     "Controller": "closed_loop",
     "Dataset": "recording",
     "Diagnosis": "diagnose",
@@ -35,12 +39,20 @@ _HOME = {
     "Estimate": "fit",
     "Experiment": "closed_loop",
     "Filter": "recording",
+    "Known": "nlp",
     "LeastSquares": "fit",
+    "Metric": "fit",
     "Model": "model",
     "Noise": "recording",
+    "Prior": "fit",
+    "Projection": "fit",
     "Recording": "recording",
     "Robot": "robot",
     "Study": "study",
+    "Sum": "nlp",
+    "Symmetric": "nlp",
+    "TotalMass": "nlp",
+    "Within": "nlp",
     "catalogue": "effects",
     "compare": "diagnose",
     "diagnose": "diagnose",
@@ -49,6 +61,7 @@ _HOME = {
     "load": "study",
     "load_estimate": "fit",
     "load_experiment": "closed_loop",
+    "project": "fit",
     "read": "recording",
     "report": "report",
     "write": "recording",
@@ -62,8 +75,28 @@ if TYPE_CHECKING:
     from dynident.diagnose import Comparison, Diagnosis, compare, diagnose
     from dynident.effects import Effect, catalogue, effects_of
     from dynident.errors import DynidentError, DynidentWarning
-    from dynident.fit import Estimate, LeastSquares, fit, load_estimate
+    from dynident.fit import (
+        Constrained,
+        Estimate,
+        LeastSquares,
+        Metric,
+        Prior,
+        Projection,
+        fit,
+        load_estimate,
+        project,
+    )
     from dynident.model import Model
+    from dynident.nlp import (
+        Bounds,
+        CentreInBox,
+        CentreInEllipsoid,
+        Known,
+        Sum,
+        Symmetric,
+        TotalMass,
+        Within,
+    )
     from dynident.recording import Dataset, Filter, Noise, Recording, read, write
     from dynident.report import report
     from dynident.robot import BaseParameters, Robot

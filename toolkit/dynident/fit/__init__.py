@@ -5,10 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Protocol
 
+from dynident.fit.constrained import Constrained
 from dynident.fit.essential import EssentialParameters, essential_parameters
 from dynident.fit.estimate import Estimate, Source, load_estimate
 from dynident.fit.factors import Factors, factorise
+from dynident.fit.given import given_estimate
 from dynident.fit.least_squares import LeastSquares, Solution, solve_factors
+from dynident.fit.metric import Metric
+from dynident.fit.prior import Prior
+from dynident.fit.projection import Projection, project
 from dynident.fit.sampling import Sampled, rows, sample
 from dynident.fit.shapes import refine_shapes, shaped_effects
 from dynident.model import Model
@@ -54,18 +59,24 @@ def fit(model: Model, data: Dataset | Recording, method: Method | None = None) -
 
 
 __all__ = [
+    "Constrained",
     "EssentialParameters",
     "Estimate",
     "Factors",
     "LeastSquares",
     "Method",
+    "Metric",
+    "Prior",
+    "Projection",
     "Sampled",
     "Solution",
     "Source",
     "essential_parameters",
     "factorise",
     "fit",
+    "given_estimate",
     "load_estimate",
+    "project",
     "refine_shapes",
     "rows",
     "sample",

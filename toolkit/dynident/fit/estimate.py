@@ -15,6 +15,7 @@ from dynident.effects import catalogue
 from dynident.errors import FitError
 from dynident.inertia import margins
 from dynident.model import Model
+from dynident.nlp import Certificate
 from dynident.robot import BaseParameters, Robot
 from dynident.robot.write import write
 from dynident.tables import Table, number, percent, print_tables
@@ -51,6 +52,9 @@ class Estimate:
     status : the solver's word.
     notes : caveats in plain words.
     sources : the recordings.
+    links : inertial parameters (10,) of each link in its own frame, by name, where the fit chose
+        them (constrained fits do); None where only the base parameters are known.
+    certificate : how far a constrained fit is from the optimum of its problem.
     """
 
     model: Model
@@ -66,6 +70,8 @@ class Estimate:
     status: str
     notes: tuple[str, ...] = ()
     sources: tuple[Source, ...] = ()
+    links: dict[str, np.ndarray] | None = None
+    certificate: Certificate | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -96,9 +102,12 @@ class Estimate:
         """The robot with the identified base parameters.
 
         What the data cannot tell (how a base parameter is shared among the links) stays as near to
-        the given description as it can; the links need not be physically consistent.
+        the given description as it can, unless the fit chose it (`links`); without that the links
+        need not be physically consistent.
         """
         robot = self.model.robot
+        if self.links is not None:
+            return robot.with_links(self.links)
         rigid = self.values[: len(self.model.base.independent)]
         return robot.with_theta(self.model.base.lift(rigid, robot.theta))
 
@@ -160,7 +169,8 @@ class Estimate:
 
     def tables(self) -> tuple[Table | str, ...]:
         """Everything that `show` prints, in its order."""
-        return (self.parameter_table(), self.error_table(), *self.notes)
+        proved = (self.certificate.table(),) if self.certificate else ()
+        return (self.parameter_table(), self.error_table(), *proved, *self.notes)
 
     def summary(self) -> str:
         """The tables as text."""
@@ -207,6 +217,8 @@ class Estimate:
             "rows": self.rows,
             "notes": list(self.notes),
             "recordings": [vars(source) for source in self.sources],
+            "links": self.links and {name: phi.tolist() for name, phi in self.links.items()},
+            "certificate": self.certificate and self.certificate.to_dict(),
             "model": {
                 "robot": description.text if description else None,
                 "joints": list(self.model.robot.names),
@@ -291,10 +303,17 @@ def load_estimate(path: str | Path) -> Estimate:
             content["status"],
             tuple(content["notes"]),
             tuple(Source(**source) for source in content["recordings"]),
+            _links_from_dict(content.get("links")),
         )
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         mend = "save one with Estimate.save"
         raise FitError(f"is not a dynident estimate ({error})", str(path), mend) from None
+
+
+def _links_from_dict(links: dict[str, list[float]] | None) -> dict[str, np.ndarray] | None:
+    return (
+        None if links is None else {name: np.array(phi, dtype=float) for name, phi in links.items()}
+    )
 
 
 def _decision(basis: BaseParameters) -> str:

@@ -1,0 +1,86 @@
+"""Solve a constrained problem by the program that was asked for, and certify the answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from dynident.errors import FitError
+from dynident.nlp import Bound, Certificate, Problem, Status, certify, lower_bound, solve_conic
+
+Solver = Literal["conic", "nlp"]
+"""conic: Clarabel, finds the optimum; nlp: Ipopt over parameters that are consistent whatever
+their values, from several starts, its answer compared with the conic bound."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """An answer x (s,) to a problem, and what is proved about it."""
+
+    x: np.ndarray
+    certificate: Certificate
+
+
+def require_solver(solver: str) -> None:
+    """Refuse a solver that does not exist.
+
+    Raises
+    ------
+    FitError
+        Naming the choices.
+    """
+    if solver not in ("conic", "nlp"):
+        raise FitError(f"no solver '{solver}'", mend="choose conic or nlp")
+
+
+def solve(problem: Problem, solver: Solver) -> Answer:
+    """Solve a problem and certify the answer.
+
+    Raises
+    ------
+    FitError
+        If no point satisfies the constraints, or the solver fails; or if the metric leaves
+        directions free and there is no prior.
+    """
+    require_solver(solver)
+    problem.require_held()
+    problem = problem.reduced()
+    free = problem.unconstrained
+    if free is not None and problem.feasible(free):
+        status = Status("least squares", "solved", "no constraint is active", 0, 0.0)
+        # No point at all has a smaller objective.
+        bound = Bound(problem.objective(free), 0.0, 0.0)
+        return Answer(free, certify(problem, free, status, "linear least squares", bound))
+    conic = solve_conic(problem)
+    _require(conic.status, problem)
+    assert conic.multipliers is not None
+    bound = lower_bound(problem, conic.x, conic.multipliers)
+    if solver == "conic":
+        x = problem.retracted(conic.x)
+        return Answer(x, certify(problem, x, conic.status, "conic program", bound))
+    from dynident.nlp.parametrised import solve_nonlinear
+
+    found = solve_nonlinear(problem)
+    _require(found.status, problem)
+    x = problem.retracted(found.x)
+    certificate = certify(problem, x, found.status, found.program, bound, found.objectives)
+    return Answer(x, certificate)
+
+
+def trivial(problem: Problem, x: np.ndarray) -> Answer:
+    """The answer to a projection of a point x (s,) that is within already: itself."""
+    status = Status("none", "solved", "already within", 0, 0.0)
+    centred = replace(problem, b=problem.A @ x, entropy=None)
+    return Answer(x, certify(centred, x, status, "none needed: it lies within already", None))
+
+
+def _require(status: Status, problem: Problem) -> None:
+    if status.ok:
+        return
+    if status.word == "infeasible":
+        names = [type(one).__name__ for one in problem.within.sets]
+        what = "no robot satisfies all constraints at once"
+        raise FitError(what, ", ".join(names) or None, "loosen one of them")
+    raise FitError(f"no answer was found ({status})", mend="check units; try solver='conic'")

@@ -1,0 +1,308 @@
+"""Projection: the nearest possible robot, under the metric of what the data know."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dynident.errors import FitError
+from dynident.fit.active import active_set
+from dynident.fit.consistent import Answer, Solver, require_solver, solve, trivial
+from dynident.fit.estimate import Estimate
+from dynident.fit.given import given_estimate, prior_model
+from dynident.fit.metric import Metric
+from dynident.fit.prior import Prior
+from dynident.inertia import distance_rows, margins
+from dynident.model import Model
+from dynident.nlp import Certificate, ParameterSpace, Problem, Vanishing, Within
+from dynident.robot import Robot
+from dynident.robot.write import write
+from dynident.tables import Table, number, print_tables
+from dynident.threads import single_threaded
+
+
+@dataclass(frozen=True, eq=False)
+class Projection:
+    """The nearest estimate within a set.
+
+    Attributes
+    ----------
+    estimate : the projected estimate; its `links` are the new inertial parameters.
+    before : what was projected.
+    space : the standard parameters.
+    x, x_before : (s,) after and before.
+    certificate : that it is the nearest.
+    metric : in which it is, None where only the prior's metric was there.
+    prior : what decided where the metric does not.
+    notes : caveats.
+    """
+
+    estimate: Estimate
+    before: Estimate
+    space: ParameterSpace
+    x: np.ndarray
+    x_before: np.ndarray
+    certificate: Certificate
+    metric: Metric | None
+    prior: Prior
+    notes: tuple[str, ...]
+
+    @property
+    def robot(self) -> Robot:
+        """The robot with the projected parameters."""
+        return self.estimate.robot
+
+    @property
+    def values(self) -> np.ndarray:
+        """The model's parameters, (p,)."""
+        return self.estimate.values
+
+    def write_robot(self, path: str | Path) -> Path:
+        """Write the robot description with the projected parameters; see `robot.write.write`."""
+        return write(self.robot, path)
+
+    @property
+    def misfit(self) -> float | None:
+        """What the move adds to the torque residual, in units of the noise: root mean square over
+        the equations; None without data.
+        """
+        if self.metric is None or self.metric.rows == 0:
+            return None
+        step = self.metric.R @ (self.estimate.values - self.before.values)
+        return float(np.linalg.norm(step) / np.sqrt(self.metric.rows))
+
+    def changes(self) -> Table:
+        """Each link before and after: how far it moved, its mass, and the rule that it broke."""
+        rows = []
+        for k, body in enumerate(self.space.bodies):
+            part = slice(10 * k, 10 * k + 10)
+            old, new = self.x_before[part], self.x[part]
+            moved = np.linalg.norm(distance_rows(self.space.references[k]) @ (new - old))
+            margin = margins(old)
+            rule, value = margin.worst
+            broken = "" if margin.consistent else f"{rule} {number(value, 3)}"
+            after = margins(new).pseudo_inertia_min_eig
+            mass = f"{number(old[0], 4)} -> {number(new[0], 4)}"
+            rows.append((body, number(float(moved), 3), mass, broken, f"{after:.1e}"))
+        notes = ["Moved: distance in units of the link's own size (0.2: all parameters by 10 %)."]
+        if self.misfit is not None:
+            notes.append(
+                f"On the data behind the metric the torque residual grows by "
+                f"{number(self.misfit, 3)} of the noise."
+            )
+        columns = ("link", "moved", "mass, kg", "broke", "margin now")
+        return Table("Links before and after", columns, tuple(rows), tuple(notes))
+
+    def tables(self) -> tuple[Table | str, ...]:
+        """Everything that `show` prints, in its order."""
+        return (self.changes(), self.certificate.table(), *self.notes)
+
+    def show(self) -> None:
+        """Print what moved and the certificate."""
+        print_tables(*self.tables())
+
+    def to_dict(self) -> dict[str, Any]:
+        """The projection as JSON holds it."""
+        links = []
+        for k, body in enumerate(self.space.bodies):
+            part = slice(10 * k, 10 * k + 10)
+            old, new = self.x_before[part], self.x[part]
+            moved = np.linalg.norm(distance_rows(self.space.references[k]) @ (new - old))
+            links.append(
+                {
+                    "name": body,
+                    "moved": float(moved),
+                    "was_consistent": margins(old).consistent,
+                    "before": old.tolist(),
+                    "after": new.tolist(),
+                }
+            )
+        return {
+            "links": links,
+            "metric": self.metric.source if self.metric else None,
+            "prior": {"distance": self.prior.distance, "spread": self.prior.spread},
+            "misfit": self.misfit,
+            "certificate": self.certificate.to_dict(),
+            "notes": list(self.notes),
+        }
+
+
+@single_threaded
+def project(
+    what: Estimate | Robot | Projection,
+    prior: Robot | Prior | None = None,
+    metric: Metric | None = None,
+    within: Within | None = None,
+    solver: Solver = "conic",
+) -> Projection:
+    """Return the nearest estimate within a set, by default the nearest physically possible robot.
+
+    Minimises 1/2 |R (values - estimate)|^2 + 1/2 (distance from the prior / its spread)^2 over the
+    inertial parameters of all links, R the root of the metric in units of noise: the maximum a
+    posteriori estimate, for which the data enter through the estimate alone (Ting et al., RSS
+    2006, equations 6 to 8). What lies within already comes back as it is.
+
+    Parameters
+    ----------
+    what : an estimate; a robot description, which without a metric is moved under the prior's own
+        metric; or a projection, which is projected again.
+    prior : robot description that decides what the metric leaves open; default: that of `what`.
+    metric : default: the inverse covariance of the estimate.
+    within : default: fully consistent links.
+    solver : see `Solver`.
+
+    Raises
+    ------
+    FitError
+        If nothing satisfies the constraints, the solver fails, or a parameter is not finite.
+    """
+    require_solver(solver)
+    within = within or Within()
+    before = _estimate(what)
+    if not isinstance(prior, Prior):
+        prior = Prior(prior or before.model.robot)
+    model = prior_model(before.model, prior.robot)
+    space = ParameterSpace.of(model)
+    x_hat = _standard(before, model, space)
+    if metric is None and before.rows:
+        metric = Metric.of_estimate(before)
+    problem, notes = _problem(space, x_hat, prior, metric, within)
+    answer = trivial(problem, x_hat) if problem.feasible(x_hat) else solve(problem, solver)
+    return _projection(answer, before, problem, x_hat, metric, prior, notes)
+
+
+def _estimate(what: Estimate | Robot | Projection) -> Estimate:
+    if isinstance(what, Projection):
+        return what.estimate
+    return given_estimate(what) if isinstance(what, Robot) else what
+
+
+def _standard(before: Estimate, model: Model, space: ParameterSpace) -> np.ndarray:
+    """Standard parameters (s,) of an estimate, what it leaves open taken from the prior."""
+    if before.links is not None:
+        robot = model.robot.with_links(before.links)
+    else:
+        rigid = before.values[: len(model.base.independent)]
+        robot = model.robot.with_theta(model.base.lift(rigid, model.robot.theta))
+    by_name = {link.name: link.phi for link in robot.links}
+    inertial = [by_name[body] for body in space.bodies]
+    x = np.concatenate([*inertial, before.values[len(model.base.independent) :]])
+    if not np.all(np.isfinite(x)):
+        names = [n for n, v in zip(space.names, x, strict=True) if not np.isfinite(v)]
+        mend = "state a number for it first: nothing is near to what is not a number"
+        raise FitError("is not finite", ", ".join(names[:5]), mend)
+    return x
+
+
+def _problem(
+    space: ParameterSpace,
+    x_hat: np.ndarray,
+    prior: Prior,
+    metric: Metric | None,
+    within: Within,
+) -> tuple[Problem, tuple[str, ...]]:
+    if metric is None:
+        A, b = prior.rows(space, x_hat)
+        notes = ("No data: nearest under the prior's own metric, link by link.",)
+        return Problem(space, A, b, within, prior.entropy(space)), notes
+    mapping = _mapping(space, metric)
+    space = sized(space, metric.R @ mapping, metric.rows, x_hat)
+    rows = metric.R @ mapping
+    centre, notes = believed(space, x_hat)
+    held, held_at = prior.rows(space, centre)
+    off = [metric.names.index(name) for name in metric.irrelevant]
+    if off:
+        within = replace(within, sets=(*within.sets, Vanishing(mapping[off])))
+        notes = (*notes, f"Irrelevant, and kept at zero: {', '.join(metric.irrelevant)}.")
+    A, b = np.vstack([rows, held]), np.concatenate([rows @ x_hat, held_at])
+    return Problem(space, A, b, within, prior.entropy(space)), (*metric.notes, *notes)
+
+
+def _mapping(space: ParameterSpace, metric: Metric) -> np.ndarray:
+    """From standard parameters to those of the metric."""
+    if metric.names == space.names:
+        return np.eye(space.size)
+    if len(metric.names) == len(space.combination):
+        return space.combination
+    what = f"the metric has {len(metric.names)} parameters"
+    mend = f"state it for the model's {len(space.combination)}, or all {space.size} standard"
+    raise FitError(what, mend=mend)
+
+
+def sized(space: ParameterSpace, rows: np.ndarray, count: int, x_hat: np.ndarray) -> ParameterSpace:
+    """The space with sizes of the effects' parameters: what makes a torque like the noise.
+
+    Parameters
+    ----------
+    rows : (r, s) of the data, in units of noise.
+    count : equations behind them.
+    x_hat : (s,) whose effects are taken as their size where no data show them.
+    """
+    norms = np.linalg.norm(rows[:, space.rigid :], axis=0)
+    values = np.abs(x_hat[space.rigid :])
+    fallback = np.where(values > 0, values, 1.0)
+    seen = norms > 0
+    root = np.sqrt(max(count, len(rows), 1))
+    sizes = np.where(seen, root / np.where(seen, norms, 1.0), fallback)
+    return space.sized(sizes)
+
+
+def believed(space: ParameterSpace, x_hat: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
+    """The centre of a prior (s,): the description, broken links replaced by bodies of their size.
+
+    Of the effects the description says nothing: their centre is what data say.
+    """
+    centre = np.concatenate([space.given[: space.rigid], x_hat[space.rigid :]])
+    replaced = []
+    for k, body in enumerate(space.bodies):
+        part = slice(10 * k, 10 * k + 10)
+        if not margins(centre[part]).consistent:
+            centre[part] = space.references[k]
+            replaced.append(body)
+    if not replaced:
+        return centre, ()
+    words = f"The prior's own links are impossible: {', '.join(replaced)}."
+    return centre, (f"{words} It believes in bodies of their size instead.",)
+
+
+def _projection(
+    answer: Answer,
+    before: Estimate,
+    problem: Problem,
+    x_hat: np.ndarray,
+    metric: Metric | None,
+    prior: Prior,
+    notes: tuple[str, ...],
+) -> Projection:
+    space, x = problem.space, answer.x
+    moved = not np.array_equal(x, x_hat)
+    covariance, told = before.covariance, ()
+    if moved and metric is not None:
+        active = active_set(problem, x)
+        covariance = space.combination @ active.covariance @ space.combination.T
+        told = (active.sentence,)
+    links = {body: x[10 * k : 10 * k + 10] for k, body in enumerate(space.bodies)}
+    estimate = replace(
+        before,
+        model=prior_model(before.model, prior.robot),
+        values=space.combination @ x if moved else before.values,
+        covariance=covariance,
+        method=f"{before.method}; projected" if moved else before.method,
+        notes=(*before.notes, *notes, *told) if moved else before.notes,
+        links=links,
+        certificate=answer.certificate,
+    )
+    return Projection(
+        estimate,
+        before,
+        space,
+        x,
+        x_hat,
+        answer.certificate,
+        metric,
+        prior,
+        (*notes, *told),
+    )

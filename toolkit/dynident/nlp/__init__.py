@@ -1,0 +1,60 @@
+"""Identification posed as nonlinear and conic programs.
+
+`Problem` states what is to be minimised within which set; `pose_conic` puts it to Clarabel through
+Drake, `pose` to Ipopt through CasADi, and `certify` says how far an answer is from the optimum.
+"""
+
+from dynident.nlp.certificate import Bound, Certificate, certify, lower_bound
+from dynident.nlp.conic import ConicProgram, ConicSolution, Multipliers, pose_conic, solve_conic
+from dynident.nlp.nearest import nearest_body
+from dynident.nlp.problem import Entropy, Problem
+from dynident.nlp.sets import (
+    Bounds,
+    CentreInBox,
+    CentreInEllipsoid,
+    Consistency,
+    ConstraintSet,
+    Known,
+    Linear,
+    SecondOrder,
+    Sum,
+    Symmetric,
+    TotalMass,
+    Vanishing,
+    Within,
+)
+from dynident.nlp.space import ParameterSpace, link_lengths, reference_bodies, stated_links
+from dynident.nlp.status import Status
+
+__all__ = [
+    "Bound",
+    "Bounds",
+    "CentreInBox",
+    "CentreInEllipsoid",
+    "Certificate",
+    "ConicProgram",
+    "ConicSolution",
+    "Consistency",
+    "ConstraintSet",
+    "Entropy",
+    "Known",
+    "Linear",
+    "Multipliers",
+    "ParameterSpace",
+    "Problem",
+    "SecondOrder",
+    "Status",
+    "Sum",
+    "Symmetric",
+    "TotalMass",
+    "Vanishing",
+    "Within",
+    "certify",
+    "link_lengths",
+    "lower_bound",
+    "nearest_body",
+    "pose_conic",
+    "reference_bodies",
+    "solve_conic",
+    "stated_links",
+]

@@ -1,0 +1,227 @@
+"""The problem as a conic program, through Drake's MathematicalProgram and Clarabel.
+
+It is convex: what the solver finds is the optimum, and its multipliers bound the objective of
+any other program for the same problem from below.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dynident.inertia import pseudo_inertia
+from dynident.nlp.problem import Problem, pseudo_basis
+from dynident.nlp.status import Status
+
+if TYPE_CHECKING:
+    from pydrake.solvers import MathematicalProgram
+
+# Below this Clarabel stops short ("almost solved"); the bound is computed from what it hands on.
+_TOLERANCE = 1e-9
+_WORDS = {"Solved": "solved", "AlmostSolved": "inaccurate", "MaxIterations": "iteration limit"}
+
+
+@dataclass(frozen=True, eq=False)
+class Multipliers:
+    """Lagrange multipliers of a problem's constraints, in parameters in units of their size.
+
+    Attributes
+    ----------
+    bodies : (n, d, d) symmetric matrices, positive semidefinite at an optimum.
+    linear : (k,) positive at a lower bound that holds x up, negative at an upper one.
+    cones : one vector per second-order cone, in that cone at an optimum.
+    """
+
+    bodies: np.ndarray
+    linear: np.ndarray
+    cones: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class ConicSolution:
+    """What the conic solver found.
+
+    Attributes
+    ----------
+    x : (s,) standard parameters; NaN where it found none.
+    """
+
+    x: np.ndarray
+    status: Status
+    multipliers: Multipliers | None
+
+
+@dataclass(frozen=True, eq=False)
+class ConicProgram:
+    """A problem in Drake's words.
+
+    Attributes
+    ----------
+    program : pydrake.solvers.MathematicalProgram; print it, or add to it.
+    z : (s,) its decision variables: (x - origin) in units of the parameters' size.
+    origin : (s,) the answer without constraints, so that costs are small numbers.
+    problem : what it poses, reduced to few rows.
+    """
+
+    program: MathematicalProgram
+    z: np.ndarray
+    origin: np.ndarray
+    problem: Problem
+    _bodies: Sequence[Any]
+    _lower: Any
+    _upper: Any
+    _equal: Any
+    _cones: Sequence[Any]
+
+    def solve(self) -> ConicSolution:
+        """Solve with Clarabel."""
+        from pydrake.solvers import ClarabelSolver, SolverOptions
+
+        options = SolverOptions()
+        for name in ("tol_gap_abs", "tol_gap_rel", "tol_feas"):
+            options.SetOption(ClarabelSolver.id(), name, _TOLERANCE)
+        start = time.perf_counter()
+        result = ClarabelSolver().Solve(self.program, None, options)
+        seconds = time.perf_counter() - start
+        details: Any = result.get_solver_details()
+        word = next((w for key, w in _WORDS.items() if details.status == key), None)
+        if word is None:
+            infeasible = "PrimalInfeasible" in details.status
+            unbounded = "DualInfeasible" in details.status
+            word = "infeasible" if infeasible else "unbounded" if unbounded else "failed"
+        status = Status("Clarabel", word, details.status, details.iterations, seconds)
+        if word not in ("solved", "inaccurate"):
+            return ConicSolution(np.full(self.problem.space.size, np.nan), status, None)
+        x = self.origin + self.problem.space.scale * result.GetSolution(self.z)
+        return ConicSolution(x, status, self._multipliers(result, x))
+
+    def _multipliers(self, result: Any, x: np.ndarray) -> Multipliers:
+        # The cost is the norm where no entropy is in it: multipliers of half its square are
+        # larger by the norm.
+        problem = self.problem
+        factor = 1.0
+        if problem.entropy is None:
+            factor = float(np.linalg.norm(problem.A @ x - problem.b))
+        size = problem.matrices.shape[1]
+        bodies = np.zeros((len(self._bodies), size, size))
+        rows, columns = np.tril_indices(size)
+        # Drake hands on the lower triangle, column by column.
+        order = np.lexsort((rows, columns))
+        for k, binding in enumerate(self._bodies):
+            dual = result.GetDualSolution(binding)
+            bodies[k, rows[order], columns[order]] = dual
+            bodies[k, columns[order], rows[order]] = dual
+        linear = np.zeros(len(problem.linear.A))
+        for chosen, binding in (self._lower, self._upper, self._equal):
+            if binding is not None:
+                linear[chosen] += result.GetDualSolution(binding)
+        cones = tuple(factor * np.ravel(result.GetDualSolution(c)) for c in self._cones)
+        return Multipliers(factor * bodies, factor * linear, cones)
+
+
+def pose_conic(problem: Problem) -> ConicProgram:
+    """Pose a problem as a conic program.
+
+    Raises
+    ------
+    FitError
+        If the metric leaves directions free.
+    """
+    from pydrake.solvers import MathematicalProgram
+
+    problem.require_held()
+    problem = problem.reduced()
+    scale = problem.space.scale
+    # The bindings' types know no shapes.
+    program: Any = MathematicalProgram()
+    z = program.NewContinuousVariables(problem.space.size, "z")
+    origin = problem.origin
+    _add_objective(program, z, problem, origin)
+    bodies = []
+    offsets = problem.body_matrices(problem.inset - origin)
+    for k, basis in enumerate(problem.scaled_matrices if problem.matrices.size else ()):
+        part = slice(10 * k, 10 * k + 10)
+        sized = basis * scale[part][:, None, None]
+        constraint = program.AddLinearMatrixInequalityConstraint([-offsets[k], *sized], z[part])
+        bodies.append(constraint)
+    linear = problem.linear
+    A = linear.A * scale
+    equal = linear.lower == linear.upper
+    lower = np.flatnonzero(np.isfinite(linear.lower) & ~equal)
+    upper = np.flatnonzero(np.isfinite(linear.upper) & ~equal)
+    equal = np.flatnonzero(equal)
+
+    def rows(chosen: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, Any]:
+        if not len(chosen):
+            return chosen, None
+        return chosen, program.AddLinearConstraint(A[chosen], low[chosen], high[chosen], z)
+
+    free, at = np.full(len(A), np.inf), linear.A @ origin
+    cones = [
+        program.AddLorentzConeConstraint(rows_, value, z)
+        for rows_, value in zip(cone_rows(problem), cone_values(problem, origin), strict=True)
+    ]
+    return ConicProgram(
+        program,
+        z,
+        origin,
+        problem,
+        bodies,
+        rows(lower, linear.lower - at, free),
+        rows(upper, -free, linear.upper - at),
+        rows(equal, linear.lower - at, linear.upper - at),
+        cones,
+    )
+
+
+def _cone_rows(A: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Rows of a cone in parameters in units of their size, with entries near one."""
+    return A * scale / np.max(np.abs(A) * scale)
+
+
+def cone_values(problem: Problem, x: np.ndarray) -> list[np.ndarray]:
+    """Return each second-order cone's vector at x, as the conic program has it."""
+    scale = problem.space.scale
+    return [_cone_rows(c.A, scale) @ (x / scale) for c in problem.cones]
+
+
+def cone_rows(problem: Problem) -> list[np.ndarray]:
+    """Return each second-order cone's rows on the parameters in units of their size."""
+    return [_cone_rows(c.A, problem.space.scale) for c in problem.cones]
+
+
+def _add_objective(program: Any, z: np.ndarray, problem: Problem, origin: np.ndarray) -> None:
+    A = np.asfortranarray(problem.A * problem.space.scale)
+    rest = problem.A @ origin - problem.b
+    if problem.entropy is None:
+        # The norm, not its square, and never the normal equations: 1e-5 more accurate.
+        program.AddL2NormCost(A, rest, z)
+        return
+    # Half the square: t >= |A z - b|^2 / size^2 as (t, 1, (A z - b) / size) in the rotated cone.
+    size = max(float(np.linalg.norm(rest)), 1.0)
+    t = program.NewContinuousVariables(1, "t")
+    stack = np.zeros((len(A) + 2, len(z) + 1))
+    stack[0, -1] = 1.0
+    stack[2:, :-1] = A / size
+    offset = np.concatenate([[0.0, 1.0], rest / size])
+    program.AddRotatedLorentzConeConstraint(stack, offset, np.concatenate([z, t]))
+    program.AddLinearCost([0.5 * size**2], t)
+    weight, basis = problem.entropy.weight, pseudo_basis()
+    for k, centre in enumerate(problem.entropy.centres):
+        part = slice(10 * k, 10 * k + 10)
+        root = np.linalg.inv(np.linalg.cholesky(pseudo_inertia(centre)))
+        sized = basis * problem.space.scale[part][:, None, None]
+        white = root @ sized @ root.T
+        program.AddLinearCost(weight * np.einsum("kii->k", white), z[part])
+        ratio = np.tensordot(z[part], white, axes=1) + root @ pseudo_inertia(origin[part]) @ root.T
+        cost, t, _ = program.AddMaximizeLogDeterminantCost(0.5 * (ratio + ratio.T))
+        cost.evaluator().UpdateCoefficients(-weight * np.ones(len(t)))
+
+
+def solve_conic(problem: Problem) -> ConicSolution:
+    """Pose and solve a problem as a conic program."""
+    return pose_conic(problem).solve()

@@ -1,0 +1,62 @@
+"""The nearest consistent body to ten given parameters: the smallest change that mends a link."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynident.errors import FitError
+from dynident.inertia import PARAMETERS, UNITS, distance_rows, reference_body
+from dynident.nlp.conic import solve_conic
+from dynident.nlp.problem import Problem
+from dynident.nlp.sets import Consistency, Within
+from dynident.nlp.space import ParameterSpace, body_scale
+
+
+def nearest_body(
+    phi: ArrayLike, length: float, consistency: Consistency = "full", mass: float = 1.0
+) -> np.ndarray:
+    """Return the consistent parameters (10,) nearest to given ones.
+
+    Nearest in `inertia.distance_rows` of a body of their size, so that neither units nor frame
+    decide. Consistent parameters come back as they are.
+
+    Parameters
+    ----------
+    phi : (10,) array_like
+        Finite.
+    length : float
+        m, extent of the body.
+    consistency : see `Consistency`.
+    mass : float
+        kg, the size of the mass where the given one is not positive.
+
+    Raises
+    ------
+    FitError
+        If phi is not finite, or the conic solver fails.
+    """
+    phi = np.asarray(phi, dtype=float)
+    if phi.shape != (10,) or not np.all(np.isfinite(phi)):
+        raise FitError("ten finite inertial parameters are needed", "body")
+    reference = reference_body(phi, mass, length)
+    rows = distance_rows(reference)
+    free = np.full(10, np.inf)
+    space = ParameterSpace(
+        PARAMETERS,
+        UNITS,
+        ("body",),
+        reference[None],
+        -free,
+        free,
+        np.eye(10),
+        phi,
+        body_scale(reference),
+    )
+    problem = Problem(space, rows, rows @ phi, Within(consistency))
+    if problem.feasible(phi):
+        return phi
+    solution = solve_conic(problem)
+    if not solution.status.ok:
+        raise FitError(f"no nearest consistent body was found ({solution.status})", "body")
+    return solution.x

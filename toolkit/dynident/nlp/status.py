@@ -1,0 +1,33 @@
+"""How a solver ended: one type for nonlinear and conic programs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Status:
+    """How a solver ended.
+
+    Attributes
+    ----------
+    solver : its name.
+    word : "solved", "inaccurate", "infeasible", "unbounded", "iteration limit" or "failed".
+    message : the solver's own.
+    iterations : it took.
+    seconds : of wall-clock time.
+    """
+
+    solver: str
+    word: str
+    message: str
+    iterations: int
+    seconds: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether there is a solution."""
+        return self.word in ("solved", "inaccurate")
+
+    def __str__(self) -> str:
+        return f"{self.solver}: {self.word} ({self.message}) in {self.iterations} iterations"
