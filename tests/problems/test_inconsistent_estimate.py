@@ -10,7 +10,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynident import Dataset, Estimate, Experiment, Study, compare, load, load_experiment
+from dynident import (
+    Constrained,
+    Dataset,
+    Estimate,
+    Experiment,
+    Prior,
+    Study,
+    Within,
+    compare,
+    load,
+    load_experiment,
+    project,
+)
 from dynident import fit as fit_model
 from dynident.inertia import margins, to_com
 from dynident.recording import read
@@ -83,6 +95,30 @@ def test_data_sheet_and_truth_are_consistent_and_differ_by_10_to_20_percent() ->
         assert 0.1 < abs(ratio - 1.0) < 0.25
     masses = [robot.theta[::10].sum() for robot in (given, true)]
     assert masses == pytest.approx([20.5, 20.5])
+
+
+def test_its_projection_is_possible_and_predicts_another_motion() -> None:
+    published = PUBLISHED["projection"]
+    found = project(estimate())
+    assert all(margins(phi).consistent for phi in found.robot.theta.reshape(-1, 10))
+    assert found.certificate.optimal
+    (result,) = compare(found.estimate, study().test).results
+    assert result.error == pytest.approx(published["test_error"], rel=published["tolerance"])
+    assert result.floor == pytest.approx(published["noise_floor"], rel=published["tolerance"])
+
+
+def test_where_little_is_believed_the_constraint_helps() -> None:
+    published = PUBLISHED["weak_prior"]
+    prior = Prior(study().robot, spread=published["spread"])
+    free, within = (
+        fit_model(study().model, study().train, Constrained(Within(notion), prior))
+        for notion in ("none", "full")
+    )
+    assert len(free.inconsistent_links()) == published["unconstrained_inconsistent_links"]
+    assert within.inconsistent_links() == ()
+    errors = [r.error for r in compare({"free": free, "within": within}, study().test).results]
+    expected = [published["unconstrained_test_error"], published["test_error"]]
+    assert errors == pytest.approx(expected, rel=published["tolerance"])
 
 
 @pytest.mark.slow
