@@ -13,7 +13,7 @@ HERE = Path(__file__).parent
 
 
 def main() -> None:
-    for script in ("hidden_effects.py", "least_squares_memory.py"):
+    for script in ("hidden_effects.py", "least_squares_memory.py", "constrained_fit.py"):
         print(f"--- {script}", flush=True)
         subprocess.run([sys.executable, str(HERE / script)], check=True)
 

@@ -45,8 +45,8 @@ def solve(problem: Problem, solver: Solver) -> Answer:
         directions free and there is no prior.
     """
     require_solver(solver)
-    problem.require_held()
     problem = problem.reduced()
+    problem.require_held()
     free = problem.unconstrained
     if free is not None and problem.feasible(free):
         status = Status("least squares", "solved", "no constraint is active", 0, 0.0)

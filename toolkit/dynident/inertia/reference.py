@@ -14,6 +14,9 @@ A data sheet that calls a rod infinitely thin is not that sure of it: distances 
 body would be infinite.
 """
 
+# The pseudo-inertia per unit of each of the ten parameters.
+_BASIS = np.array([pseudo_inertia(unit) for unit in np.eye(10)])
+
 
 def reference_body(phi: ArrayLike, mass: float, length: float) -> NDArray[np.float64]:
     """Return the parameters (10,) of a consistent body of the size of a given one.
@@ -64,9 +67,6 @@ def distance_rows(reference: ArrayLike) -> NDArray[np.float64]:
     factor = np.linalg.cholesky(pseudo_inertia(reference))
     rows, columns = np.tril_indices(4)
     weight = np.where(rows == columns, 1.0, np.sqrt(2.0))
-    found = np.empty((10, 10))
-    for k, unit in enumerate(np.eye(10)):
-        half = np.linalg.solve(factor, pseudo_inertia(unit))
-        whitened = np.linalg.solve(factor, half.T)
-        found[:, k] = weight * whitened[rows, columns]
-    return found
+    root = np.linalg.inv(factor)
+    whitened = root @ _BASIS @ root.T
+    return weight[:, None] * whitened[:, rows, columns].T

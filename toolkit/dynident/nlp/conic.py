@@ -133,8 +133,8 @@ def pose_conic(problem: Problem) -> ConicProgram:
     """
     from pydrake.solvers import MathematicalProgram
 
-    problem.require_held()
     problem = problem.reduced()
+    problem.require_held()
     scale = problem.space.scale
     # The bindings' types know no shapes.
     program: Any = MathematicalProgram()

@@ -15,6 +15,7 @@ from dynident.nlp.space import ParameterSpace
 
 _FREE = 1e-9  # of the largest: a singular value below it leaves a direction free
 _ROUNDING = 1e-12  # of a body's size: what rounding takes from the eigenvalues of a flat body
+_ROWS = 1024  # factorised at a time: few enough to stay in the cache
 TOLERANCE = 1e-7
 """Of a parameter's size: what a solver may break a linear or second-order constraint by."""
 
@@ -250,7 +251,10 @@ class Problem:
         """The same problem in at most s + 1 rows, so that no solver sees the rows of the data."""
         if len(self.b) <= self.space.size + 1:
             return self
-        R = np.asarray(np.linalg.qr(np.column_stack([self.A, self.b]), mode="r"))
+        rows, R = np.column_stack([self.A, self.b]), np.zeros((0, self.space.size + 1))
+        for start in range(0, len(rows), _ROWS):
+            part = np.vstack([R, rows[start : start + _ROWS]])
+            R = np.asarray(np.linalg.qr(part, mode="r"))
         return replace(self, A=R[:, :-1], b=R[:, -1])
 
 
