@@ -151,11 +151,9 @@ def main() -> None:
     own = beside(said.figaroh, space, NOISE * Y, NOISE * tau, said.repeats)
     ms = 1e3 * median(own["times"])
     print(f"{'figaroh':22s} {ms:9.1f} {ms / alone:14.2f} {own['status']:>12s}")
-    left = {
-        name: NOISE * np.linalg.norm(Y @ x - tau)
-        for name, x in (("dynident", answer.x), ("truth", truth))
-    }
-    print(f"residual, N m: {left} figaroh {own['residual']:.6g}")
+    mine, true = (NOISE * np.linalg.norm(Y @ x - tau) for x in (answer.x, truth))
+    words = f"dynident {mine:.6g}, figaroh {own['residual']:.6g}, truth {true:.6g}"
+    print(f"residual, N m: {words}")
 
 
 def beside(

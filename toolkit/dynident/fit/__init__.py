@@ -10,6 +10,7 @@ from dynident.fit.essential import EssentialParameters, essential_parameters
 from dynident.fit.estimate import Estimate, Source, load_estimate
 from dynident.fit.factors import Factors, factorise
 from dynident.fit.given import given_estimate
+from dynident.fit.input_noise import InputNoise, input_noise
 from dynident.fit.least_squares import LeastSquares, Solution, solve_factors
 from dynident.fit.metric import Metric
 from dynident.fit.prior import Prior
@@ -63,6 +64,7 @@ __all__ = [
     "EssentialParameters",
     "Estimate",
     "Factors",
+    "InputNoise",
     "LeastSquares",
     "Method",
     "Metric",
@@ -75,6 +77,7 @@ __all__ = [
     "factorise",
     "fit",
     "given_estimate",
+    "input_noise",
     "load_estimate",
     "project",
     "refine_shapes",
