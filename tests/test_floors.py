@@ -22,6 +22,7 @@ FLOORS = [
     ("nlp",),
     ("closed_loop",),
     ("fit",),
+    ("check",),
     ("diagnose",),
     ("study",),
     ("report",),

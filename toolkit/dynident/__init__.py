@@ -28,6 +28,7 @@ _HOME = {
     "Bounds": "nlp",
     "CentreInBox": "nlp",
     "CentreInEllipsoid": "nlp",
+    "Check": "check",
     "Comparison": "diagnose",
     "Constrained": "fit",
     "Controller": "closed_loop",
@@ -54,6 +55,7 @@ _HOME = {
     "TotalMass": "nlp",
     "Within": "nlp",
     "catalogue": "effects",
+    "check": "check",
     "compare": "diagnose",
     "diagnose": "diagnose",
     "effects_of": "effects",
@@ -71,6 +73,7 @@ _HOME = {
 __all__ = list(_HOME)  # pyright: ignore[reportUnsupportedDunderAll]
 
 if TYPE_CHECKING:
+    from dynident.check import Check, check
     from dynident.closed_loop import Controller, Experiment, load_experiment, write_experiment
     from dynident.diagnose import Comparison, Diagnosis, compare, diagnose
     from dynident.effects import Effect, catalogue, effects_of
@@ -104,7 +107,7 @@ if TYPE_CHECKING:
 
 
 # Verbs that share their name with the room they live in.
-_VERBS = ("diagnose", "fit", "report")
+_VERBS = ("check", "diagnose", "fit", "report")
 
 
 def __getattr__(name: str) -> Any:

@@ -1,0 +1,191 @@
+"""The verb `check`: anything that has a robot in it is taken apart and judged."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dynident import files
+from dynident.check.hints import hints
+from dynident.check.joints import JointCheck, Size, of_description, of_estimate
+from dynident.check.mend import mend
+from dynident.check.report import Check, LinkCheck
+from dynident.check.rules import TITLES, judge
+from dynident.check.subject import Subject, of_links
+from dynident.errors import RobotError, UnsupportedError
+from dynident.fit import Estimate, load_estimate
+from dynident.robot import Description, Link, Robot
+from dynident.robot.joint_dynamics import joint_dynamics
+from dynident.robot.lone_links import lone_links
+
+
+def check(what: Robot | Estimate | str | Path | Any) -> Check:
+    """Check whether a robot can exist: the margin of every rule, link by link.
+
+    For each link of the description, and for each moving body of several links: finite numbers,
+    positive mass, inertia about the centre of mass, triangle inequality, pseudo-inertia, and
+    where the description has geometry, centre of mass and spread of mass within its convex hull.
+    For each joint: friction, damping and rotor inertia not negative.
+
+    Parameters
+    ----------
+    what : Robot, Estimate, path, or anything with a robot in its attribute `robot`
+        A path names a robot description (URDF, SDF, MJCF) or a saved estimate.
+
+    Returns
+    -------
+    Check
+        Report first: nothing is raised for a broken robot before `Check.require`.
+
+    Raises
+    ------
+    DynidentError
+        If a file cannot be read, or is neither a robot description nor an estimate.
+    """
+    if isinstance(what, str | Path):
+        return _file(Path(what))
+    if isinstance(what, Robot):
+        return _robot(what, what.name, what.description.format if what.description else "robot")
+    if isinstance(what, Estimate):
+        return _estimate(what, what.model.robot.name)
+    robot = getattr(what, "robot", None)
+    if not isinstance(robot, Robot):
+        raise RobotError(
+            f"a {type(what).__name__} has no robot to check",
+            mend="give a Robot, an Estimate, or the path of a robot description or estimate",
+        )
+    estimate = getattr(what, "estimate", None)
+    if isinstance(estimate, Estimate):
+        return _check(robot.links, robot.description, robot, robot.name, "estimate", estimate)
+    return _robot(robot, robot.name, "robot")
+
+
+def _file(path: Path) -> Check:
+    text = files.read_text(path)
+    start = text.lstrip()[:1]
+    if start == "{":
+        return _estimate(load_estimate(path), str(path))
+    if start != "<":
+        raise RobotError(
+            "is empty" if not start else "is neither a robot description nor a saved estimate",
+            str(path),
+            "give a URDF, SDF or MJCF file, or a JSON file that Estimate.save wrote",
+        )
+    try:
+        robot = Robot.from_text(text, str(path))
+    except UnsupportedError as error:
+        description, links = lone_links(text, str(path))
+        note = (
+            f"{error}. Its links were checked one by one, without the tree of joints: extents are "
+            "those of their geometry."
+        )
+        name, source = description.path, description.format
+        return _check(links, description, None, name, source, None, (note,))
+    return _robot(robot, str(path), robot.description.format if robot.description else "robot")
+
+
+def _robot(robot: Robot, name: str, source: str) -> Check:
+    return _check(robot.links, robot.description, robot, name, source)
+
+
+def _estimate(estimate: Estimate, name: str) -> Check:
+    robot = estimate.robot
+    note = (
+        "What the data cannot tell (how a combination is shared among its parameters) was taken "
+        "as near to the description as it can be: another share may be consistent."
+    )
+    return _check(robot.links, robot.description, robot, name, "estimate", estimate, (note,))
+
+
+def _check(
+    links: tuple[Link, ...],
+    description: Description | None,
+    robot: Robot | None,
+    name: str,
+    source: str,
+    estimate: Estimate | None = None,
+    notes: tuple[str, ...] = (),
+) -> Check:
+    # Numbers of any size are looked at: what overflows is judged as not finite.
+    with np.errstate(all="ignore"):
+        rotors = _rotors(estimate)
+        subjects, scale = of_links(links, description, robot, rotors)
+        found = tuple(sorted((_link(one) for one in subjects), key=_order))
+        size = Size(scale.mass, scale.length)
+        joints: tuple[JointCheck, ...] = ()
+        if description is not None:
+            joints = of_description(joint_dynamics(description), size)
+        if estimate is not None:
+            joints += of_estimate(estimate, size)
+    mute = [link.name for link in links if link.source == "absent"]
+    if mute and len(mute) == len(links):
+        notes = ("The description states no inertia of any link.", *notes)
+    not_read = [
+        f"{one.name}: {'; '.join(one.not_checked)}"
+        for one in found
+        if one.kind == "link" and one.not_checked
+    ]
+    if not_read:
+        notes = (*notes, "Geometry not checked: " + ". ".join(not_read) + ".")
+    return Check(
+        name,
+        source,
+        tuple(one for one in found if one.kind == "link"),
+        tuple(one for one in found if one.kind != "link"),
+        tuple(sorted(joints, key=lambda one: not one.broken)),
+        notes,
+    )
+
+
+def _rotors(estimate: Estimate | None) -> frozenset[str]:
+    """Joints that an estimate gives a rotor inertia."""
+    if estimate is None:
+        return frozenset()
+    effects = [one for one in estimate.model.effects if one.name == "rotor_inertia"]
+    return frozenset(
+        str(one.joint) for one in effects if np.any(estimate.effect_values(one.label) > 0.0)
+    )
+
+
+def _link(subject: Subject) -> LinkCheck:
+    body = subject.body
+    verdicts = judge(body)
+    order = list(TITLES)
+    rules = sorted(
+        verdicts.rules,
+        key=lambda one: (
+            not one.broken,
+            one.rule != "finite",
+            one.relative if one.relative == one.relative else -np.inf,
+            order.index(one.rule),
+        ),
+    )
+    # Finite numbers are no margin to speak of once they are finite.
+    rules.sort(key=lambda one: one.rule == "finite" and not one.broken)
+    broken = any(one.broken for one in rules)
+    told = list(hints(body, verdicts))
+    if body.phi[0] == 0.0 and not broken and subject.source == "inertial element":
+        told.append("its mass is stated as zero")
+    return LinkCheck(
+        body.name,
+        subject.kind,
+        subject.carrier,
+        subject.links,
+        body.length,
+        body.length_from,
+        tuple(rules),
+        (*subject.not_checked, *verdicts.not_checked),
+        tuple(told),
+        mend(body) if broken else (),
+    )
+
+
+def _order(one: LinkCheck) -> tuple[bool, bool, float]:
+    relative = one.worst.relative
+    return (
+        not one.broken,
+        not any(rule.rule == "finite" and rule.broken for rule in one.rules),
+        relative if relative == relative else -np.inf,
+    )
