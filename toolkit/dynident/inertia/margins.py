@@ -8,12 +8,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from dynident.inertia.parameters import pseudo_inertia, to_com
 
 # Rounding in the file (a triangle met with equality, a thin plate written with six digits) is
-# not a violation: relative to the size of the inertia, this much is forgiven.
+# not a violation: relative to the inertia about the origin, this much is forgiven.
+_DIGITS = 1e-6
+
+# Nor is a mass of -1e-18 kg that a sum should have made zero: relative to the largest parameter.
 _ROUNDING = 1e-9
 
 
@@ -34,7 +37,10 @@ class Margins:
         Smallest eigenvalue of the 4x4 pseudo-inertia (mixed units): not negative exactly when
         all of the above hold together.
     scale : float
-        Largest magnitude among the parameters, against which rounding is forgiven.
+        Largest magnitude among the parameters, against which rounding of the mass is forgiven.
+    inertia_scale : float
+        Largest magnitude among the moments and products of inertia about the origin, kg m^2,
+        against which rounding of the moments is forgiven.
     """
 
     mass: float
@@ -42,6 +48,7 @@ class Margins:
     triangle: float
     pseudo_inertia_min_eig: float
     scale: float
+    inertia_scale: float
 
     def _rules(self) -> list[tuple[str, float]]:
         return [
@@ -52,10 +59,20 @@ class Margins:
         ]
 
     @property
+    def semi_consistent(self) -> bool:
+        """Whether neither the mass nor a moment about the centre of mass is negative.
+
+        What equation (5) of Ting et al., RSS 2006, ensures: the spatial inertia is positive
+        semidefinite. No mass distribution need have such parameters.
+        """
+        # Written so that a NaN margin is a violation.
+        forgiven = _DIGITS * self.inertia_scale
+        return self.mass >= -_ROUNDING * self.scale and self.inertia_com_min_eig >= -forgiven
+
+    @property
     def consistent(self) -> bool:
         """Whether some mass distribution has these parameters (rounding forgiven)."""
-        # Written so that a NaN margin is a violation.
-        return all(value >= -_ROUNDING * self.scale for _, value in self._rules())
+        return self.semi_consistent and self.triangle >= -_DIGITS * self.inertia_scale
 
     @property
     def worst(self) -> tuple[str, float]:
@@ -72,8 +89,9 @@ def margins(phi: ArrayLike) -> Margins:
     phi = np.asarray(phi, dtype=float)
     if not np.all(np.isfinite(phi)):
         nan = float("nan")
-        return Margins(float(phi[0]), nan, nan, nan, 1.0)
-    inertia_com = to_com(phi).inertia_com
+        return Margins(float(phi[0]), nan, nan, nan, 1.0, 1.0)
+    scale = float(np.max(np.abs(phi)))
+    inertia_com = to_com(_without_lost_mass(phi, _ROUNDING * scale)).inertia_com
     if np.all(np.isfinite(inertia_com)):
         moments = np.linalg.eigvalsh(inertia_com)
         smallest = float(moments[0])
@@ -85,5 +103,18 @@ def margins(phi: ArrayLike) -> Margins:
         inertia_com_min_eig=smallest,
         triangle=triangle,
         pseudo_inertia_min_eig=float(np.linalg.eigvalsh(pseudo_inertia(phi))[0]),
-        scale=float(np.max(np.abs(phi))),
+        scale=scale,
+        inertia_scale=float(np.max(np.abs(phi[4:]))),
     )
+
+
+def _without_lost_mass(phi: NDArray[np.float64], rounding: float) -> NDArray[np.float64]:
+    """Return phi with a mass below zero by rounding, and the first moment's rounding, made zero.
+
+    Such a mass would put the centre of mass anywhere, and moments about it that look right.
+    """
+    if not -rounding <= phi[0] < 0:
+        return phi
+    lost = np.abs(phi) <= rounding
+    lost[4:] = False
+    return np.where(lost, 0.0, phi)

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dynident.errors import RobotError
-from dynident.inertia import inertia_matrix
+from dynident.inertia import to_drake
 from dynident.robot.robot import Robot
 from dynident.robot.tree import Array
 
@@ -23,12 +22,7 @@ if TYPE_CHECKING:
         JointActuator,
         ModelInstanceIndex,
         RigidBody,
-        SpatialInertia,
     )
-
-# Mass given to a body that has an inertia but no mass, relative to that inertia: Drake stores
-# inertia per mass. Its weight is below rounding.
-_TRACE = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +80,7 @@ def add_to_plant(robot: Robot, plant: MultibodyPlant) -> DrakeRobot:
     from pydrake.multibody.tree import FixedOffsetFrame, PrismaticJoint, RevoluteJoint
 
     inertias = [
-        spatial_inertia(phi, f"body '{body}'")
+        to_drake(phi, f"body '{body}'")
         for body, phi in zip(robot.bodies, robot.theta.reshape(-1, 10), strict=True)
     ]
     instance = plant.AddModelInstance(robot.name)
@@ -108,45 +102,6 @@ def add_to_plant(robot: Robot, plant: MultibodyPlant) -> DrakeRobot:
         actuators.append(plant.AddJointActuator(joint.name, added))
     plant.mutable_gravity_field().set_gravity_vector(_own(robot.gravity))
     return DrakeRobot(instance, bodies, tuple(joints), tuple(actuators))
-
-
-def spatial_inertia(phi: Array, where: str = "body") -> SpatialInertia:
-    """Return Drake's spatial inertia M_BBo_B of ten parameters about the body's origin.
-
-    Validity is not checked. A massless body with an inertia gets a trace of mass.
-
-    Raises
-    ------
-    RobotError
-        If phi is not finite, or has a first moment without mass.
-    """
-    from pydrake.multibody.tree import SpatialInertia, UnitInertia
-
-    phi = np.asarray(phi, dtype=float)
-    if not np.all(np.isfinite(phi)):
-        raise RobotError("has inertial parameters that are not finite", where)
-    mass = float(phi[0])
-    if mass == 0.0:
-        if np.any(phi[1:4]):
-            raise RobotError(
-                "has a first moment but no mass, which Drake cannot hold",
-                where,
-                "lift base parameters onto a prior with mass (BaseParameters.lift)",
-            )
-        if not np.any(phi[4:]):
-            return SpatialInertia.Zero()
-        mass = _TRACE * float(np.max(np.abs(phi[4:])))
-    unit = inertia_matrix(phi) / mass
-    # Release builds of Drake do not check this constructor, and the next one is told not to.
-    G = UnitInertia(
-        Ixx=unit[0, 0],
-        Iyy=unit[1, 1],
-        Izz=unit[2, 2],
-        Ixy=unit[0, 1],
-        Ixz=unit[0, 2],
-        Iyz=unit[1, 2],
-    )
-    return SpatialInertia(mass, _own(phi[1:4] / mass), G, skip_validity_check=True)
 
 
 def _own(array: Array) -> Any:

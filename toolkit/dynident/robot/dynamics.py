@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio
 
-from dynident.errors import RobotError
-from dynident.inertia import inertia_matrix
+from dynident.inertia import to_pinocchio
 from dynident.robot.tree import Array
 
 if TYPE_CHECKING:
@@ -71,18 +70,7 @@ def pinocchio_model(robot: Robot, theta: Array) -> Any:
     model, order = _kinematics(robot)
     for pin_id, index in enumerate(order, start=1):
         phi = theta[10 * index : 10 * index + 10]
-        where = f"body '{robot.bodies[index]}'"
-        if not np.all(np.isfinite(phi)):
-            raise RobotError("has inertial values that are not finite", where)
-        if phi[0] == 0.0 and np.any(phi[1:4]):
-            raise RobotError(
-                "has a first moment but no mass, which Pinocchio cannot hold",
-                where,
-                "lift base parameters onto a prior with mass (BaseParameters.lift)",
-            )
-        model.inertias[pin_id] = (
-            pin.Inertia(0.0, np.zeros(3), inertia_matrix(phi)) if phi[0] == 0.0 else _inertia(phi)
-        )
+        model.inertias[pin_id] = to_pinocchio(phi, f"body '{robot.bodies[index]}'")
     return model
 
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynident.errors import RobotError, UnsupportedError
+from dynident.inertia import from_drake
 from dynident.robot.tree import Array
 
 _KINDS = {"revolute": "revolute", "prismatic": "prismatic", "weld": "fixed"}
@@ -101,7 +102,7 @@ def parse(copy: str, suffix: str, where: str) -> Kinematics:
         for body in bodies
         if body.name() not in attached
     }
-    phi = {body.name(): _phi(body.default_spatial_inertia()) for body in bodies}
+    phi = {body.name(): from_drake(body.default_spatial_inertia()) for body in bodies}
     return Kinematics(tuple(body.name() for body in bodies), connections, roots, phi)
 
 
@@ -164,12 +165,3 @@ def _connection(joint, where: str) -> Connection:
         upper,
         velocity if velocity > 0.0 else np.inf,
     )
-
-
-def _phi(inertia) -> Array:
-    full = inertia.CopyToFullMatrix6()
-    # [[I, m px], [-m px, m E]] about the body's origin, px the cross product matrix of the com.
-    moment = np.array([full[2, 4], full[0, 5], full[1, 3]])
-    i = full[:3, :3]
-    six = [i[0, 0], i[0, 1], i[1, 1], i[0, 2], i[1, 2], i[2, 2]]
-    return np.array([full[3, 3], *moment, *six])
