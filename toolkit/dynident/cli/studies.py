@@ -1,53 +1,29 @@
-"""The command `dynident`.
-
-Standard output carries the answer (one JSON object under `--json`), standard error everything
-else. Exit status: 0 done, 2 unusable input.
-"""
+"""The commands that take a study or an experiment."""
 
 from __future__ import annotations
 
-import json
-import math
-import os
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING
 
 import click
 
 from dynident import files
-from dynident.errors import DynidentError, DynidentWarning, FileError, StudyError
+from dynident.cli.group import commands
+from dynident.cli.output import JSON, print_json, progress, say, show
+from dynident.errors import DynidentWarning, FileError, StudyError
 
 if TYPE_CHECKING:
     from dynident.diagnose import Diagnosis
     from dynident.study import Study
 
-_JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 _STUDY = click.argument("study", type=click.Path(path_type=Path))
-
-
-class _Group(click.Group):
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(self.commands)  # in the order of use, not of the alphabet
-
-
-@click.group(
-    cls=_Group, context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=False
-)
-@click.version_option(package_name="dynident")
-def commands() -> None:
-    """Robot model identification that tells you what physics your model lacks.
-
-    Example: dynident explain study.toml --report report.html
-    """
 
 
 @commands.command()
 @_STUDY
-@_JSON
+@JSON
 @click.option("--report", type=click.Path(path_type=Path), help="Also write this HTML report.")
 def explain(study: Path, as_json: bool, report: Path | None) -> None:
     """Run the whole loop: compare, diagnose, add, refit, compare. The study stays as it is.
@@ -58,14 +34,14 @@ def explain(study: Path, as_json: bool, report: Path | None) -> None:
     diagnosis = _diagnosis(_load(study))
     _write_report(diagnosis, report)
     if as_json:
-        _print_json(diagnosis.to_dict())
+        print_json(diagnosis.to_dict())
     else:
-        _show(*diagnosis.tables(), diagnosis.after.parameter_table())
+        show(*diagnosis.tables(), diagnosis.after.parameter_table())
 
 
 @commands.command()
 @_STUDY
-@_JSON
+@JSON
 def diagnose(study: Path, as_json: bool) -> None:
     """Say where the model fails and which effects it lacks.
 
@@ -73,14 +49,14 @@ def diagnose(study: Path, as_json: bool) -> None:
     """
     diagnosis = _diagnosis(_load(study))
     if as_json:
-        _print_json(diagnosis.to_dict())
+        print_json(diagnosis.to_dict())
     else:
-        _show(*diagnosis.tables())
+        show(*diagnosis.tables())
 
 
 @commands.command()
 @_STUDY
-@_JSON
+@JSON
 @click.option("--out", type=click.Path(path_type=Path), help="Also save the estimate as JSON.")
 @click.option(
     "--robot", type=click.Path(path_type=Path), help="Also write the robot description identified."
@@ -104,7 +80,7 @@ def fit(
 
     _require_places(study, out, robot)
     loaded = _load(study)
-    with _progress("fitting"):
+    with progress("fitting"):
         method = LeastSquares("none" if ordinary else "joint")
         estimate = fit_model(loaded.model, loaded.train, method)
         tables, result = list(estimate.tables()), estimate.to_dict()
@@ -126,14 +102,14 @@ def fit(
                 stacklevel=1,
             )
     if as_json:
-        _print_json(result)
+        print_json(result)
     else:
-        _show(*tables)
+        show(*tables)
 
 
 @commands.command()
 @_STUDY
-@_JSON
+@JSON
 @click.option(
     "--with",
     "additions",
@@ -149,15 +125,15 @@ def compare(study: Path, as_json: bool, additions: tuple[str, ...]) -> None:
     loaded = _load(study)
     comparison = _comparison(loaded, additions)
     if as_json:
-        _print_json(comparison.to_dict())
+        print_json(comparison.to_dict())
     else:
-        _show(*comparison.tables())
+        show(*comparison.tables())
 
 
 @commands.command()
 @_STUDY
 @click.argument("effect", metavar="EFFECT[@JOINT[:SOURCE]]")
-@_JSON
+@JSON
 def add(study: Path, effect: str, as_json: bool) -> None:
     """Write an effect into the study file; print the error before and after.
 
@@ -179,9 +155,9 @@ def add(study: Path, effect: str, as_json: bool) -> None:
     comparison = _comparison(loaded, (effect,))
     add_effects(study, fresh)
     if as_json:
-        _print_json({"added": [one.label for one in fresh], **comparison.to_dict()})
+        print_json({"added": [one.label for one in fresh], **comparison.to_dict()})
     else:
-        _show(*comparison.tables()[:1], f"Written into {study}.")
+        show(*comparison.tables()[:1], f"Written into {study}.")
 
 
 @commands.command()
@@ -189,7 +165,7 @@ def add(study: Path, effect: str, as_json: bool) -> None:
 @click.option(
     "--out", type=click.Path(path_type=Path), required=True, help="Folder for what is written."
 )
-@_JSON
+@JSON
 def simulate(experiment: Path, out: Path, as_json: bool) -> None:
     """Make virtual measurements: recordings and a study that hides what is hidden.
 
@@ -198,17 +174,17 @@ def simulate(experiment: Path, out: Path, as_json: bool) -> None:
     from dynident.closed_loop import load_experiment, write_experiment
 
     loaded = load_experiment(experiment)
-    with _progress("simulating") as tell:
+    with progress("simulating") as tell:
         written = write_experiment(loaded, out, progress=tell)
     if as_json:
-        _print_json({"written": [str(path) for path in written]})
+        print_json({"written": [str(path) for path in written]})
     else:
-        _say(*map(str, written))
+        say(*map(str, written))
 
 
 @commands.command()
 @_STUDY
-@_JSON
+@JSON
 @click.option(
     "--to", type=click.Path(path_type=Path), default=Path("report.html"), show_default=True
 )
@@ -221,13 +197,13 @@ def report(study: Path, as_json: bool, to: Path) -> None:
     diagnosis = _diagnosis(_load(study))
     _write_report(diagnosis, to)
     if as_json:
-        _print_json({"report": str(to), **diagnosis.to_dict()})
+        print_json({"report": str(to), **diagnosis.to_dict()})
     else:
-        _say(diagnosis.sentence)
+        say(diagnosis.sentence)
 
 
 @commands.command()
-@_JSON
+@JSON
 @click.option(
     "--to", type=click.Path(path_type=Path), default=Path("demo.report.html"), show_default=True
 )
@@ -241,48 +217,9 @@ def demo(as_json: bool, to: Path) -> None:
     diagnosis = _diagnosis(_load(study))
     _write_report(diagnosis, to)
     if as_json:
-        _print_json(diagnosis.to_dict())
+        print_json(diagnosis.to_dict())
     else:
-        _show(*diagnosis.tables(), f"The report to open: {to.resolve()}")
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command; one line and an exit status for everything that can go wrong.
-
-    Parameters
-    ----------
-    arguments : by default those of the process.
-    """
-    with warnings.catch_warnings():
-        warnings.showwarning = _show_warning
-        warnings.simplefilter("always", DynidentWarning)
-        try:
-            # With standalone_mode, click would word and print the errors its own way.
-            sys.exit(commands(arguments, "dynident", standalone_mode=False) or 0)
-        except click.exceptions.Exit as stop:
-            sys.exit(stop.exit_code)
-        except click.UsageError as error:
-            command = error.ctx.command_path if error.ctx else "dynident"
-            message = error.format_message()
-            end = " " if message.endswith(("?", ".")) else ". "
-            _fail(f"{message}{end}See `{command} --help`")
-        except click.ClickException as error:
-            _fail(error.format_message())
-        except DynidentError as error:
-            _fail(str(error))
-        except (KeyboardInterrupt, click.Abort):
-            click.echo("interrupted; nothing was left half written", err=True)
-            sys.exit(130)
-        except _ReaderGone:
-            # Whoever read us has gone: nothing to say, and nobody to say it to.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            sys.exit(0)
-
-
-def _fail(message: str) -> NoReturn:
-    """Say on one line why the input is unusable, and end."""
-    click.echo(f"error: {' '.join(message.splitlines())}", err=True)
-    sys.exit(2)
+        show(*diagnosis.tables(), f"The report to open: {to.resolve()}")
 
 
 def _require_places(study: Path, *paths: Path | None) -> None:
@@ -298,14 +235,14 @@ def _require_places(study: Path, *paths: Path | None) -> None:
 def _load(path: Path) -> Study:
     from dynident.study import load
 
-    with _progress("reading"):
+    with progress("reading"):
         return load(path)
 
 
 def _diagnosis(study: Study) -> Diagnosis:
     from dynident.diagnose import diagnose as search
 
-    with _progress("diagnosing") as tell:
+    with progress("diagnosing") as tell:
         return search(study.model, study.train, study.test, tell=tell)
 
 
@@ -318,7 +255,7 @@ def _comparison(study: Study, additions: tuple[str, ...]):
         for effect in _missing(label, study):
             model = model + effect
         models[f"+ {label}"] = model
-    with _progress("comparing"):
+    with progress("comparing"):
         return compare_models(models, study.train, study.test)
 
 
@@ -338,79 +275,9 @@ def _write_report(diagnosis: Diagnosis, to: Path | None) -> None:
 
 
 def _demo_study() -> Path:
-    here = Path(__file__).resolve().parent
+    here = Path(__file__).resolve().parents[1]
     places = (here / "demo", here.parents[1] / "problems" / "hidden_effect")
     for place in places:
         if (place / "study.toml").is_file():
             return place / "study.toml"
     raise FileError("the embedded example is not installed", str(places[0]), "run it from a clone")
-
-
-def _show(*parts: Any) -> None:
-    from dynident.tables import print_tables
-
-    with _reader():
-        print_tables(*parts)
-
-
-def _print_json(content: dict[str, Any]) -> None:
-    _say(json.dumps(_plain(content), allow_nan=False))
-
-
-def _say(*lines: str) -> None:
-    """Print lines as they are, whatever the width of the terminal."""
-    with _reader():
-        for line in lines:
-            click.echo(line)
-
-
-class _ReaderGone(Exception):
-    """Whoever reads our standard output has closed it."""
-
-
-@contextmanager
-def _reader() -> Iterator[None]:
-    """Tell a closed pipe from other failures; click would end with status 1."""
-    try:
-        yield
-        sys.stdout.flush()
-    except BrokenPipeError:
-        raise _ReaderGone from None
-
-
-def _plain(value: Any) -> Any:
-    """Values as JSON has them: numbers that are not finite become null."""
-    if isinstance(value, dict):
-        return {key: _plain(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else None
-    return value
-
-
-@contextmanager
-def _progress(title: str) -> Iterator[Callable[..., None]]:
-    """Show a progress bar while standard error is a terminal, nothing otherwise."""
-    if not sys.stderr.isatty():
-        yield lambda *_: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(title, total=None)
-
-        def tell(doing: object = "", done: float | None = None, total: float | None = None) -> None:
-            bar.update(task, description=f"{title}: {doing}", completed=done, total=total)
-
-        yield tell
-
-
-def _show_warning(message, category, filename, lineno, file=None, line=None) -> None:
-    click.echo(f"warning: {message}", err=True)
-
-
-if __name__ == "__main__":
-    main()

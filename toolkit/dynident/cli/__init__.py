@@ -1,0 +1,67 @@
+"""The command `dynident`.
+
+Standard output carries the answer (one JSON object under `--json`), standard error everything
+else. Exit status: 0 done, 1 a check failed, 2 unusable input.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from collections.abc import Sequence
+from typing import NoReturn
+
+import click
+
+# Imported for what they add to the group, in the order of the help.
+from dynident.cli import studies  # isort: skip
+from dynident.cli import robots  # isort: skip
+from dynident.cli.group import commands
+from dynident.cli.output import ReaderGone
+from dynident.errors import DynidentError, DynidentWarning
+
+__all__ = ["commands", "main", "robots", "studies"]
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command; one line and an exit status for everything that can go wrong.
+
+    Parameters
+    ----------
+    arguments : by default those of the process.
+    """
+    with warnings.catch_warnings():
+        warnings.showwarning = _show_warning
+        warnings.simplefilter("always", DynidentWarning)
+        try:
+            # With standalone_mode, click would word and print the errors its own way.
+            sys.exit(commands(arguments, "dynident", standalone_mode=False) or 0)
+        except click.exceptions.Exit as stop:
+            sys.exit(stop.exit_code)
+        except click.UsageError as error:
+            command = error.ctx.command_path if error.ctx else "dynident"
+            message = error.format_message()
+            end = " " if message.endswith(("?", ".")) else ". "
+            _fail(f"{message}{end}See `{command} --help`")
+        except click.ClickException as error:
+            _fail(error.format_message())
+        except DynidentError as error:
+            _fail(str(error))
+        except (KeyboardInterrupt, click.Abort):
+            click.echo("interrupted; nothing was left half written", err=True)
+            sys.exit(130)
+        except ReaderGone:
+            # Whoever read us has gone: nothing to say, and nobody to say it to.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            sys.exit(0)
+
+
+def _fail(message: str) -> NoReturn:
+    """Say on one line why the input is unusable, and end."""
+    click.echo(f"error: {' '.join(message.splitlines())}", err=True)
+    sys.exit(2)
+
+
+def _show_warning(message, category, filename, lineno, file=None, line=None) -> None:
+    click.echo(f"warning: {message}", err=True)

@@ -1,0 +1,5 @@
+"""`python -m dynident.cli` is the command `dynident`."""
+
+from dynident.cli import main
+
+main()
