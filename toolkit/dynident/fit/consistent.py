@@ -35,8 +35,12 @@ def require_solver(solver: str) -> None:
         raise FitError(f"no solver '{solver}'", mend="choose conic or nlp")
 
 
-def solve(problem: Problem, solver: Solver) -> Answer:
+def solve(problem: Problem, solver: Solver, stay: np.ndarray | None = None) -> Answer:
     """Solve a problem and certify the answer.
+
+    Parameters
+    ----------
+    stay : (s,) parameters that a link keeps, to the bit, where another answer is no better.
 
     Raises
     ------
@@ -58,15 +62,35 @@ def solve(problem: Problem, solver: Solver) -> Answer:
     assert conic.multipliers is not None
     bound = lower_bound(problem, conic.x, conic.multipliers)
     if solver == "conic":
-        x = problem.retracted(conic.x)
+        x = _kept(problem, problem.retracted(conic.x), stay)
         return Answer(x, certify(problem, x, conic.status, "conic program", bound))
     from dynident.nlp.parametrised import solve_nonlinear
 
     found = solve_nonlinear(problem)
     _require(found.status, problem)
-    x = problem.retracted(found.x)
+    x = _kept(problem, problem.retracted(found.x), stay)
     certificate = certify(problem, x, found.status, found.program, bound, found.objectives)
     return Answer(x, certificate)
+
+
+def _kept(problem: Problem, x: np.ndarray, stay: np.ndarray | None) -> np.ndarray:
+    """X with the links of `stay` wherever that is no worse.
+
+    Solvers leave a link that need not move by about 1e-5 of its size.
+    """
+    if stay is None:
+        return x
+    rigid = problem.space.rigid
+    parts = [slice(k, k + 10) for k in range(0, rigid, 10)]
+    parts += [slice(k, k + 1) for k in range(rigid, problem.space.size)]
+    violation = problem.violation(x)
+    for part in parts:
+        candidate = np.array(x)
+        candidate[part] = stay[part]
+        better = problem.objective(candidate) <= problem.objective(x)
+        if better and problem.violation(candidate) <= violation and problem.feasible(candidate):
+            x = candidate
+    return x
 
 
 def trivial(problem: Problem, x: np.ndarray) -> Answer:
@@ -80,7 +104,7 @@ def _require(status: Status, problem: Problem) -> None:
     if status.ok:
         return
     if status.word == "infeasible":
-        names = [type(one).__name__ for one in problem.within.sets]
+        names = [c.name for one in problem.within.sets for c in one.on(problem.space)]
         what = "no robot satisfies all constraints at once"
-        raise FitError(what, ", ".join(names) or None, "loosen one of them")
+        raise FitError(what, ", ".join(dict.fromkeys(names)) or None, "loosen one of them")
     raise FitError(f"no answer was found ({status})", mend="check units; try solver='conic'")

@@ -18,6 +18,7 @@ from dynident.recording import Dataset
 from dynident.threads import single_threaded
 
 _NOTHING = 1e-12  # of the largest information: less is rounding
+_HELD = 1e-3  # of what all data together could tell about a parameter alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,10 +67,16 @@ class Metric:
         M = np.asarray(M, dtype=float)
         if M.shape != (len(names), len(names)) or not np.all(np.isfinite(M)):
             raise FitError(f"a metric of shape {M.shape} does not fit {len(names)} parameters")
-        root, lost = _root(M)
+        mend = "it must be X'X of some data, or Metric.corrected"
+        size = np.sqrt(np.abs(np.diag(M)))
+        if np.any(np.abs(M - M.T) > 1e-8 * np.outer(size, size)):
+            raise FitError("the metric is not symmetric", mend=mend)
+        root, lost = _root(M, size)
         if lost > 1e-8:
-            mend = "it must be X'X of some data, or Metric.corrected"
-            raise FitError(f"the metric has a negative direction ({lost:.1g} of the largest)", mend)
+            what = f"the metric has a negative direction ({lost:.1g} of the largest)"
+            raise FitError(what, mend=mend)
+        if not 0 < noise_std < np.inf:
+            raise FitError(f"noise_std = {noise_std:g}", mend="choose it above 0")
         return Metric(root / noise_std, tuple(names), rows, "given matrix")
 
     @staticmethod
@@ -84,9 +91,12 @@ class Metric:
         kept = list(estimate.basis.independent)
         covariance = estimate.covariance[np.ix_(kept, kept)]
         std = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
-        if not len(kept) or not np.all(std > 0):
+        if not len(kept) or not np.any(std > 0):
             what = "the estimate has no covariance to take a metric from"
             raise FitError(what, mend="give a metric: Metric.of_data(model, recordings)")
+        # What a constraint holds has no variance: it is known better than by any data.
+        std = np.where(std > 0, std, _HELD / estimate.basis.scale[kept])
+        covariance = covariance + np.diag(np.where(np.diag(covariance) > 0, 0.0, std**2))
         values, vectors = np.linalg.eigh(covariance / np.outer(std, std))
         values = np.maximum(values, _NOTHING * values[-1])
         information = (vectors / np.sqrt(values)).T / std
@@ -157,7 +167,7 @@ class Metric:
                 f"In {negative} of {len(size)} directions the inputs hold no more than their "
                 "noise: the metric there is zero, and the prior decides.",
             )
-        root, _ = _root(difference)
+        root, _ = _root(difference, size)
         return replace(self, R=root, source=f"{self.source}, less input noise", notes=notes)
 
     def weighted(self, relevance: ArrayLike) -> Metric:
@@ -182,10 +192,13 @@ class Metric:
         return replace(self, R=self.R * weights, source=source, irrelevant=off)
 
 
-def _root(M: np.ndarray) -> tuple[np.ndarray, float]:
-    """R with R'R = M where M is not negative, and the most negative eigenvalue, relative."""
-    size = np.sqrt(np.abs(np.diag(M)))
-    size[size == 0] = 1.0
+def _root(M: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, float]:
+    """R with R'R = M where M is not negative, and the most negative eigenvalue, relative.
+
+    What is negative is decided in units of the columns' size (p,): a parameter of which a
+    correction leaves next to nothing would otherwise be blown up, and what it shares with others.
+    """
+    size = np.where(size > 0, size, 1.0)
     values, vectors = np.linalg.eigh(0.5 * (M + M.T) / np.outer(size, size))
     lost = float(-values[0] / max(values[-1], np.finfo(float).tiny))
     return (vectors * np.sqrt(np.clip(values, 0.0, None))).T * size, lost

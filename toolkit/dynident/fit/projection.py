@@ -71,7 +71,11 @@ class Projection:
         """
         if self.metric is None or self.metric.rows == 0:
             return None
-        step = self.metric.R @ (self.estimate.values - self.before.values)
+        step = (
+            self.metric.R
+            @ _mapping(self.space, self.metric, self.before.names)
+            @ (self.x - self.x_before)
+        )
         return float(np.linalg.norm(step) / np.sqrt(self.metric.rows))
 
     def changes(self) -> Table:
@@ -169,8 +173,8 @@ def project(
     x_hat = _standard(before, model, space)
     if metric is None and before.rows:
         metric = Metric.of_estimate(before)
-    problem, notes = _problem(space, x_hat, prior, metric, within)
-    answer = trivial(problem, x_hat) if problem.feasible(x_hat) else solve(problem, solver)
+    problem, notes = _problem(space, x_hat, before.names, prior, metric, within)
+    answer = trivial(problem, x_hat) if problem.feasible(x_hat) else solve(problem, solver, x_hat)
     return _projection(answer, before, problem, x_hat, metric, prior, notes)
 
 
@@ -200,15 +204,17 @@ def _standard(before: Estimate, model: Model, space: ParameterSpace) -> np.ndarr
 def _problem(
     space: ParameterSpace,
     x_hat: np.ndarray,
+    names: tuple[str, ...],
     prior: Prior,
     metric: Metric | None,
     within: Within,
 ) -> tuple[Problem, tuple[str, ...]]:
     if metric is None:
-        A, b = prior.rows(space, x_hat)
-        notes = ("No data: nearest under the prior's own metric, link by link.",)
-        return Problem(space, A, b, within, prior.entropy(space)), notes
-    mapping = _mapping(space, metric)
+        # The divergence from a body that cannot be is infinite; the quadratic is its second order.
+        A, b = replace(prior, distance="quadratic").rows(space, x_hat)
+        notes = ("No data: nearest under the prior's own quadratic metric, link by link.",)
+        return Problem(space, A, b, within), notes
+    mapping = _mapping(space, metric, names)
     space = sized(space, metric.R @ mapping, metric.rows, x_hat)
     rows = metric.R @ mapping
     centre, notes = believed(space, x_hat)
@@ -221,14 +227,14 @@ def _problem(
     return Problem(space, A, b, within, prior.entropy(space)), (*metric.notes, *notes)
 
 
-def _mapping(space: ParameterSpace, metric: Metric) -> np.ndarray:
-    """From standard parameters to those of the metric."""
+def _mapping(space: ParameterSpace, metric: Metric, names: tuple[str, ...]) -> np.ndarray:
+    """From standard parameters to those of the metric; `names` are the model's."""
     if metric.names == space.names:
         return np.eye(space.size)
-    if len(metric.names) == len(space.combination):
+    if metric.names == names:
         return space.combination
-    what = f"the metric has {len(metric.names)} parameters"
-    mend = f"state it for the model's {len(space.combination)}, or all {space.size} standard"
+    what = f"the metric's {len(metric.names)} parameters are not those of the estimate"
+    mend = f"state it for the model's {len(names)} ({names[0]}, ...), or all {space.size} standard"
     raise FitError(what, mend=mend)
 
 

@@ -134,6 +134,8 @@ def lower_bound(problem: Problem, x: np.ndarray, multipliers: Multipliers) -> Bo
     The Lagrangian is at least its value at x less what its gradient there can still bring: half
     the squared Newton decrement for the quadratic, and for the entropy (self-concordant) what
     Nesterov's bound says (Nesterov, "Lectures on convex optimization", theorem 5.1.12).
+
+    The set is that of bodies at least the inset inside, as programs see it.
     """
     scale = problem.space.scale
     bodies, floor_bodies = _semidefinite(multipliers.bodies)
@@ -165,8 +167,10 @@ def certify(
 ) -> Certificate:
     """State what is proved about an answer x (s,)."""
     objective = problem.objective(x)
-    # An objective of zero, up to rounding of its terms, needs no bound to be the smallest.
-    nothing = 1e-18 * float(problem.b @ problem.b)
+    # An objective of zero needs no bound to be the smallest: zero up to rounding of its terms, and
+    # up to what a step of the inset costs.
+    step = problem.A @ problem.inset
+    nothing = max(1e-18 * float(problem.b @ problem.b), 0.5 * float(step @ step))
     if problem.entropy is None and objective <= nothing:
         bound = Bound(0.0, 0.0, 0.0)
     value = bound.value if bound else float("nan")
@@ -222,7 +226,11 @@ def _gain(problem: Problem, x: np.ndarray, rest: np.ndarray) -> float:
             blocks[part, part] = distance_rows(x[part]) * scale[part]
         rows = np.vstack([rows / np.sqrt(weight), blocks])
     # |rest| in the inverse Hessian rows' rows: the smallest y with rows' y = rest.
-    decrement = float(np.linalg.norm(np.linalg.lstsq(rows.T, rest / weight, rcond=None)[0]))
+    y = np.linalg.lstsq(rows.T, rest / weight, rcond=None)[0]
+    missed = np.linalg.norm(rows.T @ y - rest / weight)
+    if missed > 1e-8 * np.linalg.norm(rest / weight):
+        return float("inf")  # a direction that nothing holds: it falls for ever
+    decrement = float(np.linalg.norm(y))
     if problem.entropy is None:
         return 0.5 * decrement**2
     if decrement >= 1.0:

@@ -201,15 +201,8 @@ def _add_objective(program: Any, z: np.ndarray, problem: Problem, origin: np.nda
         # The norm, not its square, and never the normal equations: 1e-5 more accurate.
         program.AddL2NormCost(A, rest, z)
         return
-    # Half the square: t >= |A z - b|^2 / size^2 as (t, 1, (A z - b) / size) in the rotated cone.
-    size = max(float(np.linalg.norm(rest)), 1.0)
-    t = program.NewContinuousVariables(1, "t")
-    stack = np.zeros((len(A) + 2, len(z) + 1))
-    stack[0, -1] = 1.0
-    stack[2:, :-1] = A / size
-    offset = np.concatenate([[0.0, 1.0], rest / size])
-    program.AddRotatedLorentzConeConstraint(stack, offset, np.concatenate([z, t]))
-    program.AddLinearCost([0.5 * size**2], t)
+    if len(A):
+        _add_half_square(program, z, A, rest)
     weight, basis = problem.entropy.weight, pseudo_basis()
     for k, centre in enumerate(problem.entropy.centres):
         part = slice(10 * k, 10 * k + 10)
@@ -220,6 +213,19 @@ def _add_objective(program: Any, z: np.ndarray, problem: Problem, origin: np.nda
         ratio = np.tensordot(z[part], white, axes=1) + root @ pseudo_inertia(origin[part]) @ root.T
         cost, t, _ = program.AddMaximizeLogDeterminantCost(0.5 * (ratio + ratio.T))
         cost.evaluator().UpdateCoefficients(-weight * np.ones(len(t)))
+
+
+def _add_half_square(program: Any, z: np.ndarray, A: np.ndarray, rest: np.ndarray) -> None:
+    """Add the cost 1/2 |A z + rest|^2 beside others: its norm alone would not do."""
+    # t >= |A z - b|^2 / size^2 as (t, 1, (A z - b) / size) in the rotated cone.
+    size = max(float(np.linalg.norm(rest)), 1.0)
+    t = program.NewContinuousVariables(1, "t")
+    stack = np.zeros((len(A) + 2, len(z) + 1))
+    stack[0, -1] = 1.0
+    stack[2:, :-1] = A / size
+    offset = np.concatenate([[0.0, 1.0], rest / size])
+    program.AddRotatedLorentzConeConstraint(stack, offset, np.concatenate([z, t]))
+    program.AddLinearCost([0.5 * size**2], t)
 
 
 def solve_conic(problem: Problem) -> ConicSolution:

@@ -36,7 +36,7 @@ def nearest_body(
     FitError
         If phi is not finite, or the conic solver fails.
     """
-    phi = np.asarray(phi, dtype=float)
+    phi = np.array(phi, dtype=float)
     if phi.shape != (10,) or not np.all(np.isfinite(phi)):
         raise FitError("ten finite inertial parameters are needed", "body")
     reference = reference_body(phi, mass, length)
@@ -59,4 +59,4 @@ def nearest_body(
     solution = solve_conic(problem)
     if not solution.status.ok:
         raise FitError(f"no nearest consistent body was found ({solution.status})", "body")
-    return solution.x
+    return problem.retracted(solution.x)

@@ -184,8 +184,8 @@ class Problem:
     def retracted(self, x: np.ndarray) -> np.ndarray:
         """X with what a solver left outside the consistent bodies mended, (s,).
 
-        Each body gets as much of its reference body as it takes to be half the inset inside; the
-        change is of the size of the solver's error.
+        Each body gets as much of its reference body as it takes to be the inset inside, no less:
+        then no answer is better than the bound. The change is of the size of the solver's error.
         """
         if self.within.consistency == "none":
             return x
@@ -193,7 +193,7 @@ class Problem:
         references = self.body_matrices(self.space.reference)
         for k, matrix in enumerate(self.body_matrices(x)):
             least = float(eigh(matrix, references[k], eigvals_only=True)[0])
-            lacking = 0.5 * self.within.inset - least
+            lacking = self.within.inset - least
             if lacking > 0:
                 x[10 * k : 10 * k + 10] += lacking * self.space.references[k]
         return x

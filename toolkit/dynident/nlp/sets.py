@@ -187,7 +187,10 @@ class CentreInEllipsoid:
         centre, semi = _three(self.centre, where), _three(self.semi_axes, where)
         if not np.all(semi > 0):
             raise FitError("a semi-axis is not positive", where, "give three lengths above 0")
-        unit = np.asarray(self.axes, dtype=float).T / semi[:, None]
+        axes = np.asarray(self.axes, dtype=float)
+        if axes.shape != (3, 3) or not np.allclose(axes.T @ axes, np.eye(3), atol=1e-6):
+            raise FitError("its axes are not orthonormal", where, "give three unit vectors")
+        unit = axes.T / semi[:, None]
         A = np.zeros((4, space.size))
         start = space.body(self.body).start
         A[0, start] = 1.0
@@ -245,7 +248,8 @@ class Within:
             raise FitError(f"no notion of consistency '{self.consistency}'", mend=mend)
         if not 0.0 <= self.inset < 0.1:
             raise FitError(f"inset = {self.inset:g}", mend="choose it from 0 to 0.1")
-        object.__setattr__(self, "sets", tuple(self.sets))
+        sets = self.sets if isinstance(self.sets, Sequence) else (self.sets,)
+        object.__setattr__(self, "sets", tuple(sets))
 
     @property
     def notion(self) -> str:
@@ -263,7 +267,7 @@ def _three(values: ArrayLike, where: str) -> np.ndarray:
 def _combination(
     space: ParameterSpace, name: str, weights: dict[str, float], lower: float, upper: float
 ) -> Linear:
-    if np.isnan(lower) or np.isnan(upper) or lower > upper:
+    if not lower <= upper or lower == np.inf or upper == -np.inf:
         what = f"the bounds {lower:g} to {upper:g} hold nothing"
         raise FitError(what, name, "lower must not exceed upper")
     A = np.zeros((1, space.size))
