@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 from dynident.errors import FileError
@@ -85,8 +86,17 @@ def _require_writable(folder: Path) -> None:
         raise FileError("may not be written", str(folder), "choose another folder")
 
 
-def write_bytes(path: str | Path, data: bytes) -> Path:
+def write_bytes(
+    path: str | Path, data: bytes, verify: Callable[[Path], object] | None = None
+) -> Path:
     """Write a file in one step: to a temporary neighbour first, then renamed.
+
+    Parameters
+    ----------
+    path : the file.
+    data : its content.
+    verify : called with the temporary neighbour before it takes the file's place; whatever it
+        raises leaves the old file untouched.
 
     Raises
     ------
@@ -101,6 +111,8 @@ def write_bytes(path: str | Path, data: bytes) -> Path:
         ) as handle:
             temporary = Path(handle.name)
             handle.write(data)
+        if verify is not None:
+            verify(temporary)
         # NamedTemporaryFile makes private files; give ours the permissions any new file gets.
         umask = os.umask(0)
         os.umask(umask)

@@ -67,6 +67,11 @@ class Robot:
                 seen.add(joint.parent)
                 joint = self.joints[joint.parent]
 
+    def __repr__(self) -> str:
+        # Without the description's text, which would flood a notebook.
+        form = f", from {self.description!r}" if self.description else ""
+        return f"Robot('{self.name}': {self.n} joints, {len(self.links)} links{form})"
+
     @staticmethod
     def from_file(
         path: str | Path,

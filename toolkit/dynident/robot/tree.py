@@ -127,3 +127,6 @@ class Description:
     path: str
     format: str
     text: str
+
+    def __repr__(self) -> str:
+        return f"{self.format} '{self.path}'"
