@@ -57,6 +57,10 @@ class FitError(DynidentError):
     """An estimate cannot be computed from this data."""
 
 
+class ProgramError(DynidentError):
+    """A nonlinear program is posed wrongly, or started from an impossible point."""
+
+
 class SimulationError(DynidentError):
     """A closed loop cannot be simulated."""
 
