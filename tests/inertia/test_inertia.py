@@ -16,6 +16,7 @@ from dynident.inertia import (
     to_com,
 )
 from dynident.robot.rotations import from_rpy
+from inertia.bodies import bodies
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -116,3 +117,38 @@ def test_massless_with_a_first_moment_has_no_centre_of_mass():
     np.testing.assert_array_equal(to_com([0, 0, 0, 0, 1, 0, 1, 0, 0, 1]).com, np.zeros(3))
     with pytest.raises(ValueError, match="ten"):
         to_com(np.zeros(3))
+
+
+@given(bodies())
+@settings(max_examples=60, deadline=None)
+def test_verdicts_do_not_depend_on_the_size_of_the_body(body):
+    phi, length = body.phi, body.size[1] / body.size[0]
+    report = margins(phi)
+    assert report.consistent and report.semi_consistent and report.broken == ()
+    # A hundredth of the inertia added about one axis, taken off about another, or no mass.
+    unit = 1e-2 * report.inertia_scale
+    plate = from_com(phi[0], phi[1:4] / phi[0], np.diag([1.0, 1.0, 2.01]) * unit)
+    assert margins(plate).broken == ("triangle",)
+    assert margins(plate).semi_consistent and not margins(plate).consistent
+    negative = from_com(phi[0], phi[1:4] / phi[0], np.diag([1.0, 1.0, -0.01]) * unit)
+    assert margins(negative).broken == ("inertia_com_min_eig", "triangle")
+    assert not margins(negative).semi_consistent
+    hollow = from_com(-phi[0], phi[1:4] / phi[0], np.eye(3) * phi[0] * length**2)
+    assert "mass" in margins(hollow).broken and not margins(hollow).semi_consistent
+
+
+@given(st.floats(1e-4, 1e3), st.floats(0, 1), st.floats(1e-9, 1e6))
+@settings(max_examples=60, deadline=None)
+def test_seven_digits_of_a_thin_plate_are_forgiven(width, ratio, mass):
+    x, y = mass * width**2 / 12, mass * (ratio * width) ** 2 / 12
+    written = [float(f"{moment:.7g}") for moment in (x, y, x + y)]
+    assert margins(from_com(mass, np.zeros(3), np.diag(written))).consistent
+
+
+def test_a_mass_lost_by_rounding_counts_as_none():
+    """Its centre of mass could be anywhere, and the moments about it look right."""
+    sound = np.array([0, 0, 0, 0, 1, 0, 1, 0, 0, 1.0])
+    lost = sound - 1e-12 * np.eye(10)[0]
+    for phi in (sound, lost, lost + 1e-15 * np.eye(10)[1]):
+        assert margins(phi).consistent
+    assert not margins(lost + 1e-3 * np.eye(10)[1]).semi_consistent

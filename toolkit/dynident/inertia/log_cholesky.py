@@ -33,8 +33,8 @@ LOG_CHOLESKY = ("alpha", "d1", "d2", "d3", "s12", "s23", "s13", "t1", "t2", "t3"
 _ROW = np.array([0, 1, 2, 0, 1, 0, 0, 1, 2])
 _COLUMN = np.array([0, 1, 2, 1, 2, 2, 3, 3, 3])
 
-# A pivot that is no larger than this, relative to the second moments of mass, is rounding.
-_PIVOT = 64 * np.finfo(float).eps
+# A second moment of mass that is no larger than this, relative to the inertia, is rounding.
+_EXTENT = 64 * np.finfo(float).eps
 
 
 def log_cholesky_entries(eta: Any, exp: Callable[[Any], Any]) -> list[Any]:
@@ -100,27 +100,24 @@ def log_cholesky(phi: ArrayLike, where: str = "body") -> NDArray[np.float64]:
     phi = _ten(phi)
     report = margins(phi)
     if not report.consistent:
-        rule, value = report.worst
+        rule = report.broken[0]
         raise ConsistencyError(
-            f"is not fully consistent ({rule} is {value:.3g}): it has no log-Cholesky parameters",
+            f"is not fully consistent ({rule} is {getattr(report, rule):.3g}): it has no "
+            "log-Cholesky parameters",
             where,
             "project it onto the consistent bodies first",
         )
-    P = pseudo_inertia(phi)
-    try:
-        # With the axes reversed, P = U U' is the usual P = L L'.
-        U = np.linalg.cholesky(P[::-1, ::-1])[::-1, ::-1]
-    except np.linalg.LinAlgError:
-        U = np.zeros((4, 4))
-    pivots = np.diag(U)
-    if pivots[3] == 0.0 or np.any(pivots[:3] ** 2 <= _PIVOT * np.trace(P[:3, :3])):
+    # The triangle's margin is twice the least second moment about the centre of mass.
+    if phi[0] <= 0.0 or report.triangle <= _EXTENT * report.inertia_scale:
         raise ConsistencyError(
             "is without mass or without extent along some axis (a plate, rod or point): its "
             "log-Cholesky parameters are infinite",
             where,
             "move it inward first, by a share of a body with mass and extent",
         )
-    U = U / pivots[3]
+    # With the axes reversed, P = U U' is the usual P = L L'.
+    U = np.linalg.cholesky(pseudo_inertia(phi)[::-1, ::-1])[::-1, ::-1]
+    U = U / U[3, 3]
     eta = np.empty(10)
     eta[0] = 0.5 * np.log(phi[0])
     eta[1:] = U[_ROW, _COLUMN]

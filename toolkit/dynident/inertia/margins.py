@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dynident.inertia.parameters import pseudo_inertia, to_com
 
-# Rounding in the file (a triangle met with equality, a thin plate written with six digits) is
+# Rounding in the file (a triangle met with equality, a thin plate written with seven digits) is
 # not a violation: relative to the inertia about the origin, this much is forgiven.
 _DIGITS = 1e-6
 
@@ -59,20 +59,30 @@ class Margins:
         ]
 
     @property
+    def broken(self) -> tuple[str, ...]:
+        """The broken ones among mass, inertia_com_min_eig and triangle (rounding forgiven)."""
+        forgiven = _DIGITS * self.inertia_scale
+        held = {
+            "mass": self.mass >= -_ROUNDING * self.scale,
+            "inertia_com_min_eig": self.inertia_com_min_eig >= -forgiven,
+            "triangle": self.triangle >= -forgiven,
+        }
+        # A NaN margin holds nothing.
+        return tuple(rule for rule, holds in held.items() if not holds)
+
+    @property
     def semi_consistent(self) -> bool:
         """Whether neither the mass nor a moment about the centre of mass is negative.
 
         What equation (5) of Ting et al., RSS 2006, ensures: the spatial inertia is positive
         semidefinite. No mass distribution need have such parameters.
         """
-        # Written so that a NaN margin is a violation.
-        forgiven = _DIGITS * self.inertia_scale
-        return self.mass >= -_ROUNDING * self.scale and self.inertia_com_min_eig >= -forgiven
+        return not {"mass", "inertia_com_min_eig"} & set(self.broken)
 
     @property
     def consistent(self) -> bool:
         """Whether some mass distribution has these parameters (rounding forgiven)."""
-        return self.semi_consistent and self.triangle >= -_DIGITS * self.inertia_scale
+        return not self.broken
 
     @property
     def worst(self) -> tuple[str, float]:
