@@ -9,6 +9,7 @@ from dynident.nlp.blocks import Constraint, Cost, Residual, Variable
 from dynident.nlp.certificate import Bound, Certificate, certify, lower_bound
 from dynident.nlp.conic import ConicProgram, ConicSolution, Multipliers, pose_conic, solve_conic
 from dynident.nlp.nearest import nearest_body
+from dynident.nlp.parametrised import NonlinearSolution, Posed, pose, solve_nonlinear
 from dynident.nlp.problem import Entropy, Problem
 from dynident.nlp.program import Program
 from dynident.nlp.sets import (
@@ -47,7 +48,9 @@ __all__ = [
     "Known",
     "Linear",
     "Multipliers",
+    "NonlinearSolution",
     "ParameterSpace",
+    "Posed",
     "Problem",
     "Program",
     "ProgramSolution",
@@ -64,8 +67,10 @@ __all__ = [
     "link_lengths",
     "lower_bound",
     "nearest_body",
+    "pose",
     "pose_conic",
     "reference_bodies",
     "solve_conic",
+    "solve_nonlinear",
     "stated_links",
 ]

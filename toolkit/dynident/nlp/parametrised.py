@@ -1,0 +1,293 @@
+"""The problem as a nonlinear program: every choice of its variables is a consistent body.
+
+"semi": the virtual parameters of equation (5) of Ting et al., RSS 2006; "full": log-Cholesky
+parameters of the pseudo-inertia (Rucker and Wensing, RA-L 2022). Not convex, hence the several
+starts, and the conic bound beside the answer; but a program that can be extended at will.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dynident.errors import FitError
+from dynident.inertia import (
+    from_log_cholesky,
+    from_paper,
+    log_cholesky,
+    log_cholesky_entries,
+    pseudo_inertia,
+    virtual,
+    virtual_entries,
+)
+from dynident.nlp.nearest import nearest_body
+from dynident.nlp.problem import Problem, pseudo_basis
+from dynident.nlp.program import Constraint, Cost, Program, Residual, Solution, Variable
+from dynident.nlp.status import Status
+
+_AGREE = 1e-6  # of the objective: starts that end as near as this have found the same
+_INWARD = 0.1  # share of the reference body in a start, which is to lie well inside
+_RANDOM = 4  # random starts at most, where the first ones do not agree
+_SPREAD = 0.5  # of a random start about the reference, in units of a body's size
+
+
+@dataclass(frozen=True, eq=False)
+class Parametrisation:
+    """Ten free numbers of a body for which every value is allowed.
+
+    Attributes
+    ----------
+    name : of the program.
+    symbol : of the variables.
+    units : (10,).
+    forward : the ten inertial parameters of ten symbols.
+    inverse : the ten numbers of a body well inside.
+    sizes : of the ten numbers, from a body's mass (kg) and length (m).
+    """
+
+    name: str
+    symbol: str
+    units: tuple[str, ...]
+    forward: Callable[[Any], list[Any]]
+    inverse: Callable[[np.ndarray], np.ndarray]
+    sizes: Callable[[float, float], np.ndarray]
+
+
+def _virtual_forward(h: Any) -> list[Any]:
+    # Without the eleventh, the root of viscous friction: an effect of its own, with a bound.
+    entries = virtual_entries([*(h[k] for k in range(10)), 0.0])[:10]
+    order = np.round(from_paper(np.arange(10.0))).astype(int)
+    return [entries[k] for k in order]
+
+
+def _virtual_sizes(mass: float, length: float) -> np.ndarray:
+    root = np.sqrt(mass)
+    return np.array([root, *[length] * 3, *[root * length] * 6])
+
+
+VIRTUAL = Parametrisation(
+    "virtual parameters",
+    "h",
+    ("kg^0.5", *("m",) * 3, *("kg^0.5 m",) * 6),
+    _virtual_forward,
+    lambda phi: virtual(phi, 0.0)[:10],
+    _virtual_sizes,
+)
+LOG_CHOLESKY = Parametrisation(
+    "log-Cholesky parameters",
+    "eta",
+    ("1", "1", "1", "1", *("m",) * 6),
+    lambda eta: log_cholesky_entries(eta, ca.exp),
+    log_cholesky,
+    lambda mass, length: np.array([1.0, 1.0, 1.0, 1.0, *[length] * 6]),
+)
+PARAMETRISATIONS = {"semi": VIRTUAL, "full": LOG_CHOLESKY}
+
+
+@dataclass(frozen=True, eq=False)
+class Posed:
+    """A problem posed as a nonlinear program.
+
+    Attributes
+    ----------
+    program : to print, to extend (`program + Constraint(...)`), and to solve.
+    x : (s,) CasADi expression of the standard parameters, for more constraints and residuals.
+    problem : what it poses, reduced to few rows.
+    parametrisation : of the bodies.
+    """
+
+    program: Program
+    x: Any
+    problem: Problem
+    parametrisation: Parametrisation
+
+    def standard(self, values: dict[str, np.ndarray]) -> np.ndarray:
+        """Standard parameters (s,) of the program's variables."""
+        symbols = [variable.symbol for variable in self.program.variables]
+        function = ca.Function("x", symbols, [self.x])
+        return np.array(function(*(values[v.name] for v in self.program.variables))).ravel()
+
+    def start(self, x: np.ndarray) -> dict[str, np.ndarray]:
+        """The variables' values at standard parameters x (s,) that lie well inside."""
+        space, found = self.problem.space, {}
+        inside = x - self.problem.inset
+        for k, body in enumerate(space.bodies):
+            phi = inside[10 * k : 10 * k + 10]
+            found[f"{self.parametrisation.symbol}.{body}"] = self.parametrisation.inverse(phi)
+        if space.size > space.rigid:
+            bounded = np.clip(x, space.lower, space.upper)
+            found["effects"] = bounded[space.rigid :]
+        return found
+
+
+def pose(problem: Problem) -> Posed:
+    """Pose a problem as a nonlinear program.
+
+    Raises
+    ------
+    FitError
+        If consistency is not asked for: then there is nothing to parametrise.
+    """
+    chosen = PARAMETRISATIONS.get(problem.within.consistency)
+    if chosen is None:
+        raise FitError(
+            "has no consistent bodies to parametrise", "Within", "choose full or semi, or 'conic'"
+        )
+    problem = problem.reduced()
+    space = problem.space
+    numbers = ca.SX.sym("z", 10)
+    body_of = ca.Function("body", [numbers], [ca.vertcat(*chosen.forward(numbers))])
+    program = Program(f"{chosen.name} of {len(space.bodies)} links")
+    parts = []
+    for k, body in enumerate(space.bodies):
+        mass, length = _size(space.references[k])
+        variable = Variable(
+            f"{chosen.symbol}.{body}",
+            10,
+            unit=chosen.units,
+            start=chosen.inverse(space.references[k]),
+            scale=chosen.sizes(mass, length),
+        )
+        program = program + variable
+        inset = problem.inset[10 * k : 10 * k + 10]
+        parts.append(body_of(variable.symbol) + ca.DM(inset))
+    if space.size > space.rigid:
+        effects = slice(space.rigid, None)
+        variable = Variable(
+            "effects",
+            space.size - space.rigid,
+            unit=space.units[effects],
+            lower=space.lower[effects],
+            upper=space.upper[effects],
+            start=np.clip(0.0, space.lower[effects], space.upper[effects]),
+            scale=space.scale[effects],
+        )
+        program = program + variable
+        parts.append(variable.symbol)
+    x = ca.vertcat(*parts)
+    # Numbers of the size of one before they meet the rows: sums of squares keep their digits.
+    rows = ca.DM(problem.A * space.scale) @ (x / space.scale) - ca.DM(problem.b)
+    program = program + Residual("data and prior", rows, unit="noise")
+    if problem.entropy is not None:
+        program = program + Cost("entropic prior", _entropy(problem, x))
+    return Posed(_constrained(program, problem, x), x, problem, chosen)
+
+
+def _constrained(program: Program, problem: Problem, x: Any) -> Program:
+    linear = problem.linear
+    # Bounds of single parameters are bounds of variables already where these are effects.
+    rows = [
+        i
+        for i, row in enumerate(linear.A)
+        if np.count_nonzero(row) > 1 or np.any(row[: problem.space.rigid])
+    ]
+    if rows:
+        value = ca.DM(linear.A[rows]) @ x
+        bounds = linear.lower[rows], linear.upper[rows]
+        program = program + Constraint("linear constraints", value, *bounds, unit="size")
+    for number, cone in enumerate(problem.cones, start=1):
+        size = float(np.max(np.abs(cone.A) * problem.space.scale))
+        vector = ca.DM(cone.A / size) @ x
+        inside = vector[0] ** 2 - ca.sumsqr(vector[1:])
+        name = f"{cone.name} ({number})"
+        program = program + Constraint(name, inside, lower=0.0)
+    return program
+
+
+def _entropy(problem: Problem, x: Any) -> Any:
+    assert problem.entropy is not None
+    phi = ca.SX.sym("phi", 10)
+    P = sum((phi[k] * ca.DM(one) for k, one in enumerate(pseudo_basis())), start=ca.SX.zeros(4, 4))
+    total = 0
+    for k, centre in enumerate(problem.entropy.centres):
+        Q = pseudo_inertia(centre)
+        ratio = ca.DM(np.linalg.inv(Q)) @ P
+        logdet = ca.log(ca.det(P)) - np.linalg.slogdet(Q)[1]
+        one = ca.Function("divergence", [phi], [ca.trace(ratio) - logdet - 4])
+        total += one(x[10 * k : 10 * k + 10])
+    return problem.entropy.weight * total
+
+
+def _size(reference: np.ndarray) -> tuple[float, float]:
+    mass = float(reference[0])
+    return mass, float(np.sqrt((reference[4] + reference[6] + reference[9]) / (2 * mass)))
+
+
+@dataclass(frozen=True, eq=False)
+class NonlinearSolution:
+    """What the nonlinear program found.
+
+    Attributes
+    ----------
+    x : (s,) standard parameters.
+    status : of the best start.
+    program : its name.
+    objectives : reached from each start.
+    solution : of the program, with its multipliers.
+    """
+
+    x: np.ndarray
+    status: Status
+    program: str
+    objectives: tuple[float, ...]
+    solution: Solution
+
+
+def solve_nonlinear(problem: Problem, seed: int = 0) -> NonlinearSolution:
+    """Solve a problem as a nonlinear program, from several starts.
+
+    The first starts are the prior's own bodies, and the answer without constraints, each link
+    replaced by the nearest possible one; where they end in different places, random ones follow.
+    The conic answer is never a start: it is what this one is compared with.
+    """
+    posed = pose(problem)
+    found = [posed.program.solve([posed.start(x)]) for x in _first_starts(posed.problem)]
+    random = np.random.default_rng(seed)
+    while len(found) < 2 + _RANDOM and not _agree(found):
+        found.append(posed.program.solve([posed.start(_random_start(posed.problem, random))]))
+    best = min(found, key=lambda s: (not s.status.ok, s.objective))
+    status = replace(
+        best.status,
+        iterations=sum(s.status.iterations for s in found),
+        seconds=sum(s.status.seconds for s in found),
+    )
+    return NonlinearSolution(
+        posed.standard(best.values),
+        status,
+        posed.parametrisation.name,
+        tuple(float(s.objective) for s in found),
+        best,
+    )
+
+
+def _agree(found: list[Solution]) -> bool:
+    """Whether the two best starts that succeeded ended at the same objective."""
+    ends = sorted(s.objective for s in found if s.status.ok)
+    return len(ends) > 1 and ends[1] - ends[0] <= _AGREE * max(abs(ends[0]), 1e-300)
+
+
+def _first_starts(problem: Problem) -> list[np.ndarray]:
+    space = problem.space
+    given, mended = np.array(space.reference), np.array(problem.origin)
+    for k, reference in enumerate(space.references):
+        part = slice(10 * k, 10 * k + 10)
+        _, length = _size(reference)
+        consistency = problem.within.consistency
+        nearest = nearest_body(mended[part], length, consistency, float(reference[0]))
+        mended[part] = (1 - _INWARD) * nearest + _INWARD * reference
+    given[space.rigid :] = problem.origin[space.rigid :]
+    return [given, mended]
+
+
+def _random_start(problem: Problem, random: np.random.Generator) -> np.ndarray:
+    """Bodies whose log-Cholesky parameters are those of the references, disturbed."""
+    x = np.array(problem.origin)
+    for k, reference in enumerate(problem.space.references):
+        mass, length = _size(reference)
+        step = _SPREAD * LOG_CHOLESKY.sizes(mass, length) * random.normal(size=10)
+        x[10 * k : 10 * k + 10] = from_log_cholesky(log_cholesky(reference) + step)
+    return x
