@@ -49,7 +49,7 @@ class Certificate:
     program : how it was found.
     objective : of the answer.
     bound : below which no answer can be; NaN where there is none.
-    gap : (objective - bound) / bound.
+    gap : (objective - bound) / bound, or over what is next to nothing where the bound is less.
     stationarity, dual_feasibility : see `Bound`.
     violation : how far the answer breaks a constraint, relative to the sizes of parameters.
     worst_margin : the body with the smallest margin, the rule, and the margin relative to the
@@ -171,11 +171,12 @@ def certify(
     # up to what a step of the inset costs.
     step = problem.A @ problem.inset
     nothing = max(1e-18 * float(problem.b @ problem.b), 0.5 * float(step @ step))
+    least = max(nothing / OPTIMAL, np.finfo(float).tiny)
     if problem.entropy is None and objective <= nothing:
         bound = Bound(0.0, 0.0, 0.0)
     value = bound.value if bound else float("nan")
     excess = objective - value
-    gap = 0.0 if abs(excess) <= nothing else excess / max(abs(value), nothing)
+    gap = excess / max(abs(value), least)
     return Certificate(
         problem.within.notion,
         program,
