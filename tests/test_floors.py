@@ -25,6 +25,7 @@ FLOORS = [
     ("check",),
     ("diagnose",),
     ("study",),
+    ("refit",),
     ("report",),
     ("cli",),
 ]

@@ -40,6 +40,7 @@ _HOME = {
     "Estimate": "fit",
     "Experiment": "closed_loop",
     "Filter": "recording",
+    "GivenParameters": "fit",
     "Known": "nlp",
     "LeastSquares": "fit",
     "Metric": "fit",
@@ -48,6 +49,7 @@ _HOME = {
     "Prior": "fit",
     "Projection": "fit",
     "Recording": "recording",
+    "Refit": "refit",
     "Robot": "robot",
     "Study": "study",
     "Sum": "nlp",
@@ -65,6 +67,8 @@ _HOME = {
     "load_experiment": "closed_loop",
     "project": "fit",
     "read": "recording",
+    "read_parameters": "fit",
+    "refit": "refit",
     "report": "report",
     "write": "recording",
     "write_experiment": "closed_loop",
@@ -81,6 +85,7 @@ if TYPE_CHECKING:
     from dynident.fit import (
         Constrained,
         Estimate,
+        GivenParameters,
         LeastSquares,
         Metric,
         Prior,
@@ -88,6 +93,7 @@ if TYPE_CHECKING:
         fit,
         load_estimate,
         project,
+        read_parameters,
     )
     from dynident.model import Model
     from dynident.nlp import (
@@ -101,13 +107,14 @@ if TYPE_CHECKING:
         Within,
     )
     from dynident.recording import Dataset, Filter, Noise, Recording, read, write
+    from dynident.refit import Refit, refit
     from dynident.report import report
     from dynident.robot import BaseParameters, Robot
     from dynident.study import Study, load
 
 
 # Verbs that share their name with the room they live in.
-_VERBS = ("check", "diagnose", "fit", "report")
+_VERBS = ("check", "diagnose", "fit", "refit", "report")
 
 
 def __getattr__(name: str) -> Any:

@@ -13,6 +13,7 @@ from dynident.fit.given import given_estimate
 from dynident.fit.input_noise import InputNoise, input_noise
 from dynident.fit.least_squares import LeastSquares, Solution, solve_factors
 from dynident.fit.metric import Metric
+from dynident.fit.parameter_file import GivenParameters, read_parameters
 from dynident.fit.prior import Prior
 from dynident.fit.projection import Projection, project
 from dynident.fit.sampling import Sampled, rows, sample
@@ -64,6 +65,7 @@ __all__ = [
     "EssentialParameters",
     "Estimate",
     "Factors",
+    "GivenParameters",
     "InputNoise",
     "LeastSquares",
     "Method",
@@ -80,6 +82,7 @@ __all__ = [
     "input_noise",
     "load_estimate",
     "project",
+    "read_parameters",
     "refine_shapes",
     "rows",
     "sample",

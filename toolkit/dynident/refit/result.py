@@ -1,0 +1,157 @@
+"""What a refit found: the projection, torque errors beside it, and a file that is proved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from dynident.diagnose import Comparison
+from dynident.fit import Projection
+from dynident.robot import Robot
+from dynident.robot.verify import Verification, write_verified
+from dynident.tables import Table, number, percent, print_tables
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueErrors:
+    """Torque errors of the parameters as given, of least squares, and of the refit.
+
+    Attributes
+    ----------
+    recordings : which recordings of the study.
+    comparison : of the three, in this order.
+    """
+
+    recordings: Literal["test", "training"]
+    comparison: Comparison
+
+    def table(self) -> Table:
+        """The errors joint by joint."""
+        results = self.comparison.results
+        last = results[-1]
+        floor: list[float | None] = [None] * len(last.joint_errors)
+        if last.noise_std is not None:
+            safe = np.where(last.torque_rms > 0, last.torque_rms, np.nan)
+            floor = list(last.noise_std / safe)
+        rows = [
+            (joint, *(percent(float(r.joint_errors[j])) for r in results), percent(floor[j]))
+            for j, joint in enumerate(self.comparison.models[0].robot.names)
+        ]
+        rows.append(("all", *(percent(r.error) for r in results), percent(last.floor)))
+        columns = ("joint", *self.comparison.names, "noise floor")
+        title = f"Relative torque error on the {self.recordings} recordings"
+        notes = ("Least squares is without constraints; its links may be impossible.",)
+        return Table(title, columns, tuple(rows), notes)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The errors as JSON holds them."""
+        said = self.comparison.to_dict()
+        models = {
+            one["name"].replace(" ", "_"): {"error": one["error"], "joints": one["joints"]}
+            for one in said["models"]
+        }
+        return {"recordings": self.recordings, "noise_floor": said["noise"]["floor"], **models}
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """Given parameters, made consistent.
+
+    Attributes
+    ----------
+    projection : the nearest consistent parameters, and the proof.
+    robot : the given description with these parameters.
+    consistency : that was asked for.
+    errors : on the recordings of a study, if there is one.
+    source : the file of the description, whose bytes are kept if nothing has to change.
+    """
+
+    projection: Projection
+    robot: Robot
+    consistency: Literal["full", "semi"]
+    errors: TorqueErrors | None = None
+    source: Path | None = None
+
+    @cached_property
+    def unchanged(self) -> bool:
+        """Whether the given parameters were consistent already."""
+        return np.array_equal(self.projection.x, self.projection.x_before)
+
+    @property
+    def sentence(self) -> str:
+        """The outcome in words."""
+        notion = "fully consistent" if self.consistency == "full" else "semi-consistent"
+        if self.unchanged:
+            return f"Nothing to mend: all that is given is {notion} already."
+        space, step = self.projection.space, self.projection.x - self.projection.x_before
+        inertial = step[: space.rigid].reshape(-1, 10)
+        links = [name for name, d in zip(space.bodies, inertial, strict=True) if np.any(d)]
+        others = " and parameters of effects" if np.any(step[space.rigid :]) else ""
+        moved = f"{len(links)} of {len(space.bodies)} links"
+        return f"Made {notion}: {moved}{others} moved."
+
+    def effects(self) -> Table | None:
+        """Parameters of effects before and after, None without a study; no description has them."""
+        projection, start = self.projection, self.projection.space.rigid
+        space = projection.space
+        if self.errors is None or space.size == start:
+            return None
+        rows = tuple(
+            (name, number(old, 5), number(new, 5), unit)
+            for name, old, new, unit in zip(
+                space.names[start:],
+                projection.x_before[start:],
+                projection.x[start:],
+                space.units[start:],
+                strict=True,
+            )
+        )
+        notes = ("They are part of the study, not of the robot description.",)
+        title = "Parameters of effects before and after"
+        return Table(title, ("parameter", "before", "after", "unit"), rows, notes)
+
+    def tables(self) -> tuple[Table | str, ...]:
+        """Everything that `show` prints, in its order."""
+        effects = self.effects()
+        return (
+            self.sentence,
+            *self.projection.tables(),
+            *((effects,) if effects else ()),
+            *((self.errors.table(),) if self.errors else ()),
+        )
+
+    def show(self) -> None:
+        """Print what moved, the certificate, and the torque errors."""
+        print_tables(*self.tables())
+
+    def to_dict(self) -> dict[str, Any]:
+        """The refit as JSON holds it."""
+        projection, start = self.projection, self.projection.space.rigid
+        space = projection.space
+        effects = [
+            {"name": space.names[i], "before": float(projection.x_before[i]), "after": float(x)}
+            for i, x in enumerate(projection.x[start:], start=start)
+        ]
+        return {
+            "consistency": self.consistency,
+            "unchanged": self.unchanged,
+            **projection.to_dict(),
+            "effects": effects,
+            "torque_errors": self.errors.to_dict() if self.errors else None,
+        }
+
+    def write_robot(self, path: str | Path) -> Verification:
+        """Write the description, read back and verified before it replaces an old file.
+
+        Raises
+        ------
+        RobotError
+            If it cannot be written, or fails the verification; an old file stays as it is.
+        FileError
+            If the file cannot be written.
+        """
+        return write_verified(self.robot, path, self.consistency, self.source)
