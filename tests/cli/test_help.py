@@ -7,7 +7,7 @@ import shlex
 
 import pytest
 
-COMMANDS = ("explain", "diagnose", "fit", "compare", "add", "simulate", "report")
+COMMANDS = ("explain", "diagnose", "fit", "compare", "add", "simulate", "report", "check")
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -18,7 +18,7 @@ def test_examples_are_accepted(run, name):
     assert found
     done = run(*shlex.split(found[1])[1:])
     assert done.status == 2
-    assert re.fullmatch(r"error: \w+.toml: no such file. check the path\n", done.err)
+    assert re.fullmatch(r"error: \w+.(toml|urdf): no such file. check the path\n", done.err)
 
 
 def test_version(run):

@@ -80,9 +80,10 @@ def _sizes(body: Body, inertia: Array) -> Iterator[str]:
         )
         return
     if density > _DENSE:
+        guess = "units? (g read as kg)" if density > 2e5 else "denser than any metal"
         yield (
             f"mass about {_power(density / 2e3)} times too large for the volume of the geometry "
-            f"({density:.1g} kg/m^3): units? (g read as kg)"
+            f"({density:.1g} kg/m^3): {guess}"
         )
     if body.length_from == "inertia" or ratio != ratio or ratio <= 0.0:
         return

@@ -10,6 +10,7 @@ from dynident.check.rules import Array, Body, judge, second_moment, spread_of, w
 from dynident.errors import DynidentError
 from dynident.inertia import frame_change, from_com, to_com
 from dynident.robot.hull import Hull
+from dynident.robot.kinematics import quiet
 
 NAMES = ("mass", "com x", "com y", "com z", "ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _UNITS = ("kg", *("m",) * 3, *("kg m^2",) * 6)
@@ -55,9 +56,10 @@ def mend(body: Body) -> tuple[Change, ...]:
     if not body.readable or body.weightless:
         return ()
     try:
-        phi = _consistent(body)
-    except DynidentError:
-        return ()
+        with quiet():
+            phi = _consistent(body)
+    except (DynidentError, np.linalg.LinAlgError):
+        return ()  # numbers beyond what can be solved for: nothing near them is possible
     if body.hull is not None and phi[0] > 0.0:
         mended = replace(body, phi=phi)
         broken = {one.rule for one in judge(mended).rules if one.broken}
@@ -81,7 +83,7 @@ def _consistent(body: Body) -> Array:
     # What can turn has mass: at least so much that its extent explains its inertia.
     inertia = to_com(phi).inertia_com
     needed = 4.0 * float(np.linalg.eigvalsh(spread_of(inertia))[-1]) / body.length**2
-    if not phi[0] >= min(needed, 1e-3 * body.typical_mass):
+    if body.phi[0] <= 0.0 and not phi[0] >= min(needed, 1e-3 * body.typical_mass):
         phi = from_com(needed, np.zeros(3), inertia)
     return frame_change(np.eye(3), com) @ phi
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from dynident.check.joints import JointCheck
 from dynident.check.mend import Change
 from dynident.check.rules import TITLES, RuleMargin
 from dynident.errors import ConsistencyError
-from dynident.tables import Table, number, percent, print_tables
+from dynident.tables import WIDTH, Table, number, percent, print_tables
 
 
 @dataclass(frozen=True)
@@ -177,11 +178,11 @@ class Check:
         bodies = [f"'{one.name}'" for one in self.broken if one.kind != "link"]
         joints = sorted({f"'{one.name}'" for one in self.joints if one.broken})
         parts = [
-            f"{what} {', '.join(names)}"
-            for what, names in (
-                ("links", links),
-                ("moving bodies", bodies),
-                ("joints", joints),
+            f"{one if len(names) == 1 else several} {', '.join(names)}"
+            for one, several, names in (
+                ("link", "links", links),
+                ("moving body", "moving bodies", bodies),
+                ("joint", "joints", joints),
             )
             if names
         ]
@@ -296,7 +297,13 @@ def details(one: LinkCheck) -> str:
         lines += [f"    {', '.join(changes[i : i + 3])}" for i in range(0, len(changes), 3)]
     elif not any(rule.rule == "finite" for rule in one.broken) and one.kind == "link":
         lines.append("  no small change mends it: state its mass and inertia anew")
-    return "\n".join(lines)
+    return "\n".join(_wrapped(line) for line in lines)
+
+
+def _wrapped(line: str) -> str:
+    """A long line broken under its own indentation."""
+    indent = " " * (len(line) - len(line.lstrip()) + 4)
+    return fill(line, WIDTH - 1, subsequent_indent=indent, break_long_words=False)
 
 
 def finite(value: float) -> float | None:

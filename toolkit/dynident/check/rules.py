@@ -179,7 +179,7 @@ def _consistency(body: Body) -> list[RuleMargin]:
             "pseudo_inertia",
             found.pseudo_inertia_min_eig,
             "kg, kg m, kg m^2",
-            float(np.linalg.eigvalsh(scaled)[0]),
+            float(_eigenvalues(scaled)[0]),
             (found.mass < 0.0 and mass.broken) or turning or triangle,
             "no distribution of mass has these parameters" if turning or triangle else "",
         ),
@@ -206,10 +206,14 @@ def _mass(body: Body, found: Margins) -> RuleMargin:
 
 
 def _principal(phi: Array) -> Array:
-    inertia = to_com(phi).inertia_com
-    if not np.all(np.isfinite(inertia)):
-        return np.full(3, np.nan)
-    return np.asarray(np.linalg.eigvalsh(inertia), dtype=float)
+    return _eigenvalues(to_com(phi).inertia_com)
+
+
+def _eigenvalues(matrix: Array) -> Array:
+    """Eigenvalues of a symmetric matrix, ascending; NaN where it is not finite."""
+    if not np.all(np.isfinite(matrix)):
+        return np.full(len(matrix), np.nan)
+    return np.asarray(np.linalg.eigvalsh(matrix), dtype=float)
 
 
 def _negative_moment(phi: Array, found: Margins) -> str:

@@ -44,12 +44,19 @@ def check(what: Robot | Estimate | str | Path | Any) -> Check:
     DynidentError
         If a file cannot be read, or is neither a robot description nor an estimate.
     """
-    if isinstance(what, str | Path):
-        return _file(Path(what))
-    if isinstance(what, Robot):
-        return _robot(what, what.name, what.description.format if what.description else "robot")
-    if isinstance(what, Estimate):
-        return _estimate(what, what.model.robot.name)
+    # Numbers of any size are looked at: what overflows is judged as not finite.
+    with np.errstate(all="ignore"):
+        if isinstance(what, str | Path):
+            return _file(Path(what))
+        if isinstance(what, Robot):
+            return _robot(what, what.name, what.description.format if what.description else "robot")
+        if isinstance(what, Estimate):
+            return _estimate(what, what.model.robot.name)
+        return _holder(what)
+
+
+def _holder(what: Any) -> Check:
+    """Check what has a robot, and perhaps an estimate, among its attributes."""
     robot = getattr(what, "robot", None)
     if not isinstance(robot, Robot):
         raise RobotError(
@@ -77,9 +84,10 @@ def _file(path: Path) -> Check:
         robot = Robot.from_text(text, str(path))
     except UnsupportedError as error:
         description, links = lone_links(text, str(path))
+        place = (error.where or "").removeprefix(str(path)).lstrip(": ") or "the description"
         note = (
-            f"{error}. Its links were checked one by one, without the tree of joints: extents are "
-            "those of their geometry."
+            "Links were checked one by one, without the tree of joints that carries them: "
+            f"{place} {error.what}."
         )
         name, source = description.path, description.format
         return _check(links, description, None, name, source, None, (note,))
@@ -108,17 +116,14 @@ def _check(
     estimate: Estimate | None = None,
     notes: tuple[str, ...] = (),
 ) -> Check:
-    # Numbers of any size are looked at: what overflows is judged as not finite.
-    with np.errstate(all="ignore"):
-        rotors = _rotors(estimate)
-        subjects, scale = of_links(links, description, robot, rotors)
-        found = tuple(sorted((_link(one) for one in subjects), key=_order))
-        size = Size(scale.mass, scale.length)
-        joints: tuple[JointCheck, ...] = ()
-        if description is not None:
-            joints = of_description(joint_dynamics(description), size)
-        if estimate is not None:
-            joints += of_estimate(estimate, size)
+    subjects, scale = of_links(links, description, robot, _rotors(estimate))
+    found = tuple(sorted((_link(one) for one in subjects), key=_order))
+    size = Size(scale.mass, scale.length)
+    joints: tuple[JointCheck, ...] = ()
+    if description is not None:
+        joints = of_description(joint_dynamics(description), size)
+    if estimate is not None:
+        joints += of_estimate(estimate, size)
     mute = [link.name for link in links if link.source == "absent"]
     if mute and len(mute) == len(links):
         notes = ("The description states no inertia of any link.", *notes)
@@ -134,7 +139,7 @@ def _check(
         source,
         tuple(one for one in found if one.kind == "link"),
         tuple(one for one in found if one.kind != "link"),
-        tuple(sorted(joints, key=lambda one: not one.broken)),
+        tuple(sorted(joints, key=lambda one: one.relative if one.broken else np.inf)),
         notes,
     )
 
