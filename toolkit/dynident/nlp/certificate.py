@@ -144,7 +144,9 @@ def lower_bound(problem: Problem, x: np.ndarray, multipliers: Multipliers) -> Bo
     gradient = scale * problem.gradient(x)
     rest = gradient - scale * _pull(problem, bodies, linear, cones)
     # What the constraints' slack takes from the objective at x.
-    slack = float(np.sum(bodies * problem.body_matrices(x - problem.inset)))
+    slack = 0.0
+    if bodies.size:
+        slack += float(np.sum(bodies * problem.body_matrices(x - problem.inset)))
     slack += sum(float(c @ v) for c, v in zip(cones, cone_values(problem, x), strict=True))
     value = problem.linear.A @ x
     at = np.where(linear > 0, problem.linear.lower, problem.linear.upper)
@@ -168,8 +170,8 @@ def certify(
     """State what is proved about an answer x (s,)."""
     objective = problem.objective(x)
     # An objective of zero needs no bound to be the smallest: zero up to rounding of its terms, and
-    # up to what a step of the inset costs.
-    step = problem.A @ problem.inset
+    # up to what a step of twice the inset costs.
+    step = 2.0 * problem.A @ problem.inset
     nothing = max(1e-18 * float(problem.b @ problem.b), 0.5 * float(step @ step))
     least = max(nothing / OPTIMAL, np.finfo(float).tiny)
     if problem.entropy is None and objective <= nothing:

@@ -210,8 +210,11 @@ def _add_objective(program: Any, z: np.ndarray, problem: Problem, origin: np.nda
         sized = basis * problem.space.scale[part][:, None, None]
         white = root @ sized @ root.T
         program.AddLinearCost(weight * np.einsum("kii->k", white), z[part])
-        ratio = np.tensordot(z[part], white, axes=1) + root @ pseudo_inertia(origin[part]) @ root.T
-        cost, t, _ = program.AddMaximizeLogDeterminantCost(0.5 * (ratio + ratio.T))
+        with np.errstate(invalid="ignore"):  # arithmetic of symbols leaves the flag behind
+            ratio = np.tensordot(z[part], white, axes=1)
+            ratio = ratio + root @ pseudo_inertia(origin[part]) @ root.T
+            ratio = 0.5 * (ratio + ratio.T)
+        cost, t, _ = program.AddMaximizeLogDeterminantCost(ratio)
         cost.evaluator().UpdateCoefficients(-weight * np.ones(len(t)))
 
 

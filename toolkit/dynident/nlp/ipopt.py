@@ -110,7 +110,8 @@ def run(form: Transcription, start: np.ndarray, tolerance: float, max_iterations
     """
     z = start / form.scale
     evaluate = ca.Function("objective", [form.unknowns], [form.objective])
-    gradient = ca.Function("gradient", [form.unknowns], [ca.gradient(form.objective, form.unknowns)])
+    slope_of = ca.gradient(form.objective, form.unknowns)
+    gradient = ca.Function("gradient", [form.unknowns], [slope_of])
     # Ipopt's tolerances are for objectives near one.
     size = max(1e-8, float(np.abs(np.array(gradient(z))).max(initial=0.0)))
     size = size if np.isfinite(size) else 1.0
@@ -118,6 +119,7 @@ def run(form: Transcription, start: np.ndarray, tolerance: float, max_iterations
     options = {
         "print_time": False,
         "error_on_fail": False,
+        "show_eval_warnings": False,
         "ipopt": {
             "print_level": 0,
             "sb": "yes",

@@ -26,7 +26,7 @@ from dynident.inertia import (
 )
 from dynident.nlp.nearest import nearest_body
 from dynident.nlp.problem import Problem, pseudo_basis
-from dynident.nlp.program import Constraint, Cost, Program, Residual, Solution, Variable
+from dynident.nlp.program import Constraint, Cost, Program, ProgramSolution, Residual, Variable
 from dynident.nlp.status import Status
 
 _AGREE = 1e-6  # of the objective: starts that end as near as this have found the same
@@ -234,7 +234,7 @@ class NonlinearSolution:
     status: Status
     program: str
     objectives: tuple[float, ...]
-    solution: Solution
+    solution: ProgramSolution
 
 
 def solve_nonlinear(problem: Problem, seed: int = 0) -> NonlinearSolution:
@@ -264,7 +264,7 @@ def solve_nonlinear(problem: Problem, seed: int = 0) -> NonlinearSolution:
     )
 
 
-def _agree(found: list[Solution]) -> bool:
+def _agree(found: list[ProgramSolution]) -> bool:
     """Whether the two best starts that succeeded ended at the same objective."""
     ends = sorted(s.objective for s in found if s.status.ok)
     return len(ends) > 1 and ends[1] - ends[0] <= _AGREE * max(abs(ends[0]), 1e-300)

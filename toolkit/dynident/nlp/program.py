@@ -90,7 +90,7 @@ class Program:
         starts: Sequence[Mapping[str, ArrayLike]] = ({},),
         tolerance: float = 1e-9,
         max_iterations: int = 500,
-    ) -> Solution:
+    ) -> ProgramSolution:
         """Solve with Ipopt and exact Hessian, from one or several starts; the best one is kept.
 
         Parameters
@@ -101,7 +101,7 @@ class Program:
 
         Returns
         -------
-        Solution
+        ProgramSolution
             Also where no start succeeded: its status says so.
 
         Raises
@@ -134,7 +134,7 @@ class Program:
 
     def _solution(
         self, form: Transcription, best: Attempt, attempts: tuple[Attempt, ...]
-    ) -> Solution:
+    ) -> ProgramSolution:
         values, start = {}, 0
         for variable in self.variables:
             values[variable.name] = best.x[start : start + variable.size]
@@ -146,7 +146,7 @@ class Program:
             start += rows
         terms = (*self.residuals, *self.costs)
         parts = dict(zip((t.name for t in terms), form.terms(best.x), strict=True))
-        return Solution(
+        return ProgramSolution(
             self,
             best.status,
             values,
@@ -196,7 +196,7 @@ class Program:
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class ProgramSolution:
     """What Ipopt found.
 
     Attributes
@@ -223,7 +223,7 @@ class Solution:
     multipliers: dict[str, np.ndarray]
     attempts: tuple[Attempt, ...]
 
-    def require(self) -> Solution:
+    def require(self) -> ProgramSolution:
         """Return the solution, if it is one.
 
         Raises
