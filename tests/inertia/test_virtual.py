@@ -67,7 +67,7 @@ def test_the_parallel_axis_theorem(h):
     about_com = inertia_matrix(body.phi) - h[0] ** 2 * (c @ c * np.eye(3) - np.outer(c, c))
     np.testing.assert_allclose(about_com, L @ L.T, rtol=0, atol=1e-14 * size_of(h)[4])
     np.testing.assert_allclose(body.phi[:4], h[0] ** 2 * np.array([1, *c]), rtol=1e-15)
-    assert body.viscous == h[10] ** 2
+    assert body.viscous == h[10] * h[10]
 
 
 @given(choices())
