@@ -19,8 +19,8 @@ class Fore:
 
     mass: object = MASS
     com: object = "0.15 0 0"
-    moments: tuple[object, object, object] = MOMENTS
-    products: tuple[object, object, object] = (0, 0, 0)  # xy, xz, yz
+    moments: tuple[object, ...] = MOMENTS
+    products: tuple[object, ...] = (0, 0, 0)  # xy, xz, yz
     shapes: str | None = None
     """In the format's words; default: the box. Empty: none."""
     joint: str = ""

@@ -49,7 +49,7 @@ def body(masses: np.ndarray, places: np.ndarray) -> tuple[float, np.ndarray, np.
 def fore(mass, com, inertia, shape) -> Fore:
     moments = tuple(repr(float(x)) for x in np.diag(inertia))
     products = tuple(repr(float(inertia[i, j])) for i, j in ((0, 1), (0, 2), (1, 2)))
-    return Fore(repr(mass), text(com), moments, products, shape)  # type: ignore[arg-type]
+    return Fore(repr(mass), text(com), moments, products, shape)
 
 
 @settings(deadline=None, max_examples=60)

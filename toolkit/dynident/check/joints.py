@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dynident.effects import Parameter
 from dynident.fit import Estimate
 from dynident.robot.joint_dynamics import JointDynamics
 
@@ -72,8 +73,11 @@ def of_description(dynamics: tuple[JointDynamics, ...], size: Size) -> tuple[Joi
         broken = not 0.0 <= one.value < float("inf")
         words = ""
         if broken:
-            what = "is negative" if one.value < 0.0 else "is not a usable number"
-            words = f"{one.quantity} {what}: {one.value:.4g} {one.unit}"
+            words = f"{one.quantity} is not a usable number: {one.value:g}"
+            if np.isfinite(one.value):
+                words = (
+                    f"{one.quantity} is negative: {one.value:.4g} {one.unit} (nearest possible: 0)"
+                )
         relative = one.value / size.of(one.unit)
         found.append(
             JointCheck(one.joint, one.quantity, one.value, one.unit, relative, None, broken, words)
@@ -97,7 +101,7 @@ def of_estimate(estimate: Estimate, size: Size) -> tuple[JointCheck, ...]:
             broken = not margin >= -1e-9 * scale
             apart = margin / sigma if sigma > 0.0 else None
             name = model.names[index]
-            words = _words(name, value, parameter.unit, parameter.lower, apart) if broken else ""
+            words = _words(effect.name, value, parameter, apart) if broken else ""
             found.append(
                 JointCheck(
                     name, effect.name, value, parameter.unit, margin / scale, apart, broken, words
@@ -106,11 +110,12 @@ def of_estimate(estimate: Estimate, size: Size) -> tuple[JointCheck, ...]:
     return tuple(found)
 
 
-def _words(name: str, value: float, unit: str, lower: float, apart: float | None) -> str:
+def _words(name: str, value: float, parameter: Parameter, apart: float | None) -> str:
     if not np.isfinite(value):
         return f"{name} is not a usable number: {value:g}"
-    what = "is negative" if lower == 0.0 and value < 0.0 else "is outside of its bounds"
-    text = f"{name} {what}: {value:.4g} {unit}"
+    unit, nearest = parameter.unit, float(np.clip(value, parameter.lower, parameter.upper))
+    what = "is negative" if parameter.lower == 0.0 and value < 0.0 else "is outside of its bounds"
+    text = f"{name} {what}: {value:.4g} {unit} (nearest possible: {nearest:g})"
     if apart is None:
         return text
     verdict = "zero is within its uncertainty" if abs(apart) < 2.0 else "more than its uncertainty"

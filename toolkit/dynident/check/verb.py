@@ -10,8 +10,9 @@ import numpy as np
 from dynident import files
 from dynident.check.hints import hints
 from dynident.check.joints import JointCheck, Size, of_description, of_estimate
+from dynident.check.link import LinkCheck
 from dynident.check.mend import mend
-from dynident.check.report import Check, LinkCheck
+from dynident.check.report import Check
 from dynident.check.rules import TITLES, judge
 from dynident.check.subject import Subject, of_links
 from dynident.errors import RobotError, UnsupportedError
@@ -139,7 +140,7 @@ def _check(
         source,
         tuple(one for one in found if one.kind == "link"),
         tuple(one for one in found if one.kind != "link"),
-        tuple(sorted(joints, key=lambda one: one.relative if one.broken else np.inf)),
+        tuple(sorted(joints, key=lambda one: _worst(one.relative) if one.broken else np.inf)),
         notes,
     )
 
@@ -163,7 +164,7 @@ def _link(subject: Subject) -> LinkCheck:
         key=lambda one: (
             not one.broken,
             one.rule != "finite",
-            one.relative if one.relative == one.relative else -np.inf,
+            _worst(one.relative),
             order.index(one.rule),
         ),
     )
@@ -188,9 +189,10 @@ def _link(subject: Subject) -> LinkCheck:
 
 
 def _order(one: LinkCheck) -> tuple[bool, bool, float]:
-    relative = one.worst.relative
-    return (
-        not one.broken,
-        not any(rule.rule == "finite" and rule.broken for rule in one.rules),
-        relative if relative == relative else -np.inf,
-    )
+    finite = not any(rule.rule == "finite" and rule.broken for rule in one.rules)
+    return not one.broken, finite, _worst(one.worst.relative)
+
+
+def _worst(relative: float) -> float:
+    """A margin to sort by: what is not a number is worst."""
+    return relative if relative == relative else -np.inf
