@@ -67,7 +67,8 @@ def solve(problem: Problem, solver: Solver, stay: np.ndarray | None = None) -> A
     from dynident.nlp.parametrised import solve_nonlinear
 
     found = solve_nonlinear(problem)
-    _require(found.status, problem)
+    if not np.all(np.isfinite(found.x)) or not found.inside:
+        _require(found.status, problem)
     x = _kept(problem, problem.retracted(found.x), stay)
     certificate = certify(problem, x, found.status, found.program, bound, found.objectives)
     return Answer(x, certificate)

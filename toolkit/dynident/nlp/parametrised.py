@@ -25,7 +25,7 @@ from dynident.inertia import (
     virtual_entries,
 )
 from dynident.nlp.nearest import nearest_body
-from dynident.nlp.problem import Problem, pseudo_basis
+from dynident.nlp.problem import TOLERANCE, Problem, pseudo_basis
 from dynident.nlp.program import Constraint, Cost, Program, ProgramSolution, Residual, Variable
 from dynident.nlp.status import Status
 
@@ -236,6 +236,11 @@ class NonlinearSolution:
     objectives: tuple[float, ...]
     solution: ProgramSolution
 
+    @property
+    def inside(self) -> bool:
+        """Whether the point satisfies the constraints, however the solver ended."""
+        return self.solution.violation <= TOLERANCE
+
 
 def solve_nonlinear(problem: Problem, seed: int = 0) -> NonlinearSolution:
     """Solve a problem as a nonlinear program, from several starts.
@@ -249,7 +254,8 @@ def solve_nonlinear(problem: Problem, seed: int = 0) -> NonlinearSolution:
     random = np.random.default_rng(seed)
     while len(found) < 2 + _RANDOM and not _agree(found):
         found.append(posed.program.solve([posed.start(_random_start(posed.problem, random))]))
-    best = min(found, key=lambda s: (not s.status.ok, s.objective))
+    # Where the solver stopped early the point may still be the best one: the certificate tells.
+    best = min(found, key=lambda s: (s.violation > TOLERANCE, s.objective))
     status = replace(
         best.status,
         iterations=sum(s.status.iterations for s in found),
@@ -266,7 +272,7 @@ def solve_nonlinear(problem: Problem, seed: int = 0) -> NonlinearSolution:
 
 def _agree(found: list[ProgramSolution]) -> bool:
     """Whether the two best starts that succeeded ended at the same objective."""
-    ends = sorted(s.objective for s in found if s.status.ok)
+    ends = sorted(s.objective for s in found if s.violation <= TOLERANCE)
     return len(ends) > 1 and ends[1] - ends[0] <= _AGREE * max(abs(ends[0]), 1e-300)
 
 
