@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dynident.effects import Parameter
-from dynident.fit import Estimate
 from dynident.robot.joint_dynamics import JointDynamics
+
+if TYPE_CHECKING:
+    from dynident.effects import Parameter
+    from dynident.fit import Estimate
 
 _GRAVITY = 9.81
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,10 +16,12 @@ from dynident.check.report import Check
 from dynident.check.rules import TITLES, judge
 from dynident.check.subject import Subject, of_links
 from dynident.errors import RobotError, UnsupportedError
-from dynident.fit import Estimate, load_estimate
 from dynident.robot import Description, Link, Robot
 from dynident.robot.joint_dynamics import joint_dynamics
 from dynident.robot.lone_links import lone_links
+
+if TYPE_CHECKING:
+    from dynident.fit import Estimate
 
 
 def check(what: Robot | Estimate | str | Path | Any) -> Check:
@@ -51,13 +53,16 @@ def check(what: Robot | Estimate | str | Path | Any) -> Check:
             return _file(Path(what))
         if isinstance(what, Robot):
             return _robot(what, what.name, what.description.format if what.description else "robot")
-        if isinstance(what, Estimate):
-            return _estimate(what, what.model.robot.name)
         return _holder(what)
 
 
 def _holder(what: Any) -> Check:
-    """Check what has a robot, and perhaps an estimate, among its attributes."""
+    """Check an estimate, or what has a robot and perhaps an estimate among its attributes."""
+    # Imported where it is used: the estimators are slow to load, and a description needs none.
+    from dynident.fit import Estimate
+
+    if isinstance(what, Estimate):
+        return _estimate(what, what.model.robot.name)
     robot = getattr(what, "robot", None)
     if not isinstance(robot, Robot):
         raise RobotError(
@@ -74,6 +79,8 @@ def _file(path: Path) -> Check:
     text = files.read_text(path)
     start = text.lstrip()[:1]
     if start == "{":
+        from dynident.fit import load_estimate
+
         return _estimate(load_estimate(path), str(path))
     if start != "<":
         raise RobotError(
