@@ -10,10 +10,21 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
+SCRIPTS = (
+    "hidden_effects.py",
+    "least_squares_memory.py",
+    "constrained_fit.py",
+    "chain_length.py",
+)
 
 
 def main() -> None:
-    for script in ("hidden_effects.py", "least_squares_memory.py", "constrained_fit.py"):
+    for script in (
+        "hidden_effects.py",
+        "least_squares_memory.py",
+        "constrained_fit.py",
+        "chain_length.py",
+    ):
         print(f"--- {script}", flush=True)
         subprocess.run([sys.executable, str(HERE / script)], check=True)
 

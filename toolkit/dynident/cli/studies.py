@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -63,6 +63,13 @@ def diagnose(study: Path, as_json: bool) -> None:
 )
 @click.option("--ordinary", is_flag=True, help="Ordinary least squares: joints not weighted.")
 @click.option("--essential", is_flag=True, help="Also list the essential parameters.")
+@click.option(
+    "--consistency",
+    type=click.Choice(["full", "semi", "none"]),
+    default="none",
+    show_default=True,
+    help="Fit among the robots that can exist (full), with the description as a prior.",
+)
 def fit(
     study: Path,
     as_json: bool,
@@ -70,18 +77,23 @@ def fit(
     robot: Path | None,
     ordinary: bool,
     essential: bool,
+    consistency: Literal["full", "semi", "none"],
 ) -> None:
     """Identify the parameters from the training recordings.
 
     Example: dynident fit study.toml --out estimate.json --robot identified.urdf
     """
-    from dynident.fit import LeastSquares, essential_parameters, factorise, rows
+    from dynident.fit import Constrained, LeastSquares, essential_parameters, factorise, rows
     from dynident.fit import fit as fit_model
+    from dynident.nlp import Within
 
     _require_places(study, out, robot)
     loaded = _load(study)
     with progress("fitting"):
-        method = LeastSquares("none" if ordinary else "joint")
+        weighting = "none" if ordinary else "joint"
+        method = LeastSquares(weighting)
+        if consistency != "none":
+            method = Constrained(Within(consistency), weighting=weighting)
         estimate = fit_model(loaded.model, loaded.train, method)
         tables, result = list(estimate.tables()), estimate.to_dict()
         if essential:
