@@ -15,6 +15,7 @@ from dynident.fit.estimate import Estimate
 from dynident.fit.given import given_estimate, prior_model
 from dynident.fit.metric import Metric
 from dynident.fit.prior import Prior
+from dynident.fit.separable import solve_apart
 from dynident.inertia import distance_rows, margins
 from dynident.model import Model
 from dynident.nlp import Certificate, ParameterSpace, Problem, Vanishing, Within
@@ -88,6 +89,8 @@ class Projection:
             margin = margins(old)
             rule, value = margin.worst
             broken = "" if margin.consistent else f"{rule} {number(value, 3)}"
+            if margin.consistent and old[0] == 0.0 and np.any(old != new):
+                broken = "inertia, but no mass"
             after = margins(new).pseudo_inertia_min_eig
             mass = f"{number(old[0], 4)} -> {number(new[0], 4)}"
             rows.append((body, number(float(moved), 3), mass, broken, f"{after:.1e}"))
@@ -174,7 +177,12 @@ def project(
     if metric is None and before.rows:
         metric = Metric.of_estimate(before)
     problem, notes = _problem(space, x_hat, before.names, prior, metric, within)
-    answer = trivial(problem, x_hat) if problem.feasible(x_hat) else solve(problem, solver, x_hat)
+    if problem.feasible(x_hat):
+        answer = trivial(problem, x_hat)
+    elif metric is None and not within.sets and within.consistency != "none":
+        answer = solve_apart(problem, solver, x_hat)
+    else:
+        answer = solve(problem, solver, x_hat)
     return _projection(answer, before, problem, x_hat, metric, prior, notes)
 
 

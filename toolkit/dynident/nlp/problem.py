@@ -178,8 +178,21 @@ class Problem:
         return float(worst)
 
     def feasible(self, x: np.ndarray) -> bool:
-        """Whether x lies within: bodies up to rounding, other constraints up to `TOLERANCE`."""
-        return self.body_violation(x) <= _ROUNDING and self.violation(x) <= TOLERANCE
+        """Whether x lies within: bodies up to rounding, other constraints up to `TOLERANCE`.
+
+        A body with inertia but without mass is not: it is the limit of ever smaller masses ever
+        further away.
+        """
+        within = self.body_violation(x) <= _ROUNDING and self.violation(x) <= TOLERANCE
+        return within and not np.any(self._without_mass(x))
+
+    def _without_mass(self, x: np.ndarray) -> np.ndarray:
+        """Which bodies turn as if they had a mass, and have none, (n,) bool."""
+        if self.within.consistency == "none":
+            return np.zeros(len(self.space.bodies), dtype=bool)
+        bodies, scale = (y[: self.space.rigid].reshape(-1, 10) for y in (x, self.space.scale))
+        relative = np.abs(bodies / scale)
+        return (relative[:, 0] <= _ROUNDING) & (relative[:, 4:].max(axis=1) > _ROUNDING)
 
     def retracted(self, x: np.ndarray) -> np.ndarray:
         """X with what a solver left outside the consistent bodies mended, (s,).

@@ -11,9 +11,13 @@ import numpy as np
 
 from dynident.diagnose import Comparison
 from dynident.fit import Projection
+from dynident.inertia import to_com
 from dynident.robot import Robot
 from dynident.robot.verify import Verification, write_verified
 from dynident.tables import Table, number, percent, print_tables
+
+_FAR = 30.0
+"""Radius of gyration over that of a body of the link's size, beyond which the mass is doubted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +98,22 @@ class Refit:
         moved = f"{len(links)} of {len(space.bodies)} links"
         return f"Made {notion}: {moved}{others} moved."
 
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """Caveats: what was made possible, but is not likely."""
+        space, x = self.projection.space, self.projection.x
+        light = []
+        for k, body in enumerate(space.bodies):
+            phi, before = (y[10 * k : 10 * k + 10] for y in (x, self.projection.x_before))
+            reference = space.references[k]
+            if np.array_equal(phi, before) or not _gyration(phi) > _FAR * _gyration(reference):
+                continue
+            light.append(f"{body} ({number(float(phi[0]), 2)} kg)")
+        if not light:
+            return ()
+        words = "is hardly enough for the inertia within such an extent: weigh the link"
+        return (f"The mass of {', '.join(light)} {words}.",)
+
     def effects(self) -> Table | None:
         """Parameters of effects before and after, None without a study; no description has them."""
         projection, start = self.projection, self.projection.space.rigid
@@ -120,6 +140,7 @@ class Refit:
         return (
             self.sentence,
             *self.projection.tables(),
+            *self.notes,
             *((effects,) if effects else ()),
             *((self.errors.table(),) if self.errors else ()),
         )
@@ -140,6 +161,7 @@ class Refit:
             "consistency": self.consistency,
             "unchanged": self.unchanged,
             **projection.to_dict(),
+            "notes": [*projection.notes, *self.notes],
             "effects": effects,
             "torque_errors": self.errors.to_dict() if self.errors else None,
         }
@@ -155,3 +177,10 @@ class Refit:
             If the file cannot be written.
         """
         return write_verified(self.robot, path, self.consistency, self.source)
+
+
+def _gyration(phi: np.ndarray) -> float:
+    """Root mean square distance of the mass from the centre of mass, m."""
+    if not phi[0] > 0:
+        return float("inf") if np.any(phi) else 0.0
+    return float(np.sqrt(max(np.trace(to_com(phi).inertia_com) / (2 * phi[0]), 0.0)))

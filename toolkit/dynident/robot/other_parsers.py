@@ -27,7 +27,7 @@ _SAME = 1e-9  # of a link's largest parameter: what a parser's own arithmetic ma
 _TORQUE = 1e-8  # likewise, of the torque
 _SAMPLES = 20
 _DURATION = 0.1  # s of passive motion
-_WEIGHTLESS = {"pos": "0 0 0", "mass": "0", "diaginertia": "0 0 0"}
+_LIMITS = {"lower": "-1e9", "upper": "1e9", "velocity": "1e9", "effort": "1e9"}
 
 
 def simulate_in_drake(robot: Robot, text: str, where: str) -> float:
@@ -53,11 +53,15 @@ def simulate_in_drake(robot: Robot, text: str, where: str) -> float:
     from pydrake.multibody.plant import MultibodyPlant
 
     _, format_, contents = take_apart(text, where)
+    for link in robot.links if format_ == "mjcf" else ():
+        if link.source == "inertial element" and link.phi[0] == 0.0:
+            what, mend = "states a mass of zero, which Drake and MuJoCo refuse", "give it a mass"
+            raise RobotError(what, f"{where}: link '{link.name}'", mend)
     plant: Any = MultibodyPlant(0.0)
     try:
         with quiet():
             Parser(plant).AddModelsFromString(_copy(contents, format_), contents.suffix)
-    except Exception as error:  # the bindings raise whatever the parser's libraries throw
+    except (Exception, SystemExit) as error:  # the bindings raise whatever Drake throws
         raise RobotError(f"Drake refuses it: {_first(error)}", where) from None
     for link in robot.links:
         if link.joint < 0 and link.source == "absent":
@@ -158,8 +162,6 @@ def _copy(contents: Contents, format_: str) -> str:
             own = contents.elements[name].find("inertial")
             assert own is not None
             element.insert(0, deepcopy(own))
-        elif format_ == "mjcf" and element.find("geom") is None:
-            element.insert(0, Element("inertial", _WEIGHTLESS))
     return to_text(root)
 
 
@@ -167,13 +169,12 @@ def _for_urdfdom(copy: str) -> str:
     """What this parser demands and others do not: all limits, and a link for the world."""
     root = ElementTree.fromstring(copy)
     for joint in root.findall("joint"):
-        if joint.get("type") in ("revolute", "prismatic"):
-            limit = joint.find("limit")
-            if limit is None:
-                limit = ElementTree.SubElement(joint, "limit")
-            for key, value in (("lower", "-1e9"), ("upper", "1e9"), ("velocity", "1e9")):
+        limit = joint.find("limit")
+        if limit is None and joint.get("type") in ("revolute", "prismatic"):
+            limit = ElementTree.SubElement(joint, "limit")
+        if limit is not None:
+            for key, value in _LIMITS.items():
                 limit.attrib.setdefault(key, value)
-            limit.set("effort", "1e9")
     named = {link.get("name") for link in root.findall("link")}
     parents = {parent.get("link") for parent in root.iter("parent")}
     if "world" in parents - named:
@@ -191,6 +192,6 @@ def _require_same(phi: Array, found: Array, source: str, where: str) -> None:
     raise RobotError(what, where, "state more digits, or a thicker body")
 
 
-def _first(error: Exception) -> str:
+def _first(error: BaseException) -> str:
     lines = str(error).strip().splitlines()
-    return lines[0][:200] if lines else "no reason given"
+    return lines[0][:200].rstrip(". ") if lines else "no reason given"
