@@ -10,12 +10,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from dynident.inertia import distance_rows, margins
 from dynident.nlp.conic import Multipliers, cone_rows, cone_values
 from dynident.nlp.problem import TOLERANCE, Problem
 from dynident.nlp.status import Status
 from dynident.tables import Table, number
+
+_FALLS = 1e-13  # of the largest: curvature (its root) that is rounding
 
 OPTIMAL = 1e-4
 """Relative gap below which an answer is called the optimum."""
@@ -137,6 +140,8 @@ def lower_bound(problem: Problem, x: np.ndarray, multipliers: Multipliers) -> Bo
 
     The set is that of bodies at least the inset inside, as programs see it.
     """
+    if not np.isfinite(problem.objective(x)):
+        return Bound(-np.inf, np.inf, 0.0)
     scale = problem.space.scale
     bodies, floor_bodies = _semidefinite(multipliers.bodies)
     cones, floor_cones = _in_cones(multipliers.cones)
@@ -228,12 +233,12 @@ def _gain(problem: Problem, x: np.ndarray, rest: np.ndarray) -> float:
             part = slice(10 * k, 10 * k + 10)
             blocks[part, part] = distance_rows(x[part]) * scale[part]
         rows = np.vstack([rows / np.sqrt(weight), blocks])
-    # |rest| in the inverse Hessian rows' rows: the smallest y with rows' y = rest.
-    y = np.linalg.lstsq(rows.T, rest / weight, rcond=None)[0]
-    missed = np.linalg.norm(rows.T @ y - rest / weight)
-    if missed > 1e-8 * np.linalg.norm(rest / weight):
-        return float("inf")  # a direction that nothing holds: it falls for ever
-    decrement = float(np.linalg.norm(y))
+    # |rest| in the inverse Hessian rows' rows.
+    R = np.linalg.qr(rows, mode="r")
+    diagonal = np.abs(np.diag(R))
+    if len(R) < rows.shape[1] or diagonal.min() <= _FALLS * diagonal.max():
+        return float("inf")  # a direction that nothing holds: there it falls for ever
+    decrement = float(np.linalg.norm(solve_triangular(R.T, rest / weight, lower=True)))
     if problem.entropy is None:
         return 0.5 * decrement**2
     if decrement >= 1.0:

@@ -232,5 +232,14 @@ def _add_half_square(program: Any, z: np.ndarray, A: np.ndarray, rest: np.ndarra
 
 
 def solve_conic(problem: Problem) -> ConicSolution:
-    """Pose and solve a problem as a conic program."""
-    return pose_conic(problem).solve()
+    """Pose and solve a problem as a conic program, and add the digits that a solver leaves.
+
+    Raises
+    ------
+    FitError
+        If the metric leaves directions free.
+    """
+    from dynident.nlp.polish import polished
+
+    posed = pose_conic(problem)
+    return polished(posed.problem, posed.solve())
