@@ -88,6 +88,8 @@ def percent(value: float | None, digits: int = 2) -> str:
     """A fraction as a percentage with `digits` decimals, a dash where there is none."""
     if value is None or value != value:
         return "-"
+    if abs(value) >= 1e3:  # nobody counts the digits of ten million times too much
+        return f"{100 * value:.1e} %"
     return f"{100 * value:.{digits}f} %"
 
 
