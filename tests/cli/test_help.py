@@ -7,7 +7,7 @@ import shlex
 
 import pytest
 
-COMMANDS = ("explain", "diagnose", "fit", "compare", "add", "simulate", "report", "check")
+COMMANDS = ("explain", "diagnose", "fit", "compare", "add", "simulate", "report", "check", "refit")
 
 
 @pytest.mark.parametrize("name", COMMANDS)

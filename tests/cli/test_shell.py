@@ -18,7 +18,10 @@ import pytest
 
 from study_files import STUDY, edited, listing, write_study
 
-COMMANDS = ("explain", "diagnose", "fit", "compare", "add", "simulate", "report", "demo")
+COMMANDS = (
+    *("explain", "diagnose", "fit", "compare", "add", "simulate", "report", "check", "refit"),
+    "demo",
+)
 DYNIDENT = (sys.executable, "-m", "dynident.cli")
 ENTRY = STUDY[STUDY.index("[[recordings]]") : STUDY.rindex("[[recordings]]")]
 LIMIT = 120.0

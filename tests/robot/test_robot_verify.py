@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import pytest
 from random_trees import mjcf, random_tree, sdf, urdf
@@ -46,6 +48,19 @@ def test_joints_of_any_order_and_locked_ones(tmp_path):
         assert found.pinocchio == "own parser"
 
 
+INERTIAL = ARM[ARM.index("<inertial>") : ARM.index("</inertial>")] + "</inertial>"
+
+
+@pytest.mark.parametrize(
+    "world", ["", '<link name="world"/>', f'<link name="world">{INERTIAL}</link>']
+)
+def test_a_link_named_world(tmp_path, world):
+    text = ARM.replace('<link name="base"/>', world).replace('link="base"', 'link="world"')
+    robot = Robot.from_text(text)
+    found = write_verified(robot.with_theta(robot.theta * 1.1), tmp_path / "a.urdf")
+    assert (found.drake, found.pinocchio) == ("own parser", "own parser")
+
+
 def test_what_others_cannot_read_of_a_file_does_not_matter(tmp_path):
     """Meshes that are not there, dampings that abort Drake, limits that are not stated."""
     mesh = '<visual><geometry><mesh filename="package://none/a.stl"/></geometry></visual>'
@@ -53,8 +68,6 @@ def test_what_others_cannot_read_of_a_file_does_not_matter(tmp_path):
         ARM.replace("<inertial>", mesh + "<inertial>")
         .replace("<axis", '<dynamics damping="-1" friction="nan"/><axis')
         .replace('<limit lower="-2.5" upper="2.5" velocity="6" effort="200"/>', "")
-        .replace('parent link="base"', 'parent link="world"')
-        .replace('<link name="base"/>', "")
     )
     robot = Robot.from_text(text)
     found = write_verified(robot.with_theta(robot.theta * 1.1), tmp_path / "a.urdf")
@@ -74,13 +87,13 @@ def test_what_need_not_change_stays_to_the_byte(tmp_path, start, newline):
         assert "unchanged, to the byte" in found.sentences[0]
 
 
-def fails(robot, tmp_path, message, consistency="full"):
+def fails(robot, tmp_path, message, consistency: Literal["full", "semi"] = "full"):
     path = tmp_path / "old.urdf"
-    path.write_text("old")
+    path.write_text("<old/>")
     with pytest.raises(RobotError, match=message) as caught:
         write_verified(robot, path, consistency)
     assert "Nothing was written" in str(caught.value)
-    assert path.read_text() == "old" and others(tmp_path) == ["old.urdf"]
+    assert path.read_text() == "<old/>" and others(tmp_path) == ["old.urdf"]
 
 
 def test_impossible_links_are_not_written(tmp_path, capfd):
@@ -149,7 +162,10 @@ def test_mjcf_cannot_state_a_mass_of_zero(tmp_path):
 def test_another_format_is_refused_by_its_name(tmp_path):
     with pytest.raises(FileError, match=r"arm.sdf: the description is of the format URDF"):
         write_verified(arm(), tmp_path / "arm.sdf")
-    assert others(tmp_path) == []
+    (tmp_path / "run.csv").write_text("t,q.shoulder")
+    with pytest.raises(FileError, match=r"run.csv: is not a robot description. write to another"):
+        write_verified(arm(), tmp_path / "run.csv")
+    assert (tmp_path / "run.csv").read_text() == "t,q.shoulder"
 
 
 def test_an_interrupt_leaves_the_old_file(tmp_path):
@@ -157,10 +173,10 @@ def test_an_interrupt_leaves_the_old_file(tmp_path):
         raise KeyboardInterrupt
 
     path = tmp_path / "old.urdf"
-    path.write_text("old")
+    path.write_text("<old/>")
     with pytest.raises(KeyboardInterrupt):
         files.write_bytes(path, b"new", interrupted)
-    assert path.read_text() == "old" and others(tmp_path) == ["old.urdf"]
+    assert path.read_text() == "<old/>" and others(tmp_path) == ["old.urdf"]
 
 
 def test_a_robot_prints_in_one_line():

@@ -11,7 +11,6 @@ import click
 from dynident import files
 from dynident.cli.group import commands
 from dynident.cli.output import JSON, print_json, progress, show
-from dynident.errors import FileError
 
 _PATH = click.Path(path_type=Path)
 
@@ -103,9 +102,6 @@ def refit(
             model = replace(model, robot=believed) if model else believed
         subject = read_subject(what, model, order)
     require_format(subject.robot, out)
-    for path in (study, what if subject.source is None else None):
-        if path is not None and out.resolve() == path.resolve():
-            raise FileError("is not a robot description", str(out), "write to another file")
     with progress("refitting"):
         centre = believed or (loaded.robot if loaded else subject.described)
         prior = Prior(centre, distance, spread)

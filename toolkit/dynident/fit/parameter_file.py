@@ -90,7 +90,7 @@ def read_parameters(
     else:
         numbers = all(map(_is_number, header))
         what = "the first line holds numbers, and no order" if numbers else "no layout is known"
-        raise FileError(f"{what}", f"{path}, header", f"write {_LAYOUTS}")
+        raise FileError(what, f"{path}, header", f"write {_LAYOUTS}")
     if order is not None:
         mend = f"leave out the order '{order}'"
         raise FileError("the header names the parameters, and says their order", str(path), mend)

@@ -6,6 +6,7 @@ and Drake and Pinocchio must load it and move it.
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -93,13 +94,15 @@ class Verification:
 
 
 def require_format(robot: Robot, path: str | Path) -> None:
-    """Refuse a file whose name says another format than the robot's description has.
+    """Refuse a file that says another format than the robot's description has.
 
     Raises
     ------
     FileError
-        Naming the format.
+        If its name says so, or a file is there that is no description and would be lost.
     """
+    if Path(path).is_file() and files.read_bytes(path).removeprefix(BOM_UTF8).lstrip()[:1] != b"<":
+        raise FileError("is not a robot description", str(path), "write to another file")
     suffix, own = Path(path).suffix.lower(), robot.description and robot.description.format
     for format_, suffixes in _FILES.items():
         if own is not None and suffix in suffixes and format_ != own:
