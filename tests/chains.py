@@ -82,7 +82,8 @@ def noisy_estimate(
     columns = columns.reshape(-1, model.size)
     torque = columns @ space.combination @ x_true
     std = noise * np.sqrt(np.mean(torque**2))
-    R = np.linalg.qr(np.column_stack([columns, torque + std * rng.normal(size=len(torque))]), "r")
+    noisy = torque + std * rng.normal(size=len(torque))
+    R = np.asarray(np.linalg.qr(np.column_stack([columns, noisy]), mode="r"))
     A = R[:-1, :-1] @ space.combination / std
     x_hat = space.given + np.linalg.pinv(A, rcond=1e-9) @ (R[:-1, -1] / std - A @ space.given)
     return model, A, x_hat

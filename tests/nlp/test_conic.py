@@ -22,6 +22,7 @@ from dynident.inertia import (
 )
 from dynident.nlp import (
     CentreInEllipsoid,
+    Consistency,
     Entropy,
     Problem,
     TotalMass,
@@ -261,7 +262,8 @@ def test_the_nonlinear_program_reaches_the_bound(consistency, spread, flat, dist
 
 @pytest.mark.parametrize("links", [10, pytest.param(30, marks=pytest.mark.slow)])
 def test_long_chains(links) -> None:
-    for consistency in ("full", "semi"):
+    notions: tuple[Consistency, ...] = ("full", "semi")
+    for consistency in notions:
         case = chain_case(links, 0, Within(consistency), samples=150, spread=1.0)
         answer = solve(case.problem, "conic")
         assert answer.certificate.gap <= OPTIMAL
@@ -300,8 +302,8 @@ def test_reducing_the_rows_changes_nothing() -> None:
 def test_newtons_steps_add_the_digits_that_the_solver_leaves() -> None:
     """From half of the digits to nearly all, on matrices, bounds, equalities and cones."""
     sets = (TotalMass(9.0, 9.5), CentreInEllipsoid("l1", [0.05] * 3, [0.04, 0.05, 0.06]))
-    for consistency, constraints in (("full", ()), ("semi", ()), ("full", sets), ("semi", sets)):
-        case = chain_case(3, 1, Within(consistency, constraints), spread=10.0)
+    for within in (Within("full"), Within("semi"), Within("full", sets), Within("semi", sets)):
+        case = chain_case(3, 1, within, spread=10.0)
         raw, found = pose_conic(case.problem).solve(), solve_conic(case.problem)
         assert raw.multipliers is not None and found.multipliers is not None
         before = lower_bound(case.problem, raw.x, raw.multipliers)

@@ -234,7 +234,7 @@ def _gain(problem: Problem, x: np.ndarray, rest: np.ndarray) -> float:
             blocks[part, part] = distance_rows(x[part]) * scale[part]
         rows = np.vstack([rows / np.sqrt(weight), blocks])
     # |rest| in the inverse Hessian rows' rows.
-    R = np.linalg.qr(rows, mode="r")
+    R = np.asarray(np.linalg.qr(rows, mode="r"))
     diagonal = np.abs(np.diag(R))
     if len(R) < rows.shape[1] or diagonal.min() <= _FALLS * diagonal.max():
         return float("inf")  # a direction that nothing holds: there it falls for ever

@@ -179,12 +179,10 @@ def pose(problem: Problem) -> Posed:
 
 def _constrained(program: Program, problem: Problem, x: Any) -> Program:
     linear = problem.linear
-    # Bounds of single parameters are bounds of variables already where these are effects.
-    rows = [
-        i
-        for i, row in enumerate(linear.A)
-        if np.count_nonzero(row) > 1 or np.any(row[: problem.space.rigid])
-    ]
+    # The first rows are the effects' own bounds, which are bounds of variables already.
+    space = problem.space
+    own = int(np.sum(np.isfinite(space.lower) | np.isfinite(space.upper)))
+    rows = range(own, len(linear.A))
     if rows:
         value = ca.DM(linear.A[rows]) @ x
         bounds = linear.lower[rows], linear.upper[rows]
