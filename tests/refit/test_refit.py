@@ -237,3 +237,17 @@ def test_several_links_on_one_body_each_become_possible(tmp_path):
     told = found.write_robot(tmp_path / "a.urdf")
     assert told.notion == "full" and told.links == 4
     assert consistent(Robot.from_file(tmp_path / "a.urdf"))
+
+
+def test_bodies_beyond_the_shapes_of_their_links_are_told() -> None:
+    text = (
+        '<robot name="one"><link name="base"/><link name="rod"><inertial>'
+        '<origin xyz="0.15 0 0"/><mass value="2"/>'
+        '<inertia ixx="2e6" ixy="0" ixz="0" iyy="2e7" iyz="0" izz="2e7"/></inertial>'
+        '<visual><origin xyz="0.15 0 0"/><geometry><box size="0.3 0.06 0.06"/></geometry></visual>'
+        '</link><joint name="j" type="revolute"><parent link="base"/><child link="rod"/>'
+        '<axis xyz="0 0 1"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>'
+    )
+    found = di.refit(Robot.from_text(text))
+    assert found.unchanged
+    assert any("rod" in note and "units" in note for note in found.notes)

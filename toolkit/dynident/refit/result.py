@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from dynident.check import check
 from dynident.diagnose import Comparison
 from dynident.fit import Projection
 from dynident.inertia import to_com
@@ -61,6 +62,9 @@ class TorqueErrors:
         return {"recordings": self.recordings, "noise_floor": said["noise"]["floor"], **models}
 
 
+_OF_SHAPES = {"centre_of_mass", "spread"}
+
+
 @dataclass(frozen=True, eq=False)
 class Refit:
     """Given parameters, made consistent.
@@ -109,10 +113,21 @@ class Refit:
             if np.array_equal(phi, before) or not _gyration(phi) > _FAR * _gyration(reference):
                 continue
             light.append(f"{body} ({number(float(phi[0]), 2)} kg)")
-        if not light:
-            return ()
         words = "is hardly enough for the inertia within such an extent: weigh the link"
-        return (f"The mass of {', '.join(light)} {words}.",)
+        notes = [f"The mass of {', '.join(light)} {words}."] if light else []
+        # A body that could be somewhere need not fit into this link's shapes.
+        beyond = [
+            link.name
+            for link in check(self.robot).links
+            if any(rule.rule in _OF_SHAPES for rule in link.broken)
+        ]
+        if beyond:
+            names = ", ".join(beyond)
+            notes.append(
+                f"Possible as bodies, but not within the shapes of their links: {names} (wrong "
+                "units, or swapped axes?). `dynident check` says what is wrong."
+            )
+        return tuple(notes)
 
     def effects(self) -> Table | None:
         """Parameters of effects before and after, None without a study; no description has them."""
