@@ -1,4 +1,4 @@
-"""Draw `hidden_effect.png` of the README: python docs/make_pictures.py."""
+"""Draw the pictures of the README: python docs/make_pictures.py."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 import dynident as di
 from dynident.report.content import AFTER_COLOUR, BEFORE_COLOUR, GREY, bars
+from dynident.report.ellipsoids import inertia_ellipsoids
 
 HERE = Path(__file__).resolve().parent
 STUDY = HERE.parent / "problems" / "hidden_effect" / "study.toml"
@@ -25,6 +26,17 @@ def main() -> None:
     residual(left, diagnosis)
     waterfall(right, diagnosis)
     figure.savefig(HERE / "hidden_effect.png", dpi=150, facecolor="white")
+    impossible_links()
+
+
+def impossible_links() -> None:
+    """The inertias of an estimate that no robot can have, and of the nearest possible robot."""
+    study = di.load(HERE.parent / "problems" / "inconsistent_estimate" / "study.toml")
+    fit = di.fit(study.model, study.train)
+    robots = {"least squares": fit.robot, "projected": di.project(fit).robot}
+    posture = [0.3, 0.5, 0.0, 0.9, 0.0, 0.6, 0.0]
+    picture = inertia_ellipsoids(robots, posture)
+    picture.savefig(HERE / "impossible_links.png", facecolor="white")
 
 
 def residual(axes: Axes, diagnosis: di.Diagnosis) -> None:
