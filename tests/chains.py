@@ -1,4 +1,4 @@
-"""Chains of links with possible inertias, and noisy estimates of them that are impossible."""
+"""Chains of links with possible inertias, noisy estimates of them that are not, and recordings."""
 
 from __future__ import annotations
 
@@ -9,15 +9,19 @@ from typing import Literal
 
 import numpy as np
 
-from dynident.fit import Prior
+from dynident.fit import Estimate, LeastSquares, Prior, fit
 from dynident.fit.projection import sized
-from dynident.inertia import PARAMETERS, UNITS, distance_rows, reference_body
+from dynident.inertia import PARAMETERS, UNITS, distance_rows, from_pseudo_inertia, reference_body
 from dynident.model import Model
 from dynident.nlp import ParameterSpace, Problem, Within
 from dynident.nlp.space import body_scale
+from dynident.recording import Dataset, Filter, Recording
 from dynident.robot import Robot
+from synthetic import smooth_motion
 
 SOLVERS = ("conic", "nlp") if importlib.util.find_spec("dynident.nlp.parametrised") else ("conic",)
+
+QUIET = Filter(None, None, 50.0, edge_s=(0.02, 0.02))
 
 COUNTEREXAMPLE = np.array([1.0, 0, 0, 0, 1, 0, 1, 0, 0, 3])
 """Virtual parameters [1, 0, 0, 0, 1, 0, 0, 1, 0, sqrt 3, 0]: mass 1 and I = diag(1, 1, 3)."""
@@ -154,3 +158,28 @@ def least(phi: np.ndarray, consistency: str) -> float:
     size = np.sqrt(np.abs(np.diag(M)))
     size[size == 0] = 1.0
     return float(np.linalg.eigvalsh(M / np.outer(size, size))[0])
+
+
+def recorded(robot: Robot, seed: int = 1, noise: float = 0.1, friction: float = 0.2) -> Recording:
+    """Torques of a robot with viscous friction, noise relative to each joint's torque."""
+    rng = np.random.default_rng([seed, 5])
+    t, q, v, a = smooth_motion(robot.n, seed, 200.0, 4.0, 4.0)
+    tau = robot.inverse_dynamics(q, v, a) + friction * v
+    tau = tau + noise * np.std(tau, axis=0) * rng.normal(size=tau.shape)
+    return Recording(t, q, tau, robot.names, period=4.0)
+
+
+def estimated(robot: Robot, recording: Recording) -> Estimate:
+    return fit(Model(robot) + "viscous_friction", Dataset((recording,), QUIET), LeastSquares())
+
+
+def links(robot: Robot) -> dict[str, np.ndarray]:
+    return {link.name: link.phi for link in robot.links if link.source != "absent"}
+
+
+def clipped(phi: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """The nearest fully consistent body in closed form: negative eigenvalues become zero."""
+    L = np.linalg.cholesky(pseudo(reference))
+    inner = np.linalg.solve(L, np.linalg.solve(L, pseudo(phi)).T)
+    values, vectors = np.linalg.eigh(inner)
+    return from_pseudo_inertia(L @ (vectors * np.clip(values, 0, None)) @ vectors.T @ L.T)

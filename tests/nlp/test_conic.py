@@ -1,4 +1,4 @@
-"""The conic optimum beside closed forms, other programs, and on chains of many links."""
+"""The conic optimum beside closed forms and other programs, and the two notions of consistency."""
 
 from __future__ import annotations
 
@@ -6,33 +6,28 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from chains import COUNTEREXAMPLE, SOLVERS, chain_case, least, one_body, pseudo, spatial
+from chains import COUNTEREXAMPLE, SOLVERS, chain_case, clipped, least, one_body, pseudo, spatial
 from dynident.errors import FitError
 from dynident.fit.consistent import solve
 from dynident.inertia import (
     distance_rows,
-    frame_change,
     from_com,
     from_log_cholesky,
     from_pseudo_inertia,
     log_cholesky,
     margins,
-    reference_body,
     to_com,
 )
 from dynident.nlp import (
     CentreInEllipsoid,
-    Consistency,
     Entropy,
     Problem,
     TotalMass,
     Within,
     lower_bound,
-    nearest_body,
     pose_conic,
     solve_conic,
 )
-from dynident.nlp.certificate import OPTIMAL
 
 ROUND = from_pseudo_inertia(np.eye(4))  # a body whose metric is the Frobenius norm
 
@@ -40,14 +35,6 @@ ROUND = from_pseudo_inertia(np.eye(4))  # a body whose metric is the Frobenius n
 def impossible(seed: int) -> np.ndarray:
     B = np.random.default_rng(seed).normal(size=(4, 4))
     return from_pseudo_inertia(B + B.T + 0.5 * np.eye(4))
-
-
-def clipped(phi: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """The nearest fully consistent body in closed form: negative eigenvalues become zero."""
-    L = np.linalg.cholesky(pseudo(reference))
-    inner = np.linalg.solve(L, np.linalg.solve(L, pseudo(phi)).T)
-    values, vectors = np.linalg.eigh(inner)
-    return from_pseudo_inertia(L @ (vectors * np.clip(values, 0, None)) @ vectors.T @ L.T)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
@@ -174,101 +161,6 @@ def test_projecting_twice_is_projecting_once(seed) -> None:
         once = solve(one_body(impossible(seed), Within(consistency), rows), "conic").x
         again = solve_conic(one_body(once, Within(consistency), rows)).x
         assert np.linalg.norm(again - once) < 1e-8 * np.linalg.norm(once)
-
-
-# --- nearest_body --------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("consistency", ["full", "semi"])
-def test_nearest_bodies_of_any_size_are_consistent_and_near(consistency) -> None:
-    rng = np.random.default_rng(8)
-    for _ in range(40):
-        mass, length = 10.0 ** rng.uniform(-3, 3, 2)
-        size = mass * length ** np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
-        phi = rng.normal(size=10) * size
-        phi[0] = abs(phi[0])
-        found = nearest_body(phi, length, consistency, mass)
-        assert least(found, consistency) >= 0
-        rows = distance_rows(reference_body(phi, mass, length))
-        moved = np.linalg.norm(rows @ (found - phi))
-        best = np.linalg.norm(rows @ (clipped(phi, reference_body(phi, mass, length)) - phi))
-        assert moved <= best * (1 + 1e-6)
-        if consistency == "full":
-            assert moved >= best * (1 - 1e-6)
-        # The same body in g.
-        np.testing.assert_allclose(
-            rows @ nearest_body(1e3 * phi, length, consistency, 1e3 * mass),
-            rows @ found * 1e3,
-            atol=1e-2 * np.max(np.abs(rows @ found)),
-        )
-
-
-def test_the_nearest_body_does_not_depend_on_the_axes() -> None:
-    phi = from_com(2.0, [0.1, 0.0, 0.05], np.diag([0.01, 0.02, 0.05]))
-    R = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
-    turn = frame_change(R * np.linalg.det(R), np.zeros(3))
-    np.testing.assert_allclose(
-        nearest_body(turn @ phi, 0.3), turn @ nearest_body(phi, 0.3), atol=1e-8
-    )
-
-
-def test_a_consistent_body_comes_back_as_a_copy_of_itself() -> None:
-    phi = from_com(2.0, [0.1, 0.0, 0.2], np.diag([0.02, 0.03, 0.05]))
-    found = nearest_body(phi, 0.3)
-    np.testing.assert_array_equal(found, phi)
-    assert found is not phi
-    for broken in (np.full(10, np.nan), np.ones(9)):
-        with pytest.raises(FitError, match="ten finite"):
-            nearest_body(broken, 0.3)
-
-
-# --- chains --------------------------------------------------------------------------------------
-
-NOTIONS = [("full", 0.3, 1e-5), ("semi", 3.0, 1e-5)]
-
-
-@pytest.mark.parametrize("distance", ["quadratic", "entropic"])
-@pytest.mark.parametrize(("consistency", "spread", "flat"), NOTIONS)
-def test_twenty_impossible_estimates_of_seven_links(consistency, spread, flat, distance) -> None:
-    active = 0
-    for seed in range(20):
-        case = chain_case(7, seed, Within(consistency), distance, spread=spread)
-        space = case.problem.space
-        assert space.size == 77 and np.linalg.matrix_rank(space.combination) == 52
-        bodies = case.x_hat[:70].reshape(7, 10)
-        assert min(least(phi, consistency) for phi in bodies) < -0.01
-        answer = solve(case.problem, "conic")
-        assert answer.certificate.gap <= 1e-6, seed
-        margin = [least(phi, consistency) for phi in answer.x[:70].reshape(7, 10)]
-        assert min(margin) >= 0
-        active += min(margin) < flat
-        if distance == "entropic":
-            assert min(margin) > flat, "the divergence keeps off the boundary"
-    if distance == "quadratic":
-        assert active >= 17, "constraints are active, else nothing was tested"
-
-
-@pytest.mark.slow
-@pytest.mark.skipif("nlp" not in SOLVERS, reason="no nonlinear program yet")
-@pytest.mark.parametrize("distance", ["quadratic", "entropic"])
-@pytest.mark.parametrize(("consistency", "spread", "flat"), NOTIONS)
-def test_the_nonlinear_program_reaches_the_bound(consistency, spread, flat, distance) -> None:
-    for seed in range(20):
-        case = chain_case(7, seed, Within(consistency), distance, spread=spread)
-        answer = solve(case.problem, "nlp")
-        assert answer.certificate.gap <= OPTIMAL, seed
-        assert answer.certificate.starts, "the starts tried are told"
-
-
-@pytest.mark.parametrize("links", [10, pytest.param(30, marks=pytest.mark.slow)])
-def test_long_chains(links) -> None:
-    notions: tuple[Consistency, ...] = ("full", "semi")
-    for consistency in notions:
-        case = chain_case(links, 0, Within(consistency), samples=150, spread=1.0)
-        answer = solve(case.problem, "conic")
-        assert answer.certificate.gap <= OPTIMAL
-        bodies = answer.x[: 10 * links].reshape(links, 10)
-        assert min(least(phi, consistency) for phi in bodies) >= 0
 
 
 # --- statements of the problem -------------------------------------------------------------------
