@@ -1,165 +1,205 @@
-"""Ipopt through CasADi, on a program whose variables and objective have been scaled."""
+"""The solution of a nonlinear program by Ipopt, from one or several starts."""
 
 from __future__ import annotations
 
+import signal
+import threading
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
-import casadi as ca
 import numpy as np
+from numpy.typing import ArrayLike
 
-from dynident.nlp.blocks import Constraint, Cost, Residual, Variable
+from dynident.errors import ProgramError
+from dynident.nlp.compiled import Compiled, array_of, ipopt_solver
+from dynident.nlp.solution import Attempt, ProgramSolution
 from dynident.nlp.status import Status
+from dynident.threads import single_threaded
+
+if TYPE_CHECKING:
+    from dynident.nlp.program import Program
 
 _WORDS = {
     "Solve_Succeeded": "solved",
-    "Solved_To_Acceptable_Level": "inaccurate",
-    "Feasible_Point_Found": "inaccurate",
+    "Feasible_Point_Found": "solved",
     "Infeasible_Problem_Detected": "infeasible",
     "Diverging_Iterates": "unbounded",
     "Maximum_Iterations_Exceeded": "iteration limit",
 }
-_INTERRUPTED = "User_Requested_Stop"
+_STALLED = {
+    "Solved_To_Acceptable_Level",
+    "Search_Direction_Becomes_Too_Small",
+    "Restoration_Failed",
+    "Error_In_Step_Computation",
+}
+_NEAR = 1e-6  # relative stationarity, violation and complementarity of a solution
+_FAR = 1e-2  # relative stationarity where the objective merely became flat, on its way to infinity
 
 
-@dataclass(frozen=True, eq=False)
-class Attempt:
-    """One run of the solver.
+@single_threaded
+def solve(
+    program: Program,
+    starts: Sequence[Mapping[str, ArrayLike]] | None,
+    tolerance: float,
+    max_iterations: int,
+) -> ProgramSolution:
+    """Solve a program from each of its starts; see `Program.solve`."""
+    if not 0 < tolerance < 1:
+        raise ProgramError(f"tolerance = {tolerance:g}", program.title, "choose it within 0 and 1")
+    compiled = program.compiled
+    points = [program.point(start) for start in ([{}] if starts is None else starts)]
+    if not points:
+        raise ProgramError("there is no start", program.title, "give one, or None")
+    undefined = [compiled.undefined(point) for point in points]
+    # All starts under one scaling, or the tolerance would mean another thing for each.
+    first = next((i for i, name in enumerate(undefined) if name is None), 0)
+    scales = compiled.scales(points[first])
+    solver = ipopt_solver(compiled.nlp, compiled.hessian, tolerance, max_iterations)
+    attempts = tuple(
+        _attempt(compiled, solver, scales, tolerance, point) if name is None else _none(point, name)
+        for point, name in zip(points, undefined, strict=True)
+    )
+    best = min(attempts, key=_rank)
+    parts = array_of(compiled.terms(compiled.flat(best.values)))
+    names = (term.name for term in program.terms)
+    return ProgramSolution(
+        program, best, attempts, dict(zip(names, map(float, parts), strict=True))
+    )
 
-    Attributes
-    ----------
-    x : (k,) all variables, in SI units.
-    objective : at x.
-    multipliers : (m,) of the constraints.
-    violation, stationarity : see `Solution`.
-    """
 
-    x: np.ndarray
-    objective: float
-    multipliers: np.ndarray
-    violation: float
-    stationarity: float
-    status: Status
+def _none(point: dict[str, np.ndarray], name: str) -> Attempt:
+    """A start from which there is no way."""
+    status = Status("Ipopt", "failed", f"{name} is not finite at the start", 0, 0.0)
+    return Attempt(point, point, status, np.nan, np.nan, np.nan, np.nan, {})
 
 
-@dataclass(frozen=True, eq=False)
-class Transcription:
-    """A program as functions of one vector of unknowns.
+def _attempt(
+    compiled: Compiled,
+    solver: Any,
+    scales: np.ndarray,
+    tolerance: float,
+    point: dict[str, np.ndarray],
+) -> Attempt:
+    found = _run(compiled, solver, scales, point, point)
+    # A start far away has gradients so large that its scale makes the tolerance loose: once more.
+    scale = compiled.objective_scale(compiled.flat(found.values))
+    if found.status.ok and found.stationarity > tolerance and scale < 0.1 * scales[0]:
+        again = _run(compiled, solver, np.append(scale, scales[1:]), point, found.values)
+        if again.status.ok and again.stationarity < found.stationarity:
+            before, after = found.status, again.status
+            together = replace(
+                after,
+                iterations=before.iterations + after.iterations,
+                seconds=before.seconds + after.seconds,
+            )
+            return replace(again, status=together)
+    return found
 
-    Attributes
-    ----------
-    scale : (k,) sizes of the unknowns.
-    bounds : (2, k) and (2, m) lower and upper, of unknowns and of constraints, in SI units.
-    """
 
-    unknowns: Any
-    objective: Any
-    constraints: Any
-    scale: np.ndarray
-    bounds: np.ndarray
-    constraint_bounds: np.ndarray
-    _terms: Any
-
-    @staticmethod
-    def of(
-        variables: Sequence[Variable],
-        residuals: Sequence[Residual],
-        costs: Sequence[Cost],
-        constraints: Sequence[Constraint],
-    ) -> Transcription:
-        """Put a program's blocks into one vector of unknowns, one objective, one of constraints."""
-        scale = np.concatenate([np.asarray(v.scale) for v in variables])
-        unknowns = ca.MX.sym("z", len(scale))
-        symbols = [v.symbol for v in variables]
-        ends = np.cumsum([0, *(v.size for v in variables)]).tolist()
-        pieces = ca.vertsplit(unknowns * scale, ends)
-        terms = [0.5 * ca.sumsqr(r.expression) for r in residuals]
-        terms += [c.expression for c in costs]
-        rows = [ca.vec(ca.MX(c.expression)) for c in constraints]
-        joined = ca.graph_substitute(
-            [ca.vertcat(*terms), ca.vertcat(*rows) if rows else ca.MX(0, 1)], symbols, pieces
+def _run(
+    compiled: Compiled,
+    solver: Any,
+    scales: np.ndarray,
+    start: dict[str, np.ndarray],
+    at: dict[str, np.ndarray],
+) -> Attempt:
+    size, began = scales[1:], time.perf_counter()
+    with _interruptible():
+        result = solver(
+            x0=compiled.flat(at),
+            p=scales,
+            lbx=compiled.lower,
+            ubx=compiled.upper,
+            lbg=compiled.constraint_lower / size,
+            ubg=compiled.constraint_upper / size,
         )
-        x = ca.vertcat(*symbols)
-        none = np.zeros((2, 0))
-        return Transcription(
-            unknowns,
-            ca.sum1(joined[0]),
-            joined[1],
-            scale,
-            np.array([np.concatenate([getattr(v, w) for v in variables]) for w in _BOTH]),
-            np.array([np.concatenate([getattr(c, w) for c in constraints]) for w in _BOTH])
-            if constraints
-            else none,
-            ca.Function("terms", [x], [ca.vertcat(*terms)]),
-        )
-
-    def terms(self, x: np.ndarray) -> list[float]:
-        """Each term of the objective at x (k,) in SI units."""
-        return [float(value) for value in np.array(self._terms(x)).ravel()]
-
-
-_BOTH = ("lower", "upper")
-
-
-def run(form: Transcription, start: np.ndarray, tolerance: float, max_iterations: int) -> Attempt:
-    """Solve from one start (k,) in SI units.
-
-    The Hessian is exact: Ipopt gets it from CasADi. A Ctrl-C stops it and is passed on.
-    """
-    z = start / form.scale
-    evaluate = ca.Function("objective", [form.unknowns], [form.objective])
-    slope_of = ca.gradient(form.objective, form.unknowns)
-    gradient = ca.Function("gradient", [form.unknowns], [slope_of])
-    # Ipopt's tolerances are for objectives near one.
-    size = max(1e-8, float(np.abs(np.array(gradient(z))).max(initial=0.0)))
-    size = size if np.isfinite(size) else 1.0
-    problem = {"x": form.unknowns, "f": form.objective / size, "g": form.constraints}
-    options = {
-        "print_time": False,
-        "error_on_fail": False,
-        "show_eval_warnings": False,
-        "ipopt": {
-            "print_level": 0,
-            "sb": "yes",
-            "tol": tolerance,
-            "max_iter": max_iterations,
-            "honor_original_bounds": "yes",
-        },
-    }
-    solver = ca.nlpsol("ipopt", "ipopt", problem, options)
-    lower, upper = form.bounds / form.scale
-    low, high = form.constraint_bounds
-    started = time.perf_counter()
-    found = solver(x0=z, lbx=lower, ubx=upper, lbg=low, ubg=high)
-    seconds = time.perf_counter() - started
+    seconds = time.perf_counter() - began
     stats = solver.stats()
-    message = str(stats["return_status"])
-    if message == _INTERRUPTED:
-        raise KeyboardInterrupt
-    z = np.array(found["x"]).ravel()
-    value = np.array(found["g"]).ravel()
-    objective = float(evaluate(z))
-    status = Status(
-        "Ipopt",
-        _WORDS.get(message, "failed") if np.isfinite(objective) else "failed",
-        message.replace("_", " "),
-        int(stats["iter_count"]),
-        seconds,
+    message, values = str(stats["return_status"]), compiled.split(array_of(result["x"]))
+    z = compiled.flat(values)
+    objective, gradient = compiled.objective_gradient(z)
+    rows, jacobian = compiled.constraint_jacobian(z)
+    # CasADi adds multipliers times constraints to the objective; here the objective grows by them.
+    of_rows = 0.0 - scales[0] * array_of(result["lam_g"]) / size
+    remaining = gradient - jacobian.T @ of_rows
+    fixed = compiled.lower == compiled.upper
+    of_bounds = np.where(fixed, remaining, 0.0 - scales[0] * array_of(result["lam_x"]))
+    relative = compiled.objective_scale(z)
+    gaps = np.concatenate(
+        [
+            _gaps(of_bounds, z, compiled.lower, compiled.upper),
+            _gaps(of_rows, rows, compiled.constraint_lower, compiled.constraint_upper),
+        ]
     )
-    bounds = np.array(found["lam_x"]).ravel() * size
-    multipliers = np.array(found["lam_g"]).ravel() * size
-    slope = np.array(gradient(z)).ravel()
-    jacobian = ca.Function("jtv", [form.unknowns], [ca.jacobian(form.constraints, form.unknowns)])
-    pull = np.array(jacobian(z)).T @ multipliers if len(multipliers) else 0.0
-    rest = slope + pull + bounds
-    over = [0.0, *(low - value), *(value - high), *((lower - z) * form.scale)]
+    broken = np.maximum(compiled.constraint_lower - rows, rows - compiled.constraint_upper) / size
+    violation = _largest(broken)
+    stationarity = _largest(np.abs(remaining - of_bounds)) / relative
+    complementarity = _largest(gaps) / relative
+    word = _word(message, violation, stationarity, complementarity)
     return Attempt(
-        z * form.scale,
-        objective if np.isfinite(objective) else float("inf"),
-        multipliers,
-        float(np.nanmax([*over, *((z - upper) * form.scale)])),
-        float(np.linalg.norm(rest) / max(np.linalg.norm(slope), 1e-300)),
-        status,
+        start,
+        values,
+        Status("Ipopt", word, message.replace("_", " "), int(stats["iter_count"]), seconds),
+        objective,
+        violation,
+        stationarity,
+        complementarity,
+        compiled.by_name(of_bounds / compiled.scale, of_rows),
     )
+
+
+def _word(message: str, violation: float, stationarity: float, complementarity: float) -> str:
+    """How it ended: Ipopt's word, checked against what was computed here at its last point."""
+    word, near = _WORDS.get(message, "failed"), max(violation, stationarity, complementarity)
+    if message in _STALLED and near <= _NEAR:
+        return "inaccurate"
+    if word == "solved" and near > _NEAR:
+        return "inaccurate" if stationarity <= _FAR else "failed"
+    return word
+
+
+def _gaps(
+    multipliers: np.ndarray, at: np.ndarray, lower: np.ndarray, upper: np.ndarray
+) -> np.ndarray:
+    """Products of multipliers and the distance from the bound that they belong to."""
+    distance = np.where(multipliers > 0, at - lower, upper - at)
+    # A free entry has a multiplier of rounding only, and no distance.
+    return np.abs(multipliers) * np.where(np.isfinite(distance), np.abs(distance), 0.0)
+
+
+def _rank(attempt: Attempt) -> tuple[bool, bool, float]:
+    """Solutions first, then what comes near the constraints, then the lowest objective."""
+    objective = attempt.objective if np.isfinite(attempt.objective) else np.inf
+    return (not attempt.status.ok, not attempt.violation <= _NEAR, objective)
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Raise what Ctrl-C raises once the solver has ended: CasADi ends it, and swallows the rest."""
+    handler = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(handler):
+        yield
+        return
+    caught: list[BaseException] = []
+
+    def note(number: int, frame: Any) -> None:
+        try:
+            handler(number, frame)
+        except BaseException as exception:
+            caught.append(exception)
+            raise
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if caught:
+            raise caught[0]
+
+
+def _largest(values: np.ndarray) -> float:
+    return float(np.max(values, initial=0.0))

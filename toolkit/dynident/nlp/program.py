@@ -1,35 +1,41 @@
-"""A nonlinear program in CasADi: to print, to inspect, to extend, and to solve with Ipopt."""
+"""A nonlinear program that can be printed, inspected, extended and solved."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
-import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynident.errors import FitError
-from dynident.nlp.blocks import Constraint, Cost, Residual, Variable
-from dynident.nlp.ipopt import Attempt, Transcription, run
-from dynident.nlp.status import Status
+from dynident.errors import ProgramError
+from dynident.nlp.blocks import Constraint, Cost, Residual, Variable, numbers_of
+from dynident.nlp.compiled import Compiled
+from dynident.nlp.ipopt import solve
+from dynident.nlp.solution import ProgramSolution
 from dynident.tables import Table, number, print_tables
 
 Block = Variable | Residual | Cost | Constraint
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Program:
-    """Minimise 1/2 sum |residual|^2 + sum of costs over variables under constraints.
+    """Minimise 1/2 sum |residual|^2 + sum of costs over named variables, under constraints.
 
-    Frozen: `program + block` is a new program.
+    A sum: `program + block` is a new program with a block more, and leaves the other as it was.
+    Variables come before what depends on them.
 
     Attributes
     ----------
-    title : what it poses.
+    title : what it identifies.
     blocks : variables, residuals, costs and constraints, in the order in which they were added.
+
+    Raises
+    ------
+    ProgramError
+        If a name occurs twice, or an expression depends on anything but the program's variables.
 
     Examples
     --------
@@ -42,28 +48,57 @@ class Program:
     blocks: tuple[Block, ...] = ()
 
     def __post_init__(self) -> None:
-        names = [block.name for block in self.blocks]
-        for name in names:
-            if names.count(name) > 1:
-                raise FitError("is in the program twice", name, "give it another name")
-        known = [v.symbol for v in self.variables]
-        for block in self.blocks:
-            if isinstance(block, Variable):
-                continue
-            for symbol in ca.symvar(ca.MX(block.expression)):
-                if not any(ca.is_equal(symbol, one) for one in known):
-                    mend = "add its Variable to the program first"
-                    raise FitError(f"depends on '{symbol.name()}'", block.name, mend)
+        import casadi as ca
 
-    def __add__(self, block: Block) -> Program:
-        return replace(self, blocks=(*self.blocks, block))
+        names = [block.name for block in self.blocks]
+        known = set()
+        for block in self.blocks:
+            if names.count(block.name) > 1:
+                mend = "Name it otherwise, or put it in place by `program.replacing(block)`"
+                raise ProgramError(f"{block.name} is in the program twice", self.title, mend)
+            if isinstance(block, Variable):
+                known.add(block.symbol.__hash__())
+                continue
+            for symbol in ca.symvar(block.expression):
+                if symbol.__hash__() not in known:
+                    what = f"{block.name} depends on {symbol.name()}, no variable of the program"
+                    raise ProgramError(what, self.title, f"Add the variable before {block.name}")
+
+    # --- with other blocks ---------------------------------------------------------------------
+
+    def __add__(self, addition: Block | tuple[Block, ...]) -> Program:
+        """Return the program with a block, or several, more."""
+        more = addition if isinstance(addition, tuple) else (addition,)
+        for block in more:
+            if not isinstance(block, Block):
+                what = f"{type(block).__name__} is nothing that a program is made of"
+                raise ProgramError(what, self.title, "Add a Variable, Residual, Cost or Constraint")
+        return replace(self, blocks=(*self.blocks, *more))
+
+    def replacing(self, block: Block) -> Program:
+        """Return the program with a block in place of the one of the same name."""
+        self[block.name]
+        return replace(
+            self, blocks=tuple(block if b.name == block.name else b for b in self.blocks)
+        )
+
+    def without(self, *names: str) -> Program:
+        """Return the program without the blocks of these names."""
+        for name in names:
+            self[name]
+        return replace(self, blocks=tuple(b for b in self.blocks if b.name not in names))
+
+    # --- inspection ----------------------------------------------------------------------------
 
     def __getitem__(self, name: str) -> Block:
         for block in self.blocks:
             if block.name == name:
                 return block
-        mend = f"blocks: {', '.join(block.name for block in self.blocks)}"
-        raise FitError(f"the program has no block '{name}'", mend=mend)
+        there = ", ".join(block.name for block in self.blocks) or "nothing"
+        raise ProgramError(f"{name} is not in the program", self.title, f"There is: {there}")
+
+    def __contains__(self, name: str) -> bool:
+        return any(block.name == name for block in self.blocks)
 
     @property
     def variables(self) -> tuple[Variable, ...]:
@@ -71,212 +106,149 @@ class Program:
         return tuple(b for b in self.blocks if isinstance(b, Variable))
 
     @property
-    def residuals(self) -> tuple[Residual, ...]:
-        """The rows of least squares."""
-        return tuple(b for b in self.blocks if isinstance(b, Residual))
-
-    @property
-    def costs(self) -> tuple[Cost, ...]:
-        """The other terms of the objective."""
-        return tuple(b for b in self.blocks if isinstance(b, Cost))
+    def terms(self) -> tuple[Residual | Cost, ...]:
+        """What the objective is the sum of."""
+        return tuple(b for b in self.blocks if isinstance(b, Residual | Cost))
 
     @property
     def constraints(self) -> tuple[Constraint, ...]:
-        """The constraints."""
+        """Rows between bounds."""
         return tuple(b for b in self.blocks if isinstance(b, Constraint))
 
-    def solve(
-        self,
-        starts: Sequence[Mapping[str, ArrayLike]] = ({},),
-        tolerance: float = 1e-9,
-        max_iterations: int = 500,
-    ) -> ProgramSolution:
-        """Solve with Ipopt and exact Hessian, from one or several starts; the best one is kept.
-
-        Parameters
-        ----------
-        starts : values of variables by name; what is not named starts where its `Variable` says.
-        tolerance : of Ipopt, on the scaled program.
-        max_iterations : from each start.
-
-        Returns
-        -------
-        ProgramSolution
-            Also where no start succeeded: its status says so.
-
-        Raises
-        ------
-        FitError
-            If a start does not fit the variables, or there is nothing to solve.
-        """
-        if not self.variables or not (self.residuals or self.costs):
-            raise FitError("has no variables or no objective", self.title, "add them")
-        form = Transcription.of(self.variables, self.residuals, self.costs, self.constraints)
-        attempts = tuple(
-            run(form, self._start(start), tolerance, max_iterations) for start in starts
-        )
-        best = min(attempts, key=lambda a: (not a.status.ok, a.objective))
-        return self._solution(form, best, attempts)
-
-    def _start(self, given: Mapping[str, ArrayLike]) -> np.ndarray:
-        names = [v.name for v in self.variables]
-        for name in given:
-            if name not in names:
-                raise FitError(f"no variable '{name}'", "start", f"variables: {', '.join(names)}")
-        parts = []
-        for variable in self.variables:
-            value = np.asarray(given.get(variable.name, variable.start), dtype=float)
-            if value.shape not in ((), (variable.size,)) or not np.all(np.isfinite(value)):
-                what = f"has shape {value.shape} or is not finite"
-                raise FitError(what, f"start of {variable.name}", f"give {variable.size} numbers")
-            parts.append(np.broadcast_to(value, (variable.size,)))
-        return np.concatenate(parts)
-
-    def _solution(
-        self, form: Transcription, best: Attempt, attempts: tuple[Attempt, ...]
-    ) -> ProgramSolution:
-        values, start = {}, 0
-        for variable in self.variables:
-            values[variable.name] = best.x[start : start + variable.size]
-            start += variable.size
-        multipliers, start = {}, 0
-        for constraint in self.constraints:
-            rows = len(np.asarray(constraint.lower))
-            multipliers[constraint.name] = best.multipliers[start : start + rows]
-            start += rows
-        terms = (*self.residuals, *self.costs)
-        parts = dict(zip((t.name for t in terms), form.terms(best.x), strict=True))
-        return ProgramSolution(
-            self,
-            best.status,
-            values,
-            best.objective,
-            parts,
-            best.violation,
-            best.stationarity,
-            multipliers,
-            attempts,
-        )
-
-    # --- in words ------------------------------------------------------------------------------
+    @property
+    def size(self) -> int:
+        """Number of unknown numbers."""
+        return sum(v.size for v in self.variables)
 
     @property
     def objective(self) -> str:
         """The objective, in words."""
-        terms = [f"1/2 |{r.name}|^2" for r in self.residuals] + [c.name for c in self.costs]
-        return "minimise " + " + ".join(terms)
+        return "minimise " + (" + ".join(t.term for t in self.terms) or "nothing: any such point")
 
-    def tables(self) -> tuple[Table | str, ...]:
-        """Everything that `show` prints, in its order."""
-        variables = tuple(
-            (v.name, str(v.size), _units(v.unit), _range(v.lower, v.upper), _span(v.start))
-            for v in self.variables
-        )
-        terms = tuple(
-            (t.name, "residual" if isinstance(t, Residual) else "cost", _rows(t), _unit(t))
-            for t in (*self.residuals, *self.costs)
-        )
-        constraints = tuple(
-            (c.name, _rows(c), _range(c.lower, c.upper), c.unit) for c in self.constraints
-        )
-        columns = ("variable", "size", "unit", "bounds", "start")
-        found = [Table(f"{self.title}: {self.objective}", columns, variables)]
-        found.append(Table("Terms of the objective", ("term", "kind", "rows", "unit"), terms))
-        if constraints:
-            headings = ("constraint", "rows", "bounds", "unit")
-            found.append(Table("Constraints", headings, constraints))
-        return tuple(found)
-
-    def __str__(self) -> str:
-        return "\n".join(str(part) for part in self.tables())
-
-    def show(self) -> None:
-        """Print variables, terms of the objective, and constraints."""
-        print_tables(*self.tables())
-
-
-@dataclass(frozen=True, eq=False)
-class ProgramSolution:
-    """What Ipopt found.
-
-    Attributes
-    ----------
-    program : what was solved.
-    status : how it ended; look at it.
-    values : each variable's, by name.
-    objective : at them.
-    parts : what each residual and cost contributes to the objective.
-    violation : largest violation of a constraint or bound, in the constraints' units.
-    stationarity : norm of the Lagrangian's gradient over that of the objective, variables in
-        units of their scale.
-    multipliers : of each constraint, by name; positive where its upper bound holds.
-    attempts : from each start.
-    """
-
-    program: Program
-    status: Status
-    values: dict[str, np.ndarray]
-    objective: float
-    parts: dict[str, float]
-    violation: float
-    stationarity: float
-    multipliers: dict[str, np.ndarray]
-    attempts: tuple[Attempt, ...]
-
-    def require(self) -> ProgramSolution:
-        """Return the solution, if it is one.
+    def point(self, values: Mapping[str, ArrayLike] | None = None) -> dict[str, np.ndarray]:
+        """Values of all variables: those given, moved within the bounds; the others at their start.
 
         Raises
         ------
-        FitError
-            If the solver did not succeed from any start.
+        ProgramError
+            If a name is unknown, a shape is wrong, or a number is missing.
         """
-        if not self.status.ok:
-            mend = "try other starts or bounds"
-            raise FitError(f"was not solved ({self.status})", self.program.title, mend)
-        return self
+        given = dict(values or {})
+        found = {}
+        for variable in self.variables:
+            value = given.pop(variable.name, variable.start)
+            where = f"variable {variable.name}"
+            numbers = numbers_of(value, variable.size, where, "start")
+            if not np.all(np.isfinite(numbers)):
+                raise ProgramError("start is infinite", where)
+            found[variable.name] = np.clip(numbers, variable.lower, variable.upper)
+        if given:
+            there = ", ".join(v.name for v in self.variables)
+            what = f"{next(iter(given))} is no variable"
+            raise ProgramError(what, self.title, f"There is: {there}")
+        return found
 
-    def tables(self) -> tuple[Table | str, ...]:
-        """Everything that `show` prints, in its order."""
-        rows = tuple(
-            (name, number(value, 6), f"{value / self.objective:.1%}" if self.objective else "")
-            for name, value in self.parts.items()
-        )
-        notes = (
-            f"{self.status}; constraints broken by {self.violation:.1e}, stationarity "
-            f"{self.stationarity:.1e}.",
-            "Objective from each start: "
-            + ", ".join(f"{number(a.objective, 6)} ({a.status.word})" for a in self.attempts),
-        )
-        title = f"Objective {number(self.objective, 8)}"
-        return (Table(title, ("term", "value", "share"), rows, notes),)
+    def evaluate(
+        self, expression: Any, values: Mapping[str, ArrayLike] | None = None
+    ) -> np.ndarray:
+        """An expression of the program's symbols at given values (default: at the start)."""
+        import casadi as ca
+
+        at = self.point(values)
+        symbols = [v.symbol for v in self.variables]
+        function: Any = ca.Function("evaluate", symbols, [ca.MX(expression)])
+        result = np.array(function(*(at[v.name] for v in self.variables)).full())
+        return result[:, 0] if result.shape[1] == 1 else result
+
+    def tables(self) -> tuple[Table, ...]:
+        """Variables, objective and constraints, as they are to be read."""
+        variables = tuple(_variable_row(v) for v in self.variables)
+        columns = ("variable", "size", "unit", "bounds", "start", "scale")
+        terms = tuple((t.name, _kind(t), str(t.rows), t.unit or "-") for t in self.terms)
+        shown = [
+            Table(f"{self.title}: {self.size} unknowns", columns, variables),
+            Table("Objective", ("term", "kind", "rows", "unit"), terms, (self.objective,)),
+        ]
+        if self.constraints:
+            rows = tuple(
+                (c.name, str(c.rows), c.unit or "-", _bounds(c.lower, c.upper))
+                for c in self.constraints
+            )
+            shown.append(Table("Constraints", ("constraint", "rows", "unit", "bounds"), rows))
+        return tuple(shown)
 
     def show(self) -> None:
-        """Print the objective's parts and how the solver ended."""
+        """Print the program to the terminal."""
         print_tables(*self.tables())
 
+    def __str__(self) -> str:
+        return "\n".join(str(table) for table in self.tables())
 
-def _rows(block: Residual | Cost | Constraint) -> str:
-    return str(ca.MX(block.expression).numel())
+    def _repr_html_(self) -> str:
+        return "".join(table._repr_html_() for table in self.tables())
+
+    # --- solution ------------------------------------------------------------------------------
+
+    @cached_property
+    def compiled(self) -> Compiled:
+        """The program in the solver's variables; made once, whatever the starts."""
+        return Compiled.of(self)
+
+    def solve(
+        self,
+        starts: Sequence[Mapping[str, ArrayLike]] | None = None,
+        tolerance: float = 1e-10,
+        max_iterations: int = 500,
+    ) -> ProgramSolution:
+        """Solve the program by Ipopt with exact Hessian.
+
+        A start that fails raises nothing: ask `status`, or call `ProgramSolution.require`.
+
+        Parameters
+        ----------
+        starts : values of variables by name, one mapping per start; what is not named starts where
+            the variable says. The best solution wins. Default: one start.
+        tolerance : Ipopt's, on the scaled program.
+        max_iterations : of each start.
+
+        Raises
+        ------
+        ProgramError
+            If there is no variable, or a start does not suit the variables.
+        """
+        return solve(self, starts, tolerance, max_iterations)
 
 
-def _unit(term: Residual | Cost) -> str:
-    return term.unit if isinstance(term, Residual) else ""
+def _kind(term: Residual | Cost) -> str:
+    return "residual" if isinstance(term, Residual) else "cost"
 
 
-def _units(unit: str | tuple[str, ...]) -> str:
-    return unit if isinstance(unit, str) else ", ".join(dict.fromkeys(unit))
+def _variable_row(variable: Variable) -> tuple[str, ...]:
+    return (
+        variable.name,
+        str(variable.size),
+        ", ".join(dict.fromkeys(variable.unit)) or "-",
+        _bounds(variable.lower, variable.upper),
+        _range(variable.start),
+        _range(variable.scale),
+    )
 
 
-def _range(lower: Any, upper: Any) -> str:
-    low, high = float(np.min(lower, initial=math.inf)), float(np.max(upper, initial=-math.inf))
-    if np.array_equal(lower, upper):
-        return f"= {_span(lower)}"
-    if low == -math.inf and high == math.inf:
-        return "free"
-    return f"{number(low, 4)} to {number(high, 4)}"
+def _bounds(lower: np.ndarray, upper: np.ndarray) -> str:
+    """Bounds in a cell; those of several entries by their extremes."""
+    if np.all(lower == upper):
+        return f"= {_range(lower)}"
+    low, high = float(lower.min()), float(upper.max())
+    if low == -np.inf and high == np.inf:
+        free = np.all(np.isinf(lower) & np.isinf(upper))
+        return "free" if free else "some entries bounded"
+    if high == np.inf:
+        return f">= {number(low)}"
+    if low == -np.inf:
+        return f"<= {number(high)}"
+    return f"{number(low)} to {number(high)}"
 
 
-def _span(values: Any) -> str:
-    low, high = float(np.min(values)), float(np.max(values))
-    return number(low, 4) if low == high else f"{number(low, 4)} to {number(high, 4)}"
+def _range(values: np.ndarray) -> str:
+    low, high = number(float(values.min())), number(float(values.max()))
+    return low if low == high else f"{low} to {high}"
