@@ -259,11 +259,11 @@ class Estimate:
         return write(self.robot, path)
 
     def inconsistent_links(self) -> tuple[str, ...]:
-        """Moving bodies of `robot` whose inertial parameters no rigid body can have."""
-        theta = self.robot.theta.reshape(-1, 10)
-        bodies = (name.partition(".")[2] for name in self.robot.parameter_names[::10])
+        """Moving links of `robot` whose inertial parameters no rigid body can have."""
         return tuple(
-            body for body, phi in zip(bodies, theta, strict=True) if not margins(phi).consistent
+            link.name
+            for link in self.robot.links
+            if link.joint >= 0 and not margins(link.phi).consistent
         )
 
 

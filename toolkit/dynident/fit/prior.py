@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scipy.linalg import eigh
 
 from dynident.errors import FitError
-from dynident.inertia import distance_rows
+from dynident.inertia import distance_rows, pseudo_inertia
 from dynident.nlp import Entropy, ParameterSpace
 from dynident.robot import Robot
 
@@ -17,6 +18,9 @@ _EFFECTS = 100.0
 
 Descriptions say nothing of effects; this holds them only where no data do.
 """
+
+_THIN = 1e-4
+"""Second moment relative to that of a body of the link's size, below which a link is too thin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +71,24 @@ class Prior:
         return A, A @ centre
 
     def entropy(self, space: ParameterSpace) -> Entropy | None:
-        """The log-det divergence, if that is the distance; a broken link is replaced by a body of
-        its size.
+        """The log-det divergence, if that is the distance.
+
+        Its centre is the description; a link that is broken, or so thin that every other body is
+        infinitely far from it, is replaced by a body of its size.
         """
         if self.distance == "quadratic":
             return None
-        return Entropy(self.spread**-2, space.references)
+        given = space.given[: space.rigid].reshape(-1, 10)
+        centres = [
+            phi if _solid(phi, reference) else reference
+            for phi, reference in zip(given, space.references, strict=True)
+        ]
+        return Entropy(self.spread**-2, np.array(centres))
+
+
+def _solid(phi: np.ndarray, reference: np.ndarray) -> bool:
+    """Whether a body has mass, and extent along every axis."""
+    if not np.all(np.isfinite(phi)):
+        return False
+    P, Q = pseudo_inertia(phi), pseudo_inertia(reference)
+    return bool(eigh(P, Q, eigvals_only=True)[0] > _THIN)

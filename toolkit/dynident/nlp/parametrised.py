@@ -170,8 +170,10 @@ def pose(problem: Problem) -> Posed:
         parts.append(variable.symbol)
     x = ca.vertcat(*parts)
     # Numbers of the size of one before they meet the rows: sums of squares keep their digits.
-    rows = ca.DM(problem.A * space.scale) @ (x / space.scale) - ca.DM(problem.b)
-    program = program + Residual("data and prior", rows, unit="noise")
+    rows = problem.A * space.scale
+    program = program + Residual.linear(
+        "data and prior", rows, x / space.scale, problem.b, unit="noise"
+    )
     if problem.entropy is not None:
         program = program + Cost("entropic prior", _entropy(problem, x))
     return Posed(_constrained(program, problem, x), x, problem, chosen)
