@@ -17,8 +17,8 @@ import time
 import numpy as np
 
 from dynident.fit.consistent import Solver, solve
+from dynident.fit.posterior import sized
 from dynident.fit.prior import Prior
-from dynident.fit.projection import sized
 from dynident.model import Model
 from dynident.nlp import Consistency, ParameterSpace, Problem, Within
 from dynident.robot import Robot

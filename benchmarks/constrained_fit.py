@@ -31,8 +31,8 @@ import numpy as np
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
 from dynident.fit.consistent import solve
+from dynident.fit.posterior import sized
 from dynident.fit.prior import Prior
-from dynident.fit.projection import sized
 from dynident.inertia import pseudo_inertia
 from dynident.model import Model
 from dynident.nlp import ParameterSpace, Problem, Within

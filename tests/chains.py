@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from dynident.fit import Estimate, LeastSquares, Prior, fit
-from dynident.fit.projection import sized
+from dynident.fit.posterior import sized
 from dynident.inertia import PARAMETERS, UNITS, distance_rows, from_pseudo_inertia, reference_body
 from dynident.model import Model
 from dynident.nlp import ParameterSpace, Problem, Within

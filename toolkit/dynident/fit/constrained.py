@@ -15,8 +15,9 @@ from dynident.fit.factors import Factors, factorise
 from dynident.fit.given import prior_model
 from dynident.fit.least_squares import LeastSquares, estimate_of, solve_factors
 from dynident.fit.metric import Metric
+from dynident.fit.posterior import believed, sized
 from dynident.fit.prior import Prior
-from dynident.fit.projection import believed, project, sized
+from dynident.fit.projection import project
 from dynident.fit.sampling import rows
 from dynident.model import Model
 from dynident.nlp import ParameterSpace, Problem, Within

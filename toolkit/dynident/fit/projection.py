@@ -14,11 +14,12 @@ from dynident.fit.consistent import Answer, Solver, require_solver, solve, trivi
 from dynident.fit.estimate import Estimate
 from dynident.fit.given import given_estimate, prior_model
 from dynident.fit.metric import Metric
+from dynident.fit.posterior import mapping_of, posterior
 from dynident.fit.prior import Prior
 from dynident.fit.separable import solve_apart
 from dynident.inertia import distance_rows, margins
 from dynident.model import Model
-from dynident.nlp import Certificate, ParameterSpace, Problem, Vanishing, Within
+from dynident.nlp import Certificate, ParameterSpace, Problem, Within
 from dynident.robot import Robot
 from dynident.robot.write import write
 from dynident.tables import Table, number, print_tables
@@ -33,8 +34,8 @@ class Projection:
     ----------
     estimate : the projected estimate; its `links` are the new inertial parameters.
     before : what was projected.
-    space : the standard parameters.
-    x, x_before : (s,) after and before.
+    problem : whose answer it is: `nlp.pose` makes a program of it that can be extended.
+    x, x_before : (s,) standard parameters, after and before.
     certificate : that it is the nearest.
     metric : in which it is, None where only the prior's metric was there.
     prior : what decided where the metric does not.
@@ -43,13 +44,18 @@ class Projection:
 
     estimate: Estimate
     before: Estimate
-    space: ParameterSpace
+    problem: Problem
     x: np.ndarray
     x_before: np.ndarray
     certificate: Certificate
     metric: Metric | None
     prior: Prior
     notes: tuple[str, ...]
+
+    @property
+    def space(self) -> ParameterSpace:
+        """The standard parameters."""
+        return self.problem.space
 
     @property
     def robot(self) -> Robot:
@@ -74,7 +80,7 @@ class Projection:
             return None
         step = (
             self.metric.R
-            @ _mapping(self.space, self.metric, self.before.names)
+            @ mapping_of(self.space, self.metric, self.before.names)
             @ (self.x - self.x_before)
         )
         return float(np.linalg.norm(step) / np.sqrt(self.metric.rows))
@@ -176,7 +182,7 @@ def project(
     x_hat = _standard(before, model, space)
     if metric is None and before.rows:
         metric = Metric.of_estimate(before)
-    problem, notes = _problem(space, x_hat, before.names, prior, metric, within)
+    problem, notes = posterior(space, x_hat, before.names, prior, metric, within)
     if problem.feasible(x_hat):
         answer = trivial(problem, x_hat)
     elif metric is None and not within.sets and within.consistency != "none":
@@ -209,79 +215,6 @@ def _standard(before: Estimate, model: Model, space: ParameterSpace) -> np.ndarr
     return x
 
 
-def _problem(
-    space: ParameterSpace,
-    x_hat: np.ndarray,
-    names: tuple[str, ...],
-    prior: Prior,
-    metric: Metric | None,
-    within: Within,
-) -> tuple[Problem, tuple[str, ...]]:
-    if metric is None:
-        # The divergence from a body that cannot be is infinite; the quadratic is its second order.
-        A, b = replace(prior, distance="quadratic").rows(space, x_hat)
-        notes = ("No data: nearest under the prior's own quadratic metric, link by link.",)
-        return Problem(space, A, b, within), notes
-    mapping = _mapping(space, metric, names)
-    space = sized(space, metric.R @ mapping, metric.rows, x_hat)
-    rows = metric.R @ mapping
-    centre, notes = believed(space, x_hat)
-    held, held_at = prior.rows(space, centre)
-    off = [metric.names.index(name) for name in metric.irrelevant]
-    if off:
-        within = replace(within, sets=(*within.sets, Vanishing(mapping[off])))
-        notes = (*notes, f"Irrelevant, and kept at zero: {', '.join(metric.irrelevant)}.")
-    A, b = np.vstack([rows, held]), np.concatenate([rows @ x_hat, held_at])
-    return Problem(space, A, b, within, prior.entropy(space)), (*metric.notes, *notes)
-
-
-def _mapping(space: ParameterSpace, metric: Metric, names: tuple[str, ...]) -> np.ndarray:
-    """From standard parameters to those of the metric; `names` are the model's."""
-    if metric.names == space.names:
-        return np.eye(space.size)
-    if metric.names == names:
-        return space.combination
-    what = f"the metric's {len(metric.names)} parameters are not those of the estimate"
-    mend = f"state it for the model's {len(names)} ({names[0]}, ...), or all {space.size} standard"
-    raise FitError(what, mend=mend)
-
-
-def sized(space: ParameterSpace, rows: np.ndarray, count: int, x_hat: np.ndarray) -> ParameterSpace:
-    """The space with sizes of the effects' parameters: what makes a torque like the noise.
-
-    Parameters
-    ----------
-    rows : (r, s) of the data, in units of noise.
-    count : equations behind them.
-    x_hat : (s,) whose effects are taken as their size where no data show them.
-    """
-    norms = np.linalg.norm(rows[:, space.rigid :], axis=0)
-    values = np.abs(x_hat[space.rigid :])
-    fallback = np.where(values > 0, values, 1.0)
-    seen = norms > 0
-    root = np.sqrt(max(count, len(rows), 1))
-    sizes = np.where(seen, root / np.where(seen, norms, 1.0), fallback)
-    return space.sized(sizes)
-
-
-def believed(space: ParameterSpace, x_hat: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
-    """The centre of a prior (s,): the description, broken links replaced by bodies of their size.
-
-    Of the effects the description says nothing: their centre is what data say.
-    """
-    centre = np.concatenate([space.given[: space.rigid], x_hat[space.rigid :]])
-    replaced = []
-    for k, body in enumerate(space.bodies):
-        part = slice(10 * k, 10 * k + 10)
-        if not margins(centre[part]).consistent:
-            centre[part] = space.references[k]
-            replaced.append(body)
-    if not replaced:
-        return centre, ()
-    words = f"The prior's own links are impossible: {', '.join(replaced)}."
-    return centre, (f"{words} It believes in bodies of their size instead.",)
-
-
 def _projection(
     answer: Answer,
     before: Estimate,
@@ -312,7 +245,7 @@ def _projection(
     return Projection(
         estimate,
         before,
-        space,
+        problem,
         x,
         x_hat,
         answer.certificate,
