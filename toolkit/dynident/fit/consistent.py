@@ -8,7 +8,15 @@ from typing import Literal
 import numpy as np
 
 from dynident.errors import FitError
-from dynident.nlp import Bound, Certificate, Problem, Status, certify, lower_bound, solve_conic
+from dynident.nlp import (
+    Certificate,
+    Problem,
+    Status,
+    certify,
+    lower_bound,
+    solve_conic,
+    unconstrained_bound,
+)
 
 Solver = Literal["conic", "nlp"]
 """conic: Clarabel, finds the optimum; nlp: Ipopt over parameters that are consistent whatever
@@ -54,8 +62,7 @@ def solve(problem: Problem, solver: Solver, stay: np.ndarray | None = None) -> A
     free = problem.unconstrained
     if free is not None and problem.feasible(free):
         status = Status("least squares", "solved", "no constraint is active", 0, 0.0)
-        # No point at all has a smaller objective.
-        bound = Bound(problem.objective(free), 0.0, 0.0)
+        bound = unconstrained_bound(problem, free)
         return Answer(free, certify(problem, free, status, "linear least squares", bound))
     conic = solve_conic(problem)
     _require(conic.status, problem)
@@ -70,6 +77,7 @@ def solve(problem: Problem, solver: Solver, stay: np.ndarray | None = None) -> A
     if not np.all(np.isfinite(found.x)) or not found.inside:
         _require(found.status, problem)
     x = _kept(problem, problem.retracted(found.x), stay)
+    bound = replace(bound, stationarity=found.solution.stationarity)
     certificate = certify(problem, x, found.status, found.program, bound, found.objectives)
     return Answer(x, certificate)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from dynident.errors import FitError
 from dynident.fit.active import active_set
-from dynident.fit.consistent import Solver, solve
+from dynident.fit.consistent import Solver, require_solver, solve
 from dynident.fit.estimate import Estimate
 from dynident.fit.factors import Factors, factorise
 from dynident.fit.given import prior_model
@@ -48,6 +48,12 @@ class Constrained:
     solver: Solver = "conic"
     weighting: Literal["joint", "none"] = "joint"
     name: ClassVar[str] = "constrained least squares"
+
+    def __post_init__(self) -> None:
+        require_solver(self.solver)
+        if not isinstance(self.within, Within):
+            mend = 'give Within("full") or Within("semi")'
+            raise FitError(f"a {type(self.within).__name__} is no set", "within", mend)
 
     @single_threaded
     def fit(self, model: Model, dataset: Dataset) -> Estimate:

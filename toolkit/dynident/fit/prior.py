@@ -37,9 +37,9 @@ class Prior:
     distance : "quadratic" in the pseudo-inertia of the description (`inertia.distance_rows`), or
         "entropic", the log-det divergence of pseudo-inertias, which grows without bound towards
         bodies that cannot be and therefore keeps off the boundary.
-    spread : relative standard deviation of mass and second moments, and of the centre of mass in
-        units of the radius of gyration. 0.3 suits drawings and data sheets; weighed links deserve
-        0.05, guessed ones 1.
+    spread : relative standard deviation of mass and second moments; that of the centre of mass is
+        0.7 times as much of the radius of gyration. 0.3 suits drawings and data sheets; weighed
+        links deserve 0.05, guessed ones 1.
     """
 
     robot: Robot
@@ -47,6 +47,9 @@ class Prior:
     spread: float = 0.3
 
     def __post_init__(self) -> None:
+        if not isinstance(self.robot, Robot):
+            mend = "give a Robot: Robot.from_file(...)"
+            raise FitError(f"a {type(self.robot).__name__} is no prior", mend=mend)
         if self.distance not in ("quadratic", "entropic"):
             mend = "choose quadratic or entropic"
             raise FitError(f"no distance '{self.distance}' of a prior", mend=mend)

@@ -73,8 +73,8 @@ class Projection:
 
     @property
     def misfit(self) -> float | None:
-        """What the move adds to the torque residual, in units of the noise: root mean square over
-        the equations; None without data.
+        """What the move changes in the predicted torque, in units of the noise: root mean square
+        over the equations; None without data.
         """
         if self.metric is None or self.metric.rows == 0:
             return None
@@ -103,8 +103,8 @@ class Projection:
         notes = ["Moved: distance in units of the link's own size (0.2: all parameters by 10 %)."]
         if self.misfit is not None:
             notes.append(
-                f"On the data behind the metric the torque residual grows by "
-                f"{number(self.misfit, 3)} of the noise."
+                f"On the data behind the metric the predicted torque moves by "
+                f"{number(self.misfit, 3)} of the noise (root mean square)."
             )
         columns = ("link", "moved", "mass, kg", "broke", "margin now")
         return Table("Links before and after", columns, tuple(rows), tuple(notes))
@@ -136,7 +136,10 @@ class Projection:
         return {
             "links": links,
             "metric": self.metric.source if self.metric else None,
-            "prior": {"distance": self.prior.distance, "spread": self.prior.spread},
+            "prior": {
+                "distance": self.prior.distance if self.metric else "quadratic",
+                "spread": self.prior.spread,
+            },
             "misfit": self.misfit,
             "certificate": self.certificate.to_dict(),
             "notes": list(self.notes),
@@ -174,6 +177,8 @@ def project(
     """
     require_solver(solver)
     within = within or Within()
+    _require_kind("within", within, Within)
+    _require_kind("metric", metric, Metric | None)
     before = _estimate(what)
     if not isinstance(prior, Prior):
         prior = Prior(prior or before.model.robot)
@@ -192,10 +197,21 @@ def project(
     return _projection(answer, before, problem, x_hat, metric, prior, notes)
 
 
+def _require_kind(name: str, value: object, kind: Any) -> None:
+    if not isinstance(value, kind):
+        wanted = getattr(kind, "__name__", "Metric")
+        raise FitError(f"a {type(value).__name__} where a {wanted} is needed", name)
+
+
 def _estimate(what: Estimate | Robot | Projection) -> Estimate:
     if isinstance(what, Projection):
         return what.estimate
-    return given_estimate(what) if isinstance(what, Robot) else what
+    if isinstance(what, Robot):
+        return given_estimate(what)
+    if not isinstance(what, Estimate):
+        mend = "give an Estimate, a Robot or a Projection"
+        raise FitError(f"a {type(what).__name__} cannot be projected", mend=mend)
+    return what
 
 
 def _standard(before: Estimate, model: Model, space: ParameterSpace) -> np.ndarray:

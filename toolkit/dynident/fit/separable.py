@@ -82,8 +82,7 @@ def _solve_one(problem: Problem, solver: Solver, x_hat: np.ndarray) -> Answer:
     if problem.body_violation(x_hat) == 0 and problem.feasible(edge):
         # On the edge already (an inertia without mass): as far inside as rounding demands.
         status = Status("none", "solved", "on the edge already", 0, 0.0)
-        bound = Bound(problem.objective(edge), 0.0, 0.0)
-        return Answer(edge, certify(problem, edge, status, "a step off the edge", bound))
+        return Answer(edge, certify(problem, edge, status, "a step off the edge", None))
     return solve(problem, solver, x_hat)
 
 

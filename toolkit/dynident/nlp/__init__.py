@@ -10,7 +10,13 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from dynident.nlp.certificate import Bound, Certificate, certify, lower_bound
+from dynident.nlp.certificate import (
+    Bound,
+    Certificate,
+    certify,
+    lower_bound,
+    unconstrained_bound,
+)
 from dynident.nlp.conic import ConicProgram, ConicSolution, Multipliers, pose_conic, solve_conic
 from dynident.nlp.nearest import nearest_body
 from dynident.nlp.problem import Entropy, Problem
@@ -102,4 +108,5 @@ __all__ = [
     "solve_conic",
     "solve_nonlinear",
     "stated_links",
+    "unconstrained_bound",
 ]

@@ -6,15 +6,16 @@ found them; the bound below is computed in plain arithmetic and does not trust a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from dynident.inertia import distance_rows, margins
+from dynident.inertia import distance_rows
 from dynident.nlp.conic import Multipliers, cone_rows, cone_values
 from dynident.nlp.problem import TOLERANCE, Problem
+from dynident.nlp.sets import Within
 from dynident.nlp.status import Status
 from dynident.tables import Table, number
 
@@ -48,15 +49,18 @@ class Certificate:
 
     Attributes
     ----------
-    notion : of consistency that was asked for, in words.
+    notion : of consistency that was asked for, in words, and how far inside the set ends.
     program : how it was found.
     objective : of the answer.
     bound : below which no answer can be; NaN where there is none.
-    gap : (objective - bound) / bound, or over what is next to nothing where the bound is less.
-    stationarity, dual_feasibility : see `Bound`.
+    nothing : an objective next to nothing, in which the gap is counted where the bound is less.
+    gap : (objective - bound) / bound, or over `nothing`.
+    stationarity : of the answer, see `Bound`; of a nonlinear program in its own variables; NaN
+        where it was not computed.
+    dual_feasibility : of the multipliers that prove the bound; NaN where there are none.
     violation : how far the answer breaks a constraint, relative to the sizes of parameters.
-    worst_margin : the body with the smallest margin, the rule, and the margin relative to the
-        body's parameters.
+    worst_margin : the body that is nearest to the boundary, the matrix that says so, and its
+        smallest eigenvalue in units of the body's size.
     starts : objective reached from each start that was tried; empty where none is needed.
     status : the solver's.
     """
@@ -65,6 +69,7 @@ class Certificate:
     program: str
     objective: float
     bound: float
+    nothing: float
     gap: float
     stationarity: float
     dual_feasibility: float
@@ -91,7 +96,10 @@ class Certificate:
 
     @property
     def _gap(self) -> str:
-        return f"{max(self.gap, 0.0):.1e} of the objective"
+        excess = max(self.objective - self.bound, 0.0)
+        if abs(self.bound) < self.nothing:
+            return f"{excess:.1e}, where {self.nothing:.1e} is next to nothing"
+        return f"{excess / abs(self.bound):.1e} of the objective"
 
     def table(self) -> Table:
         """The certificate as a table."""
@@ -101,12 +109,12 @@ class Certificate:
             ("set", self.notion),
             ("program", f"{self.program}; {self.status}"),
             ("objective", number(self.objective, 8)),
-            ("lower bound (conic)", number(self.bound, 8)),
-            ("gap", f"{self.gap:.1e}"),
-            ("stationarity", f"{self.stationarity:.1e}"),
-            ("dual feasibility", f"{self.dual_feasibility:.1e}"),
-            ("constraints broken by", f"{self.violation:.1e}"),
-            ("smallest margin", f"{value:.1e} of its size ({rule} of {body})"),
+            ("lower bound", number(self.bound, 8)),
+            ("gap", _figure(self.gap)),
+            ("stationarity", _figure(self.stationarity)),
+            ("dual feasibility of the bound", _figure(self.dual_feasibility)),
+            ("constraints broken by", _figure(self.violation)),
+            ("smallest margin", f"{_figure(value)} of its size ({rule} of {body})"),
             *((("objective from each start", starts),) if self.starts else ()),
         )
         return Table("Certificate", ("", ""), rows, (self.sentence,))
@@ -129,6 +137,10 @@ class Certificate:
             "starts": list(self.starts),
             "status": {"solver": self.status.solver, "word": self.status.word},
         }
+
+
+def _figure(value: float) -> str:
+    return "-" if np.isnan(value) else f"{value:.1e}"
 
 
 def lower_bound(problem: Problem, x: np.ndarray, multipliers: Multipliers) -> Bound:
@@ -179,16 +191,19 @@ def certify(
     step = 2.0 * problem.A @ problem.inset
     nothing = max(1e-18 * float(problem.b @ problem.b), 0.5 * float(step @ step))
     least = max(nothing / OPTIMAL, np.finfo(float).tiny)
-    if problem.entropy is None and objective <= nothing:
-        bound = Bound(0.0, 0.0, 0.0)
+    if problem.entropy is None and objective <= nothing and bound is None:
+        bound = Bound(0.0, float("nan"), float("nan"))  # a sum of squares is not negative
     value = bound.value if bound else float("nan")
     excess = objective - value
     gap = excess / max(abs(value), least)
+    within = problem.within
+    inside = f", each link {within.inset:.0e} of its size inside" if within.inset else ""
     return Certificate(
-        problem.within.notion,
+        within.notion + (inside if within.consistency != "none" else ""),
         program,
         objective,
         value,
+        least,
         float(gap),
         bound.stationarity if bound else float("nan"),
         bound.dual_feasibility if bound else float("nan"),
@@ -200,12 +215,21 @@ def certify(
 
 
 def _worst(problem: Problem, x: np.ndarray) -> tuple[str, str, float]:
-    found = []
-    for k, body in enumerate(problem.space.bodies):
-        margin = margins(x[10 * k : 10 * k + 10])
-        rule, value = margin.worst
-        found.append((body, rule, value / (margin.scale or 1.0)))
-    return min(found, key=lambda one: one[2])
+    semi = problem.within.consistency == "semi"
+    judged = problem if semi else replace(problem, within=Within("full"))
+    least = np.linalg.eigvalsh(judged.body_matrices(x))[:, 0]
+    k = int(np.argmin(least))
+    matrix = "spatial inertia" if semi else "pseudo-inertia"
+    return problem.space.bodies[k], matrix, float(least[k])
+
+
+def unconstrained_bound(problem: Problem, x: np.ndarray) -> Bound:
+    """The bound that a minimiser x (s,) without constraints is: none with constraints is lower."""
+    scale = problem.space.scale
+    parts = scale * (problem.A.T @ (problem.A @ x)), scale * (problem.A.T @ problem.b)
+    size = float(np.linalg.norm(parts[0]) + np.linalg.norm(parts[1])) or 1.0
+    rest = float(np.linalg.norm(parts[0] - parts[1]))
+    return Bound(problem.objective(x), rest / size, float("nan"))
 
 
 def _pull(

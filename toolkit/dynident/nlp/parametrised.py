@@ -31,6 +31,7 @@ from dynident.nlp.status import Status
 
 _AGREE = 1e-6  # of the objective: starts that end as near as this have found the same
 _INWARD = 0.1  # share of the reference body in a start, which is to lie well inside
+_OFF = 1e-5  # share of the reference body in a start from an answer, which may be a flat one
 _RANDOM = 4  # random starts at most, where the first ones do not agree
 _SPREAD = 0.5  # of a random start about the reference, in units of a body's size
 
@@ -112,11 +113,13 @@ class Posed:
         return np.array(function(*(values[v.name] for v in self.program.variables))).ravel()
 
     def start(self, x: np.ndarray) -> dict[str, np.ndarray]:
-        """The variables' values at standard parameters x (s,) that lie well inside."""
+        """The variables' values at, or a little inside of, standard parameters x (s,)."""
         space, found = self.problem.space, {}
         inside = x - self.problem.inset
         for k, body in enumerate(space.bodies):
             phi = inside[10 * k : 10 * k + 10]
+            # Off the boundary, where the parameters of a flat body are infinite.
+            phi = phi + _OFF * space.references[k]
             found[f"{self.parametrisation.symbol}.{body}"] = self.parametrisation.inverse(phi)
         if space.size > space.rigid:
             bounded = np.clip(x, space.lower, space.upper)
@@ -255,7 +258,7 @@ def solve_nonlinear(problem: Problem, seed: int = 0) -> NonlinearSolution:
     while len(found) < 2 + _RANDOM and not _agree(found):
         found.append(posed.program.solve([posed.start(_random_start(posed.problem, random))]))
     # Where the solver stopped early the point may still be the best one: the certificate tells.
-    best = min(found, key=lambda s: (s.violation > TOLERANCE, s.objective))
+    best = min(found, key=_rank)
     status = replace(
         best.status,
         iterations=sum(s.status.iterations for s in found),
@@ -270,9 +273,14 @@ def solve_nonlinear(problem: Problem, seed: int = 0) -> NonlinearSolution:
     )
 
 
+def _rank(found: ProgramSolution) -> tuple[bool, bool, float]:
+    """Order of preference: a number, inside, small."""
+    return not np.isfinite(found.objective), not found.violation <= TOLERANCE, found.objective
+
+
 def _agree(found: list[ProgramSolution]) -> bool:
     """Whether the two best starts that succeeded ended at the same objective."""
-    ends = sorted(s.objective for s in found if s.violation <= TOLERANCE)
+    ends = sorted(s.objective for s in found if not any(_rank(s)[:2]))
     return len(ends) > 1 and ends[1] - ends[0] <= _AGREE * max(abs(ends[0]), 1e-300)
 
 
@@ -282,7 +290,8 @@ def _first_starts(problem: Problem) -> list[np.ndarray]:
     for k, reference in enumerate(space.references):
         part = slice(10 * k, 10 * k + 10)
         _, length = _size(reference)
-        consistency = problem.within.consistency
+        # The entropy is one of mass distributions, whatever set it is used with.
+        consistency = "full" if problem.entropy else problem.within.consistency
         nearest = nearest_body(mended[part], length, consistency, float(reference[0]))
         mended[part] = (1 - _INWARD) * nearest + _INWARD * reference
     given[space.rigid :] = problem.origin[space.rigid :]

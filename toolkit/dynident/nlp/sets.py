@@ -249,6 +249,10 @@ class Within:
         if not 0.0 <= self.inset < 0.1:
             raise FitError(f"inset = {self.inset:g}", mend="choose it from 0 to 0.1")
         sets = self.sets if isinstance(self.sets, Sequence) else (self.sets,)
+        for one in sets:
+            if not hasattr(one, "on"):
+                mend = "give TotalMass, Known, Bounds, Sum, CentreInBox, ..."
+                raise FitError(f"a {type(one).__name__} is no constraint set", mend=mend)
         object.__setattr__(self, "sets", tuple(sets))
 
     @property
