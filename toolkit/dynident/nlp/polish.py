@@ -20,6 +20,7 @@ from dynident.nlp.conic import ConicSolution, Multipliers, cone_rows
 from dynident.nlp.problem import Problem
 
 _STEPS = 6
+_IN_VAIN = 2  # steps without gain, after which Newton's method is not where it converges
 _ENOUGH = 1e-9  # stationarity, relative: parameters are then right to twice as many digits
 _ROUNDING = 1e-9  # what a step may break a constraint by, and of the objective what is no loss
 _DEPENDENT = 1e-4  # of the largest: constraints nearer than this to dependent are
@@ -70,6 +71,7 @@ def polished(problem: Problem, solution: ConicSolution) -> ConicSolution:
     best = current = solution
     bound, excess = _proof(problem, solution)
     excess = max(excess, _ROUNDING * problem.objective(solution.x))
+    in_vain = 0
     for _ in range(_STEPS):
         try:
             current = _step(problem, current, pattern)
@@ -82,8 +84,10 @@ def polished(problem: Problem, solution: ConicSolution) -> ConicSolution:
             and _violation(problem, current.x) <= _ROUNDING
             and more <= excess
         ):
-            best, bound = current, found
-        if bound.stationarity < _ENOUGH or not np.isfinite(found.value):
+            best, bound, in_vain = current, found, 0
+        else:
+            in_vain += 1
+        if bound.stationarity < _ENOUGH or in_vain == _IN_VAIN or not np.isfinite(found.value):
             break
     return best
 
