@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dynident.inertia import PARAMETERS, Margins, margins, pseudo_inertia, to_com
+from dynident.inertia import LARGEST, PARAMETERS, Margins, margins, pseudo_inertia, to_com
 from dynident.robot.hull import Hull
 
 Array = NDArray[np.float64]
@@ -22,9 +22,6 @@ TITLES = {
     "spread": "spread of mass within the geometry",
 }
 """The rules by name, in the order in which one builds on another."""
-
-_LARGEST = 1e30
-"""SI: beyond this a number is no property of a robot, and its square may overflow."""
 
 # Shapes and centres of mass are written with some digits: relative to the extent.
 _DRAWN = 1e-6
@@ -99,7 +96,7 @@ class Body:
     @property
     def readable(self) -> bool:
         """Whether its numbers are finite and of a size that can be computed with."""
-        return bool(np.all(np.abs(self.phi) < _LARGEST))
+        return bool(np.all(np.abs(self.phi) < LARGEST))
 
     @property
     def moment(self) -> float:
@@ -144,7 +141,7 @@ def _finite(body: Body) -> RuleMargin:
     names = body.broken_numbers or tuple(
         f"{name} = {value:g}"
         for name, value in zip(PARAMETERS, body.phi, strict=True)
-        if not abs(value) < _LARGEST
+        if not abs(value) < LARGEST
     )
     nan = float("nan")
     return RuleMargin("finite", nan, "", nan, True, f"not a usable number: {', '.join(names)}")

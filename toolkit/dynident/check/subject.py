@@ -7,14 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dynident.check.rules import Array, Body
-from dynident.inertia import to_com
+from dynident.inertia import LARGEST, to_com
 from dynident.robot import Description, Link, Robot
 from dynident.robot.broken_numbers import broken_numbers
 from dynident.robot.geometry import LinkGeometry, link_geometry
 from dynident.robot.hull import Hull
 from dynident.robot.joint_dynamics import carries_rotor, joint_dynamics
-
-_LARGEST = 1e30
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +75,7 @@ def of_links(
     reaches = _reaches(robot) if robot is not None else {}
     hulls = {name: Hull(one.points) for name, one in geometry.items() if len(one.points)}
     known = [hull.extent for hull in hulls.values()] or [x for x in reaches.values() if x > 0.0]
-    masses = [float(link.phi[0]) for link in links if 0.0 < link.phi[0] < _LARGEST]
+    masses = [float(link.phi[0]) for link in links if 0.0 < link.phi[0] < LARGEST]
     scale = Scale(
         float(np.quantile(masses, 0.5, method="lower")) if masses else 1.0,
         float(np.median(known)) if known else 0.0,
@@ -124,7 +122,7 @@ def _length(
     if typical > 0.0:
         return typical, "robot"
     # Nothing but the inertia itself tells: the extent of a box that has it.
-    if np.all(np.abs(phi) < _LARGEST) and phi[0] != 0.0:
+    if np.all(np.abs(phi) < LARGEST) and phi[0] != 0.0:
         properties = to_com(phi)
         size = float(np.sqrt(6.0 * abs(np.trace(properties.inertia_com) / phi[0])))
         size = max(size, 2.0 * float(np.linalg.norm(properties.com)))

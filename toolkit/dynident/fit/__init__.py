@@ -7,7 +7,8 @@ from typing import Protocol
 
 from dynident.fit.constrained import Constrained
 from dynident.fit.essential import EssentialParameters, essential_parameters
-from dynident.fit.estimate import Estimate, Source, load_estimate
+from dynident.fit.estimate import Estimate, Source
+from dynident.fit.estimate_file import load_estimate
 from dynident.fit.factors import Factors, factorise
 from dynident.fit.given import given_estimate
 from dynident.fit.input_noise import InputNoise, input_noise

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from dynident import files
-from dynident.effects import catalogue
 from dynident.errors import FitError
 from dynident.inertia import margins
 from dynident.model import Model
@@ -19,8 +18,6 @@ from dynident.nlp import Certificate
 from dynident.robot import BaseParameters, Robot
 from dynident.robot.write import write
 from dynident.tables import Table, number, percent, print_tables
-
-FORMAT = "dynident-estimate-1"
 
 
 @dataclass(frozen=True)
@@ -193,48 +190,10 @@ class Estimate:
 
     def to_dict(self) -> dict[str, Any]:
         """The estimate as JSON holds it."""
-        description = self.model.robot.description
-        return {
-            "format": FORMAT,
-            "method": self.method,
-            "status": self.status,
-            "parameters": [
-                {
-                    "name": name,
-                    "value": float(self.values[i]),
-                    "sigma": float(self.sigma[i]) if self.identified[i] else None,
-                    "unit": self.model.units[i],
-                    "expression": self.model.expressions[i],
-                }
-                for i, name in enumerate(self.names)
-            ],
-            "covariance": self.covariance.tolist(),
-            "basis": _basis_to_dict(self.basis),
-            "torque_std": self.torque_std.tolist(),
-            "joint_errors": self.joint_errors.tolist(),
-            "error": self.error,
-            "condition_number": self.condition_number,
-            "rows": self.rows,
-            "notes": list(self.notes),
-            "recordings": [vars(source) for source in self.sources],
-            "links": self.links and {name: phi.tolist() for name, phi in self.links.items()},
-            "certificate": self.certificate and self.certificate.to_dict(),
-            "model": {
-                "robot": description.text if description else None,
-                "joints": list(self.model.robot.names),
-                "gravity": [float(g) for g in self.model.robot.gravity],
-                "friction_width": self.model.friction_width,
-                "effects": [
-                    {
-                        "effect": effect.name,
-                        "joint": effect.joint,
-                        "source": effect.source,
-                        "shape": list(effect.shape),
-                    }
-                    for effect in self.model.effects
-                ],
-            },
-        }
+        # Imported where it is used: the file's module knows the estimate.
+        from dynident.fit.estimate_file import to_dict
+
+        return to_dict(self)
 
     def save(self, path: str | Path) -> Path:
         """Write the estimate as JSON, with the robot description in it.
@@ -267,76 +226,9 @@ class Estimate:
         )
 
 
-def load_estimate(path: str | Path) -> Estimate:
-    """Read an estimate that `Estimate.save` wrote.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be read.
-    FitError
-        If it is not an estimate of this version.
-    """
-    text = files.read_text(path)
-    try:
-        content = json.loads(text)
-        if content["format"] != FORMAT:
-            raise ValueError(f"format '{content['format']}'")
-        given = content["model"]
-        robot = Robot.from_text(given["robot"], str(path), given["joints"], given["gravity"])
-        known = catalogue()
-        effects = tuple(
-            known[e["effect"]](e["joint"], e["source"], tuple(e["shape"])) for e in given["effects"]
-        )
-        model = Model(robot, effects, given["friction_width"])
-        return Estimate(
-            model,
-            np.array([p["value"] for p in content["parameters"]]),
-            np.array(content["covariance"]),
-            _basis_from_dict(content["basis"]),
-            np.array(content["torque_std"]),
-            np.array(content["joint_errors"]),
-            content["error"],
-            content["condition_number"],
-            content["rows"],
-            content["method"],
-            content["status"],
-            tuple(content["notes"]),
-            tuple(Source(**source) for source in content["recordings"]),
-            _links_from_dict(content.get("links")),
-        )
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        mend = "save one with Estimate.save"
-        raise FitError(f"is not a dynident estimate ({error})", str(path), mend) from None
-
-
-def _links_from_dict(links: dict[str, list[float]] | None) -> dict[str, np.ndarray] | None:
-    return (
-        None if links is None else {name: np.array(phi, dtype=float) for name, phi in links.items()}
-    )
-
-
 def _decision(basis: BaseParameters) -> str:
     """How the rank was decided, in words."""
     if basis.rank == len(basis.names):
         least = float(basis.diagonal[-1] / basis.diagonal[0])
         return f"full rank, smallest direction {least:.2g} of the largest"
     return f"rank gap {basis.gap:.2g} at tolerance {basis.tolerance:.0e}"
-
-
-def _basis_to_dict(basis: BaseParameters) -> dict[str, Any]:
-    lists = {name: getattr(basis, name).tolist() for name in _ARRAYS}
-    plain = {name: list(getattr(basis, name)) for name in _TUPLES}
-    return {**plain, **lists, "tolerance": basis.tolerance}
-
-
-def _basis_from_dict(content: dict[str, Any]) -> BaseParameters:
-    arrays: dict[str, Any] = {name: np.array(content[name], dtype=float) for name in _ARRAYS}
-    plain: dict[str, Any] = {name: tuple(content[name]) for name in _TUPLES}
-    rank = len(plain["independent"])
-    arrays["K"] = arrays["K"].reshape(rank, len(plain["names"]) - rank)
-    return BaseParameters(**plain, **arrays, tolerance=content["tolerance"])
-
-
-_ARRAYS = ("K", "scale", "diagonal")
-_TUPLES = ("names", "independent", "dependent", "expressions")

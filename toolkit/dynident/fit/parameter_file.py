@@ -19,7 +19,7 @@ import numpy as np
 
 from dynident import files
 from dynident.errors import DynidentWarning, FileError
-from dynident.inertia import PAPER_ORDER, PARAMETERS
+from dynident.inertia import LARGEST, PAPER_ORDER, PARAMETERS
 from dynident.model import Model
 from dynident.robot import Robot
 from dynident.robot.xmltree import closest
@@ -71,7 +71,7 @@ def read_parameters(
     ------
     FileError
         If the file cannot be read, its order is not stated (or stated twice), a link or parameter
-        is unknown, missing or there twice, or a value is not a finite number.
+        is unknown, missing or there twice, or a value is not a finite number or beyond `LARGEST`.
     """
     if order is not None and order not in ORDERS:
         raise FileError(f"no order '{order}' of parameters", mend=f"orders: {', '.join(ORDERS)}")
@@ -259,6 +259,9 @@ def _number(text: str, where: str) -> float:
         raise FileError(f"'{shown}' is not a number", where, "every cell holds a number")
     if not np.isfinite(value := float(text)):
         raise FileError(f"'{text}' is not a finite number", where, "every cell holds a number")
+    if not abs(value) < LARGEST:
+        what = f"'{text[:30]}' is no property of a robot"
+        raise FileError(what, where, "state it in SI units")
     return value
 
 

@@ -21,6 +21,7 @@ from dynident.inertia.log_cholesky import (
 )
 from dynident.inertia.margins import Margins, margins
 from dynident.inertia.parameters import (
+    LARGEST,
     PARAMETERS,
     UNITS,
     MassProperties,
@@ -41,6 +42,7 @@ from dynident.inertia.virtual import (
 )
 
 __all__ = [
+    "LARGEST",
     "LOG_CHOLESKY",
     "PAPER_ORDER",
     "PARAMETERS",

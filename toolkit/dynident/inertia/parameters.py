@@ -19,6 +19,9 @@ UNITS = ("kg", "kg m", "kg m", "kg m", *(("kg m^2",) * 6))
 _ROW = np.array([0, 0, 1, 0, 1, 2])
 _COLUMN = np.array([0, 1, 1, 2, 2, 2])
 
+LARGEST = 1e30
+"""SI: beyond this a number is no property of a robot, and its square may overflow."""
+
 
 @dataclass(frozen=True, eq=False)
 class MassProperties:

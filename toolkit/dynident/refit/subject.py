@@ -12,9 +12,11 @@ from dynident import files
 from dynident.errors import DynidentWarning, FileError, RobotError
 from dynident.fit import Estimate, load_estimate
 from dynident.fit.parameter_file import GivenParameters, read_parameters
-from dynident.inertia import PARAMETERS
+from dynident.inertia import LARGEST, PARAMETERS
 from dynident.model import Model
 from dynident.robot import Robot
+
+_DESCRIPTIONS = (".urdf", ".sdf", ".xml", ".mjcf", ".xacro")
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,28 +38,43 @@ class Subject:
     estimate: Estimate | None = None
     source: Path | None = None
 
-    def require_finite(self) -> None:
-        """Refuse parameters that are no numbers: nothing is near to them.
+    def require_usable(self) -> None:
+        """Refuse parameters that are no numbers, or beyond computing with: nothing is near to them.
 
         Raises
         ------
         RobotError
             Naming the first link and its parameters.
         """
-        for link in self.robot.links:
-            if np.all(np.isfinite(link.phi)):
-                continue
-            broken = ", ".join(
-                f"{name} = {value:g}"
-                for name, value in zip(PARAMETERS, link.phi, strict=True)
-                if not np.isfinite(value)
-            )
-            file = self.robot.description.path if self.robot.description else self.robot.name
+        require_usable(self.robot)
+
+
+def require_usable(robot: Robot) -> None:
+    """Refuse a robot with parameters that are not finite, beyond `LARGEST`, or next to no mass.
+
+    Raises
+    ------
+    RobotError
+        Naming the first link and its parameters.
+    """
+    file = robot.description.path if robot.description else robot.name
+    for link in robot.links:
+        where, mass = f"{file}: link '{link.name}'", float(link.phi[0])
+        broken = ", ".join(
+            f"{name} = {value:g}"
+            for name, value in zip(PARAMETERS, link.phi, strict=True)
+            if not abs(value) < LARGEST
+        )
+        if broken:
+            finite = np.all(np.isfinite(link.phi))
+            what = "is beyond any robot" if finite else "is not finite"
+            mend = "state numbers first: nothing is near to what is not a number"
             raise RobotError(
-                f"is not finite ({broken})",
-                f"{file}: link '{link.name}'",
-                "state numbers first: nothing is near to what is not a number",
+                f"{what} ({broken})", where, "state it in SI units" if finite else mend
             )
+        if 0.0 < abs(mass) < 1.0 / LARGEST:
+            mend = "state 0 if it has no mass, and its mass in kg if it has"
+            raise RobotError(f"has next to no mass (m = {mass:g})", where, mend)
 
 
 def read_subject(
@@ -87,9 +104,24 @@ def read_subject(
         return _estimated(what)
     if isinstance(what, GivenParameters):
         return _listed(what)
-    path = Path(what)
+    # Numbers of any size are read: what cannot be computed with is refused by `require_usable`.
+    with np.errstate(all="ignore"):
+        subject = _read(Path(what), model, order)
+    subject.require_usable()
+    return subject
+
+
+def _read(path: Path, model: Model | Robot | None, order: str | None) -> Subject:
     text = files.read_text(path)
-    start = text.lstrip()[:1]
+    start, suffix = text.lstrip()[:1], path.suffix.lower()
+    if not start:
+        mend = "give a robot description, a saved estimate or a CSV of parameters"
+        raise FileError("is empty", str(path), mend)
+    # What it is shows in its first character; a file that is damaged, by its name.
+    if start not in "<{" and suffix in _DESCRIPTIONS:
+        start = "<"
+    if start not in "<{" and suffix == ".json":
+        start = "{"
     if start in ("<", "{") and order is not None:
         mend = f"leave out the order '{order}'"
         raise FileError("is no CSV file, and says its own order", str(path), mend)

@@ -27,7 +27,7 @@ from dynident.fit.parameter_file import GivenParameters
 from dynident.model import Model
 from dynident.nlp import Within
 from dynident.refit.result import Refit, TorqueErrors
-from dynident.refit.subject import Subject, aligned, in_study, read_subject
+from dynident.refit.subject import Subject, aligned, in_study, read_subject, require_usable
 from dynident.robot import Robot
 from dynident.threads import single_threaded
 
@@ -64,7 +64,7 @@ def refit(
     FitError
         If nothing satisfies the constraints, or the solver fails; if links need not be consistent.
     RobotError, FileError
-        If what is given cannot be read, or is not finite.
+        If what is given cannot be read, or is not finite, or beyond any robot.
     """
     within = within or Within()
     if within.consistency == "none":
@@ -73,7 +73,9 @@ def refit(
     if not isinstance(subject, Subject):
         known = study.model if study else prior.robot if isinstance(prior, Prior) else prior
         subject = read_subject(subject, known)
-    subject.require_finite()
+    subject.require_usable()
+    centre = prior.robot if isinstance(prior, Prior) else prior
+    require_usable(centre or (study.robot if study else subject.described))
     if study is None:
         given = subject.estimate or subject.robot
         found = project(given, prior or subject.described, within=within, solver=solver)
