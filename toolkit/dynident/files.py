@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import stat
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -53,16 +54,34 @@ def require_place(path: str | Path) -> Path:
     Raises
     ------
     FileError
-        If its folder is missing or may not be written, or a folder is there in its place.
+        If its folder is missing or may not be written, or something is there in its place that
+        is no regular file: a folder, a device, a pipe.
     """
     path = Path(path)
-    if path.is_dir():
-        raise FileError("is a folder, not a file", str(path), "name a file in it")
-    if not path.parent.is_dir():
-        what = "is a file" if path.parent.exists() else "no such folder"
-        raise FileError(what, str(path.parent), "name a file in a folder that is there")
-    _require_writable(path.parent)
+    folder = _target(path).parent
+    if not folder.is_dir():
+        what = "is a file" if folder.exists() else "no such folder"
+        raise FileError(what, str(folder), "name a file in a folder that is there")
+    _require_writable(folder)
     return path
+
+
+def _target(path: Path) -> Path:
+    """Return the file itself where a path is a link to it; refuse what a file may not replace."""
+    target = Path(os.path.realpath(path)) if path.is_symlink() else path
+    try:
+        mode = target.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return target
+    except OSError as error:
+        raise FileError(f"cannot be written ({error.strerror or error})", str(path)) from None
+    if stat.S_ISDIR(mode):
+        raise FileError("is a folder, not a file", str(path), "name a file in it")
+    if not stat.S_ISREG(mode):
+        # Renaming over it would put a file in the place of /dev/null or of a reader's pipe.
+        what = "is not a regular file, but a device, a pipe or a socket"
+        raise FileError(what, str(path), "name another file")
+    return target
 
 
 def require_folder(path: str | Path) -> Path:
@@ -91,6 +110,8 @@ def write_bytes(
 ) -> Path:
     """Write a file in one step: to a temporary neighbour first, then renamed.
 
+    Where the path is a symbolic link, the file that it leads to is replaced and the link stays.
+
     Parameters
     ----------
     path : the file.
@@ -101,13 +122,15 @@ def write_bytes(
     Raises
     ------
     FileError
-        If the folder is missing or may not be written; the old file is then untouched.
+        If the folder is missing or may not be written, or what is there is no regular file; it is
+        then untouched.
     """
     path = Path(path)
+    target = _target(path)
     temporary = None
     try:
         with tempfile.NamedTemporaryFile(
-            dir=path.parent, prefix=f".{path.name}.", delete=False
+            dir=target.parent, prefix=f".{target.name}.", delete=False
         ) as handle:
             temporary = Path(handle.name)
             handle.write(data)
@@ -116,8 +139,8 @@ def write_bytes(
         # NamedTemporaryFile makes private files; give ours the permissions any new file gets.
         umask = os.umask(0)
         os.umask(umask)
-        temporary.chmod(path.stat().st_mode & 0o777 if path.exists() else 0o666 & ~umask)
-        temporary.replace(path)
+        temporary.chmod(target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~umask)
+        temporary.replace(target)
     except OSError as error:
         raise FileError(f"cannot be written ({error.strerror or error})", str(path)) from None
     finally:
