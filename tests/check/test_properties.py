@@ -58,6 +58,7 @@ def test_masses_inside_a_box_are_never_flagged(seed):
     masses, places, shape = points_in_a_box(np.random.default_rng(seed))
     found = fore_of(di.check(Robot.from_text(urdf(fore(*body(masses, places), shape)))))
     assert not found.broken, found
+    assert not any(rule.doubtful for rule in found.rules), found
 
 
 @settings(deadline=None, max_examples=60)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
 import pytest
 
 import dynident as di
-from broken_robots import MASS, MOMENTS, WRITERS, Fore, urdf
+from broken_robots import BOX, MASS, MOMENTS, WRITERS, Fore, urdf
 from dynident.robot import Robot
 
 
@@ -53,21 +54,6 @@ BROKEN = {
     ),
     "kg cm^2": (Fore(moments=scaled(1e4)), "spread", r"about 1e4 times too large.*kg cm\^2"),
     "lb in^2": (Fore(moments=scaled(3417.2)), "spread", r"about 3e3 times too large.*lb in\^2"),
-    "swapped x and z": (
-        Fore(moments=turned(2, 1, 0)),
-        "spread",
-        r"spread more along z than the geometry allows.*axes swapped\? It fits with x and z exch",
-    ),
-    "swapped x and y": (
-        Fore(moments=turned(1, 0, 2)),
-        "spread",
-        r"axes swapped\? It fits with x and y exchanged",
-    ),
-    "about the origin": (
-        Fore(moments=(0.0011, 0.0155 + MASS * 0.15**2, 0.0163 + MASS * 0.15**2)),
-        "spread",
-        "stated about the link's origin, not the centre of mass",
-    ),
     "placeholder": (Fore(moments=(1, 1, 1)), "spread", r"same moment \(1 kg.*a placeholder\?"),
     "com outside": (Fore(com="0.5 0 0"), "centre_of_mass", "0.2 m outside of the link's geom"),
     "com in mm": (
@@ -91,6 +77,77 @@ def test_broken(writer, fore, rule, words, capfd):
         found.require()
     assert "NOT consistent: link 'fore'" in found.sentence
     assert capfd.readouterr() == ("", "")
+
+
+BEYOND = "mass is spread more along {} than the geometry allows, by .* or the shapes are simplified"
+DOUBTFUL = {
+    "swapped x and z": (
+        Fore(moments=turned(2, 1, 0)),
+        "z",
+        r"axes swapped\? It fits with x and z exchanged",
+    ),
+    "swapped x and y": (
+        Fore(moments=turned(1, 0, 2)),
+        "y",
+        r"axes swapped\? It fits with x and y exchanged",
+    ),
+    "about the origin": (
+        Fore(moments=(0.0011, 0.0155 + MASS * 0.15**2, 0.0163 + MASS * 0.15**2)),
+        "x",
+        "it fits if it was stated about the link's origin, not the centre of mass",
+    ),
+    "a rod for a body": (Fore(moments=scaled(5.0)), "x", None),
+}
+
+
+@pytest.mark.parametrize("writer", WRITERS.values(), ids=WRITERS)
+@pytest.mark.parametrize(("fore", "axis", "cause"), DOUBTFUL.values(), ids=DOUBTFUL)
+def test_mass_a_little_beyond_the_shapes_is_a_hint(writer, fore, axis, cause):
+    found = di.check(Robot.from_text(writer(fore)))
+    assert found.consistent and found.require() is found
+    link = found.links[0]
+    assert link.name == "fore" and not link.broken and not link.mend
+    assert link.worst.rule == "spread" and link.worst.relative < 0 and link.worst.doubtful
+    first, *causes = link.hints
+    assert re.fullmatch(BEYOND.format(axis), first)
+    assert causes == [] if cause is None else re.fullmatch(cause, causes[0])
+    assert found.link_table().rows[0][-1] == "look at it"
+    assert "no rule is broken, but look at 'fore'" in found.sentence
+
+
+@pytest.mark.parametrize(("factor", "broken"), [(9.5, False), (10.5, True)])
+@pytest.mark.parametrize("length", [1e-3, 1.0, 1e3])
+def test_ten_times_what_the_shapes_allow_is_broken(factor, broken, length):
+    """Two halves of the mass at the ends of the box are the most that it allows."""
+    edges = length * np.array(BOX)
+    along = MASS * (edges[0] / 2) ** 2
+    shape = f'<visual><geometry><box size="{" ".join(map(str, edges))}"/></geometry></visual>'
+    moments = tuple(factor * along * np.array([0.0, 1.0, 1.0]))
+    fore = Fore(com="0 0 0", moments=moments, shapes=shape)
+    links = di.check(Robot.from_text(urdf(fore))).links
+    spread = next(rule for one in links if one.name == "fore" for rule in one.rules[:1])
+    assert spread.rule == "spread" and spread.broken == broken
+    assert spread.value == pytest.approx((1.0 - factor) * along)
+
+
+def test_a_thin_wall_with_a_thickness_of_mass_is_no_broken_link():
+    """Across a thin shape nothing is allowed: that is no matter of units."""
+    shape = '<visual><geometry><box size="1 1 1e-4"/></geometry></visual>'
+    fore = Fore(com="0 0 0", moments=(0.2, 0.2, 0.3), shapes=shape)
+    (hints,) = (one.hints for one in di.check(Robot.from_text(urdf(fore))).links if one.hints)
+    assert re.fullmatch(BEYOND.format("z"), hints[0])
+
+
+def test_every_rule_of_every_link_in_one_table():
+    found = di.check(Robot.from_text(urdf(Fore(moments=turned(2, 1, 0)))))
+    table = found.margin_table()
+    assert len(table.rows) == sum(len(one.rules) for one in (*found.links, *found.bodies))
+    assert [row[-1] for row in table.rows if row[1].startswith("spread of")] == ["look at it"]
+    (mass,) = (row for row in table.rows if row[:2] == ("fore", "mass"))
+    assert mass[2:4] == ("2", "kg") and mass[4].endswith(" %") and mass[-1] == "holds"
+    assert any("margin_table()" in note for note in found.link_table().notes)
+    broken = di.check(Robot.from_text(urdf(Fore(mass="nan")))).margin_table()
+    assert broken.rows[0][1:] == ("finite numbers", "-", "", "-", "BROKEN")
 
 
 NO_SHAPES = {

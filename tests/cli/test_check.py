@@ -14,6 +14,7 @@ from synthetic import ARM
 BODY = {"name", "kind", "body", "parts", "length", "length_from", "broken", "rules"}
 BODY |= {"not_checked", "hints", "mend"}
 RULE = {"rule", "value", "unit", "relative", "broken", "words"}
+SWAPPED = Fore(moments=(0.0163, 0.0155, 0.0011))
 JOINT = {"name", "quantity", "value", "unit", "relative", "sigma", "broken", "words"}
 
 
@@ -33,7 +34,8 @@ def test_healthy_and_broken(run, tmp_path, name):
 
 
 @pytest.mark.parametrize(
-    "fore", [Fore(), Fore(mass="nan"), Fore(moments=(0.0011, 0.0155, 0.03)), Fore(com="9 0 0")]
+    "fore",
+    [Fore(), Fore(mass="nan"), Fore(moments=(0.0011, 0.0155, 0.03)), Fore(com="9 0 0"), SWAPPED],
 )
 def test_json(run, tmp_path, fore):
     (tmp_path / "arm.urdf").write_text(urdf(fore))
@@ -47,12 +49,32 @@ def test_json(run, tmp_path, fore):
         assert set(body) == BODY
         assert body["broken"] == any(rule["broken"] for rule in body["rules"])
         for rule in body["rules"]:
-            assert set(rule) == RULE and bool(rule["words"]) == rule["broken"]
+            assert set(rule) == RULE and bool(rule["words"]) == (
+                rule["broken"] or (rule["rule"] == "spread" and rule["value"] < 0)
+            )
         for change in body["mend"]:
             assert set(change) == {"name", "before", "after", "unit"}
     for joint in said["joints"]:
         assert set(joint) == JOINT
     assert said["consistent"] == (not any(one["broken"] for one in said["links"]))
+
+
+def test_a_hint_is_no_failure(run, tmp_path):
+    (tmp_path / "arm.urdf").write_text(urdf(SWAPPED))
+    done = run("check", "arm.urdf")
+    assert done.status == 0 and done.err == "" and "look at it" in done.out
+    assert "axes swapped? It fits with x and z exchanged" in done.out
+    assert "or the shapes are simplified" in " ".join(done.out.split())
+
+
+def test_all_rules(run, tmp_path):
+    (tmp_path / "arm.urdf").write_text(urdf(Fore(mass=-1)))
+    short, long = run("check", "arm.urdf"), run("check", "arm.urdf", "--all")
+    assert short.status == long.status == 1 and long.out.endswith(short.out)
+    assert "`dynident check --all`" in short.out
+    rule = "inertia about the centre of mass"
+    assert rule not in short.out and long.out.count(rule) == 2
+    assert run("check", "arm.urdf", "--all", "--json").out == run("check", "arm.urdf", "--json").out
 
 
 def test_tables_fit_a_page(run, tmp_path):
@@ -62,7 +84,7 @@ def test_tables_fit_a_page(run, tmp_path):
     name = "a_rather_long_name_of_a_link"
     fore = Fore(products=(0.2, -0.1, 0.05), rest=rest.format(name, -1))
     (tmp_path / "arm.urdf").write_text(urdf(fore))
-    done = run("check", "arm.urdf")
+    done = run("check", "arm.urdf", "--all")
     assert done.status == 1
     assert max(len(line) for line in done.out.splitlines()) <= 110
 
@@ -75,6 +97,10 @@ def test_an_estimate(run, study, tmp_path):
     assert said["source"] == "estimate" and done.status == (0 if said["consistent"] else 1)
     assert {one["name"] for one in said["joints"]} == {"Fv@shoulder", "Fv@elbow"}
     assert all(one["sigma"] is not None for one in said["joints"])
+    assert any("What the data cannot tell" in note for note in said["notes"])
+    # A fit of consistent links chose what the data cannot tell.
+    assert run("fit", path, "--consistency", "full", "--out", "full.json").status == 0
+    assert not any("cannot tell" in note for note in run("check", "full.json").out.splitlines())
 
 
 UNUSABLE = {

@@ -251,3 +251,12 @@ def test_bodies_beyond_the_shapes_of_their_links_are_told() -> None:
     found = di.refit(Robot.from_text(text))
     assert found.unchanged
     assert any("rod" in note and "units" in note for note in found.notes)
+    # Semi-consistent is less than possible as a body.
+    flat = text.replace('iyy="2e7"', 'iyy="1e6"')
+    for one in (text, flat):
+        semi = di.refit(Robot.from_text(one), within=di.Within("semi"))
+        assert semi.unchanged and not any("Possible" in note for note in semi.notes)
+    # Shapes a little too small for the mass are nothing to mend, and nothing to tell.
+    simplified = text.replace("2e6", "0.02").replace("2e7", "0.2")
+    found = di.refit(Robot.from_text(simplified))
+    assert found.unchanged and not found.notes

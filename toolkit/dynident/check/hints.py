@@ -11,7 +11,8 @@ from itertools import permutations
 
 import numpy as np
 
-from dynident.check.rules import Array, Body, Verdicts, judge, second_moment
+from dynident.check.rules import Array, Body, RuleMargin, Verdicts, judge
+from dynident.check.spread import second_moment
 from dynident.inertia import from_com, margins, to_com
 from dynident.robot.hull import Hull
 
@@ -38,10 +39,11 @@ def hints(body: Body, verdicts: Verdicts) -> tuple[str, ...]:
     if not body.readable:
         return ()
     broken = {one.rule for one in verdicts.rules if one.broken}
-    return tuple(_hints(body, broken))
+    doubtful = tuple(one for one in verdicts.rules if one.doubtful)
+    return tuple(_hints(body, broken, doubtful))
 
 
-def _hints(body: Body, broken: set[str]) -> Iterator[str]:
+def _hints(body: Body, broken: set[str], doubtful: tuple[RuleMargin, ...]) -> Iterator[str]:
     properties = to_com(body.phi)
     mass = properties.mass
     if "mass" in broken and mass < 0.0:
@@ -50,11 +52,12 @@ def _hints(body: Body, broken: set[str]) -> Iterator[str]:
             yield f"with a mass of +{-mass:.4g} kg all else holds: a slip of the sign?"
     if not mass > 0.0:
         return
+    yield from (f"{one.words}, or the shapes are simplified" for one in doubtful)
     wrong_size = list(_sizes(body, properties.inertia_com))
     yield from wrong_size
     if wrong_size or broken & {"mass", "inertia", "triangle"}:
         return
-    if "spread" in broken:
+    if "spread" in broken or doubtful:
         yield from _causes_of_spread(body)
     elif body.hull is not None and "centre_of_mass" not in broken:
         yield from _like_uniform(body, body.hull)
@@ -163,7 +166,7 @@ def _holds(body: Body, inertia: Array) -> bool:
     changed = Body(
         body.name, phi, body.length, body.length_from, body.typical_mass, body.hull, body.whole
     )
-    return not any(one.broken for one in judge(changed).rules)
+    return not any(one.broken or one.doubtful for one in judge(changed).rules)
 
 
 def _permuted(inertia: Array, order: tuple[int, ...]) -> Array:

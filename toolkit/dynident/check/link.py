@@ -67,6 +67,11 @@ class LinkCheck:
         return (plain or list(self.rules))[0]
 
     @property
+    def label(self) -> str:
+        """Name, for tables."""
+        return self.name if self.kind == "link" else f"{self.name} (moving body)"
+
+    @property
     def title(self) -> str:
         """Kind and name, for sentences."""
         return f"{self.kind} '{self.name}'"
@@ -104,6 +109,11 @@ class LinkCheck:
                 for one in self.mend
             ],
         }
+
+    @property
+    def verdict(self) -> str:
+        """The finding in a word or three."""
+        return "BROKEN" if self.broken else "look at it" if self.hints else "holds"
 
     def details(self) -> str:
         """Return what is broken on it, why that may be, and what mends it, in words."""

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dynident.check.rules import Array, Body, judge, second_moment, spread_of, worst_spread
+from dynident.check.rules import Array, Body, judge
+from dynident.check.spread import second_moment, spread_of, worst_spread
 from dynident.errors import DynidentError
 from dynident.inertia import frame_change, from_com, to_com
 from dynident.robot.hull import Hull

@@ -7,9 +7,15 @@ from typing import Any
 
 from dynident.check.joints import JointCheck
 from dynident.check.link import LinkCheck, finite
-from dynident.check.rules import TITLES
+from dynident.check.rules import TITLES, RuleMargin
+from dynident.check.spread import IMPOSSIBLE_SPREAD
 from dynident.errors import ConsistencyError
 from dynident.tables import Table, number, percent, print_tables
+
+_RELATIVE = (
+    "relative: a mass to the robot's typical mass, a length to the link's extent l, a "
+    "moment to m l^2."
+)
 
 
 @dataclass(frozen=True)
@@ -110,27 +116,33 @@ class Check:
 
     def link_table(self) -> Table:
         """The worst rule of every link and moving body."""
-        rows = []
-        for one in (*self.links, *self.bodies):
-            rule = one.worst
-            shown = one.name if one.kind == "link" else f"{one.name} (moving body)"
-            verdict = "BROKEN" if one.broken else "look at it" if one.hints else "holds"
-            rows.append(
-                (
-                    shown,
-                    TITLES[rule.rule],
-                    number(rule.value, 3),
-                    rule.unit,
-                    percent(rule.relative, 1),
-                    verdict,
-                )
-            )
+        rows = [(one.label, *_cells(one.worst), one.verdict) for one in (*self.links, *self.bodies)]
         columns = ("link", "smallest margin", "margin", "unit", "relative", "verdict")
         notes = (
-            "relative: a mass to the robot's typical mass, a length to the link's extent l, a "
-            "moment to m l^2.",
+            _RELATIVE,
+            "The margins of all rules: `dynident check --all`, or Check.margin_table().",
         )
         return Table("Links, worst first", columns, tuple(rows), notes if rows else ())
+
+    def margin_table(self) -> Table:
+        """Every rule that was judged, of every link and moving body, in SI and relative."""
+        order = list(TITLES)
+        rows = tuple(
+            (
+                one.label,
+                *_cells(rule),
+                "BROKEN" if rule.broken else "look at it" if rule.doubtful else "holds",
+            )
+            for one in (*self.links, *self.bodies)
+            for rule in sorted(one.rules, key=lambda rule: order.index(rule.rule))
+        )
+        columns = ("link", "rule", "margin", "unit", "relative", "verdict")
+        notes = (
+            _RELATIVE,
+            "The spread of mass is broken where it is more than "
+            f"{IMPOSSIBLE_SPREAD:g} times too large; below that the shapes may be simplified.",
+        )
+        return Table("Every rule, worst link first", columns, rows, notes if rows else ())
 
     def joint_table(self) -> Table:
         """Friction, damping and rotor inertia of every joint that states them."""
@@ -184,3 +196,10 @@ class Check:
             ],
             "notes": [*self._hidden(), *self.notes],
         }
+
+
+def _cells(rule: RuleMargin) -> tuple[str, str, str, str]:
+    """A rule, its margin with its unit, and relative to the body."""
+    if rule.rule == "finite":  # it has no margin: numbers are finite, or they are not
+        return TITLES[rule.rule], "-", "", "-"
+    return TITLES[rule.rule], number(rule.value, 3), rule.unit, percent(rule.relative, 1)

@@ -7,6 +7,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dynident.check.spread import (
+    IMPOSSIBLE_SPREAD,
+    axis_name,
+    relative_spread,
+    worst_spread,
+)
 from dynident.inertia import LARGEST, PARAMETERS, Margins, margins, pseudo_inertia, to_com
 from dynident.robot.hull import Hull
 
@@ -44,7 +50,7 @@ class RuleMargin:
     broken : bool
         Rounding forgiven.
     words : str
-        Why it is broken and by how much; empty where the rule holds.
+        Why it is broken, or to be looked at, and by how much; empty where the rule holds.
     """
 
     rule: str
@@ -53,6 +59,11 @@ class RuleMargin:
     relative: float
     broken: bool
     words: str = ""
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether it is exceeded by no more than simplified shapes explain: a hint, not broken."""
+        return bool(self.words) and not self.broken
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,43 +249,19 @@ def _spread(body: Body, hull: Hull) -> RuleMargin:
     m (hi - c) (c - lo) about c (Bhatia and Davis, "A better bound on the variance", 2000).
     """
     excess, direction = worst_spread(body.phi, hull)
-    broken = -excess < -_DRAWN * body.moment
+    exceeded = -excess < -_DRAWN * body.moment
     words = (
         f"mass is spread more along {axis_name(direction)} than the geometry allows, by "
         f"{excess:.3g} kg m^2"
     )
-    return _rule("spread", -excess, "kg m^2", body.moment, broken, words)
-
-
-def second_moment(phi: Array) -> Array:
-    """Return the (3, 3) second moment of mass about the centre of mass, kg m^2."""
-    return spread_of(to_com(phi).inertia_com)
-
-
-def spread_of(inertia: Array) -> Array:
-    """Return the second moment of mass that has this rotational inertia (both (3, 3))."""
-    return 0.5 * np.trace(inertia) * np.eye(3) - inertia
-
-
-def worst_spread(phi: Array, hull: Hull) -> tuple[float, Array]:
-    """Return the largest excess of spread over what a hull allows, kg m^2, and its direction."""
-    spread = second_moment(phi)
-    _, principal = np.linalg.eigh(spread)
-    directions = np.vstack([np.eye(3), principal.T, hull.normals])
-    low, high = hull.reach(directions)
-    along = directions @ to_com(phi).com
-    allowed = phi[0] * (high - along) * (along - low)
-    excess = np.einsum("ki,ij,kj->k", directions, spread, directions) - allowed
-    worst = int(np.argmax(excess))
-    return float(excess[worst]), directions[worst]
-
-
-def axis_name(direction: Array) -> str:
-    """Return "x", "y" or "z" where a direction is (nearly) an axis, else its coordinates."""
-    axis = int(np.argmax(np.abs(direction)))
-    if abs(direction[axis]) > 0.999:
-        return "xyz"[axis]
-    return "({})".format(" ".join(f"{x:.2g}" for x in direction))
+    return RuleMargin(
+        "spread",
+        -excess,
+        "kg m^2",
+        -excess / body.moment,
+        exceeded and relative_spread(body.phi, hull) > IMPOSSIBLE_SPREAD,
+        words if exceeded else "",
+    )
 
 
 def _rule(name: str, value: float, unit: str, scale: float, broken: bool, words: str) -> RuleMargin:

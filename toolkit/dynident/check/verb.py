@@ -29,7 +29,8 @@ def check(what: Robot | Estimate | str | Path | Any) -> Check:
 
     For each link of the description, and for each moving body of several links: finite numbers,
     positive mass, inertia about the centre of mass, triangle inequality, pseudo-inertia, and
-    where the description has geometry, centre of mass and spread of mass within its convex hull.
+    where the description has geometry, centre of mass and spread of mass within its convex hull
+    (a spread no more than ten times too large is a hint: shapes are often simplified).
     For each joint: friction, damping and rotor inertia not negative.
 
     Parameters
@@ -108,11 +109,13 @@ def _robot(robot: Robot, name: str, source: str) -> Check:
 
 def _estimate(estimate: Estimate, name: str) -> Check:
     robot = estimate.robot
-    note = (
-        "What the data cannot tell (how a combination is shared among its parameters) was taken "
-        "as near to the description as it can be: another share may be consistent."
-    )
-    return _check(robot.links, robot.description, robot, name, "estimate", estimate, (note,))
+    notes = ()
+    if estimate.links is None:  # else the fit chose the links itself
+        notes = (
+            "What the data cannot tell (how a combination is shared among its parameters) was "
+            "taken as near to the description as it can be: another share may be consistent.",
+        )
+    return _check(robot.links, robot.description, robot, name, "estimate", estimate, notes)
 
 
 def _check(

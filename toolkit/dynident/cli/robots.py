@@ -17,9 +17,10 @@ _PATH = click.Path(path_type=Path)
 
 @commands.command()
 @click.argument("robot", metavar="ROBOT|ESTIMATE", type=_PATH)
+@click.option("--all", "every_rule", is_flag=True, help="Print the margin of every rule, too.")
 @JSON
 @click.pass_context
-def check(context: click.Context, robot: Path, as_json: bool) -> None:
+def check(context: click.Context, robot: Path, every_rule: bool, as_json: bool) -> None:
     """Say whether a robot can exist: the margin of every rule, link by link, worst first.
 
     ROBOT is a robot description (URDF, SDF or MJCF), ESTIMATE a saved estimate. Exit status 1 if a
@@ -34,7 +35,7 @@ def check(context: click.Context, robot: Path, as_json: bool) -> None:
     if as_json:
         print_json(found.to_dict())
     else:
-        show(*found.tables())
+        show(*((found.margin_table(),) if every_rule else ()), *found.tables())
     context.exit(0 if found.consistent else 1)
 
 

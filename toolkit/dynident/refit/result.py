@@ -121,11 +121,13 @@ class Refit:
             for link in check(self.robot).links
             if any(rule.rule in _OF_SHAPES for rule in link.broken)
         ]
+        # Which semi-consistent bodies no mass distribution has is told by the certificate.
+        beyond = beyond if self.consistency == "full" else []
         if beyond:
             names = ", ".join(beyond)
             notes.append(
                 f"Possible as bodies, but not within the shapes of their links: {names} (wrong "
-                "units, or swapped axes?). `dynident check` says what is wrong."
+                "units, or another frame?). `dynident check` says what is wrong."
             )
         return tuple(notes)
 
