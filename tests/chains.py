@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
@@ -19,7 +18,7 @@ from dynident.recording import Dataset, Filter, Recording
 from dynident.robot import Robot
 from synthetic import smooth_motion
 
-SOLVERS = ("conic", "nlp") if importlib.util.find_spec("dynident.nlp.parametrised") else ("conic",)
+SOLVERS = ("conic", "nlp")
 
 QUIET = Filter(None, None, 50.0, edge_s=(0.02, 0.02))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from chains import SOLVERS, chain_case, least
+from chains import chain_case, least
 from dynident.fit.consistent import solve
 from dynident.nlp import (
     Consistency,
@@ -40,7 +40,6 @@ def test_twenty_impossible_estimates_of_seven_links(consistency, spread, flat, d
 
 
 @pytest.mark.slow
-@pytest.mark.skipif("nlp" not in SOLVERS, reason="no nonlinear program yet")
 @pytest.mark.parametrize("distance", ["quadratic", "entropic"])
 @pytest.mark.parametrize(("consistency", "spread", "flat"), NOTIONS)
 def test_the_nonlinear_program_reaches_the_bound(consistency, spread, flat, distance) -> None:
