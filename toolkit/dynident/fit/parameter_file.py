@@ -21,6 +21,7 @@ from dynident import files
 from dynident.errors import DynidentWarning, FileError
 from dynident.inertia import LARGEST, PAPER_ORDER, PARAMETERS
 from dynident.model import Model
+from dynident.recording.csv_file import is_number
 from dynident.robot import Robot
 from dynident.robot.xmltree import closest
 
@@ -82,13 +83,13 @@ def read_parameters(
     named = {_ALIASES[name] for name in header if name in _ALIASES}
     if {"name", "value"} <= set(header):
         read = reader.by_name
-    elif named and not all(map(_is_number, header)):
+    elif named and not all(map(is_number, header)):
         read = reader.by_link
     elif order is not None:
-        body = cells if all(map(_is_number, header)) else cells[1:]
+        body = cells if all(map(is_number, header)) else cells[1:]
         return reader.without_names(body, ORDERS[order])
     else:
-        numbers = all(map(_is_number, header))
+        numbers = all(map(is_number, header))
         what = "the first line holds numbers, and no order" if numbers else "no layout is known"
         raise FileError(what, f"{path}, header", f"write {_LAYOUTS}")
     if order is not None:
@@ -254,7 +255,7 @@ def _column(names: list[str], name: str, file: str) -> int:
 def _number(text: str, where: str) -> float:
     if not text:
         raise FileError("the cell is empty", where, "every cell holds a number")
-    if not _is_number(text):
+    if not is_number(text):
         shown = text if len(text) <= 30 else text[:27] + "..."
         raise FileError(f"'{shown}' is not a number", where, "every cell holds a number")
     if not np.isfinite(value := float(text)):
@@ -263,12 +264,3 @@ def _number(text: str, where: str) -> float:
         what = f"'{text[:30]}' is no property of a robot"
         raise FileError(what, where, "state it in SI units")
     return value
-
-
-def _is_number(text: str) -> bool:
-    # float() takes 1_000 for a number; no other program does.
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return "_" not in text and text.isascii()

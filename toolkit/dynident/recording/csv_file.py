@@ -61,7 +61,7 @@ def _header(line: str, separator: str, file: str) -> tuple[str, ...]:
         )
     except (csv.Error, StopIteration) as error:
         raise RecordingError(f"the header cannot be read ({error})", f"{file}, line 1") from None
-    if all(_is_number(name) for name in names):
+    if all(is_number(name) for name in names):
         raise RecordingError(
             "the first line holds numbers, not the names of columns",
             f"{file}, line 1",
@@ -144,8 +144,8 @@ def _cell(text: str, where: str) -> float:
     text = text.strip()
     if not text:
         raise RecordingError("the cell is empty", where, "every cell holds a number")
-    if not _is_number(text):
-        comma = text.count(",") == 1 and _is_number(text.replace(",", "."))
+    if not is_number(text):
+        comma = text.count(",") == 1 and is_number(text.replace(",", "."))
         shown = text if len(text) <= 30 else text[:27] + "..."
         mend = "write a decimal point" if comma else "every cell holds a number"
         raise RecordingError(f"'{shown}' is not a number", where, mend)
@@ -154,7 +154,8 @@ def _cell(text: str, where: str) -> float:
     return value
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
+    """Whether a cell of a file is a number."""
     # float() takes 1_000 for a number; no other program does.
     try:
         float(text)
