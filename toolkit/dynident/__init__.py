@@ -55,6 +55,7 @@ _HOME = {
     "Sum": "nlp",
     "Symmetric": "nlp",
     "TotalMass": "nlp",
+    "Validation": "diagnose",
     "Within": "nlp",
     "catalogue": "effects",
     "check": "check",
@@ -70,6 +71,7 @@ _HOME = {
     "read_parameters": "fit",
     "refit": "refit",
     "report": "report",
+    "validate": "diagnose",
     "write": "recording",
     "write_experiment": "closed_loop",
 }
@@ -79,7 +81,14 @@ __all__ = list(_HOME)  # pyright: ignore[reportUnsupportedDunderAll]
 if TYPE_CHECKING:
     from dynident.check import Check, check
     from dynident.closed_loop import Controller, Experiment, load_experiment, write_experiment
-    from dynident.diagnose import Comparison, Diagnosis, compare, diagnose
+    from dynident.diagnose import (
+        Comparison,
+        Diagnosis,
+        Validation,
+        compare,
+        diagnose,
+        validate,
+    )
     from dynident.effects import Effect, catalogue, effects_of
     from dynident.errors import DynidentError, DynidentWarning
     from dynident.fit import (

@@ -3,6 +3,8 @@
 from dynident.diagnose.compare import Comparison, compare, compare_models
 from dynident.diagnose.diagnosis import Candidate, Diagnosis, JointResult, ResidualMap, Step
 from dynident.diagnose.procedure import diagnose
+from dynident.diagnose.replay import validate
+from dynident.diagnose.validation import Validation
 
 __all__ = [
     "Candidate",
@@ -11,7 +13,9 @@ __all__ = [
     "JointResult",
     "ResidualMap",
     "Step",
+    "Validation",
     "compare",
     "compare_models",
     "diagnose",
+    "validate",
 ]
