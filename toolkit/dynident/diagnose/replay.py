@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dynident.closed_loop import Controller, Mechanism
 from dynident.diagnose.control_law import law_torque, settling_time
+from dynident.diagnose.diagnosis import NoiseSource
+from dynident.diagnose.loop_run import QUANTITIES, LoopRun, Signals, Skipped
 from dynident.diagnose.noise import differences
-from dynident.diagnose.validation import QUANTITIES, LoopRun, Signals, Skipped, Validation
+from dynident.diagnose.validation import Validation
 from dynident.errors import DynidentError, RecordingError, SimulationError
 from dynident.fit.estimate import Estimate
+from dynident.fit.least_squares import sources_of
 from dynident.fit.sampling import Sampled, sample
 from dynident.model import Model
 from dynident.recording import Dataset, Noise, Recording, mismatch, periods, uniform
@@ -98,12 +101,23 @@ def simulate_again(
         where = ", ".join(r.where for r in dataset.recordings) or None
         mend = f"record it as the column {_column(robot)}, or map it to one in [columns]"
         raise SimulationError(what, where, mend)
-    skipped = [
-        Skipped(r.name, "no_reference", f"it has no column {_column(robot)}")
-        for r in dataset.recordings
-        if r.q_ref is None
-    ]
     usable = [uniform(r) for r in dataset.recordings if r.q_ref is not None]
+    nothing = Validation(
+        robot.name,
+        robot.names,
+        robot.units,
+        robot.torque_units,
+        _words(controller),
+        (),
+        tuple(
+            Skipped(r.name, "no_reference", f"it has no column {_column(robot)}")
+            for r in dataset.recordings
+            if r.q_ref is None
+        ),
+        np.nan,
+        "unknown",
+        sources_of(Dataset(tuple(usable), dataset.filter)),
+    )
     try:
         bodies = {
             carries: judged.mechanism(carries_payload=carries)
@@ -111,54 +125,41 @@ def simulate_again(
         }
         settling = settling_time(controller, next(iter(bodies.values())), usable[0].q)
     except DynidentError as error:
-        reason = str(error)
-        failed = [Skipped(r.name, "failed", reason) for r in usable]
-        return _validation(judged, controller, (), (*skipped, *failed), np.nan, "unknown", ())
-    short = [r for r in usable if r.duration <= settling]
-    skipped += [Skipped(r.name, "too_short", _too_short(r, settling)) for r in short]
+        failed = [Skipped(r.name, "failed", str(error)) for r in usable]
+        return replace(nothing, skipped=(*nothing.skipped, *failed))
+    skipped = [
+        Skipped(r.name, "too_short", _too_short(r, settling))
+        for r in usable
+        if r.duration <= settling
+    ]
     long = [r for r in usable if r.duration > settling]
     again, failed, remarks = _retraced(long, bodies, controller, judged.model, progress)
-    runs = []
+    runs: list[LoopRun] = []
     for recording, one in again:
         try:
             runs.append(_run(recording, one, controller, judged.model, dataset, settling))
         except RecordingError as error:
             skipped.append(Skipped(recording.name, "too_short", str(error)))
-    if any(recording.period for recording, _ in again):
-        source = "replicates"
-    else:
-        source = "given" if dataset.noise else "unknown"
-    if any(run.noise is None for run in runs):
-        source = "unknown"
-    every = (*skipped, *failed)
-    return _validation(judged, controller, tuple(runs), every, settling, source, remarks)
-
-
-def _validation(
-    judged: Judged,
-    controller: Controller,
-    runs: tuple[LoopRun, ...],
-    skipped: tuple[Skipped, ...],
-    settling: float,
-    source: Literal["replicates", "given", "unknown"],
-    remarks: tuple[str, ...],
-) -> Validation:
-    robot = judged.model.robot
-    kind = controller.kind.replace("_", " ")
-    words = f"{kind[:1].upper()}{kind[1:]} controller at {controller.rate_hz:g} Hz"
-    if len(controller.kind) <= 3:
-        words = f"{controller.kind.upper()} controller at {controller.rate_hz:g} Hz"
-    return Validation(
-        robot.names,
-        robot.units,
-        robot.torque_units,
-        words,
-        runs,
-        skipped,
-        settling,
-        source,
-        remarks,
+    return replace(
+        nothing,
+        runs=tuple(runs),
+        skipped=(*nothing.skipped, *skipped, *failed),
+        settling=settling,
+        noise_source=_noise_source(runs, usable),
+        remarks=remarks,
     )
+
+
+def _words(controller: Controller) -> str:
+    kind = controller.kind.replace("_", " ")
+    name = kind.upper() if len(kind) <= 3 else kind.capitalize()
+    return f"{name} controller at {controller.rate_hz:g} Hz"
+
+
+def _noise_source(runs: list[LoopRun], recordings: list[Recording]) -> NoiseSource:
+    if not runs or any(run.noise is None for run in runs):
+        return "unknown"
+    return "replicates" if any(r.period is not None for r in recordings) else "given"
 
 
 def _retraced(

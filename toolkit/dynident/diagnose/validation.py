@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 
-from dynident.diagnose.diagnosis import finite
+from dynident.diagnose.diagnosis import NoiseSource, finite
+from dynident.diagnose.loop_run import QUANTITIES, Errors, LoopRun, Signals, Skipped
+from dynident.fit.estimate import Source
 from dynident.tables import Table, number, percent, print_tables
 
-Quantity = Literal["position", "velocity", "acceleration", "torque"]
-QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
-
-Status = Literal["simulated", "no_reference", "too_short", "failed"]
+Verdict = Literal["follows", "no_nearer", "not_simulated"]
 
 ORIENTATION = (
     "For orientation: a two-link robot that was identified well came within 0.5 % of the position, "
@@ -29,100 +28,12 @@ _LAW_HOLDS = 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class Signals:
-    """A motion and its torque, filtered and decimated, (T, n) each, SI units.
-
-    Attributes
-    ----------
-    position, velocity, acceleration : rad or m, and per s and s^2.
-    torque : N m or N.
-    """
-
-    position: np.ndarray
-    velocity: np.ndarray
-    acceleration: np.ndarray
-    torque: np.ndarray
-
-    def of(self, quantity: Quantity) -> np.ndarray:
-        """One of them, (T, n)."""
-        return getattr(self, quantity)
-
-
-@dataclass(frozen=True, eq=False)
-class LoopRun:
-    """A recording and the simulation of its loop, at the same instants.
-
-    Attributes
-    ----------
-    name : of the recording.
-    t : (T,) s, on the recording's clock.
-    measured, simulated : what was recorded, and what the identified robot did.
-    reference : the reference motion; its torque is what the control law gives for the recorded
-        positions, no model of the robot involved.
-    noise : (4, n) noise of the measured quantities, rms; None where it is unknown.
-    saturated : (n,) share of the samples at which the simulated command was at its limit.
-    """
-
-    name: str
-    t: np.ndarray
-    measured: Signals
-    simulated: Signals
-    reference: Signals
-    noise: np.ndarray | None
-    saturated: np.ndarray
-
-
-@dataclass(frozen=True)
-class Skipped:
-    """A recording whose loop was not simulated, and why.
-
-    Attributes
-    ----------
-    name : of the recording.
-    status : "no_reference" (it has no column q_ref), "too_short" (the loop settles after its end)
-        or "failed" (the loop cannot be simulated).
-    reason : in words.
-    """
-
-    name: str
-    status: Status
-    reason: str
-
-
-@dataclass(frozen=True, eq=False)
-class Errors:
-    """Norm of a difference over norm of the measurement, over all recordings.
-
-    Attributes
-    ----------
-    joints : (4, n) joint by joint, rows in the order of `QUANTITIES`; NaN where a joint has no
-        such quantity to measure.
-    overall : (4,) of all joints together; where some are in rad and others in m, the root mean
-        square of the joints' errors.
-    """
-
-    joints: np.ndarray
-    overall: np.ndarray
-
-    def of(self, quantity: Quantity) -> float:
-        """The error over all joints in one quantity."""
-        return float(self.overall[QUANTITIES.index(quantity)])
-
-    def at(self, joint: int) -> dict[str, float | None]:
-        """Errors of a joint by quantity, as JSON has them."""
-        return _named(self.joints[:, joint])
-
-    def to_dict(self) -> dict[str, float | None]:
-        """Errors over all joints by quantity, as JSON has them."""
-        return _named(self.overall)
-
-
-@dataclass(frozen=True, eq=False)
 class Validation:
     """A model in the closed loop in which it was measured.
 
     Attributes
     ----------
+    robot : name.
     joints, units, torque_units : names; rad or m; N m or N.
     controller : the loop's, in words.
     runs : recordings whose loop was simulated.
@@ -130,9 +41,11 @@ class Validation:
     settling : s dropped at the start of each recording, where simulation and measurement still
         remember different beginnings: five time constants of the loop's slowest pole.
     noise_source : "replicates", "given" or "unknown".
+    sources : the recordings.
     remarks : of the simulator.
     """
 
+    robot: str
     joints: tuple[str, ...]
     units: tuple[str, ...]
     torque_units: tuple[str, ...]
@@ -140,7 +53,8 @@ class Validation:
     runs: tuple[LoopRun, ...]
     skipped: tuple[Skipped, ...]
     settling: float
-    noise_source: Literal["replicates", "given", "unknown"]
+    noise_source: NoiseSource
+    sources: tuple[Source, ...] = ()
     remarks: tuple[str, ...] = ()
 
     # --- numbers -------------------------------------------------------------------------------
@@ -271,45 +185,66 @@ class Validation:
         return Table("Recordings", ("recording", "status", *QUANTITIES), tuple(rows), notes)
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """What the errors mean, in plain words."""
+    def verdict(self) -> Verdict:
+        """Whether the simulated loop tells more of the motion than its reference does."""
         if not self.runs:
-            return ("No loop could be simulated.", *self.remarks)
-        found = [s for j in range(len(self.joints)) if (s := self._sentence(j))]
-        if not found:
-            found.append(
+            return "not_simulated"
+        return "no_nearer" if any(map(self._lost, range(len(self.joints)))) else "follows"
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in plain words."""
+        if not self.runs:
+            return "No loop could be simulated."
+        lost = [j for j in range(len(self.joints)) if self._lost(j)]
+        if not lost:
+            return (
                 "At every joint the simulated loop is nearer to the measurement than the reference "
                 "is, or within the noise: model and controller account for how the robot follows."
             )
+        foreign = [j for j in lost if not self.without_model.joints[3, j] <= _LAW_HOLDS]
+        where = ", ".join(self.joints[j] for j in lost)
+        found = f"At {where} the simulated loop is no nearer to the measurement than the reference"
+        if foreign:
+            return f"{found}: the stated controller is not the one that ran."
+        return f"{found}: the model is poor."
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The sentence, and what it rests on, in plain words."""
+        found = [self.sentence]
+        found += [self._loss(j) for j in range(len(self.joints)) if self.runs and self._lost(j)]
         for joint, share in zip(self.joints, self.saturated, strict=True):
             if share > 0:
                 found.append(
                     f"{joint}: the simulated command is at its limit for {percent(share, 1)} of "
                     "the samples; there the torque says nothing of the model."
                 )
-        return (*found, ORIENTATION, *self.remarks)
+        return (*found, *((ORIENTATION,) if self.runs else ()), *self.remarks)
 
-    def _sentence(self, j: int) -> str:
-        """What is wrong at a joint; empty where nothing is."""
-        joint, own = self.joints[j], self.errors.joints[0, j]
-        reference = self.without_model.joints[0, j]
+    def _lost(self, j: int) -> bool:
+        """Whether a joint's simulated position is no better than the reference, noise aside."""
+        own, reference = self.errors.joints[0, j], self.without_model.joints[0, j]
         noise = 0.0 if self.noise is None else self.noise.joints[0, j]
-        if not own >= reference or own <= _SAME_AS_NOISE * noise:
-            return ""
+        return bool(own >= reference and own > _SAME_AS_NOISE * noise)
+
+    def _loss(self, j: int) -> str:
+        """What is wrong at a joint."""
+        own, reference = self.errors.joints[0, j], self.without_model.joints[0, j]
         found = (
-            f"{joint}: the simulated position is no nearer to the measured one than the reference "
-            f"is ({percent(own, 3)} against {percent(reference, 3)})"
+            f"{self.joints[j]}: the simulated position is {percent(own, 3)} off the measured one, "
+            f"the reference {percent(reference, 3)}"
         )
         law = self.without_model.joints[3, j]
-        if not law <= _LAW_HOLDS:
+        if law <= _LAW_HOLDS:
             return (
-                f"{found}, and the stated control law does not give the recorded torque "
-                f"({percent(law, 1)} off): another controller ran, with other gains or a delay, or "
-                "torque or reference are recorded in other units."
+                f"{found}. The stated control law gives the recorded torque, {percent(law, 1)} "
+                "off: it is the model that does not respond as the robot does."
             )
         return (
-            f"{found}, though the stated control law gives the recorded torque ({percent(law, 1)} "
-            "off): the model is poor."
+            f"{found}. The stated control law does not give the recorded torque ({percent(law, 1)} "
+            "off): another one ran, with other gains or a delay, or torque or reference are "
+            "recorded in other units."
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -317,6 +252,7 @@ class Validation:
         without, tracking, noise = self.without_model, self.tracking, self.noise
         known = bool(self.runs)
         return {
+            "verdict": self.verdict,
             "controller": self.controller,
             "settling_s": finite(self.settling),
             "noise": {
@@ -361,10 +297,6 @@ class Validation:
             ],
             "notes": list(self.notes),
         }
-
-
-def _named(values: np.ndarray) -> dict[str, float | None]:
-    return {one: finite(float(x)) for one, x in zip(QUANTITIES, values, strict=True)}
 
 
 def _percents(values: np.ndarray) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -187,11 +188,17 @@ def thinned(trace: Trace, points: int) -> np.ndarray:
     -------
     (<= points,) indices, increasing.
     """
-    samples = len(trace.t)
+    return kept_of(
+        (trace.measured, trace.measured - trace.before, trace.measured - trace.after), points
+    )
+
+
+def kept_of(signals: Sequence[np.ndarray], points: int) -> np.ndarray:
+    """`thinned` for any signals, (T,) each."""
+    samples = len(signals[0])
     if samples <= points:
         return np.arange(samples)
     edges = np.linspace(0, samples, max(points - 2, 14) // 6 + 1).astype(int)
-    signals = (trace.measured, trace.measured - trace.before, trace.measured - trace.after)
     kept = {0, samples - 1}
     for start, stop in pairwise(edges):
         for signal in signals:

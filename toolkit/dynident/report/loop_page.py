@@ -1,0 +1,84 @@
+"""The section of the report on the simulated loop, and a page of its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import plotly.graph_objects as go
+
+from dynident.diagnose.loop_run import QUANTITIES, Quantity
+from dynident.diagnose.validation import Validation
+from dynident.report.loop_content import loop_trace
+from dynident.report.loop_pictures import loop_quantity
+from dynident.tables import Table
+
+_BYTES = 1_600_000
+"""What all pictures together may take in the page."""
+_BYTES_PER_POINT = 54
+"""Five lines, two single-precision numbers each, in base 64."""
+_MOST_PICTURED = 21
+"""Joints times recordings that have pictures."""
+
+
+@dataclass(frozen=True)
+class Unsimulated:
+    """Why the loop of a study was not simulated."""
+
+    failure: str
+
+
+@dataclass(frozen=True)
+class LoopSection:
+    """What the section shows.
+
+    Attributes
+    ----------
+    failure : why there is nothing to show; empty where there is.
+    opening : what was done, in words.
+    first, rest : tables before the pictures, tables and sentences after them.
+    pictures : joint and recording of each set of pictures.
+    left_out : recordings without pictures.
+    figures : by name.
+    """
+
+    failure: str = ""
+    opening: str = ""
+    first: tuple[Table, ...] = ()
+    rest: tuple[Table | str, ...] = ()
+    pictures: tuple[tuple[str, str], ...] = ()
+    left_out: int = 0
+    figures: tuple[tuple[str, go.Figure], ...] = ()
+    quantities: tuple[Quantity, ...] = QUANTITIES
+
+
+def loop_section(found: Validation | Unsimulated | None) -> LoopSection | None:
+    """Return what the section on the simulated loop shows; None where there is no controller."""
+    if found is None:
+        return None
+    if isinstance(found, Unsimulated):
+        return LoopSection(failure=found.failure)
+    opening = (
+        "The identified robot follows each recording's reference once more, under the stated "
+        "controller, and is compared with what was measured."
+    )
+    if not found.runs:
+        return LoopSection(opening=opening, rest=(found.recording_table(), *found.notes))
+    n = len(found.joints)
+    most = max(1, _MOST_PICTURED // n)
+    runs = found.runs[:most]
+    points = max(16, min(2500, _BYTES // _BYTES_PER_POINT // (len(QUANTITIES) * n * len(runs))))
+    pairs = [(j, run) for run in runs for j in range(n)]
+    figures = [
+        (f"loop-{i}-{quantity}", loop_quantity(loop_trace(found, run, j, quantity).thinned(points)))
+        for i, (j, run) in enumerate(pairs)
+        for quantity in QUANTITIES
+    ]
+    tables = found.tables()
+    return LoopSection(
+        opening=opening,
+        first=(found.error_table(),),
+        rest=(*(part for part in tables[1:] if isinstance(part, Table)), *found.notes),
+        pictures=tuple((found.joints[j], run.name) for j, run in pairs),
+        left_out=len(found.runs) - len(runs),
+        figures=tuple(figures),
+    )
