@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from dynident.closed_loop import Controller, Mechanism
-from dynident.closed_loop.controllers import Drive
+from dynident.closed_loop.drive import Drive, Reference
 from dynident.recording import Recording, central_difference
 from dynident.robot import Robot
 
@@ -33,25 +33,15 @@ def settling_time(controller: Controller, mechanism: Mechanism, q: np.ndarray) -
     -------
     s; infinite where a joint's position is not controlled.
     """
-    stiffness, damping = _second_order(controller, largest_inertia(mechanism, q))
+    feedback = controller.feedback()
+    inertia = 1.0 if controller.law.through_model else largest_inertia(mechanism, q)
+    stiffness, damping = feedback.position / inertia, feedback.speed / inertia
     with np.errstate(divide="ignore", invalid="ignore"):
         natural = np.sqrt(stiffness)
         ratio = np.maximum(damping / (2 * natural), _LEAST_DAMPING)
         slow = natural * np.where(ratio > 1, ratio - np.sqrt(np.maximum(ratio**2 - 1, 0)), ratio)
         times = np.where(stiffness > 0, _TIME_CONSTANTS / slow, np.inf)
     return float(np.max(times))
-
-
-def _second_order(controller: Controller, inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Stiffness and damping over inertia of each joint's loop, (n,): 1/s^2 and 1/s."""
-    kp = np.array(controller.kp)
-    if controller.kind == "cascade":
-        kv = np.array(controller.kv)
-        return kp * kv / inertia, kv / inertia
-    kd = np.array(controller.kd)
-    if controller.kind == "computed_torque":
-        return kp, kd
-    return kp / inertia, kd / inertia
 
 
 def largest_inertia(mechanism: Mechanism, q: np.ndarray) -> np.ndarray:
@@ -83,8 +73,9 @@ def law_torque(recording: Recording, controller: Controller, nominal: Robot) -> 
     assert recording.q_ref is not None
     t, rate, q_ref = recording.t, recording.rate_hz, recording.q_ref
     v_ref = central_difference(q_ref, rate)
-    drive = Drive(replace(controller, rate_hz=rate), recording.q[0], v_ref[0])
-    command = np.array([drive.command(*row) for row in zip(recording.q, q_ref, v_ref, strict=True)])
+    followed = Reference(q_ref, v_ref, central_difference(v_ref, rate))
+    drive = Drive(replace(controller, rate_hz=rate), followed, [nominal])
+    command = np.array([drive.command(k, q) for k, q in enumerate(recording.q)])
     if controller.delay_s > 0:
         late = t - controller.delay_s
         command = np.column_stack([np.interp(late, t, column) for column in command.T])
