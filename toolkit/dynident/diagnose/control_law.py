@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from dynident.closed_loop import Controller, Mechanism
-from dynident.closed_loop.drive import Drive, Reference
 from dynident.recording import Recording, central_difference
 from dynident.robot import Robot
 
@@ -70,6 +69,8 @@ def law_torque(recording: Recording, controller: Controller, nominal: Robot) -> 
     controller : the law.
     nominal : the robot inside a computed torque or a feed-forward.
     """
+    from dynident.closed_loop.drive import Drive, Reference
+
     assert recording.q_ref is not None
     t, rate, q_ref = recording.t, recording.rate_hz, recording.q_ref
     v_ref = central_difference(q_ref, rate)
