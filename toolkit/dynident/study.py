@@ -41,6 +41,7 @@ Positive = Field(default=None, gt=0)
 
 class _RecordingEntry(Table):
     file: str
+    record: str | None = None
     use: Literal["train", "test"] = "train"
     period: float | None = Positive
     start: float = 0.0
@@ -248,15 +249,16 @@ def _recordings(said: _StudyFile, path: Path, robot: Robot) -> list[Recording]:
             ours: Column(theirs, 1.0) if isinstance(theirs, str) else Column(**theirs.model_dump())
             for ours, theirs in said.columns.items()
         }
-    known: dict[Path, Recording] = {}
+    known: dict[tuple[Path, str | None], Recording] = {}
     found = []
     for entry in said.recordings:
         file = find_data(entry.file, path.parent)
-        if file not in known:
-            known[file] = read(file, robot.names, columns, kinds=robot.kinds)
+        key = (file, entry.record)
+        if key not in known:
+            known[key] = read(file, robot.names, columns, robot.kinds, entry.record)
         found.append(
-            known[file].replace(
-                name=entry.file,
+            known[key].replace(
+                name=entry.record or entry.file,
                 use=entry.use,
                 period=entry.period,
                 start=entry.start,

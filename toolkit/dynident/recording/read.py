@@ -15,6 +15,7 @@ from dynident.recording.binary_files import open_mat, open_npz, open_parquet
 from dynident.recording.columns import OPTIONAL, REQUIRED, Column, joints_in, load, resolve
 from dynident.recording.csv_file import open_csv
 from dynident.recording.recording import Provenance, Recording, _joint_names
+from dynident.recording.records import pick
 from dynident.recording.units_check import warn_of_units
 
 _OPENERS = {".csv": open_csv, ".npz": open_npz, ".mat": open_mat, ".parquet": open_parquet}
@@ -26,6 +27,7 @@ def read(
     joints: Sequence[str] | None = None,
     columns: Mapping[str, Column | str] | None = None,
     kinds: Sequence[str] | None = None,
+    record: str | None = None,
 ) -> Recording:
     """Read a recording; the file's suffix says its format.
 
@@ -38,11 +40,14 @@ def read(
     columns : ours -> theirs for files with other names or units, as
         `{"tau.slider": Column("vir", 35.15)}`; names that it leaves out are ours.
     kinds : "revolute" or "prismatic" for each joint, for warnings of units.
+    record : which one of an NPZ or MAT file that holds several: a two-dimensional array each, a row
+        a sample, and one array of text, `columns`, that names the columns of all.
 
     Returns
     -------
     Recording
-        Named after the file; period, use and so on are set with `Recording.replace`.
+        Named after the record, else the file; period, use and so on are set with
+        `Recording.replace`.
 
     Raises
     ------
@@ -65,6 +70,8 @@ def read(
     if not data:
         raise RecordingError("is empty", where, "is the file complete?")
     table = opener(data, where)
+    if record is not None:
+        table = pick(table, record)
     names = joints_in(table) if joints is None else _joint_names(joints, where)
     if kinds is not None and len(kinds) != len(names):
         raise RecordingError(f"{len(kinds)} kinds for {len(names)} joints", where)
@@ -77,8 +84,8 @@ def read(
     recording = Recording(
         t=found["t"],
         joints=names,
-        name=path.stem,
-        provenance=Provenance(where, hashlib.sha256(data).hexdigest()),
+        name=record or path.stem,
+        provenance=Provenance(where, hashlib.sha256(data).hexdigest(), record=record or ""),
         **signals,
     )
     warn_of_units(recording, kinds)

@@ -29,11 +29,13 @@ class Provenance:
     file : path of the file as it was given; empty for a recording made in memory.
     sha256 : hexadecimal digits of the file's content; empty likewise.
     filter : what was done to the numbers since, in words; empty if nothing.
+    record : which recording of a file that holds several; empty if it holds one.
     """
 
     file: str = ""
     sha256: str = ""
     filter: str = ""
+    record: str = ""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -130,8 +132,10 @@ class Recording:
 
     @property
     def where(self) -> str:
-        """How messages call this recording: its file, else its name."""
-        return self.provenance.file or self.name or "recording"
+        """How messages call this recording: its file (and record in it), else its name."""
+        source = self.provenance
+        record = f", record {source.record}" if source.record else ""
+        return source.file + record if source.file else self.name or "recording"
 
     def row(self, index: int) -> str:
         """How messages call a sample, given its index from 0: file and row (and line, in CSV)."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from dynident.errors import DynidentWarning, RecordingError
-from dynident.recording.recording import SIGNALS, Provenance, Recording
+from dynident.recording.recording import SIGNALS, Recording
 
 TOLERANCE = 1e-3
 """Relative jitter up to which a recording counts as uniform."""
@@ -78,9 +79,7 @@ def uniform(recording: Recording) -> Recording:
     warnings.warn(f"{recording.where}: {why}; {done}", DynidentWarning, stacklevel=2)
     source = recording.provenance
     history = f"{source.filter}, {done}" if source.filter else done
-    return recording.replace(
-        t=grid, provenance=Provenance(source.file, source.sha256, history), **signals
-    )
+    return recording.replace(t=grid, provenance=replace(source, filter=history), **signals)
 
 
 def _step(recording: Recording) -> float | None:
