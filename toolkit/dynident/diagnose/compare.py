@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from dynident.closed_loop import Controller
 from dynident.diagnose.diagnosis import finite
 from dynident.diagnose.evidence import ColumnStore, gather
 from dynident.diagnose.held_out import HeldOut, on_blocks, on_recordings
+from dynident.diagnose.loop_columns import loop_columns, loop_json
 from dynident.diagnose.maps import residual_maps
 from dynident.diagnose.present import fit_present
+from dynident.diagnose.replay import Judged, loop_of
+from dynident.diagnose.validation import Unsimulated, Validation
 from dynident.errors import FitError
 from dynident.fit.estimate import Estimate
 from dynident.fit.shapes import refine_shapes, shaped_effects
@@ -29,11 +33,14 @@ class Comparison:
     names : of the estimates.
     models : theirs.
     results : what each misses.
+    loops : each in the closed loop of the recordings, see `dynident.validate`; None where the
+        controller or the reference is not known.
     """
 
     names: tuple[str, ...]
     models: tuple[Model, ...]
     results: tuple[HeldOut, ...]
+    loops: tuple[Validation | Unsimulated | None, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON of `compare --json`."""
@@ -49,8 +56,11 @@ class Comparison:
                         {"name": joint, "error": finite(float(error))}
                         for joint, error in zip(robot.names, result.joint_errors, strict=True)
                     ],
+                    **({} if loop is None else {"closed_loop": loop_json(loop)}),
                 }
-                for name, model, result in zip(self.names, self.models, self.results, strict=True)
+                for name, model, result, loop in zip(
+                    self.names, self.models, self.results, self._loops, strict=True
+                )
             ],
             "joints": [
                 {
@@ -61,6 +71,10 @@ class Comparison:
                 for j, joint in enumerate(robot.names)
             ],
         }
+
+    @property
+    def _loops(self) -> tuple[Validation | Unsimulated | None, ...]:
+        return self.loops or (None,) * len(self.names)
 
     def tables(self) -> tuple[Table | str, ...]:
         """Everything that `show` prints, in its order."""
@@ -77,12 +91,24 @@ class Comparison:
         notes = () if last.floor is not None else ("The noise floor is unknown.",)
         columns = ("joint", *self.names, "noise floor")
         errors = Table("Relative torque error on held-out recordings", columns, tuple(rows), notes)
+        loops = loop_columns(self.names, self._loops, robot.names)
+        if loops and len(self.names) == 1:
+            # One table: the simulated loop beside what the regression leaves.
+            pairs = zip(errors.rows, loops.rows, strict=True)
+            errors = replace(
+                errors,
+                columns=(*columns, *loops.columns[1:]),
+                rows=tuple((*row, *more[1:]) for row, more in pairs),
+                notes=(*notes, *loops.notes),
+            )
+            loops = None
         seen = residual_maps(self.models[-1], last, last)
         where = tuple((m.joint, m.against, m.sentence) for m in seen if m.sentence)
+        first = (errors, loops) if loops else (errors,)
         if not where:
-            return (errors, f"Where '{self.names[-1]}' fails: no simple shape stands out.")
+            return (*first, f"Where '{self.names[-1]}' fails: no simple shape stands out.")
         title = f"Where '{self.names[-1]}' fails"
-        return (errors, Table(title, ("joint", "against", "what is seen"), where))
+        return (*first, Table(title, ("joint", "against", "what is seen"), where))
 
     def show(self) -> None:
         """Print the errors side by side, and where the last estimate fails."""
@@ -90,13 +116,19 @@ class Comparison:
 
 
 @single_threaded
-def compare(estimates: Estimate | Mapping[str, Estimate], dataset: Dataset) -> Comparison:
+def compare(
+    estimates: Estimate | Mapping[str, Estimate],
+    dataset: Dataset,
+    controller: Controller | None = None,
+) -> Comparison:
     """Compare estimates with measurements that they were not fitted to.
 
     Parameters
     ----------
     estimates : one, or several by name.
     dataset : recordings, with their filter and, where nothing repeats, their noise.
+    controller : of the loop in which they were made: each estimate is simulated in it, too, where
+        recordings have their reference.
 
     Raises
     ------
@@ -113,11 +145,21 @@ def compare(estimates: Estimate | Mapping[str, Estimate], dataset: Dataset) -> C
         store = ColumnStore(estimate.model, runs)
         store.prepare(estimate.model.effects)
         results.append(on_recordings(store, estimate))
-    return Comparison(tuple(named), tuple(e.model for e in named.values()), tuple(results))
+    return Comparison(
+        tuple(named),
+        tuple(e.model for e in named.values()),
+        tuple(results),
+        tuple(loop_of(Judged.of(e), dataset, controller) for e in named.values()),
+    )
 
 
 @single_threaded
-def compare_models(models: Mapping[str, Model], train: Dataset, test: Dataset) -> Comparison:
+def compare_models(
+    models: Mapping[str, Model],
+    train: Dataset,
+    test: Dataset,
+    controller: Controller | None = None,
+) -> Comparison:
     """Fit models as the diagnosis does, and compare them on data that they have not seen.
 
     Parameters
@@ -126,10 +168,12 @@ def compare_models(models: Mapping[str, Model], train: Dataset, test: Dataset) -
     train : recordings to fit.
     test : recordings to judge by; where it is empty, blocks of time of the training recordings
         are held out.
+    controller : as in `compare`; the loops are those of the test recordings, or of the training
+        recordings where there are none.
     """
     runs = gather(train)
     held = gather(test) if len(test) else None
-    results, fitted = [], []
+    results, fitted, loops = [], [], []
     for model in models.values():
         if shaped_effects(model):
             model = refine_shapes(model, train).model
@@ -143,4 +187,5 @@ def compare_models(models: Mapping[str, Model], train: Dataset, test: Dataset) -
             judge.prepare(model.effects)
             results.append(on_recordings(judge, present))
         fitted.append(model)
-    return Comparison(tuple(models), tuple(fitted), tuple(results))
+        loops.append(loop_of(Judged(model, present.values), test if held else train, controller))
+    return Comparison(tuple(models), tuple(fitted), tuple(results), tuple(loops))

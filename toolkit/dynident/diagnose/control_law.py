@@ -69,12 +69,12 @@ def law_torque(recording: Recording, controller: Controller, nominal: Robot) -> 
     controller : the law.
     nominal : the robot inside a computed torque or a feed-forward.
     """
-    from dynident.closed_loop.drive import Drive, Reference
+    from dynident.closed_loop.drive import Drive, ReferenceSamples
 
     assert recording.q_ref is not None
     t, rate, q_ref = recording.t, recording.rate_hz, recording.q_ref
     v_ref = central_difference(q_ref, rate)
-    followed = Reference(q_ref, v_ref, central_difference(v_ref, rate))
+    followed = ReferenceSamples(q_ref, v_ref, central_difference(v_ref, rate))
     drive = Drive(replace(controller, rate_hz=rate), followed, [nominal])
     command = np.array([drive.command(k, q) for k, q in enumerate(recording.q)])
     if controller.delay_s > 0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -13,8 +14,8 @@ from dynident.diagnose.control_law import law_torque, settling_time
 from dynident.diagnose.diagnosis import NoiseSource
 from dynident.diagnose.loop_run import QUANTITIES, LoopRun, Signals, Skipped
 from dynident.diagnose.noise import differences
-from dynident.diagnose.validation import Validation
-from dynident.errors import DynidentError, RecordingError, SimulationError
+from dynident.diagnose.validation import Unsimulated, Validation
+from dynident.errors import DynidentError, DynidentWarning, RecordingError, SimulationError
 from dynident.fit.estimate import Estimate
 from dynident.fit.least_squares import sources_of
 from dynident.fit.sampling import Sampled, sample
@@ -60,9 +61,7 @@ def validate(
         If no recording has a reference, or the controller cannot be simulated or is another
         robot's. A loop that cannot be simulated is no error: see `Validation.skipped`.
     """
-    theta = None if estimate.links is None else estimate.robot.theta
-    judged = Judged(estimate.model, estimate.values, theta)
-    return simulate_again(judged, dataset, controller, progress)
+    return simulate_again(Judged.of(estimate), dataset, controller, progress)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +71,12 @@ class Judged:
     model: Model
     values: np.ndarray
     theta: np.ndarray | None = None
+
+    @staticmethod
+    def of(estimate: Estimate) -> Judged:
+        """Return what is simulated of an estimate."""
+        theta = None if estimate.links is None else estimate.robot.theta
+        return Judged(estimate.model, estimate.values, theta)
 
     def mechanism(self, *, carries_payload: bool) -> Mechanism:
         """Return what is simulated."""
@@ -83,6 +88,32 @@ class Judged:
 def has_reference(dataset: Dataset) -> bool:
     """Whether there is a recording whose loop can be followed once more."""
     return any(recording.q_ref is not None for recording in dataset.recordings)
+
+
+def loop_of(
+    judged: Judged,
+    dataset: Dataset,
+    controller: Controller | None,
+    progress: Progress | None = None,
+) -> Validation | Unsimulated | None:
+    """Simulate the loop where there is one to simulate, for those who do not insist.
+
+    Returns
+    -------
+    None without a controller or a reference; `Unsimulated` where something is in the way.
+    """
+    if controller is None or not has_reference(dataset):
+        return None
+    try:
+        with warnings.catch_warnings():
+            # What is to be said of the recordings was said when they were compared.
+            warnings.simplefilter("ignore", DynidentWarning)
+            found = simulate_again(judged, dataset, controller, progress)
+    except DynidentError as error:
+        return Unsimulated(str(error))
+    if found.runs:
+        return found
+    return Unsimulated("; ".join(dict.fromkeys(one.reason for one in found.skipped)))
 
 
 def simulate_again(

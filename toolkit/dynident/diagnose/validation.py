@@ -27,6 +27,13 @@ _LAW_HOLDS = 0.2
 """Relative error up to which the stated control law is the one that ran."""
 
 
+@dataclass(frozen=True)
+class Unsimulated:
+    """Why no loop of a study was simulated, in words."""
+
+    reason: str
+
+
 @dataclass(frozen=True, eq=False)
 class Validation:
     """A model in the closed loop in which it was measured.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import jinja2
@@ -15,7 +15,7 @@ from plotly.offline import get_plotlyjs
 from dynident import files
 from dynident.diagnose.diagnosis import Diagnosis, JointResult, ResidualMap
 from dynident.diagnose.loop_run import QUANTITIES
-from dynident.diagnose.validation import Validation
+from dynident.diagnose.validation import Unsimulated, Validation
 from dynident.report import pictures
 from dynident.report.content import after_name, ranked, seen, x_title
 from dynident.report.diagnosis_tables import (
@@ -27,7 +27,7 @@ from dynident.report.diagnosis_tables import (
     step_table,
     versions,
 )
-from dynident.report.loop_page import LoopSection, Unsimulated, loop_section
+from dynident.report.loop_page import LoopSection, loop_section
 from dynident.tables import Table, number, percent
 
 _TRACE_BYTES = 2_400_000
@@ -139,6 +139,7 @@ def _diagnosis_page(diagnosis: Diagnosis, closed: LoopSection | None, command: s
 def _validation_page(validation: Validation, command: str) -> str:
     closed = loop_section(validation)
     assert closed is not None
+    closed = replace(closed, sentence="")  # the head of the page has it
     errors = zip(QUANTITIES, validation.error_table().rows[-1][1:], strict=False)
     used = tuple((s.file, s.sha256, s.filter) for s in validation.sources)
     return _template("validation.html").render(

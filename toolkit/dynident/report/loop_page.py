@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import plotly.graph_objects as go
 
 from dynident.diagnose.loop_run import QUANTITIES, Quantity
-from dynident.diagnose.validation import Validation
+from dynident.diagnose.validation import Unsimulated, Validation
 from dynident.report.loop_content import loop_trace
 from dynident.report.loop_pictures import loop_quantity
 from dynident.tables import Table
@@ -21,20 +21,13 @@ _MOST_PICTURED = 21
 
 
 @dataclass(frozen=True)
-class Unsimulated:
-    """Why the loop of a study was not simulated."""
-
-    failure: str
-
-
-@dataclass(frozen=True)
 class LoopSection:
     """What the section shows.
 
     Attributes
     ----------
     failure : why there is nothing to show; empty where there is.
-    opening : what was done, in words.
+    opening, sentence : what was done, and what came of it, in words.
     first, rest : tables before the pictures, tables and sentences after them.
     pictures : joint and recording of each set of pictures.
     left_out : recordings without pictures.
@@ -43,6 +36,7 @@ class LoopSection:
 
     failure: str = ""
     opening: str = ""
+    sentence: str = ""
     first: tuple[Table, ...] = ()
     rest: tuple[Table | str, ...] = ()
     pictures: tuple[tuple[str, str], ...] = ()
@@ -56,13 +50,14 @@ def loop_section(found: Validation | Unsimulated | None) -> LoopSection | None:
     if found is None:
         return None
     if isinstance(found, Unsimulated):
-        return LoopSection(failure=found.failure)
+        return LoopSection(failure=found.reason)
     opening = (
         "The identified robot follows each recording's reference once more, under the stated "
         "controller, and is compared with what was measured."
     )
     if not found.runs:
-        return LoopSection(opening=opening, rest=(found.recording_table(), *found.notes))
+        rest = (found.recording_table(), *found.notes[1:])
+        return LoopSection(opening=opening, sentence=found.sentence, rest=rest)
     n = len(found.joints)
     most = max(1, _MOST_PICTURED // n)
     runs = found.runs[:most]
@@ -74,10 +69,12 @@ def loop_section(found: Validation | Unsimulated | None) -> LoopSection | None:
         for quantity in QUANTITIES
     ]
     tables = found.tables()
+    sentence, *notes = found.notes
     return LoopSection(
         opening=opening,
         first=(found.error_table(),),
-        rest=(*(part for part in tables[1:] if isinstance(part, Table)), *found.notes),
+        rest=(*(part for part in tables[1:] if isinstance(part, Table)), *notes),
+        sentence=sentence,
         pictures=tuple((found.joints[j], run.name) for j, run in pairs),
         left_out=len(found.runs) - len(runs),
         figures=tuple(figures),

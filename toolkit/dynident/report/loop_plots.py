@@ -66,11 +66,10 @@ def simulated_loop(
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             found.setdefault(label, handle)
     figure.legend(
-        found.values(), found.keys(), loc="outside upper left", ncols=len(found), frameon=False
+        found.values(), found.keys(), loc="outside upper right", ncols=len(found), frameon=False
     )
-    figure.suptitle(
-        f"{plain(run.name)}: {validation.controller}", fontsize="medium", ha="left", x=0.5
-    )
+    title = f"{plain(run.name)}: {validation.controller}"
+    figure.suptitle(title, fontsize="medium", ha="left", x=0.005)
     return figure
 
 
