@@ -16,12 +16,14 @@ import click
 
 # Imported for what they add to the group, in the order of the help.
 from dynident.cli import studies  # isort: skip
+from dynident.cli import loops  # isort: skip
+from dynident.cli import pages  # isort: skip
 from dynident.cli import robots  # isort: skip
 from dynident.cli.group import commands
 from dynident.cli.output import ReaderGone
 from dynident.errors import DynidentError, DynidentWarning
 
-__all__ = ["commands", "main", "robots", "studies"]
+__all__ = ["commands", "loops", "main", "pages", "robots", "studies"]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

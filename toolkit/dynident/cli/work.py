@@ -1,0 +1,84 @@
+"""What several commands do with a study."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from dynident import files
+from dynident.cli.output import progress
+from dynident.errors import FileError
+
+if TYPE_CHECKING:
+    from dynident.diagnose import Comparison, Diagnosis
+    from dynident.study import Study
+
+STUDY = click.argument("study", type=click.Path(path_type=Path))
+
+
+def require_places(study: Path, *paths: Path | None) -> None:
+    """Refuse files that could not be written, before the work that they are to hold is done."""
+    for path in paths:
+        if path is None:
+            continue
+        files.require_place(path)
+        if path.resolve() == study.resolve():
+            raise FileError("is the study itself", str(path), "write to another file")
+
+
+def load_study(path: Path) -> Study:
+    """Read a study and everything that it names."""
+    from dynident.study import load
+
+    with progress("reading"):
+        return load(path)
+
+
+def diagnosis_of(study: Study) -> Diagnosis:
+    """Run the search for what the model lacks."""
+    from dynident.diagnose import diagnose as search
+
+    with progress("diagnosing") as tell:
+        return search(study.model, study.train, study.test, tell=tell)
+
+
+def comparison_of(study: Study, additions: tuple[str, ...]) -> Comparison:
+    """Compare the study's model with those that have an effect more."""
+    from dynident.diagnose import compare_models
+
+    models = {"study": study.model}
+    for label in additions:
+        model = study.model
+        for effect in _missing(label, study):
+            model = model + effect
+        models[f"+ {label}"] = model
+    with progress("comparing"):
+        return compare_models(models, study.train, study.test, study.controller)
+
+
+def _missing(label: str, study: Study):
+    from dynident.effects import effects_of
+
+    return [effect for effect in effects_of(label, study.robot) if effect not in study.model]
+
+
+def write_report(study: Study, diagnosis: Diagnosis, to: Path | None) -> None:
+    """Write the HTML report, with the final model's loop where the study knows its controller."""
+    if to is None:
+        return
+    from dynident.diagnose.replay import Judged, loop_of
+    from dynident.report import report as write
+
+    with progress("simulating"):
+        recordings = study.test if len(study.test) else study.train
+        loop = loop_of(Judged.of(diagnosis.after), recordings, study.controller)
+    write(diagnosis, to=to, loop=loop, command=command_line())
+    click.echo(f"report: {to}", err=True)
+
+
+def command_line() -> str:
+    """The command as it was typed, for the provenance of a report."""
+    return " ".join(["dynident", *sys.argv[1:]])
