@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,64 +10,117 @@ import pytest
 from tests.synthetic import arm
 
 from dynident.closed_loop import Controller, ControllerFile
-from dynident.closed_loop.controllers import Drive
+from dynident.closed_loop.drive import Drive, ReferenceSamples
 from dynident.errors import SimulationError, StudyError
 from dynident.robot import Robot
 
 RATE = 100.0
-Q, Q_REF, V_REF = (np.array(x) for x in ([0.1, -0.2], [0.3, 0.1], [1.0, -2.0]))
+Q, Q_REF, V_REF, A_REF = (np.array(x) for x in ([0.1, -0.2], [0.3, 0.1], [1.0, -2.0], [3.0, 1.0]))
 BEFORE = np.array([0.09, -0.21])
 SPEED = (Q - BEFORE) * RATE
 
 
-def first_command(controller: Controller) -> np.ndarray:
-    return Drive(controller, BEFORE, np.zeros(2)).command(Q, Q_REF, V_REF)
+def constant(samples: int, q: Any, v: Any, a: Any = 0.0) -> ReferenceSamples:
+    rows = (
+        np.tile(np.asarray(x, dtype=float) + np.zeros(np.shape(q)), (samples, 1)) for x in (q, v, a)
+    )
+    return ReferenceSamples(*rows)
+
+
+def second_command(controller: Controller, scale: Any = None) -> np.ndarray:
+    """The command at Q, one sample after BEFORE."""
+    drive = Drive(controller, constant(2, Q_REF, V_REF, A_REF), [arm()], scale)
+    drive.command(0, BEFORE)
+    return drive.command(1, Q)
+
+
+def one_joint(controller: Controller, q_ref: float, samples: int) -> Drive:
+    return Drive(controller, constant(samples, [q_ref], 0.0), [arm()])
 
 
 def test_pd() -> None:
     kp, kd = np.array([10.0, 20.0]), np.array([1.0, 2.0])
-    u = first_command(Controller("pd", RATE, (10.0, 20.0), (1.0, 2.0)))
-    np.testing.assert_allclose(u, kp * (Q_REF - Q) + kd * (V_REF - SPEED), rtol=1e-12)
+    expected = kp * (Q_REF - Q) + kd * (V_REF - SPEED)
+    pd = Controller("pd", RATE, (10.0, 20.0), (1.0, 2.0))
+    np.testing.assert_allclose(second_command(pd), expected, rtol=1e-12)
+    np.testing.assert_allclose(
+        second_command(pd, np.array([2.0, 0.5])), [2.0, 0.5] * expected, rtol=1e-12
+    )
+    amplified = Controller("pd", RATE, (1.0, 10.0), (0.1, 1.0), drive_gain=(10.0, 2.0))
+    np.testing.assert_allclose(second_command(amplified), expected, rtol=1e-12)
 
 
 def test_pd_without_reference_velocity() -> None:
     kp, kd = np.array([10.0, 20.0]), np.array([1.0, 2.0])
-    u = first_command(Controller("pd", RATE, (10.0, 20.0), (1.0, 2.0), velocity_reference=False))
+    u = second_command(Controller("pd", RATE, (10.0, 20.0), (1.0, 2.0), velocity_reference=False))
     np.testing.assert_allclose(u, kp * (Q_REF - Q) - kd * SPEED, rtol=1e-12)
 
 
-def test_cascade() -> None:
-    kp, kv = np.array([10.0, 20.0]), np.array([1.0, 2.0])
-    u = first_command(Controller("cascade", RATE, (10.0, 20.0), kv=(1.0, 2.0)))
-    np.testing.assert_allclose(u, kv * (kp * (Q_REF - Q) - SPEED), rtol=1e-12)
+def test_cascade_of_the_paper() -> None:
+    """tau = g (kp kv (q_ref - q) - kv v)."""
+    kp, kv, g = np.array([10.0, 20.0]), np.array([1.0, 2.0]), np.array([3.0, 4.0])
+    expected = g * (kp * kv * (Q_REF - Q) - kv * SPEED)
+    u = second_command(Controller("cascade", RATE, (10.0, 20.0), kv=(1.0, 2.0), drive_gain=(3, 4)))
+    np.testing.assert_allclose(u, expected, rtol=1e-12)
+    u = second_command(Controller("cascade", RATE, (10.0, 20.0), kv=(3.0, 8.0)))
+    np.testing.assert_allclose(u, expected, rtol=1e-12)
+
+
+def test_computed_torque_is_the_inverse_dynamics_of_the_wanted_acceleration() -> None:
+    kp, kd = np.array([10.0, 20.0]), np.array([1.0, 2.0])
+    controller = Controller("computed_torque", RATE, (10.0, 20.0), (1.0, 2.0))
+    for factor in (1.0, 0.5):
+        wanted = A_REF + factor * (kp * (Q_REF - Q) + kd * (V_REF - SPEED))
+        (expected,) = arm().inverse_dynamics(Q[None], SPEED[None], wanted[None])
+        u = second_command(controller, np.full(2, factor))
+        np.testing.assert_allclose(u, expected, rtol=1e-12)
+
+
+def test_feed_forward_adds_the_torque_along_the_reference() -> None:
+    pd = Controller("pd", RATE, (10.0, 20.0), (1.0, 2.0))
+    (along,) = arm().inverse_dynamics(Q_REF[None], V_REF[None], A_REF[None])
+    for scale in (np.ones(2), np.array([0.5, 2.0])):
+        added = second_command(replace(pd, feedforward=True), scale) - second_command(pd, scale)
+        np.testing.assert_allclose(added, along, rtol=1e-12)
+
+
+def test_robots_side_by_side_are_driven_by_their_own_models() -> None:
+    light = arm()
+    heavy = light.with_theta(2.0 * light.theta)
+    controller = Controller("computed_torque", RATE, (10.0, 20.0), (1.0, 2.0))
+    both = constant(1, np.tile(Q_REF, 3), np.tile(V_REF, 3), np.tile(A_REF, 3))
+    u = Drive(controller, both, [light, heavy, light]).command(0, np.tile(Q, 3))
+    np.testing.assert_allclose(u[2:4], 2.0 * u[:2], rtol=1e-12)
+    np.testing.assert_array_equal(u[4:], u[:2])
 
 
 def test_pid_integrates_and_stops_at_the_limit() -> None:
     gains: dict[str, Any] = {"kp": (1.0,), "ki": (10.0,), "kd": (0.0,)}
-    drive = Drive(Controller("pid", RATE, **gains), np.zeros(1), np.zeros(1))
     zero, one = np.zeros(1), np.ones(1)
-    found = [float(drive.command(zero, one, zero)[0]) for _ in range(20)]
+    drive = one_joint(Controller("pid", RATE, **gains), 1.0, 20)
+    found = [float(drive.command(k, zero)[0]) for k in range(20)]
     np.testing.assert_allclose(found, 1.0 + 0.1 * np.arange(1, 21))
-    drive = Drive(Controller("pid", RATE, **gains, limit=(1.45,)), np.zeros(1), np.zeros(1))
-    held = [float(drive.command(zero, one, zero)[0]) for _ in range(1000)]
+    drive = one_joint(Controller("pid", RATE, **gains, limit=(1.45,)), 1.0, 1001)
+    held = [float(drive.command(k, zero)[0]) for k in range(1000)]
     assert max(held) == 1.45
-    released = float(drive.command(one, one, zero)[0])
+    assert drive.saturated.all()
+    released = float(drive.command(1000, one)[0])
     assert abs(released) <= 0.5, "the integral has wound up"
+    assert not drive.saturated.any()
 
 
 def test_limit_binds_both_ways() -> None:
     for sign in (1, -1):
         controller = Controller("pd", RATE, (1e4, 1e4), (0.0, 0.0), limit=(3.0, 5.0))
-        drive = Drive(controller, np.zeros(2), np.zeros(2))
-        u = drive.command(np.zeros(2), sign * np.ones(2), np.zeros(2))
+        drive = Drive(controller, constant(1, sign * np.ones(2), 0.0), [arm()])
+        u = drive.command(0, np.zeros(2))
         np.testing.assert_array_equal(u, sign * np.array([3.0, 5.0]))
 
 
 def test_filtered_derivative_of_a_ramp_settles_on_its_slope() -> None:
     controller = Controller("pd", RATE, (0.0,), (1.0,), derivative_cutoff_hz=5.0)
-    drive = Drive(controller, np.zeros(1), np.zeros(1))
-    zero = np.zeros(1)
-    u = [float(drive.command(np.array([0.02 * k]), zero, zero)[0]) for k in range(1, 200)]
+    drive = one_joint(controller, 0.0, 200)
+    u = [float(drive.command(k, np.array([0.02 * k]))[0]) for k in range(200)][1:]
     assert u[0] == pytest.approx(-2.0 * (1 - np.exp(-2 * np.pi * 5.0 / RATE)))
     assert u[-1] == pytest.approx(-2.0)
     assert np.all(np.diff(u) <= 1e-12)
@@ -88,6 +142,9 @@ def test_filtered_derivative_of_a_ramp_settles_on_its_slope() -> None:
         ({"limit": (1.0,)}, "limit"),
         ({"derivative_cutoff_hz": -1.0}, "derivative_cutoff_hz"),
         ({"delay_s": -1.0}, "delay_s"),
+        ({"drive_gain": (1.0, 0.0)}, "drive_gain"),
+        ({"kind": "computed_torque", "feedforward": True}, "makes the model's torque itself"),
+        ({"kind": "computed_torque", "drive_gain": (1.0, 1.0)}, "torque itself"),
     ],
 )
 def test_what_is_refused(changes: dict[str, Any], words: str) -> None:
@@ -95,12 +152,6 @@ def test_what_is_refused(changes: dict[str, Any], words: str) -> None:
     Controller(**good)
     with pytest.raises(SimulationError, match=words):
         Controller(**(good | changes))
-
-
-def test_a_delay_is_stated_but_not_simulated() -> None:
-    controller = Controller("pd", RATE, (1.0,), (1.0,), delay_s=0.002)
-    with pytest.raises(SimulationError, match=r"0\.002 s cannot be simulated yet"):
-        Drive(controller, np.zeros(1), np.zeros(1))
 
 
 def test_table_of_a_file() -> None:

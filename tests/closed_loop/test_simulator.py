@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,7 @@ from scipy.special import ellipk
 from tests.synthetic import arm
 
 from dynident.closed_loop import Controller, Fourier, Mechanism, Rollout, Sensors, Task, TrueEffect
-from dynident.closed_loop.compiled import _plain as plain
-from dynident.closed_loop.compiled import point_force
+from dynident.closed_loop.compiled import Bodies, PlainForce, TracedForce, point_force
 from dynident.closed_loop.simulator import simulate
 from dynident.effects import catalogue, effects_of
 from dynident.errors import SimulationError
@@ -59,13 +59,12 @@ def test_a_damped_mass_under_sampled_pd_moves_as_the_exact_recursion() -> None:
     (run,) = simulate([task], Controller("pd", rate, (kp,), (kd,)), lead_in=0.0, accuracy=1e-8)
 
     step = expm(np.array([[0, 1, 0], [0, -damping / mass, 1 / mass], [0, 0, 0]]) / rate)
-    time = np.arange(-1, len(run.t)) / rate
-    q_ref, v_ref, _ = (x[:, 0] for x in trajectory.at(time))
-    before, state = q_ref[0], np.array([q_ref[1], v_ref[1]])
+    q_ref, v_ref, _ = (x[:, 0] for x in trajectory.at(np.arange(len(run.t)) / rate))
+    before, state = q_ref[0] - v_ref[0] / rate, np.array([q_ref[0], v_ref[0]])
     for k in range(len(run.t)):
         np.testing.assert_allclose([run.q[k, 0], run.v[k, 0]], state, atol=1e-6)
         speed = (state[0] - before) * rate
-        u = kp * (q_ref[k + 1] - state[0]) + kd * (v_ref[k + 1] - speed)
+        u = kp * (q_ref[k] - state[0]) + kd * (v_ref[k] - speed)
         assert run.u[k, 0] == pytest.approx(u, abs=1e-3)
         before, state = state[0], step[:2] @ np.array([*state, u])
 
@@ -144,35 +143,42 @@ def test_commands_are_the_torque_of_the_recorded_motion(name: str) -> None:
 
 @pytest.mark.parametrize("name", catalogue())
 def test_compiled_force_is_the_effects_force(name: str) -> None:
+    """Also at values other than those it was compiled for."""
     robot = arm()
-    mechanism = Mechanism.of(robot, truth_of(name, robot), carries_payload=True)
-    place = np.array([1, 0, 3, 2])
-    starts = (0.0, 5.0)
-    force = point_force([mechanism] * 2, starts, place)
-    plainly = plain([mechanism] * 2, starts, place)
+    (one,) = truth_of(name, robot)
+    place, starts = np.array([1, 0, 3, 2]), (0.0, 5.0)
+
+    def bodies(*factors: float) -> Bodies:
+        scaled = [
+            Mechanism(robot, (replace(one, values=tuple(f * x for x in one.values)),), WIDTH)
+            for f in factors
+        ]
+        return Bodies(tuple(scaled), starts, place)
+
+    force, plainly = point_force(bodies(0.0, 1.0)), PlainForce(bodies(1.0, 1.0))
+    assert isinstance(force, TracedForce)
+    then = bodies(-2.0, 3.0)
     rng = np.random.default_rng(1)
-    for t in range(20):
-        x = rng.normal(size=8)
-        expected = np.concatenate(
-            [
-                -mechanism.force(
-                    np.array([t + start]), x[place[own]][None], x[place[own] + 4][None]
-                )[0]
-                for start, own in zip(starts, (slice(0, 2), slice(2, 4)), strict=True)
+    for law in (force, plainly):
+        law.set(then)
+        for t in range(20):
+            x = rng.normal(size=8)
+            expected = [
+                -body.force(np.array([t + start]), x[place[own]][None], x[place[own] + 4][None])[0]
+                for body, start, own in zip(
+                    then.mechanisms, starts, (slice(0, 2), slice(2, 4)), strict=True
+                )
             ]
-        )
-        np.testing.assert_allclose(plainly(t, x)[place], expected, rtol=1e-12)
-        if force is None:
-            assert not np.any(expected)
-        else:
-            np.testing.assert_allclose(force(t, x)[place], expected, rtol=1e-9, atol=1e-12)
+            np.testing.assert_allclose(
+                law(t, x)[place], np.concatenate(expected), rtol=1e-9, atol=1e-12
+            )
 
 
 def test_effects_that_do_not_run_on_symbols_are_simulated_all_the_same(monkeypatch) -> None:
     robot = arm()
-    truth = truth_of("coulomb_friction", robot)
+    truth = truth_of("quadratic_drag", robot)
     compiled = followed(robot, truth)
-    kind = catalogue()["coulomb_friction"]
+    kind = catalogue()["quadratic_drag"]
     original = kind.simulated_force
     monkeypatch.setattr(
         kind,

@@ -62,7 +62,27 @@ class ProgramError(DynidentError):
 
 
 class SimulationError(DynidentError):
-    """A closed loop cannot be simulated."""
+    """A closed loop cannot be simulated.
+
+    Parameters
+    ----------
+    what, where, mend : see `DynidentError`.
+    reason : str
+        In one word, for programs that go on without it: "setting", "reference" (none, or unfit),
+        "clock", "inertia" (M(q) is not positive definite), "massless" (a first moment without
+        mass), "unstable" (the loop diverges or oscillates).
+    """
+
+    def __init__(
+        self,
+        what: str,
+        where: str | None = None,
+        mend: str | None = None,
+        *,
+        reason: str = "setting",
+    ) -> None:
+        super().__init__(what, where, mend)
+        self.reason = reason
 
 
 class DynidentWarning(UserWarning):

@@ -3,23 +3,33 @@
 from dynident.closed_loop.controllers import Controller, ControllerFile
 from dynident.closed_loop.experiment import Experiment, Run
 from dynident.closed_loop.experiment_file import load_experiment
+from dynident.closed_loop.loop import ClosedLoop
 from dynident.closed_loop.mechanism import Mechanism, TrueEffect
+from dynident.closed_loop.references import Reference, SampledReference
+from dynident.closed_loop.retrace import Retraced, retrace
 from dynident.closed_loop.rollout import Rollout, Task
 from dynident.closed_loop.sensors import Sensors
+from dynident.closed_loop.simulator import simulate
 from dynident.closed_loop.trajectories import Fourier
 from dynident.closed_loop.virtual_study import write_experiment
 
 __all__ = [
+    "ClosedLoop",
     "Controller",
     "ControllerFile",
     "Experiment",
     "Fourier",
     "Mechanism",
+    "Reference",
+    "Retraced",
     "Rollout",
     "Run",
+    "SampledReference",
     "Sensors",
     "Task",
     "TrueEffect",
     "load_experiment",
+    "retrace",
+    "simulate",
     "write_experiment",
 ]

@@ -1,119 +1,164 @@
 """The force of effects as one compiled function of a single instant.
 
-An integrator asks for the force of one instant, thousands of times a second. Effects are written
-for blocks of samples in NumPy, whose overhead on one sample is twenty times the arithmetic. Run
-once on symbols, the same code gives a CasADi function that takes half a microsecond. Effects that
-cannot be run on symbols (they branch on values, say) are evaluated as they are.
+For the effects that are more than a sum of terms (`Effect.simulated_terms`). An integrator asks for
+the force of one instant, thousands of times a second. Effects are written for blocks of samples in
+NumPy, whose overhead on one sample is twenty times the arithmetic. Run once on symbols, the same
+code gives a CasADi function that takes half a microsecond; the values of the effects stay symbols,
+so that other values need no other function. Effects that cannot be run on symbols (they branch on
+values, say) are evaluated as they are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
 
 from dynident.closed_loop.mechanism import Mechanism
 
-PointForce = Callable[[float, np.ndarray], np.ndarray]
-"""(t, state (2 N,)) -> generalised force (N,), an array that the next call overwrites."""
-
 _PROBES = 64
 _AGREEMENT = 1e-9
 
 
-def point_force(
-    mechanisms: Sequence[Mechanism], starts: Sequence[float], place: np.ndarray
-) -> PointForce | None:
-    """Return what the effects of mechanisms side by side add to a plant's generalised force.
+class PointForce(Protocol):
+    """What effects add to a plant's generalised force: minus what they take."""
 
-    That is minus what they take; None where they take nothing.
+    def set(self, bodies: Bodies) -> None:
+        """Take other values, of the same effects, and other times at which motions start."""
+        ...
 
-    Parameters
+    def __call__(self, t: float, x: np.ndarray) -> np.ndarray:
+        """Return the force (N,) at t and state (2 N,); the next call overwrites it."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """Mechanisms of n joints each, side by side in one plant.
+
+    Attributes
     ----------
-    mechanisms : of n joints each, N in all.
-    starts : s, added to the time of each.
-    place : (N,) where each joint's speed stands in the plant's velocities, and its position in
+    mechanisms : K of them.
+    starts : (K,) s, added to the time of each.
+    place : (K n,) where each joint's speed stands in the plant's velocities, and its position in
         the plant's positions, which come first in the state.
     """
-    distinct = list({id(one): one for one in mechanisms}.values())
-    if not any(np.any(one.force(*_probes(one))) for one in distinct):
-        return None
+
+    mechanisms: tuple[Mechanism, ...]
+    starts: tuple[float, ...]
+    place: np.ndarray
+
+    @property
+    def distinct(self) -> list[Mechanism]:
+        """Each mechanism once."""
+        return list({id(one): one for one in self.mechanisms}.values())
+
+
+def point_force(bodies: Bodies) -> PointForce:
+    """Return the force of effects, as fast as they allow."""
     try:
-        if all(_agrees(one) for one in distinct):
-            return _traced(mechanisms, starts, place)
+        if all(_agrees(one) for one in bodies.distinct):
+            return TracedForce(bodies)
     except Exception:  # code that is not symbolic fails in as many ways as there are
         pass
-    return _plain(mechanisms, starts, place)
-
-
-def _probes(mechanism: Mechanism) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    rng, shape = np.random.default_rng(0), (_PROBES, mechanism.robot.n)
-    scale = np.geomspace(1e-3, 10.0, _PROBES)[:, None]
-    t = rng.uniform(0.0, 1000.0, _PROBES)
-    return t, rng.uniform(-3.0, 3.0, shape), rng.uniform(-1.0, 1.0, shape) * scale
+    return PlainForce(bodies)
 
 
 def _agrees(mechanism: Mechanism) -> bool:
-    t, q, v = _probes(mechanism)
-    force = _traced([mechanism], [0.0], np.arange(mechanism.robot.n))
+    """Whether its force on symbols is the force."""
+    n, rng = mechanism.robot.n, np.random.default_rng(0)
+    scale = np.geomspace(1e-3, 10.0, _PROBES)[:, None]
+    t = rng.uniform(0.0, 1000.0, _PROBES)
+    q = rng.uniform(-3.0, 3.0, (_PROBES, n))
+    v = rng.uniform(-1.0, 1.0, (_PROBES, n)) * scale
+    # Not at the given values: they may be zero, and others are to come.
+    other = tuple(
+        replace(one, values=tuple(rng.uniform(0.5, 2.0, len(one.values))))
+        for one in mechanism.effects
+    )
+    probed = replace(mechanism, effects=other)
+    force = TracedForce(Bodies((mechanism,), (0.0,), np.arange(n)))
+    force.set(Bodies((probed,), (0.0,), np.arange(n)))
     found = np.array([-force(*instant) for instant in zip(t, np.hstack([q, v]), strict=True)])
-    expected = mechanism.force(t, q, v)
+    expected = probed.force(t, q, v)
     return bool(np.abs(found - expected).max() <= _AGREEMENT * np.abs(expected).max())
 
 
-def _traced(
-    mechanisms: Sequence[Mechanism], starts: Sequence[float], place: np.ndarray
-) -> PointForce:
-    import casadi
+class TracedForce:
+    """The force as a CasADi function of t, state, starts and values."""
 
-    n, size = mechanisms[0].robot.n, len(place)
-    t, x = casadi.SX.sym("t"), casadi.SX.sym("x", 2 * size)
-    added: list = [None] * size
-    for k, (mechanism, start) in enumerate(zip(mechanisms, starts, strict=True)):
-        own = place[k * n : k * n + n]
-        # One sample of a block, as the effects expect it.
-        q = np.array([[x[int(i)] for i in own]], dtype=object)
-        v = np.array([[x[int(i) + size] for i in own]], dtype=object)
-        force = mechanism.force(np.array([t + start], dtype=object), q, v)[0]
-        for i, one in zip(own, force, strict=True):
-            added[i] = -casadi.SX(one)
-    function: Any = casadi.Function("force", [casadi.vertcat(t, x)], [casadi.vertcat(*added)])
-    # The memory that the function reads and writes is these two arrays for good.
-    inside, outside = np.zeros(1 + 2 * size), np.zeros(size)
-    buffer, call = function.buffer()
-    views: Any = (memoryview(inside), memoryview(outside))  # type: ignore[arg-type]
-    buffer.set_arg(0, views[0])
-    buffer.set_res(0, views[1])
+    def __init__(self, bodies: Bodies) -> None:
+        import casadi
 
-    def evaluate(t: float, x: np.ndarray) -> np.ndarray:
-        inside[0] = t
-        inside[1:] = x
-        call()
-        return outside
+        mechanisms, place = bodies.mechanisms, bodies.place
+        n, size = mechanisms[0].robot.n, len(place)
+        t, x = casadi.SX.sym("t"), casadi.SX.sym("x", 2 * size)
+        parameters = casadi.SX.sym("p", len(_parameters(bodies)))
+        left = iter(casadi.vertsplit(parameters))
+        starts = [next(left) for _ in mechanisms]
+        added: list = [None] * size
+        for k, (mechanism, start) in enumerate(zip(mechanisms, starts, strict=True)):
+            own = place[k * n : k * n + n]
+            # One sample of a block, as the effects expect it.
+            q = np.array([[x[int(i)] for i in own]], dtype=object)
+            v = np.array([[x[int(i) + size] for i in own]], dtype=object)
+            block = mechanism.block(np.array([t + start], dtype=object), q, v)
+            force = [casadi.SX(0.0)] * n
+            for one in mechanism.effects:
+                # A force is linear in the values: it is traced value by value.
+                for unit in np.eye(len(one.values)).tolist():
+                    value, per_unit = next(left), one.effect.simulated_force(unit, block)[0]
+                    force = [f + value * casadi.SX(x) for f, x in zip(force, per_unit, strict=True)]
+            for i, one in zip(own, force, strict=True):
+                added[i] = -one
+        inputs, output = casadi.vertcat(t, x, parameters), casadi.vertcat(*added)
+        function: Any = casadi.Function("force", [inputs], [output])
+        # The memory that the function reads and writes is these two arrays for good; the buffer
+        # must live as long as they are used.
+        self._inside, self._outside = np.zeros(inputs.numel()), np.zeros(size)
+        self._buffer, self._call = function.buffer()
+        views: Any = (memoryview(self._inside), memoryview(self._outside))  # type: ignore[arg-type]
+        self._buffer.set_arg(0, views[0])
+        self._buffer.set_res(0, views[1])
+        self._state = self._inside[1 : 1 + 2 * size]
+        self.set(bodies)
 
-    evaluate.buffer = buffer  # type: ignore[attr-defined]  # it must live as long as the function
-    return evaluate
+    def set(self, bodies: Bodies) -> None:
+        """Take other values and starts."""
+        self._inside[1 + len(self._state) :] = _parameters(bodies)
+
+    def __call__(self, t: float, x: np.ndarray) -> np.ndarray:
+        """Return the force."""
+        self._inside[0] = t
+        self._state[:] = x
+        self._call()
+        return self._outside
 
 
-def _plain(
-    mechanisms: Sequence[Mechanism], starts: Sequence[float], place: np.ndarray
-) -> PointForce:
-    n, size = mechanisms[0].robot.n, len(place)
-    groups = []
-    for one in {id(one): one for one in mechanisms}.values():
-        rows = np.array([k for k, other in enumerate(mechanisms) if other is one])
-        # Effects that are not a force (an inertia, a gain, a body) cost nothing here.
-        probe = one.block(*_probes(one))
-        acting = tuple(e for e in one.effects if np.any(e.effect.simulated_force(e.values, probe)))
-        own = place.reshape(-1, n)[rows]
-        groups.append((own, np.array(starts)[rows], replace(one, effects=acting)))
-    added = np.zeros(size)
+def _parameters(bodies: Bodies) -> list[float]:
+    values = [x for body in bodies.mechanisms for one in body.effects for x in one.values]
+    return [*bodies.starts, *values]
 
-    def evaluate(t: float, x: np.ndarray) -> np.ndarray:
-        for own, start, mechanism in groups:
-            added[own] = -mechanism.force(start + t, x[own], x[own + size])
-        return added
 
-    return evaluate
+class PlainForce:
+    """The force as the effects themselves evaluate it."""
+
+    def __init__(self, bodies: Bodies) -> None:
+        self._added = np.zeros(len(bodies.place))
+        self.set(bodies)
+
+    def set(self, bodies: Bodies) -> None:
+        """Take other values and starts."""
+        self._groups = []
+        for one in bodies.distinct:
+            rows = np.array([k for k, other in enumerate(bodies.mechanisms) if other is one])
+            own = bodies.place.reshape(-1, one.robot.n)[rows]
+            self._groups.append((own, np.array(bodies.starts)[rows], one))
+
+    def __call__(self, t: float, x: np.ndarray) -> np.ndarray:
+        """Return the force."""
+        size = len(self._added)
+        for own, start, mechanism in self._groups:
+            self._added[own] = -mechanism.force(start + t, x[own], x[own + size])
+        return self._added

@@ -5,26 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydantic import Field
 
+from dynident.closed_loop.laws import GAINS, LAWS, Feedback, Law
 from dynident.errors import DynidentError, SimulationError, StudyError
 from dynident.settings import Table
 
 if TYPE_CHECKING:
     from dynident.robot import Robot
-
-Kind = Literal["pd", "pid", "cascade", "computed_torque"]
-KINDS: tuple[str, ...] = get_args(Kind)
-GAINS: dict[str, tuple[str, ...]] = {
-    "pd": ("kp", "kd"),
-    "pid": ("kp", "ki", "kd"),
-    "cascade": ("kp", "kv"),
-    "computed_torque": ("kp", "kd"),
-}
-"""The gains of each kind."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +27,15 @@ class Controller:
     - "pd": u = kp e + kd (v_ref - v)
     - "pid": u = kp e + ki (integral of e) + kd (v_ref - v)
     - "cascade": u = kv (kp e - v)
-    - "computed_torque": u = M(q) (a_ref + kp e + kd (v_ref - v)) + h(q, v), M and h of the given
-      robot; it can be stated, and is not simulated yet
+    - "computed_torque": u = M(q) (a_ref + kp e + kd (v_ref - v)) + h(q, v), with M and h of the
+      rigid body that the controller believes in (`Task.nominal`)
 
     v is the backward difference of the measured position, through a first-order low-pass where
     `derivative_cutoff_hz` is given. The integral stands still while the torque is at its limit.
+
+    A drive whose loops work on a signal before an amplifier is stated with `drive_gain`: the loop
+    v_tau = k_p k_v (q_ref - q) - k_v v, tau = g_tau v_tau (Janot, Vandanjon and Gautier, equations
+    40 and 41) is a "cascade" with kp = k_p, kv = k_v and drive_gain = g_tau, or with kv = g_tau k_v alone.
 
     Attributes
     ----------
@@ -53,8 +48,11 @@ class Controller:
     velocity_reference : False sets v_ref = 0 (a cascade has no v_ref).
     derivative_cutoff_hz : Hz, or None for the bare difference.
     limit : (n,) N m or N, greatest magnitude of the command, or None.
-    delay_s : s from a sample to its command. Stated for the record; it is not simulated yet.
-    feedforward : whether the torque of the given robot along the reference is added. Likewise.
+    delay_s : s from a sample to when its command acts; any fraction or multiple of a sample.
+    feedforward : whether the torque of the robot that the controller believes in, along the
+        reference, is added.
+    drive_gain : (n,) N m or N per unit of control signal, positive; the gains are then per unit of
+        torque above, in units of that signal. None where the gains make torques.
 
     Raises
     ------
@@ -62,7 +60,7 @@ class Controller:
         If a gain is missing, superfluous, negative or not finite, or a setting out of its range.
     """
 
-    kind: Kind
+    kind: str
     rate_hz: float | None
     kp: tuple[float, ...]
     kd: tuple[float, ...] = ()
@@ -73,23 +71,28 @@ class Controller:
     limit: tuple[float, ...] | None = None
     delay_s: float = 0.0
     feedforward: bool = False
+    drive_gain: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise SimulationError(
-                f"no controller of kind '{self.kind}'", "controller", f"kinds: {', '.join(KINDS)}"
-            )
-        for name in ("kp", "kd", "kv", "ki", "limit"):
+        if self.kind not in LAWS:
+            mend = f"kinds: {', '.join(LAWS)}"
+            raise SimulationError(f"no controller of kind '{self.kind}'", "controller.kind", mend)
+        for name in (*GAINS, "limit", "drive_gain"):
             value = getattr(self, name)
             if value is not None:
                 object.__setattr__(self, name, tuple(float(x) for x in np.atleast_1d(value)))
-        for name in ("kp", "kd", "kv", "ki"):
+        for name in GAINS:
             self._check_gain(name, getattr(self, name))
-        if self.limit is not None and (
-            len(self.limit) != len(self.kp) or not all(x > 0 for x in self.limit)
-        ):
-            mend = "give one positive number per joint"
-            raise SimulationError(f"limit = {list(self.limit)}", "controller.limit", mend)
+        for name in ("limit", "drive_gain"):
+            value = getattr(self, name)
+            if value is not None and (len(value) != self.n or not all(x > 0 for x in value)):
+                mend = "give one positive number per joint"
+                raise SimulationError(f"{name} = {list(value)}", f"controller.{name}", mend)
+        if self.law.through_model:
+            for name in ("feedforward", "drive_gain"):
+                if getattr(self, name):
+                    what = f"a {self.kind} makes the model's torque itself"
+                    raise SimulationError(what, f"controller.{name}", "leave it out")
         for name in ("rate_hz", "derivative_cutoff_hz"):
             value = getattr(self, name)
             if value is not None and not (value > 0 and math.isfinite(value)):
@@ -104,34 +107,38 @@ class Controller:
         """Number of joints."""
         return len(self.kp)
 
+    @property
+    def law(self) -> Law:
+        """What its kind does."""
+        return LAWS[self.kind]
+
+    def feedback(self) -> Feedback:
+        """Return what it makes of the errors, with the gain of the drive."""
+        found = self.law.feedback(self)
+        if self.drive_gain is None:
+            return found
+        g = np.array(self.drive_gain)
+        return Feedback(g * found.position, g * found.integral, g * found.speed, found.follow)
+
     def simulated_rate(self) -> float:
         """Return `rate_hz`, if this controller can be simulated.
 
         Raises
         ------
         SimulationError
-            If `rate_hz` is not stated, or something is that cannot be simulated yet.
+            If `rate_hz` is not stated.
         """
-        if self.kind == "computed_torque":
-            mend = "simulate a pd, pid or cascade controller"
-            what = "a computed torque cannot be simulated yet"
-            raise SimulationError(what, "controller.kind", mend)
-        if self.feedforward:
-            what = "feedforward cannot be simulated yet"
-            raise SimulationError(what, "controller.feedforward", "leave it out")
-        if self.delay_s > 0:
-            what = f"a delay of {self.delay_s:g} s cannot be simulated yet"
-            raise SimulationError(what, "controller.delay_s", "leave it out")
         if self.rate_hz is None:
             what = "the controller's rate is not stated"
-            raise SimulationError(what, "controller.rate_hz", "give its samples per second")
+            mend = "give its samples per second"
+            raise SimulationError(what, "controller.rate_hz", mend, reason="clock")
         return self.rate_hz
 
     def _check_gain(self, name: str, value: tuple[float, ...]) -> None:
-        where, wanted = f"controller.{name}", name in GAINS[self.kind]
+        where, wanted = f"controller.{name}", name in self.law.gains
         if bool(value) != wanted:
             verb = "needs" if wanted else "takes no"
-            mend = f"its gains are {', '.join(GAINS[self.kind])}"
+            mend = f"its gains are {', '.join(self.law.gains)}"
             raise SimulationError(f'a "{self.kind}" controller {verb} {name}', where, mend)
         if wanted and len(value) != self.n:
             mend = "give one gain per joint"
@@ -141,65 +148,10 @@ class Controller:
             raise SimulationError(f"{name} = {list(value)}", where, mend)
 
 
-class Drive:
-    """A controller at work: its state from sample to sample.
-
-    Parameters
-    ----------
-    controller : Controller
-    q, v : (n,) position and velocity at the sample before the first.
-    """
-
-    def __init__(self, controller: Controller, q: np.ndarray, v: np.ndarray) -> None:
-        n, self._rate = controller.n, controller.simulated_rate()
-        self._kp = np.array(controller.kp)
-        if controller.kind == "cascade":
-            # kv (kp e - v) is a PD law without reference velocity.
-            self._kd = np.array(controller.kv)
-            self._kp = self._kp * self._kd
-        else:
-            self._kd = np.array(controller.kd)
-        follows = controller.velocity_reference and controller.kind != "cascade"
-        self._follow = 1.0 if follows else 0.0
-        self._ki = np.array(controller.ki) / self._rate if controller.ki else None
-        self._integral = np.zeros(n)
-        self._limit = None if controller.limit is None else np.array(controller.limit)
-        cutoff = controller.derivative_cutoff_hz
-        # Exact for a velocity that is constant from sample to sample.
-        self._blend = None if cutoff is None else -math.expm1(-2 * math.pi * cutoff / self._rate)
-        self._q, self._v = np.array(q, dtype=float), np.array(v, dtype=float)
-
-    def command(self, q: np.ndarray, q_ref: np.ndarray, v_ref: np.ndarray) -> np.ndarray:
-        """Return the torque held from this sample to the next, (n,) N m or N.
-
-        Parameters
-        ----------
-        q : (n,) measured position.
-        q_ref, v_ref : (n,) reference.
-        """
-        speed = (q - self._q) * self._rate
-        self._q = q
-        if self._blend is None:
-            self._v = speed
-        else:
-            self._v = self._v + self._blend * (speed - self._v)
-        error = q_ref - q
-        u = self._kp * error + self._kd * (self._follow * v_ref - self._v)
-        if self._ki is not None:
-            integral = self._integral + self._ki * error
-            u = u + integral
-            if self._limit is not None:
-                integral = np.where(np.abs(u) < self._limit, integral, self._integral)
-            self._integral = integral
-        if self._limit is not None:
-            u = np.minimum(np.maximum(u, -self._limit), self._limit)
-        return u
-
-
 class ControllerFile(Table):
     """The table [controller] of a study or an experiment file."""
 
-    kind: Kind
+    kind: str
     rate_hz: float | None = Field(default=None, gt=0)
     kp: float | list[float]
     kd: float | list[float] | None = None
@@ -210,6 +162,7 @@ class ControllerFile(Table):
     limit: float | list[float] | None = None
     delay_s: float = Field(default=0.0, ge=0)
     feedforward: bool = False
+    drive_gain: float | list[float] | None = None
 
     def controller(self, robot: Robot, where: str) -> Controller:
         """Return the controller of a robot; a single number stands for every joint.
@@ -231,21 +184,11 @@ class ControllerFile(Table):
                 raise StudyError(what, f"{where}.{name}", mend)
             return tuple(value)
 
-        kp, kd, kv, ki = (spread(name) for name in ("kp", "kd", "kv", "ki"))
+        said = self.model_dump()
+        said |= {name: spread(name) for name in GAINS}
+        said |= {name: spread(name) or None for name in ("limit", "drive_gain")}
         try:
-            return Controller(
-                self.kind,
-                self.rate_hz,
-                kp,
-                kd,
-                kv,
-                ki,
-                self.velocity_reference,
-                self.derivative_cutoff_hz,
-                spread("limit") or None,
-                self.delay_s,
-                self.feedforward,
-            )
+            return Controller(**said)
         except DynidentError as error:
             key = (error.where or "").partition(".")[2]
             raise StudyError(error.what, f"{where}.{key}".rstrip("."), error.mend) from None

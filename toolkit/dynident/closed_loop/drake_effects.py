@@ -1,4 +1,4 @@
-"""The force of effects as systems of a Drake diagram."""
+"""Forces that need Python as systems of a Drake diagram."""
 
 from __future__ import annotations
 
@@ -13,43 +13,51 @@ from dynident.closed_loop.compiled import PointForce
 class ForceSystem(LeafSystem):
     """What effects add to the generalised force on the plant."""
 
-    def __init__(self, plant: Any, force: PointForce) -> None:
+    def __init__(self, size: int, force: PointForce) -> None:
         LeafSystem.__init__(self)
-        size = plant.num_velocities()
-        self._force = force
+        self.force = force
         self.state = self.DeclareVectorInputPort("state", 2 * size)
         self.output = self.DeclareVectorOutputPort("force", size, self._calculate)
 
     def _calculate(self, context: Any, output: Any) -> None:
         x: Any = self.state.Eval(context)
-        output.SetFromVector(self._force(context.get_time(), x))
+        output.SetFromVector(self.force(context.get_time(), x))
 
 
 class InertiaSystem(LeafSystem):
-    """The same where effects also bring an inertia A that is not the motors' own.
+    """The force of an inertia A that is neither a body's nor a motor's own.
 
-    It takes A a, with a the acceleration that solves (M + A) a = u - bias - force; all in the
-    plant's order.
+    It is -A a, with a the acceleration that solves (M + A) a = u - bias + other forces; all in the
+    plant's order, M with the motors. The acceleration of the plant under this force is then a.
+
+    Attributes
+    ----------
+    A : (N, N) kg m^2, ..., to be set before each simulation.
+    parameters : the Context in which the bodies' and motors' inertias are set, the plant's alone.
     """
 
-    def __init__(self, plant: Any, force: PointForce | None, A: np.ndarray) -> None:
+    def __init__(self, plant: Any, has_other_forces: bool) -> None:
         LeafSystem.__init__(self)
         size = plant.num_velocities()
-        self._force, self._A = force, A
-        self._plant, self._context = plant, plant.CreateDefaultContext()
-        self._actuation = plant.MakeActuationMatrix()
+        self.A = np.zeros((size, size))
+        self.parameters = plant.CreateDefaultContext()
+        self._plant, self._actuation = plant, plant.MakeActuationMatrix()
         self.state = self.DeclareVectorInputPort("state", 2 * size)
         self.torque = self.DeclareVectorInputPort("torque", size)
+        self.others = self.DeclareVectorInputPort("others", size) if has_other_forces else None
         self.output = self.DeclareVectorOutputPort("force", size, self._calculate)
 
     def _calculate(self, context: Any, output: Any) -> None:
         x: Any = self.state.Eval(context)
-        plant = self._plant
+        if not np.isfinite(x).all():  # which would end the process inside Drake
+            raise RuntimeError("the state is not finite")
+        plant, parameters = self._plant, self.parameters
         torque: Any = self.torque.Eval(context)
         load = self._actuation @ torque
-        added = 0.0 if self._force is None else self._force(context.get_time(), x)
-        plant.SetPositionsAndVelocities(self._context, x)
-        load += added - plant.CalcBiasTerm(self._context)
-        load += plant.CalcGravityGeneralizedForces(self._context)
-        mass = plant.CalcMassMatrix(self._context)
-        output.SetFromVector(added - self._A @ np.linalg.solve(mass + self._A, load))
+        if self.others is not None:
+            load += self.others.Eval(context)
+        plant.SetPositionsAndVelocities(parameters, x)
+        load -= plant.CalcBiasTerm(parameters)
+        load += plant.CalcGravityGeneralizedForces(parameters)
+        mass = plant.CalcMassMatrix(parameters)
+        output.SetFromVector(-self.A @ np.linalg.solve(mass + self.A, load))

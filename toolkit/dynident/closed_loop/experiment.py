@@ -154,6 +154,7 @@ class Experiment:
                 run.start,
                 self._stream(index, 0),
                 run.file,
+                self.nominal or self.robot,
             )
             for index, run in enumerate(self.runs)
         ]
@@ -199,9 +200,7 @@ class Experiment:
 
     def _record(self, index: int, run: Run, rollout: Rollout) -> Recording:
         n = self.robot.n
-        tau = rollout.u
-        if self.torque == "measured":
-            tau = (np.vstack([rollout.u_before, tau[:-1]]) + tau) / 2
+        tau = rollout.torque if self.torque == "measured" else rollout.u
         noise = self._stream(index, 1).standard_normal(tau.shape)
         tau = tau + self.sensors.each("torque_std", n) * noise
         return Recording(

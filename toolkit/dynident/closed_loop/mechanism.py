@@ -8,8 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from dynident.effects import FRICTION_WIDTH, Block, Effect, effects_of
+from dynident.effects import FRICTION_WIDTH, Block, Effect, Term, effects_of
 from dynident.errors import EffectError, SimulationError
+from dynident.model import Model
 from dynident.robot import Robot
 from dynident.settings import nearest
 
@@ -106,11 +107,63 @@ class Mechanism:
             acting.append(TrueEffect(effect, values, one.hidden))
             robot = effect.simulated_robot(values, robot)
         made = cls(robot, tuple(acting), friction_width, carries_payload)
-        for joint, gain in zip(robot.names, made.gain, strict=True):
+        made._check_gain()
+        return made
+
+    @classmethod
+    def of_model(
+        cls,
+        model: Model,
+        values: np.ndarray,
+        theta: np.ndarray | None = None,
+        *,
+        carries_payload: bool = False,
+    ) -> Mechanism:
+        """Return the mechanism that a model says the robot is.
+
+        Bounds of effects are not enforced: an estimate on its way may have negative friction.
+
+        Parameters
+        ----------
+        model : Model
+        values : (p,) its parameters, in the order of `Model.names`.
+        theta : (10 n,) the robot's standard parameters; None for those nearest to the given
+            description that have the base parameters in `values`.
+        carries_payload : whether the payload is on board.
+
+        Raises
+        ------
+        SimulationError
+            If a value is not finite, or a torque gain not positive.
+        """
+        values = np.asarray(values, dtype=float)
+        if values.shape != (model.size,):
+            what = f"values of shape {values.shape} for a model of {model.size} parameters"
+            raise SimulationError(what, mend="give them in the order of Model.names")
+        for name, value in zip(model.names, values, strict=True):
+            if not np.isfinite(value):
+                raise SimulationError(f"{name} = {value:g}", mend="give finite values")
+        robot = model.robot
+        if theta is None:
+            rigid = values[: len(model.base.independent)]
+            theta = model.base.lift(rigid, robot.theta)
+        robot = robot.with_theta(theta)
+        acting = []
+        for effect in model.effects:
+            if "payload" in effect.needs and not carries_payload:
+                continue
+            own = tuple(float(x) for x in values[model.slices[effect.label]])
+            acting.append(TrueEffect(effect, own))
+            robot = effect.simulated_robot(own, robot)
+        made = cls(robot, tuple(acting), model.friction_width, carries_payload)
+        made._check_gain()
+        return made
+
+    def _check_gain(self) -> None:
+        for joint, gain in zip(self.robot.names, self.gain, strict=True):
             if not (gain > 0 and np.isfinite(gain)):
                 what, mend = f"torque gain {gain:g}", "choose a gain error above -1"
                 raise SimulationError(what, f"joint '{joint}'", mend)
-        return made
 
     @cached_property
     def inertia(self) -> np.ndarray:
@@ -127,6 +180,24 @@ class Mechanism:
         for one in self.effects:
             total *= one.effect.simulated_gain(one.values, self.robot)
         return total
+
+    @cached_property
+    def terms(self) -> tuple[Term, ...]:
+        """The force of all effects that a simulator evaluates natively."""
+        return tuple(
+            term
+            for one in self.effects
+            for term in one.effect.simulated_terms(one.values, self.robot) or ()
+        )
+
+    @cached_property
+    def others(self) -> tuple[TrueEffect, ...]:
+        """The effects whose force is more than terms."""
+        return tuple(
+            one
+            for one in self.effects
+            if one.effect.simulated_terms(one.values, self.robot) is None
+        )
 
     def block(self, t: np.ndarray, q: np.ndarray, v: np.ndarray) -> Block:
         """Return samples as effects see them; no force depends on the acceleration."""

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynident.closed_loop.mechanism import Mechanism
-from dynident.closed_loop.trajectories import Fourier
+from dynident.closed_loop.references import Reference
+from dynident.robot import Robot
 
 LEAD_IN = 2.0
 """s that a motion is simulated before it is recorded, for the loop to settle on it."""
@@ -20,19 +21,22 @@ class Task:
     Attributes
     ----------
     mechanism : Mechanism
-    trajectory : its phase is zero at the first sample.
+    trajectory : any `Reference`; its time is zero at the first sample.
     duration : s.
     start : s, when the first sample is taken in the session.
     rng : of the encoder's noise; None for none.
     name : for messages.
+    nominal : the model inside the controller (a computed torque, a feed-forward); None for the
+        mechanism's own robot.
     """
 
     mechanism: Mechanism
-    trajectory: Fourier
+    trajectory: Reference
     duration: float
     start: float = 0.0
     rng: np.random.Generator | None = None
     name: str = ""
+    nominal: Robot | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,18 +46,25 @@ class Rollout:
     Attributes
     ----------
     t : (T,) s, from the first sample.
-    q, v : (T, n) true position and velocity, rad or m.
+    q, v, a : (T, n) true position, rad or m, and its derivatives. The acceleration jumps where a
+        command begins to act; at a sample it is the one just after.
     q_measured : (T, n) position as the encoder gives it.
     q_ref, v_ref : (T, n) reference.
-    u : (T, n) command, held from its sample to the next; N m or N.
-    u_before : (n,) command held until the first sample.
+    u : (T, n) command; N m or N. It acts, after the controller's delay, until the next one does.
+    u_before : (n,) command of the sample before the first.
+    torque : (T, n) command that acted, in the mean over the sample before and the one after, as a
+        sensor of limited bandwidth has it.
+    saturated : (n,) share of the commands that are at the controller's limit.
     """
 
     t: np.ndarray
     q: np.ndarray
     v: np.ndarray
+    a: np.ndarray
     q_measured: np.ndarray
     q_ref: np.ndarray
     v_ref: np.ndarray
     u: np.ndarray
     u_before: np.ndarray
+    torque: np.ndarray
+    saturated: np.ndarray

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path, PurePath
 
 import tomlkit
@@ -122,16 +123,15 @@ def _multiline(labels: list[str]):
 
 
 def _controller(experiment: Experiment):
+    """The table of a controller; what has its default is left out."""
     controller = experiment.controller
     table = tomlkit.table()
-    table["kind"] = controller.kind
-    for name in ("kp", "ki", "kd", "kv", "limit"):
-        value = getattr(controller, name)
-        if value:
-            table[name] = list(value)
-    if controller.kind != "cascade":
-        table["velocity_reference"] = controller.velocity_reference
-    table["rate_hz"] = controller.rate_hz
-    if controller.derivative_cutoff_hz is not None:
-        table["derivative_cutoff_hz"] = controller.derivative_cutoff_hz
+    for part in fields(controller):
+        value = getattr(controller, part.name)
+        if isinstance(value, tuple):
+            value = list(value)
+        if part.name == "velocity_reference" and controller.kind == "cascade":
+            continue
+        if value != part.default and value not in ([], None):
+            table[part.name] = value
     return table

@@ -20,6 +20,7 @@ from dynident.effects.base import (
     Parameter,
     ShapeParameter,
 )
+from dynident.effects.terms import Term
 from dynident.errors import EffectError
 
 __all__ = [
@@ -29,6 +30,7 @@ __all__ = [
     "JointEffect",
     "Parameter",
     "ShapeParameter",
+    "Term",
     "catalogue",
     "effects_of",
 ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.effects.base import Block, JointEffect, Parameter, force_unit, motion_unit
+from dynident.effects.terms import Term
 
 
 class AsymmetricFriction(JointEffect):
@@ -30,3 +31,7 @@ class AsymmetricFriction(JointEffect):
     def at_joint(self, block: Block) -> np.ndarray:
         v = block.v[:, [block.index(self.joint)]]
         return np.hstack([np.abs(v), np.ones_like(v)])
+
+    def simulated_terms(self, values, robot):
+        j = robot.names.index(str(self.joint))
+        return (Term(j, "magnitude", (j,), values[0]), Term(j, "constant", (), values[1]))

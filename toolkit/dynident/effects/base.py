@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
+from dynident.effects.terms import Term
 from dynident.errors import EffectError
 
 if TYPE_CHECKING:
@@ -219,6 +220,13 @@ class Effect(ABC):
     def simulated_force(self, values: Sequence[float], block: Block) -> np.ndarray:
         """Torque that it takes from the drives, (T, n), from t, q and v alone."""
         return self.columns(block) @ np.asarray(values, dtype=float)
+
+    def simulated_terms(self, values: Sequence[float], robot: Robot) -> tuple[Term, ...] | None:
+        """The same force as terms that a simulator evaluates natively; None if it has others.
+
+        Such a force is evaluated in Python, which takes longer. Empty where there is no force.
+        """
+        return None
 
     def simulated_inertia(self, values: Sequence[float], robot: Robot) -> np.ndarray:
         """Addition to the joint-space inertia matrix, (n, n)."""

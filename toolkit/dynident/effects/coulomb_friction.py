@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.effects.base import Block, JointEffect, Parameter, force_unit
+from dynident.effects.terms import Term
 
 
 class CoulombFriction(JointEffect):
@@ -21,3 +22,7 @@ class CoulombFriction(JointEffect):
 
     def at_joint(self, block: Block) -> np.ndarray:
         return block.sign(block.v[:, [block.index(self.joint)]])
+
+    def simulated_terms(self, values, robot):
+        j = robot.names.index(str(self.joint))
+        return (Term(j, "sign", (j,), values[0]),)

@@ -34,6 +34,9 @@ class DriveGain(JointEffect):
     def simulated_force(self, values, block):
         return np.zeros_like(block.q)
 
+    def simulated_terms(self, values, robot):
+        return ()
+
     def simulated_gain(self, values, robot):
         gain = np.ones(robot.n)
         gain[robot.names.index(str(self.joint))] += values[0]

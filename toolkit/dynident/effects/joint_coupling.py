@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.effects.base import Block, JointEffect, Parameter, force_unit, motion_unit
+from dynident.effects.terms import Term
 
 
 class JointCoupling(JointEffect):
@@ -41,6 +42,15 @@ class JointCoupling(JointEffect):
         without_acceleration = np.array(values, dtype=float)
         without_acceleration[2] = 0.0
         return self.columns(block) @ without_acceleration
+
+    def simulated_terms(self, values, robot):
+        j, i = robot.names.index(str(self.joint)), robot.names.index(str(self.source))
+        viscous, dry, _, both = values
+        return (
+            Term(j, "speed", (i,), viscous),
+            Term(j, "sign", (i,), dry),
+            Term(j, "sign", (i, j), both),
+        )
 
     def simulated_inertia(self, values, robot):
         inertia = np.zeros((robot.n, robot.n))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.effects.base import Block, JointEffect, Parameter, force_unit, motion_unit
+from dynident.effects.terms import Term
 
 
 class JointSpring(JointEffect):
@@ -24,3 +25,7 @@ class JointSpring(JointEffect):
     def at_joint(self, block: Block) -> np.ndarray:
         q = block.q[:, [block.index(self.joint)]]
         return np.hstack([q, np.ones_like(q)])
+
+    def simulated_terms(self, values, robot):
+        j = robot.names.index(str(self.joint))
+        return (Term(j, "position", (j,), values[0]), Term(j, "constant", (), values[1]))

@@ -44,6 +44,9 @@ class Payload(Effect):
     def simulated_force(self, values, block):
         return np.zeros_like(block.q)
 
+    def simulated_terms(self, values, robot):
+        return ()
+
     def simulated_robot(self, values, robot):
         theta = np.array(robot.theta, dtype=float).reshape(robot.n, 10)
         theta[robot.tip] += np.asarray(values, dtype=float)

@@ -28,6 +28,9 @@ class RotorInertia(JointEffect):
     def simulated_force(self, values, block):
         return np.zeros_like(block.q)
 
+    def simulated_terms(self, values, robot):
+        return ()
+
     def simulated_inertia(self, values, robot):
         inertia = np.zeros((robot.n, robot.n))
         j = robot.names.index(str(self.joint))

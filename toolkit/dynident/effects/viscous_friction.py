@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.effects.base import Block, JointEffect, Parameter, force_unit, motion_unit
+from dynident.effects.terms import Term
 
 
 class ViscousFriction(JointEffect):
@@ -22,3 +23,7 @@ class ViscousFriction(JointEffect):
 
     def at_joint(self, block: Block) -> np.ndarray:
         return block.v[:, [block.index(self.joint)]]
+
+    def simulated_terms(self, values, robot):
+        j = robot.names.index(str(self.joint))
+        return (Term(j, "speed", (j,), values[0]),)

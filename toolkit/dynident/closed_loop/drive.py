@@ -1,0 +1,124 @@
+"""A controller at work: from measured positions to torques, sample by sample."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynident.closed_loop.controllers import Controller
+from dynident.robot import Robot
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceSamples:
+    """The reference of K robots of n joints side by side, at the controller's samples.
+
+    Attributes
+    ----------
+    q, v, a : (T, K n) rad or m, and derivatives.
+    """
+
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+
+
+class Drive:
+    """The same controller on K robots of n joints side by side; vectors are (K n,).
+
+    At the sample before the first the robots were a sample's motion behind the reference's start.
+
+    Parameters
+    ----------
+    controller : of n joints.
+    reference : what all of them follow.
+    nominal : the model inside the controller, for each robot. Used by a computed torque and by a
+        feed-forward only.
+    scale : (n,) factor of the feedback; None for 1.
+    """
+
+    def __init__(
+        self,
+        controller: Controller,
+        reference: ReferenceSamples,
+        nominal: Sequence[Robot],
+        scale: np.ndarray | None = None,
+    ) -> None:
+        n, rate, count = controller.n, controller.simulated_rate(), len(nominal)
+        feedback, factor = controller.feedback(), np.ones(n) if scale is None else scale
+        self._rate, self._n = rate, n
+        self._kp = np.tile(factor * feedback.position, count)
+        self._kd = np.tile(factor * feedback.speed, count)
+        self._ki = np.tile(factor * feedback.integral / rate, count)
+        self._integrates = bool(np.any(self._ki))
+        self._q_ref, self._v_ref = reference.q, feedback.follow * reference.v
+        self._robots = _distinct(nominal)
+        self._through_model = controller.law.through_model
+        self._added = None
+        if self._through_model:
+            self._added = reference.a
+        elif controller.feedforward:
+            self._added = np.empty_like(reference.q)
+            for robot, rows in self._robots:
+                for row in rows:
+                    own = slice(row * n, row * n + n)
+                    motion = (x[:, own] for x in (reference.q, reference.v, reference.a))
+                    self._added[:, own] = robot.inverse_dynamics(*motion)
+        limit = controller.limit
+        self._limit = np.full(n * count, np.inf) if limit is None else np.tile(limit, count)
+        self._limited = limit is not None
+        self._saturated = np.zeros(n * count, dtype=bool)
+        cutoff = controller.derivative_cutoff_hz
+        # Exact for a velocity that is constant from sample to sample.
+        self._blend = None if cutoff is None else -math.expm1(-2 * math.pi * cutoff / rate)
+        self._q, self._v = reference.q[0] - reference.v[0] / rate, reference.v[0]
+        self._integral = np.zeros(n * count)
+
+    @property
+    def saturated(self) -> np.ndarray:
+        """Which of the last command's torques are at their limit, (K n,) bool."""
+        return self._saturated
+
+    def command(self, k: int, q: np.ndarray) -> np.ndarray:
+        """Return the torque of sample k, (K n,) N m or N, from the measured position q."""
+        speed = (q - self._q) * self._rate
+        self._q = q
+        if self._blend is None:
+            self._v = speed
+        else:
+            self._v = self._v + self._blend * (speed - self._v)
+        error = self._q_ref[k] - q
+        u = self._kp * error + self._kd * (self._v_ref[k] - self._v)
+        integral = self._integral
+        if self._integrates:
+            integral = integral + self._ki * error
+            u = u + integral
+        if self._added is not None:
+            u = u + self._added[k]
+            if self._through_model:
+                u = self._inverse_dynamics(q, u)
+        if self._limited:
+            self._saturated = np.abs(u) >= self._limit
+            integral = np.where(self._saturated, self._integral, integral)
+            u = np.minimum(np.maximum(u, -self._limit), self._limit)
+        self._integral = integral
+        return u
+
+    def _inverse_dynamics(self, q: np.ndarray, a: np.ndarray) -> np.ndarray:
+        shape = (-1, self._n)
+        q, v, a = q.reshape(shape), self._v.reshape(shape), a.reshape(shape)
+        torque = np.empty_like(q)
+        for robot, rows in self._robots:
+            torque[rows] = robot.inverse_dynamics(q[rows], v[rows], a[rows])
+        return torque.ravel()
+
+
+def _distinct(robots: Sequence[Robot]) -> list[tuple[Robot, list[int]]]:
+    """Return each robot once, with where it stands."""
+    by_id = {id(robot): robot for robot in robots}
+    return [
+        (robot, [k for k, one in enumerate(robots) if one is robot]) for robot in by_id.values()
+    ]

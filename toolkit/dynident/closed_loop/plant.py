@@ -1,0 +1,212 @@
+"""The diagram of mechanisms side by side: built once for a structure, then given parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import DiagramBuilder
+
+from dynident.closed_loop.compiled import Bodies, point_force
+from dynident.closed_loop.drake_effects import ForceSystem, InertiaSystem
+from dynident.closed_loop.layers import Layers, Terms, summed
+from dynident.closed_loop.mechanism import Mechanism
+from dynident.errors import DynidentError, SimulationError
+from dynident.inertia import to_drake
+from dynident.robot import Robot
+from dynident.robot.drake import add_to_plant
+
+
+def structure(mechanisms: Sequence[Mechanism]) -> Hashable:
+    """Return what two groups of mechanisms have in common where one diagram serves both."""
+    parts = []
+    for one in mechanisms:
+        terms = frozenset((term.at, term.law, term.of) for term in one.terms)
+        others = tuple((other.effect, len(other.values)) for other in one.others)
+        said = (one.friction_width, one.carries_payload) if others else ()
+        parts.append((_kinematics(one.robot), terms, others, said))
+    return tuple(parts), any(_is_coupled(one.inertia) for one in mechanisms)
+
+
+def _kinematics(robot: Robot) -> Hashable:
+    joints = tuple(
+        (joint.name, joint.kind, joint.parent, _bytes(joint.R, joint.p, joint.axis))
+        for joint in robot.joints
+    )
+    return joints, robot.bodies, _bytes(robot.gravity)
+
+
+def _bytes(*arrays: np.ndarray) -> bytes:
+    return b"".join(np.asarray(one, dtype=float).tobytes() for one in arrays)
+
+
+def _is_coupled(inertia: np.ndarray) -> bool:
+    """Whether an effect's inertia is more than the motors' own, which Drake has by itself."""
+    return bool(np.any(inertia - np.diag(np.diag(inertia))))
+
+
+@contextmanager
+def _refusals() -> Iterator[None]:
+    """Turn what the rooms below refuse into this room's error."""
+    try:
+        yield
+    except DynidentError as error:
+        raise SimulationError(error.what, error.where, error.mend, reason="massless") from None
+
+
+class Plant:
+    """Mechanisms of n joints each, in one Drake diagram; stacked vectors are (N,), N = K n.
+
+    Attributes
+    ----------
+    diagram : its input is the actuation (N,) in the order of `inputs`.
+    context : the diagram's, with the present parameters.
+    place : (N,) where each joint stands in the plant's positions and velocities.
+    inputs : (N,) where each joint stands in the plant's actuation.
+    gain : (N,) recorded torque per torque that acts.
+    """
+
+    def __init__(self, mechanisms: Sequence[Mechanism]) -> None:
+        # Drake's type stubs know neither shapes nor the classes that it returns: hence Any.
+        builder: Any = DiagramBuilder()
+        plant: Any = builder.AddSystem(MultibodyPlant(0.0))
+        with _refusals():
+            self._parts = [
+                add_to_plant(replace(one.robot, name=f"robot{k}"), plant)
+                for k, one in enumerate(mechanisms)
+            ]
+        plant.Finalize()
+        # In a tree of joints of one degree, positions and velocities stand in the same order.
+        self.place = np.concatenate([part.velocity_indices() for part in self._parts])
+        self.inputs = np.concatenate([part.input_indices() for part in self._parts])
+        self._plant, size = plant, plant.num_velocities()
+        builder.ExportInput(plant.get_actuation_input_port(), "torque")
+        state = plant.get_state_output_port()
+        bodies = self._bodies(mechanisms, [0.0] * len(mechanisms))
+        self._layers = Layers(builder, state, Terms.of(bodies))
+        outputs = self._layers.outputs
+        self._forces: Any = None
+        if any(one.effects for one in _others(bodies).mechanisms):
+            self._forces = builder.AddSystem(ForceSystem(size, point_force(_others(bodies))))
+            builder.Connect(state, self._forces.state)
+            outputs.append(self._forces.output)
+        self._coupling: Any = None
+        if any(_is_coupled(one.inertia) for one in mechanisms):
+            self._coupling = builder.AddSystem(InertiaSystem(plant, bool(outputs)))
+            builder.Connect(state, self._coupling.state)
+            builder.ConnectInput("torque", self._coupling.torque)
+            if outputs:
+                builder.Connect(summed(builder, outputs, size), self._coupling.others)
+            outputs.append(self._coupling.output)
+        if outputs:
+            generalized = plant.get_applied_generalized_force_input_port()
+            builder.Connect(summed(builder, outputs, size), generalized)
+        self.diagram = builder.Build()
+        self.context = self.diagram.CreateDefaultContext()
+
+    def set(self, mechanisms: Sequence[Mechanism], starts: Sequence[float]) -> None:
+        """Give the bodies and effects the values of mechanisms of the same structure.
+
+        Raises
+        ------
+        SimulationError
+            If a body has a first moment without mass.
+        """
+        self._mechanisms = tuple(mechanisms)
+        bodies = self._bodies(mechanisms, starts)
+        inertia = _diagonal_blocks([one.inertia for one in mechanisms])
+        self._inertia, motors = inertia, np.diag(inertia)
+        self.gain = np.concatenate([one.gain for one in mechanisms])
+        contexts = [self._plant.GetMyMutableContextFromRoot(self.context)]
+        if self._coupling is not None:
+            contexts.append(self._coupling.parameters)
+            rest = inertia - np.diag(motors)
+            self._coupling.A[np.ix_(self.place, self.place)] = rest
+        actuators = [actuator for part in self._parts for actuator in part.actuators]
+        for part, mechanism in zip(self._parts, mechanisms, strict=True):
+            robot = mechanism.robot
+            for k, body in enumerate(part.bodies):
+                phi = robot.theta[10 * k : 10 * k + 10]
+                with _refusals():
+                    value = to_drake(phi, f"body '{robot.bodies[k]}'")
+                for context in contexts:
+                    body.SetSpatialInertiaInBodyFrame(context, value)
+        for actuator, value in zip(actuators, motors, strict=True):
+            for context in contexts:
+                # Drake takes any value here, and refuses a hinge without positive inertia later.
+                actuator.SetRotorInertia(context, value)
+        self._layers.set(self.context, Terms.of(bodies))
+        if self._forces is not None:
+            self._forces.force.set(_others(bodies))
+
+    def require_inertia(self, poses: np.ndarray) -> None:
+        """Refuse robots whose joint-space inertia is not positive at one of the poses (T, N).
+
+        Raises
+        ------
+        SimulationError
+        """
+        context, place = self._plant.GetMyMutableContextFromRoot(self.context), self.place
+        coupled = self._inertia - np.diag(np.diag(self._inertia))
+        n = self._mechanisms[0].robot.n
+        for pose in poses:
+            self._plant.SetPositions(context, scattered(pose, place))
+            mass = self._plant.CalcMassMatrix(context)[np.ix_(place, place)]
+            whole = mass + coupled
+            for k, mechanism in enumerate(self._mechanisms):
+                own = slice(k * n, k * n + n)
+                least = _least_eigenvalue(mass[own, own])
+                if not (least > 0 and np.linalg.det(whole[own, own]) > 0):
+                    at = zip(mechanism.robot.names, pose[own], strict=True)
+                    raise SimulationError(
+                        f"the joint-space inertia is not positive (least eigenvalue {least:.3g})",
+                        f"{mechanism.robot.name} at " + ", ".join(f"{j} = {x:.3g}" for j, x in at),
+                        "check the inertias of the robot (dynident check) and of its effects",
+                        reason="inertia",
+                    )
+
+    def notes(self) -> tuple[str, ...]:
+        """Say what is not evaluated in C++."""
+        found = [
+            one.effect.label
+            for mechanism in self._mechanisms
+            for one in mechanism.effects
+            if one in mechanism.others
+            or _is_coupled(one.effect.simulated_inertia(one.values, mechanism.robot))
+        ]
+        return tuple(
+            f"{label} is evaluated in Python, which makes the simulation slower."
+            for label in dict.fromkeys(found)
+        )
+
+    def _bodies(self, mechanisms: Sequence[Mechanism], starts: Sequence[float]) -> Bodies:
+        return Bodies(tuple(mechanisms), tuple(starts), self.place)
+
+
+def _others(bodies: Bodies) -> Bodies:
+    """Return the mechanisms with only those effects whose force is more than terms."""
+    by_id = {id(one): replace(one, effects=one.others) for one in bodies.distinct}
+    return replace(bodies, mechanisms=tuple(by_id[id(one)] for one in bodies.mechanisms))
+
+
+def _diagonal_blocks(blocks: Sequence[np.ndarray]) -> np.ndarray:
+    size, n = sum(len(block) for block in blocks), len(blocks[0])
+    full = np.zeros((size, size))
+    for k, block in enumerate(blocks):
+        full[k * n : k * n + n, k * n : k * n + n] = block
+    return full
+
+
+def _least_eigenvalue(matrix: np.ndarray) -> float:
+    return float(np.linalg.eigvalsh(matrix)[0]) if np.isfinite(matrix).all() else float("nan")
+
+
+def scattered(values: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Return the plant's vector of values that are in our order."""
+    vector = np.empty(len(values))
+    vector[place] = values
+    return vector

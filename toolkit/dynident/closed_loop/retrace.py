@@ -1,0 +1,134 @@
+"""Recordings run again: their references, through models of their robots, in the same loop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynident.closed_loop.controllers import Controller
+from dynident.closed_loop.loop import ClosedLoop, Progress
+from dynident.closed_loop.mechanism import Mechanism
+from dynident.closed_loop.references import SampledReference
+from dynident.closed_loop.rollout import Rollout, Task
+from dynident.errors import SimulationError
+from dynident.recording import Recording
+from dynident.robot import Robot
+
+_ROUNDING = 1e-6
+"""Of a sample: time stamps this near to the controller's are the controller's."""
+
+
+@dataclass(frozen=True, eq=False)
+class Retraced:
+    """A recording, and what the model makes of its reference.
+
+    Attributes
+    ----------
+    recording : as the measured one (time stamps, settings, convention of the torque), with the
+        simulated motion and torque; velocity and acceleration only where the measured one has
+        them.
+    rollout : at the controller's samples.
+    saturated : (n,) share of the commands at the controller's limit.
+    """
+
+    recording: Recording
+    rollout: Rollout
+    saturated: np.ndarray
+
+
+def retrace(
+    loop: ClosedLoop,
+    mechanisms: Sequence[Mechanism],
+    recordings: Sequence[Recording],
+    controller: Controller,
+    *,
+    nominal: Robot | None = None,
+    feedback_scale: np.ndarray | None = None,
+    progress: Progress | None = None,
+) -> tuple[Retraced, ...]:
+    """Run the references of recordings again, in closed loop, with ideal sensors.
+
+    Each starts on its reference, with the reference's velocity, at the recording's first sample.
+
+    Parameters
+    ----------
+    loop : that simulates; its diagram is used again.
+    mechanisms : the robot of each recording (its payload may differ).
+    recordings : with references.
+    controller : of the loop in which they were made.
+    nominal : the model inside the controller; None for each mechanism's own.
+    feedback_scale, progress : see `ClosedLoop.simulate`.
+
+    Raises
+    ------
+    SimulationError
+        If a recording has no reference, its joints are not the robot's, or a loop cannot be
+        simulated; see `ClosedLoop.simulate`.
+    """
+    if len(mechanisms) != len(recordings):
+        what = f"{len(mechanisms)} mechanisms for {len(recordings)} recordings"
+        raise SimulationError(what, mend="give one for each recording")
+    rate = controller.simulated_rate()
+    tasks = []
+    for mechanism, recording in zip(mechanisms, recordings, strict=True):
+        if recording.joints != mechanism.robot.names:
+            mend = f"the robot's are {', '.join(mechanism.robot.names)}"
+            raise SimulationError("the recording has other joints", recording.where, mend)
+        reference = SampledReference.of(recording)
+        # One sample beyond the last time stamp, to interpolate to it.
+        samples = int(np.ceil(recording.duration * rate - _ROUNDING)) + 2
+        tasks.append(
+            Task(
+                mechanism,
+                reference,
+                samples / rate,
+                recording.start,
+                None,
+                recording.name or recording.where,
+                nominal,
+            )
+        )
+    rollouts = loop.simulate(
+        tasks, controller, lead_in=0.0, feedback_scale=feedback_scale, progress=progress
+    )
+    return tuple(
+        Retraced(_resampled(recording, rollout, rate), rollout, rollout.saturated)
+        for recording, rollout in zip(recordings, rollouts, strict=True)
+    )
+
+
+def _resampled(recording: Recording, rollout: Rollout, rate: float) -> Recording:
+    """Return a rollout at the time stamps of a recording."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    x = (recording.t - recording.t[0]) * rate
+    nearest = np.rint(x)
+    # Where the clocks agree there is nothing to interpolate.
+    x = np.where(np.abs(x - nearest) < _ROUNDING, nearest, x)
+    changes = {}
+    if np.array_equal(x, nearest):
+        rows = x.astype(int)
+        q, v, a, held, torque = (
+            y[rows] for y in (rollout.q, rollout.v, rollout.a, rollout.u, rollout.torque)
+        )
+    else:
+        t = x / rate
+        q = CubicHermiteSpline(rollout.t, rollout.q, rollout.v)(t)
+        v = CubicHermiteSpline(rollout.t, rollout.v, rollout.a)(t)
+        a, torque = _between(x, rollout.a), _between(x, rollout.torque)
+        held = rollout.u[np.floor(x).astype(int)]
+    changes = {"q": q, "tau": held if recording.torque == "held_command" else torque}
+    if recording.v is not None:
+        changes["v"] = v
+    if recording.a is not None:
+        changes["a"] = a
+    return recording.replace(**changes)
+
+
+def _between(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return y (T, n) at x samples, in a straight line between them."""
+    k = np.minimum(np.floor(x).astype(int), len(y) - 2)
+    share = (x - k)[:, None]
+    return (1.0 - share) * y[k] + share * y[k + 1]
