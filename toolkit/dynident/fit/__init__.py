@@ -11,7 +11,9 @@ from dynident.fit.estimate import Estimate, Source
 from dynident.fit.estimate_file import load_estimate
 from dynident.fit.factors import Factors, factorise
 from dynident.fit.given import given_estimate
+from dynident.fit.history import Convergence
 from dynident.fit.input_noise import InputNoise, input_noise
+from dynident.fit.instrumental import IV, Filtered, SimulatedLoop, SwappedPeriods
 from dynident.fit.least_squares import LeastSquares, Solution, solve_factors
 from dynident.fit.metric import Metric
 from dynident.fit.parameter_file import GivenParameters, read_parameters
@@ -62,10 +64,13 @@ def fit(model: Model, data: Dataset | Recording, method: Method | None = None) -
 
 
 __all__ = [
+    "IV",
     "Constrained",
+    "Convergence",
     "EssentialParameters",
     "Estimate",
     "Factors",
+    "Filtered",
     "GivenParameters",
     "InputNoise",
     "LeastSquares",
@@ -74,8 +79,10 @@ __all__ = [
     "Prior",
     "Projection",
     "Sampled",
+    "SimulatedLoop",
     "Solution",
     "Source",
+    "SwappedPeriods",
     "essential_parameters",
     "factorise",
     "fit",

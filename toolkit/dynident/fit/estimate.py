@@ -12,6 +12,7 @@ import numpy as np
 
 from dynident import files
 from dynident.errors import FitError
+from dynident.fit.history import Convergence
 from dynident.inertia import margins
 from dynident.model import Model
 from dynident.nlp import Certificate
@@ -52,6 +53,7 @@ class Estimate:
     links : inertial parameters (10,) of each link in its own frame, by name, where the fit chose
         them (constrained fits do); None where only the base parameters are known.
     certificate : how far a constrained fit is from the optimum of its problem.
+    history : the iterations of an instrumental variable estimate.
     """
 
     model: Model
@@ -69,6 +71,7 @@ class Estimate:
     sources: tuple[Source, ...] = ()
     links: dict[str, np.ndarray] | None = None
     certificate: Certificate | None = None
+    history: Convergence | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -167,7 +170,8 @@ class Estimate:
     def tables(self) -> tuple[Table | str, ...]:
         """Everything that `show` prints, in its order."""
         proved = (self.certificate.table(),) if self.certificate else ()
-        return (self.parameter_table(), self.error_table(), *proved, *self.notes)
+        iterated = self.history.tables() if self.history else ()
+        return (self.parameter_table(), *iterated, self.error_table(), *proved, *self.notes)
 
     def summary(self) -> str:
         """The tables as text."""
@@ -182,8 +186,10 @@ class Estimate:
             f"{self.method}; {self.rows} equations, {len(self.basis.independent)} of "
             f"{self.model.size} parameters identified ({_decision(self.basis)}), "
             f"condition number {self.condition_number:.6g}; {self.status}.",
-            "sigma takes the errors of the equations as independent: what the model lacks is not "
-            "in it.",
+            "sigma carries the noise of the encoders; what the model lacks is not in it."
+            if self.history
+            else "sigma takes the errors of the equations as independent: what the model lacks is "
+            "not in it.",
         )
 
     # --- files ---------------------------------------------------------------------------------

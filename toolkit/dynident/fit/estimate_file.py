@@ -64,6 +64,7 @@ def to_dict(estimate: Estimate) -> dict[str, Any]:
         "recordings": [vars(source) for source in estimate.sources],
         "links": links and {name: phi.tolist() for name, phi in links.items()},
         "certificate": certificate and certificate.to_dict(),
+        "iterations": estimate.history and estimate.history.to_dict(),
         "model": {
             "robot": description.text if description else None,
             "joints": list(model.robot.names),
@@ -85,7 +86,8 @@ def to_dict(estimate: Estimate) -> dict[str, Any]:
 def load_estimate(path: str | Path) -> Estimate:
     """Read an estimate that `Estimate.save` wrote.
 
-    Its certificate is not read back: a proof holds for whoever has computed it.
+    Its certificate and its iterations are not read back: a proof holds for whoever has computed
+    it.
 
     Raises
     ------

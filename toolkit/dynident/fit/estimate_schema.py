@@ -98,4 +98,5 @@ class EstimateFile(_Part):
     recordings: list[_Recording]
     links: dict[str, list[_Number]] | None = None
     certificate: dict[str, Any] | None = None
+    iterations: dict[str, Any] | None = None
     model: ModelPart

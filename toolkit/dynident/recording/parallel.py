@@ -158,6 +158,10 @@ class ParallelFilter:
         """Filter and decimate one block, `x` being the record's samples `block.raw`."""
         return self._filtered(np.asarray(x, dtype=float), block.rows)
 
+    def low_pass(self, x: np.ndarray) -> np.ndarray:
+        """Filter without decimating, (T, ...) -> (T, ...); symmetric but for the ends."""
+        return self._filtered(np.asarray(x, dtype=float), np.arange(len(x)))
+
     def _filtered(self, x: np.ndarray, rows: np.ndarray) -> np.ndarray:
         if not self.stages:
             return x[rows]

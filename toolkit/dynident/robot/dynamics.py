@@ -5,6 +5,7 @@ Pinocchio is given joints and inertias by us, never a file: its parsers change b
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -74,6 +75,20 @@ def pinocchio_model(robot: Robot, theta: Array) -> Any:
     return model
 
 
+@dataclass(frozen=True, eq=False)
+class TorqueDerivatives:
+    """Derivatives of the torque along a motion: [t, i, j] = d tau_i / d x_j.
+
+    Attributes
+    ----------
+    by_q, by_v, by_a : (T, n, n); `by_a` is the joint-space inertia.
+    """
+
+    by_q: Array
+    by_v: Array
+    by_a: Array
+
+
 class Dynamics:
     """The evaluator of one robot: its model, work space and the order of its joints.
 
@@ -122,12 +137,34 @@ class Dynamics:
         extra[:, 0] = np.where([_representable(body) for body in phi], 0.0, _mass_offset(phi))
         return self._rnea(q, v, a, phi + extra) - self._rnea(q, v, a, extra)
 
-    def _rnea(self, q: Array, v: Array, a: Array, phi: Array) -> Array:
-        model, data, evaluate = self.model, self.data, pin.rnea
+    def derivatives(self, q: Array, v: Array, a: Array, theta: Array) -> TorqueDerivatives:
+        """Return the derivatives of tau, in the robot's order; theta must be representable."""
+        model, data, evaluate = self.model, self.data, pin.computeRNEADerivatives
+        self._set_inertias(theta.reshape(self.n, 10))
+        q, v, a = self._sorted(q, v, a)
+        by_q, by_v, by_a = (np.empty((len(q), self.n, self.n)) for _ in range(3))
+        for k in range(len(q)):
+            by_q[k], by_v[k], by_a[k] = evaluate(model, data, q[k], v[k], a[k])
+        # Pinocchio fills the upper triangle of the inertia matrix only.
+        by_a = np.triu(by_a) + np.triu(by_a, 1).transpose(0, 2, 1)
+        if self.order is None:
+            return TorqueDerivatives(by_q, by_v, by_a)
+        sorted_back = []
+        for x in (by_q, by_v, by_a):
+            permuted = np.empty_like(x)
+            permuted[:, self.order[:, None], self.order[None, :]] = x
+            sorted_back.append(permuted)
+        return TorqueDerivatives(*sorted_back)
+
+    def _set_inertias(self, phi: Array) -> None:
         order = range(self.n) if self.order is None else self.order
         for pin_id, index in enumerate(order, start=1):
             body = phi[index]
-            model.inertias[pin_id] = _inertia(body) if np.any(body) else pin.Inertia.Zero()
+            self.model.inertias[pin_id] = _inertia(body) if np.any(body) else pin.Inertia.Zero()
+
+    def _rnea(self, q: Array, v: Array, a: Array, phi: Array) -> Array:
+        model, data, evaluate = self.model, self.data, pin.rnea
+        self._set_inertias(phi)
         q, v, a = self._sorted(q, v, a)
         out = np.empty(q.shape)
         for k in range(len(q)):

@@ -18,7 +18,7 @@ from dynident.robot.motion import random_motion
 from dynident.robot.tree import Array, Description, Joint, Link, frozen
 
 if TYPE_CHECKING:
-    from dynident.robot.dynamics import Dynamics
+    from dynident.robot.dynamics import Dynamics, TorqueDerivatives
 
 GRAVITY = (0.0, 0.0, -9.81)
 
@@ -313,6 +313,25 @@ class Robot:
         """
         own = self.theta if theta is None else self._vector(theta)
         return self._dynamics.inverse_dynamics(*self._motion(q, v, a), own)
+
+    def torque_derivatives(
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, theta: ArrayLike | None = None
+    ) -> TorqueDerivatives:
+        """Return the derivatives of the torque by q, v and a, (T, n, n) each.
+
+        Parameters
+        ----------
+        q, v, a : (T, n), in rad or m, and per s and s^2.
+        theta : (10 n,), optional
+            Default: the robot's own. A body with a first moment needs a mass.
+
+        Raises
+        ------
+        RobotError
+            If the shapes do not fit.
+        """
+        own = self.theta if theta is None else self._vector(theta)
+        return self._dynamics.derivatives(*self._motion(q, v, a), own)
 
     def random_motion(self, seed: int, samples: int) -> tuple[Array, Array, Array]:
         """Return q, v, a (samples, n), uniform within the limits, for structural questions.

@@ -1,0 +1,111 @@
+"""The bias that instruments leave: what encoder noise does to columns that bend within it.
+
+E[tanh(v + n)] is not tanh(v): the regressor of dry friction is wrong in the mean, not only in the
+single sample, and no instrument mends that. How much it makes is found by adding noise of the
+measured size to the instruments' own motion, whose parameters are known, and estimating again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynident.fit.instrumental.moments import InstrumentalSolution
+from dynident.fit.sampling import sample
+from dynident.model import Model
+from dynident.recording import Dataset, Recording
+
+_PAIRS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class ExpectedBias:
+    """What noise of the encoders does to an estimate in the mean.
+
+    Attributes
+    ----------
+    values : (p,) mean error of the draws.
+    uncertainty : (p,) standard error of that mean.
+    residual_variance : (n,) that the noise makes in a row of each joint.
+    """
+
+    values: np.ndarray
+    uncertainty: np.ndarray
+    residual_variance: np.ndarray
+
+
+def expected_bias(
+    model: Model,
+    values: np.ndarray,
+    instruments: Dataset,
+    solution: InstrumentalSolution,
+    position_std: np.ndarray,
+    seed: int = 0,
+) -> ExpectedBias:
+    """Estimate from the instruments' own motion under encoder noise.
+
+    Parameters
+    ----------
+    model : Model
+    values : (p,) the estimate, which is the truth here.
+    instruments : recordings behind V.
+    solution : the estimate's weights.
+    position_std : (n,) encoder noise, rad or m.
+    seed : of the noise.
+    """
+    kept = list(solution.basis.independent)
+    sums = _Sums(model, solution, 2 * _PAIRS)
+    for recording in instruments.recordings:
+        sums.add(recording, instruments, values, _motions(recording, position_std, seed))
+    # With the torque V values, the error is -(V' O^-1 W)^-1 V' O^-1 (W - V) values.
+    errors = -np.linalg.solve(sums.crossed, sums.shifted[:, :, None])[:, :, 0]
+    pairs = errors.reshape(_PAIRS, 2, -1).mean(axis=1)
+    bias, uncertainty = np.zeros(model.size), np.zeros(model.size)
+    bias[kept] = pairs.mean(axis=0)
+    uncertainty[kept] = np.std(pairs, axis=0, ddof=1) / np.sqrt(_PAIRS)
+    return ExpectedBias(bias, uncertainty, sums.squares / sums.count / (2 * _PAIRS))
+
+
+def _motions(recording: Recording, position_std: np.ndarray, seed: int) -> list[Recording]:
+    """The recording with noise and with its mirror image: what is odd in it cancels."""
+    found = []
+    for draw in range(_PAIRS):
+        rng = np.random.default_rng((seed, draw))
+        noise = position_std * rng.standard_normal(recording.q.shape)
+        found += [recording.replace(q=recording.q + sign * noise) for sign in (1.0, -1.0)]
+    return found
+
+
+class _Sums:
+    """Products of instruments and noisy regressors, over all rows."""
+
+    def __init__(self, model: Model, solution: InstrumentalSolution, draws: int) -> None:
+        rank = solution.rank
+        self._model, self._kept = model, list(solution.basis.independent)
+        self._weights = solution.weights
+        self.crossed = np.zeros((draws, rank, rank))
+        self.shifted = np.zeros((draws, rank))
+        self.squares, self.count = np.zeros(model.robot.n), 0
+
+    def add(
+        self, clean: Recording, dataset: Dataset, values: np.ndarray, noisy: list[Recording]
+    ) -> None:
+        """Add the rows of a recording, clean and under each draw of noise."""
+
+        def columns(block):
+            return [self._model.columns(block, values)]
+
+        parts = [
+            sample(one, dataset.filter).blocks(self._model, columns) for one in (clean, *noisy)
+        ]
+        for (V,), *drawn in zip(*parts, strict=True):
+            instruments = V[:, :, self._kept] * (self._weights**2)[:, None]
+            self.count += len(V)
+            for draw, (W,) in enumerate(drawn):
+                self.crossed[draw] += np.einsum(
+                    "tij,tik->jk", instruments, W[:, :, self._kept], optimize=True
+                )
+                error = (W - V) @ values
+                self.shifted[draw] += np.einsum("tij,ti->j", instruments, error)
+                self.squares += np.sum(error**2, axis=0)

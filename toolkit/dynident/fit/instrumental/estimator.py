@@ -1,0 +1,202 @@
+"""The instrumental variable estimator, iterated to a fixed point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from dynident.closed_loop import Controller
+from dynident.errors import DynidentError, FitError, SimulationError
+from dynident.fit.estimate import Estimate
+from dynident.fit.history import Ending, Round
+from dynident.fit.instrumental.assemble import assemble
+from dynident.fit.instrumental.moments import InstrumentalSolution, Moments, moments, solve
+from dynident.fit.instrumental.simulated import LoopSource, SimulatedLoop
+from dynident.fit.instrumental.source import Guess, Instruments, Source, Tell, silent
+from dynident.fit.instrumental.starts import START_NAMES, Start, start_values
+from dynident.fit.least_squares import LeastSquares
+from dynident.model import Model
+from dynident.recording import Dataset
+from dynident.threads import single_threaded
+
+_HALVINGS = 5
+
+
+@dataclass(frozen=True)
+class IV:
+    """Instrumental variables: x = (V' W)^-1 V' y, V from motion that has not the measured noise.
+
+    With noisy positions the regressor W is noisy too, and least squares is wrong however long the
+    recording. V, the same columns along a motion without that noise, mends this. Where V comes
+    from the simulated loop of the last estimate, the two are iterated to a fixed point.
+
+    Parameters
+    ----------
+    instruments : a `Controller`, for the simulated loop with its defaults; a `SimulatedLoop`;
+        `SwappedPeriods`; or `Filtered`.
+    start : "least_squares"; "description", of the robot, without effects; "regular", every rotor
+        inertia (or inertia about the joint's axis) 1 and all else 0; or an earlier estimate of the
+        same model.
+    weighting : "joint" weights each joint's rows with the standard deviation of its residual.
+    tolerance : the iterations stop when the norm of y - V x changes by less, relatively.
+    rounds : at most so many iterations.
+    tell : of progress.
+
+    Notes
+    -----
+    Janot, Vandanjon and Gautier, "An instrumental variable approach for rigid industrial robots
+    identification" (preprint 2010), equations 28 to 34.
+    """
+
+    instruments: Controller | Instruments
+    start: Start | Estimate = "least_squares"
+    weighting: Literal["joint", "none"] = "joint"
+    tolerance: float = 1e-2
+    rounds: int = 20
+    tell: Tell = field(default=silent, compare=False)
+    name: ClassVar[str] = "instrumental variables"
+
+    def __post_init__(self) -> None:
+        if isinstance(self.instruments, Controller):
+            object.__setattr__(self, "instruments", SimulatedLoop(self.instruments))
+        if not hasattr(self.instruments, "prepare"):
+            what = f"a {type(self.instruments).__name__} is no choice of instruments"
+            mend = (
+                "give the study's controller (a [controller] table), SwappedPeriods() or Filtered"
+            )
+            raise FitError(what, "IV", mend)
+        if not isinstance(self.start, Estimate) and self.start not in START_NAMES:
+            mend = f"choose {', '.join(START_NAMES)}, or give an estimate"
+            raise FitError(f"start = {self.start!r}", "IV", mend)
+        if not 0 < self.tolerance < 1 or self.rounds < 1:
+            what = f"tolerance = {self.tolerance!r}, rounds = {self.rounds!r}"
+            raise FitError(what, "IV", "choose a tolerance between 0 and 1, and 1 round or more")
+
+    @single_threaded
+    def fit(self, model: Model, dataset: Dataset) -> Estimate:
+        """Fit a model whose shape parameters are what they are.
+
+        Raises
+        ------
+        FitError
+            If the recordings cannot carry the model or the instruments, or lose rank.
+        SimulationError
+            If not even the start can be simulated.
+        """
+        if not dataset.recordings:
+            raise FitError("no recording to fit", mend='mark some recordings use = "train"')
+        assert not isinstance(self.instruments, Controller)
+        first = LeastSquares(self.weighting).fit(model, dataset)
+        start = start_values(self.start, model, first)
+        guess = Guess(start, (model.given_values(), first.values), self.tell)
+        source = self.instruments.prepare(model, dataset, guess)
+        iterations = Iterations(self, model, source, start)
+        iterations.run()
+        return assemble(self, model, source, iterations, start)
+
+
+class Iterations:
+    """The fixed-point iteration at work, and what it has found so far.
+
+    Attributes
+    ----------
+    values : (p,) the present estimate.
+    rounds : one for each iteration done.
+    ending, message : how they ended.
+    found, solution : of the last round.
+    instruments : recordings behind the last round.
+    """
+
+    def __init__(self, method: IV, model: Model, source: Source, start: np.ndarray) -> None:
+        self._method, self._model, self._source = method, model, source
+        self._good: np.ndarray | None = None
+        self._root = np.eye(model.size)
+        self.values = start
+        self.rounds: list[Round] = []
+        self.ending, self.message = Ending.ROUNDS_EXHAUSTED, ""
+        self.found: Moments
+        self.solution: InstrumentalSolution
+        self.instruments: Dataset
+
+    def run(self) -> None:
+        """Iterate until the residual stays, or an estimate cannot be simulated."""
+        limit = self._method.rounds if self._source.iterates else 1
+        for count in range(limit):
+            self._method.tell("instrumental variables", count, limit)
+            try:
+                step = self._renew()
+            except SimulationError as error:
+                if not self.rounds:
+                    raise
+                self.ending, self.message = Ending.NOT_SIMULATED, str(error)
+                # The last estimate that could be simulated is kept.
+                self.values = self._good if self._good is not None else self.values
+                return
+            self._estimate(step)
+            if not self._source.iterates:
+                self.ending = Ending.DIRECT
+                return
+            if len(self.rounds) > 1 and self._settled():
+                self.ending = Ending.CONVERGED
+                break
+        if self.ending is Ending.ROUNDS_EXHAUSTED:
+            self.message = f"the residual still changes after {limit} iterations"
+        if doubt := self._source.verdict():
+            self.ending, self.message = Ending.DOUBTFUL_LOOP, doubt
+
+    def _renew(self) -> float:
+        """Make the instruments of the present estimate, damped or projected if need be.
+
+        Returns the share of the last step that was taken.
+        """
+        try:
+            self.instruments = self._source.at(self.values)
+            self._good = self.values
+            return 1.0
+        except SimulationError as error:
+            reason = error
+        if isinstance(self._source, LoopSource):
+            try:
+                self.instruments = self._source.projected(self.values, self._root)
+                self._good = self.values
+                return 1.0
+            except DynidentError:
+                pass
+        if self._good is None:
+            raise reason
+        for halving in range(1, _HALVINGS + 1):
+            share = 0.5**halving
+            values = self._good + share * (self.values - self._good)
+            try:
+                self.instruments = self._source.at(values)
+                self._good = self.values = values
+                return share
+            except SimulationError:
+                continue
+        raise reason
+
+    def _estimate(self, step: float) -> None:
+        model, measured = self._model, self._source.measured
+        found = moments(model, measured, self.instruments, self.values)
+        given = model.given_values()
+        solution = solve(found, model.names, given, self._method.weighting)
+        values = solution.values
+        if model.needs_torque:
+            values = model.settled(self.values, values)
+        R = found.factors.pooled(solution.weights)[: model.size, : model.size]
+        self.found, self.solution, self._root, self.values = found, solution, R, values
+        self.rounds.append(
+            Round(
+                values,
+                found.relative(found.residual_norms(values)),
+                found.relative(found.simulated_norms(values)),
+                solution.correlation,
+                step,
+            )
+        )
+
+    def _settled(self) -> bool:
+        before, now = (one.error_simulated for one in self.rounds[-2:])
+        return abs(now - before) <= self._method.tolerance * before

@@ -1,0 +1,83 @@
+"""Joint inertias of an iterate, and the feedback that keeps its loop's poles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from dynident.closed_loop import Controller
+from dynident.errors import SimulationError
+from dynident.model import Model
+
+_POSES = 50
+
+
+def poses_of(motions: Sequence[np.ndarray]) -> np.ndarray:
+    """Return up to 50 poses (P, n), evenly spread over motions (T, n)."""
+    stacked = np.concatenate(motions)
+    return stacked[:: max(1, len(stacked) // _POSES)]
+
+
+class InertiaMatrices:
+    """The joint-space inertia at some poses, as a function of the model's parameters.
+
+    It is linear in them, so base parameters suffice, possible or not: no body is ever made.
+
+    Parameters
+    ----------
+    model : Model
+    poses : (P, n) rad or m.
+    """
+
+    def __init__(self, model: Model, poses: np.ndarray) -> None:
+        count, n = poses.shape
+        t, still = np.zeros(count), np.zeros((count, n))
+        rest = model.columns(model.block(t, poses, still, still))
+        self._columns = np.empty((count, n, n, model.size))
+        for j in range(n):
+            a = still.copy()
+            a[:, j] = 1.0
+            self._columns[:, :, j] = model.columns(model.block(t, poses, still, a)) - rest
+        self._poses, self._names = poses, model.robot.names
+
+    def of(self, values: np.ndarray) -> np.ndarray:
+        """Joint-space inertia at each pose, (P, n, n)."""
+        return self._columns @ values
+
+    def joint_inertias(self, values: np.ndarray) -> np.ndarray:
+        """J_j, the largest M_jj over the poses, (n,) kg m^2 or kg (Janot et al., equation 38)."""
+        return np.einsum("pjj->pj", self.of(values)).max(axis=0)
+
+    def require_positive(self, values: np.ndarray) -> None:
+        """Refuse values with which the inertia is not positive definite at some pose.
+
+        Raises
+        ------
+        SimulationError
+            Naming the pose.
+        """
+        M = self.of(values)
+        if not np.all(np.isfinite(M)):
+            raise SimulationError("the joint-space inertia is not finite")
+        least = np.linalg.eigvalsh((M + M.transpose(0, 2, 1)) / 2)[:, 0]
+        worst = int(np.argmin(least))
+        if not least[worst] > 0:
+            at = zip(self._names, self._poses[worst], strict=True)
+            raise SimulationError(
+                f"the joint-space inertia is not positive (least eigenvalue {least[worst]:.3g})",
+                "at " + ", ".join(f"{joint} = {x:.3g}" for joint, x in at),
+            )
+
+
+def stiffness(controller: Controller) -> np.ndarray:
+    """Feedback torque per position error, (n,) N m/rad or N/m; of a computed torque 1/s^2."""
+    kp = np.array(controller.kp)
+    return kp * np.array(controller.kv) if controller.kind == "cascade" else kp
+
+
+def natural_frequencies(controller: Controller, inertias: np.ndarray) -> np.ndarray:
+    """w_n of each joint's double integrator under its feedback, (n,) rad/s (equation 44)."""
+    if controller.kind == "computed_torque":
+        return np.sqrt(stiffness(controller))
+    return np.sqrt(stiffness(controller) / inertias)

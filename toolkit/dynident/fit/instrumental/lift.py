@@ -1,0 +1,84 @@
+"""From base parameters to standard parameters that a simulator can hold.
+
+Base parameters say all that the torque depends on; a plant wants ten parameters of each body. Any
+choice gives the same motion, as long as no body has a first moment without a mass.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.fit.given import given_estimate
+from dynident.fit.metric import Metric
+from dynident.fit.prior import Prior
+from dynident.fit.projection import project
+from dynident.model import Model
+from dynident.nlp import Within
+
+_MASS_STAYS = 1e-3
+"""Weight of a mass against the other parameters: where it is not told, it stays as described."""
+_NEXT_TO_NOTHING = 1e-6
+"""Share of the typical mass below which a described mass cannot carry a first moment."""
+
+
+def minimum_norm(model: Model, values: np.ndarray) -> np.ndarray:
+    """Return the standard parameters nearest to the description, masses kept where they can be.
+
+    The bodies need not be physically possible: every base value is kept.
+
+    Parameters
+    ----------
+    model : its robot is the description.
+    values : (p,) the model's parameters.
+
+    Returns
+    -------
+    (10 n,) parameters of the moving bodies, each in its joint's frame.
+    """
+    base = model.base
+    theta = np.array(model.robot.theta)
+    masses = theta[0::10]
+    known = masses[np.isfinite(masses) & (masses > 0)]
+    typical = float(np.median(known)) if known.size else 1.0
+    theta[0::10] = np.where(masses > _NEXT_TO_NOTHING * typical, masses, typical)
+    theta = np.where(np.isfinite(theta), theta, 0.0)
+    weight = np.divide(1.0, base.scale, out=np.zeros_like(base.scale), where=base.scale > 0)
+    weight[0::10] *= _MASS_STAYS
+    B = base.combination * weight
+    wanted = values[: base.rank]
+    correction = np.linalg.lstsq(B, wanted - base.coordinates(theta), rcond=None)[0]
+    theta = theta + weight * correction
+    # One step of refinement puts what rounding is left into the independent parameters.
+    theta[list(base.independent)] += wanted - base.coordinates(theta)
+    return theta
+
+
+def consistent(model: Model, values: np.ndarray, root: np.ndarray) -> np.ndarray:
+    """Return the standard parameters of possible bodies nearest to base values.
+
+    What a possible robot can have is kept; what none can have moves where the data mind least,
+    and effects that may not be negative become zero.
+
+    Parameters
+    ----------
+    model : its robot decides what the base values leave open.
+    values : (p,) the model's parameters.
+    root : (r, p) R with R'R the information that the data hold, in units of their noise.
+
+    Returns
+    -------
+    (10 n + k,) parameters of the moving bodies, then those of the effects.
+
+    Raises
+    ------
+    FitError
+        If the projection fails.
+    """
+    from dataclasses import replace
+
+    robot = model.robot
+    before = replace(given_estimate(robot), model=model, values=np.array(values))
+    metric = Metric(root, model.names, 0, "the last iteration")
+    found = project(before, Prior(robot), metric, Within("full"))
+    effects = found.values[model.base.rank :]
+    return np.concatenate([found.robot.theta, effects])

@@ -1,0 +1,255 @@
+"""Instruments from the simulated closed loop (Janot, Vandanjon and Gautier, IDIM-IV, 2010)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from dynident.closed_loop import ClosedLoop, Controller, Mechanism, Retraced, retrace
+from dynident.errors import FitError, SimulationError
+from dynident.fit.instrumental import lift
+from dynident.fit.instrumental.gains import (
+    InertiaMatrices,
+    natural_frequencies,
+    poses_of,
+    stiffness,
+)
+from dynident.fit.instrumental.source import Guess, prepared
+from dynident.fit.sampling import LEAST_ROWS
+from dynident.model import Model
+from dynident.recording import Dataset, Recording, within
+from dynident.robot import Robot
+
+_SETTLED = 5.0
+"""Transient in units of 1/w_n: what of it is left is below 1 % of where it began."""
+_DOUBT = 1.0
+"""Distance of the simulated from the measured motion over that of the reference from it."""
+
+
+@dataclass(frozen=True)
+class SimulatedLoop:
+    """The robot of the last estimate in the recording's own closed loop.
+
+    The simulated motion has no noise, and is as good an instrument as it is near to the true
+    motion. Only the regressor comes from it: the torque stays the measured one.
+
+    Attributes
+    ----------
+    controller : of the recorded loop: its structure must be the real one's.
+    natural_frequency_hz : (n,) or one number; poles that the simulated loop keeps: after each
+        iteration the feedback torque is multiplied by J w_n^2 / (its stiffness), J the joint's
+        largest inertia (equations 45 to 47; the damping stays that of the stated gains at the
+        inertia they were designed for). None: the gains as stated, which are the real loop's;
+        only the start, if its inertia is not the believed one, gets gains in proportion.
+    lift : how base parameters become bodies: "minimum_norm" (nearest to the description, possible
+        or not) or "consistent" (the nearest possible robot).
+    nominal : the robot inside a computed torque or a feed-forward; None: the description.
+    """
+
+    controller: Controller
+    natural_frequency_hz: float | Sequence[float] | None = None
+    lift: Literal["minimum_norm", "consistent"] = "minimum_norm"
+    nominal: Robot | None = None
+    name: ClassVar[str] = "simulated closed loop"
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.controller, Controller):
+            what = f"a {type(self.controller).__name__} where a Controller is needed"
+            mend = "give the study's: di.IV(study.controller); it needs a [controller] table"
+            raise FitError(what, "instruments", mend)
+        if self.lift not in ("minimum_norm", "consistent"):
+            mend = 'choose "minimum_norm" or "consistent"'
+            raise FitError(f"lift = {self.lift!r}", "instruments", mend)
+        if self.natural_frequency_hz is not None:
+            given = np.atleast_1d(np.asarray(self.natural_frequency_hz, dtype=float))
+            if given.shape not in ((1,), (self.controller.n,)) or not np.all(given > 0):
+                mend = "give one positive number, or one per joint"
+                raise FitError(f"natural_frequency_hz = {given.tolist()}", "instruments", mend)
+
+    def prepare(self, model: Model, dataset: Dataset, guess: Guess) -> LoopSource:
+        """Return the loop of a robot, ready to be simulated at any estimate.
+
+        Raises
+        ------
+        FitError
+            If a recording is shorter than the transient.
+        SimulationError
+            If a recording has no reference, or the controller does not suit the robot.
+        """
+        return LoopSource(self, model, prepared(dataset), guess)
+
+
+class LoopSource:
+    """The closed loops of some recordings; see `Source`. One diagram serves all estimates."""
+
+    iterates: ClassVar[bool] = True
+    noise_share = 1.0
+
+    def __init__(
+        self, settings: SimulatedLoop, model: Model, dataset: Dataset, guess: Guess
+    ) -> None:
+        controller, n = settings.controller, model.robot.n
+        if controller.n != n:
+            what = f"a controller of {controller.n} joints for a robot of {n}"
+            raise SimulationError(what, "controller", "give its gains for every joint")
+        controller.simulated_rate()
+        self._settings, self._model, self._tell = settings, model, guess.tell
+        references = [_reference(one) for one in dataset.recordings]
+        self._matrices = InertiaMatrices(model, poses_of(references))
+        self._start = guess.start
+        self._believed = self._believed_inertias(guess)
+        frequencies = natural_frequencies(controller, self._believed)
+        if settings.natural_frequency_hz is not None:
+            given = 2 * np.pi * np.asarray(settings.natural_frequency_hz, dtype=float)
+            frequencies = np.broadcast_to(given, (n,)).copy()
+        self._frequencies = frequencies
+        self.transient = float(_SETTLED / frequencies.min())
+        cut = tuple(_without_transient(one, self.transient) for one in dataset.recordings)
+        self.measured = replace(dataset, recordings=cut)
+        self._loop = ClosedLoop()
+        self._last: tuple[Retraced, ...] = ()
+
+    @property
+    def builds(self) -> int:
+        """Diagrams built so far."""
+        return self._loop.builds
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Caveats, and the settings that the instruments rest on."""
+        hertz = ", ".join(f"{f / (2 * np.pi):.3g}" for f in self._frequencies)
+        saturated = max((float(one.saturated.max()) for one in self._last), default=0.0)
+        found = [
+            f"Instruments: simulated closed loop ({self._settings.controller.kind}), natural "
+            f"frequencies {hertz} Hz, the first {self.transient:.3g} s of each recording dropped. "
+            "They are right if the controller's structure is the real one's, and stay usable down "
+            "to about half of the real bandwidth."
+        ]
+        if saturated > 0:
+            found.append(
+                f"The simulated torque is at its limit in up to {100 * saturated:.2g} % of the "
+                "samples: there the loop does not have these natural frequencies."
+            )
+        return (*found, *self._loop.notes)
+
+    def at(self, values: np.ndarray) -> Dataset:
+        """Simulate an estimate; see `Source.at`."""
+        if self._settings.lift == "consistent":
+            return self.projected(values, np.diag(self._column_scale()))
+        self._matrices.require_positive(values)
+        return self._simulated(values, lift.minimum_norm(self._model, values))
+
+    def projected(self, values: np.ndarray, root: np.ndarray) -> Dataset:
+        """Simulate the nearest possible robot; `root` (r, p) tells what the data mind."""
+        found = lift.consistent(self._model, values, root)
+        theta = found[: 10 * self._model.robot.n]
+        rigid = self._model.base.coordinates(theta)
+        nearest = np.concatenate([rigid, found[len(theta) :]])
+        self._matrices.require_positive(nearest)
+        return self._simulated(nearest, theta)
+
+    def verdict(self) -> str:
+        """Return which joints' simulated motion is no nearer to the measurement than the reference.
+
+        The encoder's noise is in both distances.
+        """
+        names = self._model.robot.names
+        simulated, reference = np.zeros(len(names)), np.zeros(len(names))
+        for one, retraced in zip(self.measured.recordings, self._last, strict=True):
+            window = one.window or (one.t[0], one.t[-1])
+            rows = within(one.t, *window, one.where)
+            assert one.q_ref is not None
+            simulated += np.sum((retraced.recording.q - one.q)[rows] ** 2, axis=0)
+            reference += np.sum((one.q_ref - one.q)[rows] ** 2, axis=0)
+        bad = [
+            f"{name} ({np.sqrt(s / r):.2g} times as far)"
+            for name, s, r in zip(names, simulated, reference, strict=True)
+            if s > _DOUBT * r > 0
+        ]
+        if not bad:
+            return ""
+        return (
+            "the simulated motion is further from the measured one than the reference is, at "
+            + ", ".join(bad)
+            + ": is this the controller of the recorded loop (structure, gains, rate, delay)?"
+        )
+
+    # --- inside --------------------------------------------------------------------------------
+
+    def _simulated(self, values: np.ndarray, theta: np.ndarray) -> Dataset:
+        recordings, model = self.measured.recordings, self._model
+        bodies = {
+            carries: Mechanism.of_model(model, values, theta, carries_payload=carries)
+            for carries in {bool(one.payload) for one in recordings}
+        }
+        total = sum(one.duration for one in recordings)
+
+        def progress(done: float, whole: float) -> None:
+            self._tell("simulating", done, whole or total)
+
+        self._last = retrace(
+            self._loop,
+            [bodies[bool(one.payload)] for one in recordings],
+            recordings,
+            self._settings.controller,
+            nominal=self._settings.nominal or model.robot,
+            feedback_scale=self._feedback_scale(values),
+            progress=progress,
+        )
+        return replace(self.measured, recordings=tuple(one.recording for one in self._last))
+
+    def _feedback_scale(self, values: np.ndarray) -> np.ndarray:
+        inertias = self._matrices.joint_inertias(values)
+        if self._settings.natural_frequency_hz is not None:
+            if self._settings.controller.kind == "computed_torque":
+                return self._frequencies**2 / stiffness(self._settings.controller)
+            return inertias * self._frequencies**2 / stiffness(self._settings.controller)
+        if np.array_equal(values, self._start):
+            return inertias / self._believed
+        return np.ones(len(inertias))
+
+    def _believed_inertias(self, guess: Guess) -> np.ndarray:
+        """Joint inertias before the first iteration: the largest that is believed of each.
+
+        A description often lacks the motors' inertia, and least squares shrinks what it estimates
+        from noisy accelerations: both err downwards.
+        """
+        for group in (guess.others, (guess.start,)):
+            inertias = [self._matrices.joint_inertias(values) for values in group]
+            sound = [J for J in inertias if np.all(np.isfinite(J)) and np.all(J > 0)]
+            if sound:
+                return np.max(sound, axis=0)
+        mend = 'start from "regular", or state natural_frequency_hz'
+        raise SimulationError("no start has positive joint inertias", "instruments", mend)
+
+    def _column_scale(self) -> np.ndarray:
+        scale = np.ones(self._model.size)
+        base = self._model.base
+        scale[: base.rank] = base.scale[list(base.independent)]
+        return scale
+
+
+def _reference(recording: Recording) -> np.ndarray:
+    if recording.q_ref is None:
+        mend = (
+            f"add columns q_ref.{recording.joints[0]}, ..., or take other instruments: "
+            "di.SwappedPeriods() or di.Filtered(cutoff_hz)"
+        )
+        raise SimulationError("the recording has no reference", recording.where, mend)
+    return recording.q_ref
+
+
+def _without_transient(recording: Recording, transient: float) -> Recording:
+    start = float(recording.t[0]) + transient
+    first, last = recording.window or (float(recording.t[0]), float(recording.t[-1]))
+    first = max(first, start)
+    if last - first < LEAST_ROWS / recording.rate_hz:
+        what = (
+            f"{recording.duration:.4g} s are shorter than the loop's transient, {transient:.3g} s"
+        )
+        mend = "record longer, or state the loop's natural_frequency_hz"
+        raise FitError(what, recording.where, mend)
+    return recording.replace(window=(first, last))

@@ -1,0 +1,127 @@
+"""What instruments are to the estimator, wherever they come from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Protocol
+
+import numpy as np
+
+from dynident.model import Model
+from dynident.recording import Dataset, Recording, uniform
+
+Tell = Callable[[str, float, float], None]
+"""(what is being done, how much is done, how much there is to do)."""
+
+
+def silent(what: str, done: float, total: float) -> None:
+    """Tell nobody."""
+
+
+@dataclass(frozen=True, eq=False)
+class Guess:
+    """What is believed before the first iteration.
+
+    Attributes
+    ----------
+    start : (p,) where the iterations begin.
+    others : (p,) values that may be nearer to the truth where the start is none, best first.
+    tell : of progress.
+    """
+
+    start: np.ndarray
+    others: tuple[np.ndarray, ...] = ()
+    tell: Tell = field(default=silent)
+
+
+class Source(Protocol):
+    """Instruments of some recordings, made anew at each estimate if they depend on it.
+
+    Attributes
+    ----------
+    measured : recordings on a uniform clock, their windows without what is transient.
+    notes : caveats.
+    noise_share : variance of (measured - instrument) position over that of the encoder's noise.
+    iterates : whether the instruments depend on the estimate.
+    """
+
+    @property
+    def measured(self) -> Dataset: ...
+
+    @property
+    def notes(self) -> tuple[str, ...]: ...
+
+    @property
+    def noise_share(self) -> float: ...
+
+    iterates: ClassVar[bool]
+
+    def at(self, values: np.ndarray) -> Dataset:
+        """Return the instruments of an estimate: `measured` with other positions.
+
+        Raises
+        ------
+        SimulationError
+            If the estimate cannot be simulated.
+        """
+        ...
+
+    def verdict(self) -> str:
+        """Return what speaks against the last instruments, in words; empty if nothing does."""
+        ...
+
+
+class Instruments(Protocol):
+    """A choice of instruments."""
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        ...
+
+    def prepare(self, model: Model, dataset: Dataset, guess: Guess) -> Source:
+        """Return the instruments of recordings.
+
+        Raises
+        ------
+        FitError, RecordingError, SimulationError
+            If the recordings cannot have such instruments.
+        """
+        ...
+
+
+def prepared(dataset: Dataset) -> Dataset:
+    """Return the recordings on uniform clocks, without the rows whose derivatives are one-sided.
+
+    Instruments then have the same time stamps. One-sided differences at the very ends would pass
+    several times the noise of central ones, and nothing beside them cancels it.
+    """
+    return replace(dataset, recordings=tuple(_central(uniform(r)) for r in dataset.recordings))
+
+
+def _central(recording: Recording) -> Recording:
+    first, last = recording.window or (-np.inf, np.inf)
+    # Half a sample more: a window's end is no matter of rounding.
+    first = max(first, float(recording.t[2] + recording.t[1]) / 2)
+    last = min(last, float(recording.t[-3] + recording.t[-2]) / 2)
+    return recording.replace(window=(first, last)) if first < last else recording
+
+
+@dataclass(frozen=True, eq=False)
+class FixedInstruments:
+    """Instruments that do not depend on the estimate; see `Source`."""
+
+    measured: Dataset
+    instruments: Dataset
+    notes: tuple[str, ...]
+    noise_share: float
+    iterates: ClassVar[bool] = False
+
+    def at(self, values: np.ndarray) -> Dataset:
+        """Return the instruments."""
+        return self.instruments
+
+    def verdict(self) -> str:
+        """Return nothing: there is no loop to doubt."""
+        return ""
