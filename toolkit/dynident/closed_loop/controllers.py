@@ -35,7 +35,8 @@ class Controller:
 
     A drive whose loops work on a signal before an amplifier is stated with `drive_gain`: the loop
     v_tau = k_p k_v (q_ref - q) - k_v v, tau = g_tau v_tau (Janot, Vandanjon and Gautier, equations
-    40 and 41) is a "cascade" with kp = k_p, kv = k_v and drive_gain = g_tau, or with kv = g_tau k_v alone.
+    40 and 41) is a "cascade" with kp = k_p, kv = k_v and drive_gain = g_tau, or with kv = g_tau k_v
+    alone.
 
     Attributes
     ----------

@@ -1,9 +1,10 @@
 """Forces made of terms as Drake's own systems, in C++.
 
-Three `MultilayerPerceptron`s of the plant's state, each there only if it is needed: an identity
-layer for constants, springs and viscous friction; a tanh layer for dry friction; and a layer of
-rectifiers for magnitudes, |x| = max(x, 0) + max(-x, 0). All weights live in the Context: other
-coefficients, of any sign, need no other diagram.
+Two `MultilayerPerceptron`s of the plant's state, each there only if it is needed. One has a tanh
+layer for dry friction, and for springs and viscous friction too: tanh(e x) / e is x to the last
+digit where e is small enough, and one network costs less than two and their sum. The other has a
+layer of rectifiers for magnitudes, |x| = max(x, 0) + max(-x, 0). All weights live in the Context:
+other coefficients, of any sign, need no other diagram.
 """
 
 from __future__ import annotations
@@ -19,8 +20,11 @@ from pydrake.systems.primitives import PerceptronActivationType as Activation
 from dynident.closed_loop.compiled import Bodies
 from dynident.effects import Term
 
-Unit = tuple[int, ...]
-"""Entries of the plant's velocities whose sum one hidden unit sees."""
+Unit = tuple[str, tuple[int, ...]]
+"""A law, and the entries of the plant's velocities whose motion it is taken of: a hidden unit."""
+
+_STRAIGHT = 2.0**-40
+"""e above: of x = 1e5 the last digit is lost. A power of two, so that scaling rounds nothing."""
 
 
 @dataclass(frozen=True)
@@ -52,13 +56,17 @@ class Terms:
         return cls(tuple(terms), tuple(widths), len(bodies.place))
 
     @property
-    def is_linear(self) -> bool:
-        """Whether some are linear in the state."""
-        return any(term.law in ("constant", "position", "speed") for term in self.terms)
+    def smooth(self) -> tuple[Unit, ...]:
+        """Units of the tanh layer; a constant needs one to stand behind."""
+        units = {(t.law, t.of) for t in self.terms if t.law in ("position", "speed", "sign")}
+        if not units and any(term.law == "constant" for term in self.terms):
+            units = {("speed", (0,))}
+        return tuple(sorted(units))
 
-    def units(self, law: str) -> tuple[Unit, ...]:
-        """Return the distinct sums of speeds that a law is taken of."""
-        return tuple(sorted({term.of for term in self.terms if term.law == law}))
+    @property
+    def rectified(self) -> tuple[Unit, ...]:
+        """Units of which a pair of rectifiers makes the magnitude."""
+        return tuple(sorted({(t.law, t.of) for t in self.terms if t.law == "magnitude"}))
 
 
 class Layers:
@@ -72,67 +80,68 @@ class Layers:
     """
 
     def __init__(self, builder: Any, state: Any, terms: Terms) -> None:
-        size = terms.size
-        self._signs, self._magnitudes = terms.units("sign"), terms.units("magnitude")
-        self._linear = self._dry = self._rectified = None
-        if terms.is_linear:
-            self._linear = _network([2 * size, size], [Activation.kIdentity])
-        if self._signs:
-            self._dry = _network(
-                [2 * size, len(self._signs), size], [Activation.kTanh, Activation.kIdentity]
-            )
-        if self._magnitudes:
-            self._rectified = _network(
-                [2 * size, 2 * len(self._magnitudes), size],
-                [Activation.kReLU, Activation.kIdentity],
-            )
-        self._systems = [
-            builder.AddSystem(one)
-            for one in (self._linear, self._dry, self._rectified)
-            if one is not None
-        ]
-        for one in self._systems:
-            builder.Connect(state, one.get_input_port())
+        self._smooth, self._rectified = terms.smooth, terms.rectified
+        self._networks: list[Any] = []
+        for hidden, activation in (
+            (len(self._smooth), Activation.kTanh),
+            (2 * len(self._rectified), Activation.kReLU),
+        ):
+            if hidden:
+                sizes = [2 * terms.size, hidden, terms.size]
+                network = MultilayerPerceptron(sizes, [activation, Activation.kIdentity])
+                self._networks.append(builder.AddSystem(network))
+        for network in self._networks:
+            builder.Connect(state, network.get_input_port())
 
     @property
     def outputs(self) -> list[Any]:
         """Output ports whose sum is the force (N,)."""
-        return [one.get_output_port() for one in self._systems]
+        return [network.get_output_port() for network in self._networks]
 
     def set(self, root: Any, terms: Terms) -> None:
         """Write the weights of terms of the same structure into the diagram's Context."""
-        size = terms.size
-        if self._linear is not None:
-            W, b = _zeros(size, 2 * size), np.zeros(size)
-            for term in terms.terms:
-                if term.law == "constant":
-                    b[term.at] -= term.coefficient
-                elif term.law in ("position", "speed"):
-                    offset = size if term.law == "speed" else 0
-                    for i in term.of:
-                        W[term.at, i + offset] -= term.coefficient
-            _write(self._linear, root, [(W, b)])
-        if self._dry is not None:
-            count = len(self._signs)
-            inner, outer = _zeros(count, 2 * size), _zeros(size, count)
-            for term, width in zip(terms.terms, terms.widths, strict=True):
-                if term.law == "sign":
-                    unit = self._signs.index(term.of)
-                    for i in term.of:
-                        inner[unit, size + i] = 1.0 / width
-                    outer[term.at, unit] -= term.coefficient
-            _write(self._dry, root, [(inner, np.zeros(count)), (outer, np.zeros(size))])
-        if self._rectified is not None:
-            count = len(self._magnitudes)
-            inner, outer = _zeros(2 * count, 2 * size), _zeros(size, 2 * count)
-            for term in terms.terms:
-                if term.law == "magnitude":
-                    unit = self._magnitudes.index(term.of)
-                    for half, sign in ((unit, 1.0), (unit + count, -1.0)):
-                        for i in term.of:
-                            inner[half, size + i] = sign
-                        outer[term.at, half] -= term.coefficient
-            _write(self._rectified, root, [(inner, np.zeros(2 * count)), (outer, np.zeros(size))])
+        weights = []
+        if self._smooth:
+            weights.append(_smooth_weights(terms, self._smooth))
+        if self._rectified:
+            weights.append(_rectified_weights(terms, self._rectified))
+        for network, (inner, outer, bias) in zip(self._networks, weights, strict=True):
+            context = network.GetMyMutableContextFromRoot(root)
+            network.SetWeights(context, 0, inner)
+            network.SetBiases(context, 0, np.zeros(len(inner)))
+            network.SetWeights(context, 1, outer)
+            network.SetBiases(context, 1, bias)
+
+
+Weights = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Weights of the hidden layer (H, 2 N), of the output (N, H), and its bias (N,)."""
+
+
+def _smooth_weights(terms: Terms, units: Sequence[Unit]) -> Weights:
+    size = terms.size
+    inner, outer, bias = _zeros(len(units), 2 * size), _zeros(size, len(units)), np.zeros(size)
+    for term, width in zip(terms.terms, terms.widths, strict=True):
+        if term.law == "constant":
+            bias[term.at] -= term.coefficient
+        elif term.law != "magnitude":
+            unit = units.index((term.law, term.of))
+            slope = 1.0 / width if term.law == "sign" else _STRAIGHT
+            first = 0 if term.law == "position" else size
+            inner[unit, [first + i for i in term.of]] = slope
+            outer[term.at, unit] -= term.coefficient / (1.0 if term.law == "sign" else slope)
+    return inner, outer, bias
+
+
+def _rectified_weights(terms: Terms, units: Sequence[Unit]) -> Weights:
+    size, count = terms.size, len(units)
+    inner, outer = _zeros(2 * count, 2 * size), _zeros(size, 2 * count)
+    for term in terms.terms:
+        if term.law == "magnitude":
+            unit = units.index((term.law, term.of))
+            for half, sign in ((unit, 1.0), (unit + count, -1.0)):
+                inner[half, [size + i for i in term.of]] = sign
+                outer[term.at, half] -= term.coefficient
+    return inner, outer, np.zeros(size)
 
 
 def summed(builder: Any, outputs: Sequence[Any], size: int) -> Any:
@@ -145,17 +154,6 @@ def summed(builder: Any, outputs: Sequence[Any], size: int) -> Any:
     return adder.get_output_port()
 
 
-def _network(sizes: list[int], activations: list[Any]) -> Any:
-    return MultilayerPerceptron(sizes, activations)
-
-
 def _zeros(rows: int, columns: int) -> np.ndarray:
     # The bindings take weights column by column only.
     return np.zeros((rows, columns), order="F")
-
-
-def _write(network: Any, root: Any, weights: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
-    context = network.GetMyMutableContextFromRoot(root)
-    for layer, (W, b) in enumerate(weights):
-        network.SetWeights(context, layer, W)
-        network.SetBiases(context, layer, b)
