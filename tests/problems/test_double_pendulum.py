@@ -1,0 +1,73 @@
+"""A measured double pendulum: inertias that do not depend on the filter."""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dynident as di
+from dynident.fit.instrumental import Filtered
+from problem_scripts import script
+
+ROOT = Path(__file__).parents[2]
+FILE = Path("dfki_double_pendulum_C0") / "recordings.npz"
+FOLDER = Path(os.environ.get("DYNIDENT_DATA", ROOT.parent / "shared" / "data"))
+pytestmark = pytest.mark.skipif(
+    not (FOLDER / FILE).is_file(), reason=f"no {FILE} in DYNIDENT_DATA or ../shared/data"
+)
+cutoffs = script("double_pendulum", "cutoffs")
+CUTOFFS, AUTHORS = cutoffs.PUBLISHED["cutoffs"], cutoffs.PUBLISHED["authors"]
+NARROW, WIDE = 10.0, 40.0
+
+
+@cache
+def study() -> di.Study:
+    return cutoffs.load()
+
+
+@cache
+def least_squares() -> dict[str, np.ndarray]:
+    return cutoffs.sweep(study(), di.LeastSquares(), (NARROW, WIDE))
+
+
+@cache
+def instruments() -> dict[str, np.ndarray]:
+    method = di.IV(Filtered(CUTOFFS["instruments_hz"]))
+    return cutoffs.sweep(study(), method, (NARROW, WIDE))
+
+
+def test_every_record_is_read_by_its_name() -> None:
+    recordings = study().train.recordings
+    assert len(recordings) == 9
+    assert [r.name for r in recordings][-1] == "trajectory_13"
+    assert len({r.provenance.sha256 for r in recordings}) == 1
+    assert all(r.jitter < 1e-6 for r in recordings)
+    assert 550 < recordings[-1].rate_hz < 600 and 490 < recordings[0].rate_hz < 510
+
+
+def test_least_squares_loses_the_inertias_as_the_filter_is_opened() -> None:
+    for name in cutoffs.INERTIAL:
+        narrow, wide = least_squares()[name]
+        assert wide < (1.0 - CUTOFFS["least_fall"]) * narrow, name
+    at = [CUTOFFS["hz"].index(hz) for hz in (NARROW, WIDE)]
+    expected = np.array(CUTOFFS["least_squares_J2"])[at]
+    assert least_squares()["J2"] == pytest.approx(expected, abs=CUTOFFS["tolerance"])
+
+
+def test_instruments_give_the_same_inertias_at_every_cutoff() -> None:
+    for name in cutoffs.INERTIAL:
+        narrow, wide = instruments()[name]
+        assert abs(wide / narrow - 1.0) < CUTOFFS["largest_change"], name
+    at = [CUTOFFS["hz"].index(hz) for hz in (NARROW, WIDE)]
+    expected = np.array(CUTOFFS["instruments_J2"])[at]
+    assert instruments()["J2"] == pytest.approx(expected, abs=CUTOFFS["tolerance"])
+
+
+@pytest.mark.parametrize("name", ["J1", "J2", "m2r2", "g1"])
+def test_they_are_near_to_the_authors_fits(name: str) -> None:
+    low, high = sorted(AUTHORS[name])
+    assert 0.96 * low < instruments()[name][0] < 1.04 * high
