@@ -67,7 +67,7 @@ def assemble(
         found.relative(norms),
         solution.condition_number,
         found.factors.rows,
-        f"{method.name}, {method.instruments.name}",
+        f"{method.name}, {method.chosen.name}",
         history.sentence,
         (*_notes(model, solution, history, bias), *source.notes),
         sources_of(source.measured),

@@ -59,9 +59,7 @@ class IV:
     name: ClassVar[str] = "instrumental variables"
 
     def __post_init__(self) -> None:
-        if isinstance(self.instruments, Controller):
-            object.__setattr__(self, "instruments", SimulatedLoop(self.instruments))
-        if not hasattr(self.instruments, "prepare"):
+        if not hasattr(self.chosen, "prepare"):
             what = f"a {type(self.instruments).__name__} is no choice of instruments"
             mend = (
                 "give the study's controller (a [controller] table), SwappedPeriods() or Filtered"
@@ -73,6 +71,13 @@ class IV:
         if not 0 < self.tolerance < 1 or self.rounds < 1:
             what = f"tolerance = {self.tolerance!r}, rounds = {self.rounds!r}"
             raise FitError(what, "IV", "choose a tolerance between 0 and 1, and 1 round or more")
+
+    @property
+    def chosen(self) -> Instruments:
+        """The instruments: a controller alone stands for its simulated loop."""
+        if isinstance(self.instruments, Controller):
+            return SimulatedLoop(self.instruments)
+        return self.instruments
 
     @single_threaded
     def fit(self, model: Model, dataset: Dataset) -> Estimate:
@@ -87,11 +92,10 @@ class IV:
         """
         if not dataset.recordings:
             raise FitError("no recording to fit", mend='mark some recordings use = "train"')
-        assert not isinstance(self.instruments, Controller)
         first = LeastSquares(self.weighting).fit(model, dataset)
         start = start_values(self.start, model, first)
         guess = Guess(start, (model.given_values(), first.values), self.tell)
-        source = self.instruments.prepare(model, dataset, guess)
+        source = self.chosen.prepare(model, dataset, guess)
         iterations = Iterations(self, model, source, start)
         iterations.run()
         return assemble(self, model, source, iterations, start)

@@ -1,0 +1,174 @@
+"""Instruments from the simulated loop: right where least squares is not, and honest about it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import dynident as di
+import loops
+from dynident.errors import DynidentError, FitError, SimulationError
+from dynident.fit import IV, LeastSquares, SimulatedLoop
+from dynident.fit.history import Ending
+from dynident.model import Model
+from dynident.recording import Dataset, Filter
+
+FILTERED = Filter(20.0, 8.0, 20.0)
+TIGHT = 1e-12
+
+
+@pytest.fixture(scope="module")
+def quiet() -> Dataset:
+    return loops.dataset(loops.experiment(0, 0.0, coulomb=True), FILTERED)
+
+
+@pytest.fixture(scope="module")
+def noisy() -> Dataset:
+    return loops.dataset(loops.experiment(1, 3e-5))
+
+
+@pytest.mark.parametrize(("coulomb", "rate"), [(False, 200.0), (True, 1000.0)])
+def test_without_noise_it_is_least_squares(coulomb, rate):
+    """To 1e-6; dry friction at 200 Hz misses that: sampling leaves a residual at reversals."""
+    loop = replace(loops.LOOP, rate_hz=rate)
+    dataset = loops.dataset(loops.experiment(0, 0.0, coulomb=coulomb, controller=loop))
+    model = loops.model(coulomb=coulomb)
+    ours = di.fit(model, dataset, IV(loop, tolerance=TIGHT))
+    window = _window(dataset, model)
+    same = replace(dataset, recordings=tuple(r.replace(window=window) for r in dataset.recordings))
+    theirs = di.fit(model, same, LeastSquares())
+    assert ours.rows == theirs.rows
+    difference = np.linalg.norm(ours.values - theirs.values)
+    assert difference < 1e-6 * np.linalg.norm(theirs.values)
+
+
+def _window(dataset: Dataset, model: Model) -> tuple[float, float]:
+    """What the loop's transient leaves."""
+    from dynident.fit.instrumental.source import Guess
+
+    guess = Guess(loops.truth(model), (loops.truth(model),))
+    (cut,) = SimulatedLoop(loops.LOOP).prepare(model, dataset, guess).measured.recordings
+    assert cut.window is not None
+    return cut.window
+
+
+def test_two_starts_reach_the_same_fixed_point(quiet):
+    model = loops.model(coulomb=True)
+    found = [
+        di.fit(model, quiet, IV(loops.LOOP, start=start, tolerance=TIGHT)).values
+        for start in ("least_squares", "regular")
+    ]
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-9)
+
+
+@pytest.mark.parametrize("start", ["least_squares", "description", "regular"])
+def test_noise_that_ruins_least_squares_is_mended_in_three_iterations(noisy, start):
+    model = loops.model(coulomb=False)
+    true = loops.inertial(loops.truth(model), model)
+    plain = loops.inertial(di.fit(model, noisy).values, model)
+    found = di.fit(model, noisy, IV(SimulatedLoop(loops.LOOP, loops.FREQUENCY_HZ), start=start))
+    mended = loops.inertial(found.values, model)
+    assert found.history is not None and found.history.ending is Ending.CONVERGED
+    assert len(found.history.rounds) <= 3
+    assert np.linalg.norm(plain - true) > 0.2 * np.linalg.norm(true)
+    assert np.linalg.norm(mended - true) < 0.005 * np.linalg.norm(true)
+
+
+def test_half_of_the_bandwidth_will_do(noisy):
+    model = loops.model(coulomb=False)
+    true = loops.inertial(loops.truth(model), model)
+    half = tuple(f / 2 for f in loops.FREQUENCY_HZ)
+    found = di.fit(model, noisy, IV(SimulatedLoop(loops.LOOP, half), start="regular"))
+    mended = loops.inertial(found.values, model)
+    assert np.linalg.norm(mended - true) < 0.01 * np.linalg.norm(true)
+
+
+def test_one_diagram_serves_all_iterations(noisy):
+    from dynident.fit.instrumental.source import Guess
+
+    model = loops.model(coulomb=True)
+    start = loops.truth(model)
+    source = SimulatedLoop(loops.LOOP).prepare(model, noisy, Guess(start, (start,)))
+    for share in (1.0, 0.7, 1.3, 0.9):
+        source.at(share * start)
+    assert source.builds == 1
+
+
+def test_a_consistent_lift_gives_the_same_estimate(noisy):
+    model = loops.model(coulomb=False)
+    plain = di.fit(model, noisy, IV(loops.LOOP))
+    lifted = di.fit(model, noisy, IV(SimulatedLoop(loops.LOOP, lift="consistent")))
+    np.testing.assert_allclose(lifted.values, plain.values, rtol=2e-3, atol=2e-4)
+
+
+def test_a_start_that_cannot_move_is_projected(noisy):
+    """Negative inertia everywhere: the nearest possible robot is simulated in its place."""
+    model = loops.model(coulomb=False)
+    first = di.fit(model, noisy)
+    values = first.values.copy()
+    values[: model.base.rank] *= -1.0
+    found = di.fit(model, noisy, IV(loops.LOOP, start=replace(first, values=values)))
+    true = loops.inertial(loops.truth(model), model)
+    assert np.linalg.norm(loops.inertial(found.values, model) - true) < 0.01 * np.linalg.norm(true)
+
+
+# --- what cannot work gets a clear line and a status -------------------------------------------
+
+
+def test_a_controller_that_is_not_the_recorded_one_is_doubted(noisy):
+    slow = replace(loops.LOOP, kp=tuple(k / 40 for k in loops.LOOP.kp))
+    found = di.fit(loops.model(coulomb=False), noisy, IV(slow))
+    assert found.history is not None and found.history.ending is Ending.DOUBTFUL_LOOP
+    assert any("is this the controller" in note for note in found.notes)
+    assert "doubtful loop" in found.status
+
+
+def test_an_unstable_loop_is_refused(noisy):
+    wild = replace(loops.LOOP, kd=tuple(40 * k for k in loops.LOOP.kd))
+    with pytest.raises(
+        SimulationError, match=r"diverges|oscillates|cannot be integrated"
+    ) as caught:
+        di.fit(loops.model(coulomb=False), noisy, IV(wild))
+    assert "\n" not in str(caught.value)
+
+
+def test_saturation_is_told(noisy):
+    tired = replace(loops.LOOP, limit=(4.0, 0.4))
+    found = di.fit(loops.model(coulomb=False), noisy, IV(tired))
+    assert any("at its limit" in note for note in found.notes)
+
+
+def test_a_missing_reference_is_named(noisy):
+    bare = Dataset(tuple(r.replace(q_ref=None) for r in noisy.recordings), Filter())
+    with pytest.raises(SimulationError, match=r"no reference.*q_ref\.shoulder"):
+        di.fit(loops.model(coulomb=False), bare, IV(loops.LOOP))
+
+
+def test_a_recording_shorter_than_the_transient_is_refused():
+    brief = loops.dataset(loops.experiment(1, 0.0, seconds=0.45))
+    with pytest.raises(FitError, match="shorter than the loop's transient"):
+        di.fit(loops.model(coulomb=False), brief, IV(loops.LOOP))
+
+
+def test_a_controller_for_another_robot_is_refused(noisy):
+    other = replace(loops.LOOP, kp=(1.0,), kd=(1.0,))
+    with pytest.raises(DynidentError, match="1 joints for a robot of 2"):
+        di.fit(loops.model(coulomb=False), noisy, IV(other))
+
+
+def test_lost_rank_is_refused_by_name(noisy):
+    """An elbow that never moved, with instruments that do: no direction is made up."""
+    (recording,) = noisy.recordings
+    still = recording.replace(q_ref=recording.q_ref * (1.0, 0.0), q=recording.q * (1.0, 0.0))
+    with pytest.raises(FitError, match=r"rank of the measured regressor is \d, that of the instr"):
+        di.fit(loops.model(coulomb=False), Dataset((still,), Filter()), IV(loops.LOOP))
+
+
+def test_history_prints_saves_and_is_left_out_when_read_back(noisy, tmp_path):
+    found = di.fit(loops.model(coulomb=True), noisy, IV(loops.LOOP))
+    assert "regressor simulated" in found.summary() and "textbook" in found.summary()
+    back = di.load_estimate(found.save(tmp_path / "estimate.json"))
+    np.testing.assert_array_equal(back.values, found.values)
+    assert back.history is None and back.status == found.status
