@@ -10,7 +10,8 @@ from dynident.closed_loop import Controller
 from dynident.diagnose.diagnosis import finite
 from dynident.diagnose.evidence import ColumnStore, gather
 from dynident.diagnose.held_out import HeldOut, on_blocks, on_recordings
-from dynident.diagnose.loop_columns import loop_columns, loop_json
+from dynident.diagnose.loop_columns import loop_columns
+from dynident.diagnose.loop_json import loop_json
 from dynident.diagnose.maps import residual_maps
 from dynident.diagnose.present import fit_present
 from dynident.diagnose.replay import Judged, loop_of

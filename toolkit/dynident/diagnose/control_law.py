@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from dynident.closed_loop import Controller, Mechanism
-from dynident.recording import Recording, central_difference
+from dynident.recording import Recording
 from dynident.robot import Robot
 
-_TIME_CONSTANTS = 5.0
-"""After which a loop has forgotten where it began (to 1 %)."""
 _LEAST_DAMPING = 0.1
 """Damping ratio that a robot has by its friction alone."""
 _POSES = 50
+_ROUNDING = 1e-6
+"""Of a sample: instants this near to the controller's are the controller's."""
 
 
-def settling_time(controller: Controller, mechanism: Mechanism, q: np.ndarray) -> float:
-    """Time after which the slowest joint's loop has settled, s.
+def time_constant(controller: Controller, mechanism: Mechanism, q: np.ndarray) -> float:
+    """Time constant of the slowest joint's loop, s.
 
-    Five time constants of the slowest pole of J s^2 + kd s + kp, J the joint's largest inertia
-    over the motion (Janot et al., equations 45 to 47): 5 / w_n where the damping is critical.
+    Of the slowest pole of J s^2 + kd s + kp, J the joint's largest inertia over the motion (Janot
+    et al., equations 45 to 47): 1 / w_n where the damping is critical. An integral is left out:
+    it is slower, and what it holds hardly changes the motion.
 
     Parameters
     ----------
@@ -39,7 +38,7 @@ def settling_time(controller: Controller, mechanism: Mechanism, q: np.ndarray) -
         natural = np.sqrt(stiffness)
         ratio = np.maximum(damping / (2 * natural), _LEAST_DAMPING)
         slow = natural * np.where(ratio > 1, ratio - np.sqrt(np.maximum(ratio**2 - 1, 0)), ratio)
-        times = np.where(stiffness > 0, _TIME_CONSTANTS / slow, np.inf)
+        times = np.where(stiffness > 0, 1.0 / slow, np.inf)
     return float(np.max(times))
 
 
@@ -65,23 +64,39 @@ def law_torque(recording: Recording, controller: Controller, nominal: Robot) -> 
 
     Parameters
     ----------
-    recording : T samples with a reference; the law runs at their rate.
+    recording : T samples with a reference.
     controller : the law.
     nominal : the robot inside a computed torque or a feed-forward.
     """
-    from dynident.closed_loop.drive import Drive, ReferenceSamples
+    from scipy.interpolate import CubicSpline
 
-    assert recording.q_ref is not None
-    t, rate, q_ref = recording.t, recording.rate_hz, recording.q_ref
-    v_ref = central_difference(q_ref, rate)
-    followed = ReferenceSamples(q_ref, v_ref, central_difference(v_ref, rate))
-    drive = Drive(replace(controller, rate_hz=rate), followed, [nominal])
-    command = np.array([drive.command(k, q) for k, q in enumerate(recording.q)])
-    if controller.delay_s > 0:
-        late = t - controller.delay_s
-        command = np.column_stack([np.interp(late, t, column) for column in command.T])
+    from dynident.closed_loop.drive import Drive, ReferenceSamples
+    from dynident.closed_loop.references import SampledReference
+
+    # On the controller's clock, which as a rule is the record's; followed as the simulator does.
+    rate, t = controller.simulated_rate(), recording.t - recording.t[0]
+    clock = np.arange(int(np.floor(t[-1] * rate + _ROUNDING)) + 1) / rate
+    drive = Drive(
+        controller, ReferenceSamples(*SampledReference.of(recording).at(clock)), [nominal]
+    )
+    positions = CubicSpline(t, recording.q)(clock)
+    command = np.array([drive.command(k, q) for k, q in enumerate(positions)])
     if recording.torque == "measured":
-        command = np.concatenate([command[:1], (command[:-1] + command[1:]) / 2])
+        # The command that acted, in the mean over a sample before and a sample after.
+        impulse = np.concatenate([np.zeros((1, controller.n)), np.cumsum(command, axis=0)])
+        late = (t - controller.delay_s) * rate
+        ends = [_at(impulse, late + side) for side in (-1.0, 1.0)]
+        torque = (ends[1] - ends[0]) / 2.0
+    else:
+        last = np.floor(t * rate + _ROUNDING).astype(int)
+        torque = command[np.minimum(last, len(command) - 1)]
     if controller.ki:
-        command = command + (recording.tau - command).mean(axis=0)
-    return command
+        # The first sample, at which the drive does not know its speed yet, is no part of it.
+        torque = torque + np.median(recording.tau - torque, axis=0)
+    return torque
+
+
+def _at(y: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Return y (T, n) at x samples, in straight lines."""
+    places = np.arange(len(y))
+    return np.column_stack([np.interp(x, places, column) for column in y.T])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from dynident.diagnose.validation import Unsimulated, Validation
 from dynident.tables import Table, percent
 
@@ -45,15 +43,3 @@ def _notes(names: tuple[str, ...], loops: tuple[Loop, ...]) -> tuple[str, ...]:
                 found.append(f"{whose}: {loop.sentence}")
             found += [f"{whose}: {one.name} left out: {one.reason}." for one in loop.skipped]
     return tuple(found)
-
-
-def loop_json(loop: Validation | Unsimulated) -> dict[str, Any]:
-    """What `compare --json` says of a simulated loop."""
-    if isinstance(loop, Unsimulated):
-        return {"verdict": "not_simulated", "reason": loop.reason, "error": None, "joints": None}
-    return {
-        "verdict": loop.verdict,
-        "reason": None,
-        "error": loop.errors.to_dict(),
-        "joints": [{"name": name, **loop.errors.at(j)} for j, name in enumerate(loop.joints)],
-    }

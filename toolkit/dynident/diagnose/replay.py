@@ -10,17 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dynident.closed_loop import Controller, Mechanism
-from dynident.diagnose.control_law import law_torque, settling_time
+from dynident.diagnose.control_law import time_constant
 from dynident.diagnose.diagnosis import NoiseSource
-from dynident.diagnose.loop_run import QUANTITIES, LoopRun, Signals, Skipped
-from dynident.diagnose.noise import differences
+from dynident.diagnose.loop_run import LoopRun, Skipped
+from dynident.diagnose.loop_signals import filtered_run
 from dynident.diagnose.validation import Unsimulated, Validation
 from dynident.errors import DynidentError, DynidentWarning, RecordingError, SimulationError
 from dynident.fit.estimate import Estimate
 from dynident.fit.least_squares import sources_of
-from dynident.fit.sampling import Sampled, sample
 from dynident.model import Model
-from dynident.recording import Dataset, Noise, Recording, mismatch, periods, uniform
+from dynident.recording import Dataset, Recording, uniform
 from dynident.threads import single_threaded
 
 if TYPE_CHECKING:
@@ -29,8 +28,10 @@ if TYPE_CHECKING:
 Progress = Callable[[float, float], None]
 """(s simulated, s to simulate)."""
 
-_REPEATS = 0.3
-"""Mismatch of two periods, relative to the motion, above which nothing repeats."""
+_INTEGRAL = (
+    "What the controller's integral held when a recording began is not recorded: the simulation "
+    "begins with none, and position and torque differ until it has grown."
+)
 
 
 @single_threaded
@@ -154,30 +155,29 @@ def simulate_again(
             carries: judged.mechanism(carries_payload=carries)
             for carries in {bool(r.payload) for r in usable}
         }
-        settling = settling_time(controller, next(iter(bodies.values())), usable[0].q)
+        slowest = time_constant(controller, next(iter(bodies.values())), usable[0].q)
     except DynidentError as error:
         failed = [Skipped(r.name, "failed", str(error)) for r in usable]
         return replace(nothing, skipped=(*nothing.skipped, *failed))
-    skipped = [
-        Skipped(r.name, "too_short", _too_short(r, settling))
-        for r in usable
-        if r.duration <= settling
-    ]
-    long = [r for r in usable if r.duration > settling]
+    settling = [_settling(r, slowest) for r in usable]
+    pairs = list(zip(usable, settling, strict=True))
+    skipped = [Skipped(r.name, "too_short", _too_short(r, s)) for r, s in pairs if r.duration <= s]
+    long = [r for r, s in pairs if r.duration > s]
     again, failed, remarks = _retraced(long, bodies, controller, judged.model, progress)
     runs: list[LoopRun] = []
     for recording, one in again:
         try:
-            runs.append(_run(recording, one, controller, judged.model, dataset, settling))
+            drop = _settling(recording, slowest)
+            runs.append(filtered_run(recording, one, controller, judged.model, dataset, drop))
         except RecordingError as error:
             skipped.append(Skipped(recording.name, "too_short", str(error)))
     return replace(
         nothing,
         runs=tuple(runs),
         skipped=(*nothing.skipped, *skipped, *failed),
-        settling=settling,
+        settling=max(settling),
         noise_source=_noise_source(runs, usable),
-        remarks=remarks,
+        remarks=(*remarks, *((_INTEGRAL,) if controller.ki else ())),
     )
 
 
@@ -185,6 +185,14 @@ def _words(controller: Controller) -> str:
     kind = controller.kind.replace("_", " ")
     name = kind.upper() if len(kind) <= 3 else kind.capitalize()
     return f"{name} controller at {controller.rate_hz:g} Hz"
+
+
+def _settling(recording: Recording, slowest: float) -> float:
+    """Time to drop at the start of a recording, s: simulation and measurement began differently.
+
+    Five time constants; up to ten where that is a tenth of the recording at most.
+    """
+    return max(5.0 * slowest, min(10.0 * slowest, 0.1 * recording.duration))
 
 
 def _noise_source(runs: list[LoopRun], recordings: list[Recording]) -> NoiseSource:
@@ -224,76 +232,6 @@ def _retraced(
         except SimulationError as error:
             failed.append(Skipped(recording.name, "failed", str(error)))
     return found, failed, tuple(loop.notes)
-
-
-def _run(
-    recording: Recording,
-    again: Retraced,
-    controller: Controller,
-    model: Model,
-    dataset: Dataset,
-    settling: float,
-) -> LoopRun:
-    """Pass measurement, simulation and reference through the same filters."""
-    assert recording.q_ref is not None
-    first = recording.t[0] + settling
-    window = (first, np.inf)
-    if recording.window is not None:
-        window = (max(first, recording.window[0]), recording.window[1])
-    if not window[0] < window[1]:
-        raise RecordingError("its window ends before the loop has settled", recording.where)
-    recording = recording.replace(window=window)
-    measured = sample(recording, dataset.filter)
-    simulated = sample(again.recording.replace(window=window), dataset.filter)
-    law = law_torque(recording, controller, model.robot)
-    reference = sample(recording.replace(q=recording.q_ref, tau=law), dataset.filter)
-    return LoopRun(
-        recording.name,
-        measured.t,
-        _signals(measured),
-        _signals(simulated),
-        _signals(reference),
-        _noise(recording, measured, dataset),
-        np.asarray(again.saturated, dtype=float),
-    )
-
-
-def _signals(sampled: Sampled) -> Signals:
-    return Signals(sampled.q, sampled.v, sampled.a, sampled.tau)
-
-
-def _noise(recording: Recording, measured: Sampled, dataset: Dataset) -> np.ndarray | None:
-    """Noise of the measured quantities, rms (4, n): of repeated periods, else as stated."""
-    signals = _signals(measured)
-    if recording.period is not None:
-        try:
-            found = periods(len(measured.t), measured.rate_hz, recording.period, recording.where)
-        except RecordingError:
-            found = None
-        if found is not None and mismatch(found.fold(measured.q)) <= _REPEATS:
-            return np.array([_spread(found.fold(signals.of(one))) for one in QUANTITIES])
-    if dataset.noise is None:
-        return None
-    noisy = _signals(sample(_with_noise(recording, dataset.noise), dataset.filter))
-    return np.array(
-        [np.sqrt(np.mean((noisy.of(x) - signals.of(x)) ** 2, axis=0)) for x in QUANTITIES]
-    )
-
-
-def _spread(folded: np.ndarray) -> np.ndarray:
-    """Root mean square (n,) of what differs from period to period, (P, S, n)."""
-    n = folded.shape[2]
-    return np.array(
-        [np.sqrt(np.mean(differences(folded[..., j], "repeated") ** 2)) for j in range(n)]
-    )
-
-
-def _with_noise(recording: Recording, noise: Noise) -> Recording:
-    """Return a recording with one more draw of the stated noise, always the same."""
-    stream = np.random.default_rng(0)
-    q = recording.q + noise.position_std * stream.standard_normal(recording.q.shape)
-    tau = recording.tau + noise.torque_std * stream.standard_normal(recording.tau.shape)
-    return recording.replace(q=q, tau=tau)
 
 
 def _column(robot) -> str:

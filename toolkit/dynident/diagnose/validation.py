@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from dynident.diagnose.diagnosis import NoiseSource, finite
+from dynident.diagnose.diagnosis import NoiseSource
 from dynident.diagnose.loop_run import QUANTITIES, Errors, LoopRun, Signals, Skipped
 from dynident.fit.estimate import Source
 from dynident.tables import Table, number, percent, print_tables
@@ -23,6 +23,8 @@ ORIENTATION = (
 
 _SAME_AS_NOISE = 1.5
 """A difference up to so many times the noise may be the noise."""
+_BEYOND_NOISE = 3.0
+"""Torque error over its noise above which something is missing."""
 _LAW_HOLDS = 0.2
 """Relative error up to which the stated control law is the one that ran."""
 
@@ -45,8 +47,8 @@ class Validation:
     controller : the loop's, in words.
     runs : recordings whose loop was simulated.
     skipped : recordings whose loop was not, and why.
-    settling : s dropped at the start of each recording, where simulation and measurement still
-        remember different beginnings: five time constants of the loop's slowest pole.
+    settling : s dropped at the start of a recording (at most), where simulation and measurement
+        still remember different beginnings: five to ten time constants of the loop.
     noise_source : "replicates", "given" or "unknown".
     sources : the recordings.
     remarks : of the simulator.
@@ -207,7 +209,7 @@ class Validation:
         if not lost:
             return (
                 "At every joint the simulated loop is nearer to the measurement than the reference "
-                "is, or within the noise: model and controller account for how the robot follows."
+                "is, or within the noise."
             )
         foreign = [j for j in lost if not self.without_model.joints[3, j] <= _LAW_HOLDS]
         where = ", ".join(self.joints[j] for j in lost)
@@ -227,7 +229,21 @@ class Validation:
                     f"{joint}: the simulated command is at its limit for {percent(share, 1)} of "
                     "the samples; there the torque says nothing of the model."
                 )
+        found += [
+            f"{joint}: the torque of the simulated loop is {number(ratio, 2)} times the noise off; "
+            "`diagnose` looks for what the model lacks."
+            for joint, ratio in zip(self.joints, self._torque_ratios(), strict=True)
+            if ratio > _BEYOND_NOISE
+        ]
         return (*found, *((ORIENTATION,) if self.runs else ()), *self.remarks)
+
+    def _torque_ratios(self) -> np.ndarray:
+        """Torque error of each joint over its noise, (n,); zero where the noise is unknown."""
+        noise = self.noise
+        if noise is None:
+            return np.zeros(len(self.joints))
+        ratios = self.errors.joints[3] / np.where(noise.joints[3] > 0, noise.joints[3], np.inf)
+        return np.nan_to_num(ratios)
 
     def _lost(self, j: int) -> bool:
         """Whether a joint's simulated position is no better than the reference, noise aside."""
@@ -256,54 +272,10 @@ class Validation:
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON of `simulate --json`; numbers that are not known are null."""
-        without, tracking, noise = self.without_model, self.tracking, self.noise
-        known = bool(self.runs)
-        return {
-            "verdict": self.verdict,
-            "controller": self.controller,
-            "settling_s": finite(self.settling),
-            "noise": {
-                "source": self.noise_source,
-                "error": noise.to_dict() if noise else None,
-            },
-            "error": self.errors.to_dict() if known else None,
-            "without_model": without.to_dict() if known else None,
-            "tracking": tracking.to_dict() if known else None,
-            "joints": [
-                {
-                    "name": joint,
-                    "error": self.errors.at(j),
-                    "without_model": without.at(j),
-                    "tracking": tracking.at(j),
-                    "noise": noise.at(j) if noise else None,
-                    "saturated": float(self.saturated[j]),
-                }
-                for j, joint in enumerate(self.joints if known else ())
-            ],
-            "recordings": [
-                *(
-                    {
-                        "name": run.name,
-                        "status": "simulated",
-                        "reason": None,
-                        "error": self.error_of(run).to_dict(),
-                        "saturated": [float(x) for x in run.saturated],
-                    }
-                    for run in self.runs
-                ),
-                *(
-                    {
-                        "name": one.name,
-                        "status": one.status,
-                        "reason": one.reason,
-                        "error": None,
-                        "saturated": None,
-                    }
-                    for one in self.skipped
-                ),
-            ],
-            "notes": list(self.notes),
-        }
+        # Imported where it is used: that module knows this class.
+        from dynident.diagnose.loop_json import validation_json
+
+        return validation_json(self)
 
 
 def _percents(values: np.ndarray) -> tuple[str, ...]:

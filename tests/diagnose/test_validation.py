@@ -1,0 +1,314 @@
+"""The identified robot in the recorded loop: four errors, and what they are held against."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dynident.closed_loop import (
+    Controller,
+    Experiment,
+    Fourier,
+    Mechanism,
+    Run,
+    Sensors,
+    TrueEffect,
+)
+from dynident.diagnose import Validation, compare, validate
+from dynident.diagnose.control_law import law_torque, time_constant
+from dynident.errors import SimulationError
+from dynident.fit import Estimate
+from dynident.fit.given import given_estimate
+from dynident.model import Model
+from dynident.recording import Dataset, Noise, Recording
+from dynident.robot import Robot
+from synthetic import arm
+
+GAINS: dict[str, Any] = {"kp": (400.0, 120.0), "kd": (50.0, 8.0)}
+CONTROLLER = Controller("pd", 250.0, **GAINS)
+FRICTION = (1.5, 0.7)
+
+
+def model() -> Model:
+    return Model(arm()) + "viscous_friction"
+
+
+@cache
+def recordings(
+    controller: Controller = CONTROLLER, noise: float = 0.0, torque: Any = "held_command"
+) -> tuple[Recording, Recording]:
+    """Two recordings of the arm with viscous friction, in the steady state of their loop."""
+    robot = arm()
+    truth = [
+        one
+        for joint, value in zip(robot.names, FRICTION, strict=True)
+        for one in TrueEffect.of(f"viscous_friction@{joint}", robot, [value])
+    ]
+    runs = [
+        Run(Fourier.random(robot, 2.0, seed, harmonics=3), 4.0, f"run{seed}.csv") for seed in (1, 2)
+    ]
+    sensors = Sensors(position_std=noise, torque_std=1e3 * noise)
+    experiment = Experiment(robot, controller, tuple(runs), tuple(truth), sensors, torque=torque)
+    first, second = experiment.run()
+    return first, second
+
+
+def dataset(*chosen: Recording, **settings: Any) -> Dataset:
+    return Dataset(chosen or recordings(), **settings)
+
+
+def estimate(scale: float = 1.0, friction: tuple[float, float] = FRICTION) -> Estimate:
+    """The true parameters, the bodies' times a factor."""
+    known = model()
+    values = known.given_values() * scale
+    values[-2:] = friction
+    return replace(given_estimate(arm(), known), values=values, links=None)
+
+
+def test_the_true_model_in_its_own_loop_moves_as_measured() -> None:
+    found = validate(estimate(), dataset(), CONTROLLER)
+    assert found.verdict == "follows" and not found.skipped
+    assert [run.name for run in found.runs] == ["run1.csv", "run2.csv"]
+    for quantity, most in (("position", 1e-4), ("velocity", 2e-4), ("acceleration", 1e-3)):
+        assert found.errors.of(quantity) < most  # type: ignore[arg-type]
+    assert found.errors.of("torque") < 1e-3
+    # Without a model the reference is no substitute, but the control law is the torque.
+    assert found.without_model.of("position") > 1e-2
+    assert found.without_model.of("torque") < 1e-3
+    assert found.tracking.of("position") == pytest.approx(
+        found.without_model.of("position"), rel=0.05
+    )
+
+
+@pytest.mark.parametrize("kind", ["pid", "cascade", "computed_torque", "late", "measured"])
+def test_every_controller_is_simulated_and_recognised(kind: str) -> None:
+    controller = {
+        "pid": Controller("pid", 250.0, **GAINS, ki=(200.0, 60.0)),
+        "cascade": Controller("cascade", 250.0, (8.0, 15.0), kv=(50.0, 8.0)),
+        "computed_torque": Controller("computed_torque", 250.0, (150.0, 150.0), (25.0, 25.0)),
+        "late": Controller(
+            "pd", 250.0, (300.0, 60.0), (35.0, 4.0), delay_s=0.003, feedforward=True
+        ),
+        "measured": Controller("pd", 250.0, (300.0, 60.0), (35.0, 4.0), delay_s=0.001),
+    }[kind]
+    made = recordings(controller, torque="measured" if kind == "measured" else "held_command")
+    found = validate(estimate(), dataset(*made), controller)
+    # A slow loop, or an integral whose past is not recorded, has not quite forgotten its start.
+    assert found.errors.of("position") < 0.02
+    assert found.errors.of("torque") < 0.01
+    assert found.without_model.of("torque") < 1e-3
+    assert any("integral" in note for note in found.notes) == (kind == "pid")
+    assert found.verdict == "follows"
+
+
+def test_a_wrong_mass_is_seen_in_torque_and_motion() -> None:
+    right = validate(estimate(), dataset(), CONTROLLER)
+    wrong = validate(estimate(1.2), dataset(), CONTROLLER)
+    assert 0.1 < wrong.errors.of("torque") < 0.3
+    assert np.all(wrong.errors.joints > 10 * right.errors.joints)
+    # The control law and the reference are the same, whatever the model.
+    np.testing.assert_allclose(wrong.without_model.joints, right.without_model.joints, rtol=0.05)
+
+
+def test_a_poor_model_is_told_from_a_wrong_controller() -> None:
+    poor = validate(estimate(2.5), dataset(), CONTROLLER)
+    assert poor.verdict == "no_nearer"
+    assert poor.sentence.endswith("the model is poor.")
+    assert "gives the recorded torque" in poor.notes[1]
+    soft = Controller("pd", 250.0, (150.0, 40.0), (20.0, 4.0))
+    foreign = validate(estimate(), dataset(), soft)
+    assert foreign.verdict == "no_nearer"
+    assert foreign.sentence.endswith("the stated controller is not the one that ran.")
+    assert "does not give the recorded torque" in foreign.notes[1]
+
+
+def test_noise_is_stated_and_counts() -> None:
+    noise = 1e-4
+    made = recordings(noise=noise)
+    known = dataset(*made, noise=Noise(np.full(2, noise), np.full(2, 1e3 * noise)))
+    single = replace(known, recordings=tuple(r.replace(period=None) for r in known.recordings))
+    found = validate(estimate(), single, CONTROLLER)
+    assert found.noise_source == "given" and found.noise is not None
+    # What is left of the true model is the noise: that of the loop on top of the sensors'.
+    ratio = found.errors.joints / found.noise.joints
+    assert np.all((ratio > 0.3) & (ratio < 6.0))
+    bare = replace(single, noise=None)
+    silent = validate(estimate(), bare, CONTROLLER)
+    assert silent.noise is None and silent.noise_source == "unknown"
+    assert "noise is unknown" in str(silent.yardstick_table())
+    repeats = replace(bare, recordings=tuple(r.replace(period=2.0) for r in bare.recordings))
+    measured = validate(estimate(), repeats, CONTROLLER)
+    assert measured.noise_source == "replicates" and measured.noise is not None
+    np.testing.assert_allclose(measured.noise.joints[0], found.noise.joints[0], rtol=10.0)
+    lacking = validate(estimate(friction=(0.0, 0.0)), repeats, CONTROLLER)
+    assert any("times the noise off" in note for note in lacking.notes)
+
+
+def test_recordings_without_a_reference_are_left_out_by_name() -> None:
+    first, second = recordings()
+    found = validate(estimate(), dataset(first.replace(q_ref=None), second), CONTROLLER)
+    assert [(one.name, one.status) for one in found.skipped] == [("run1.csv", "no_reference")]
+    assert [run.name for run in found.runs] == ["run2.csv"]
+    assert "run1.csv: it has no column q_ref.<joint>." in str(found.recording_table())
+    for nothing in (dataset(first.replace(q_ref=None)), Dataset(())):
+        with pytest.raises(SimulationError, match=r"q_ref\.<joint>"):
+            validate(estimate(), nothing, CONTROLLER)
+
+
+def test_settings_that_cannot_be_simulated_are_refused_at_once() -> None:
+    with pytest.raises(SimulationError, match="rate"):
+        validate(estimate(), dataset(), replace(CONTROLLER, rate_hz=None))
+    with pytest.raises(SimulationError, match="a controller of 1 joints for a robot of 2"):
+        validate(estimate(), dataset(), Controller("pd", 250.0, (1.0,), (1.0,)))
+
+
+def test_what_cannot_be_simulated_leaves_the_others_standing() -> None:
+    """The payload of one recording makes its inertia negative."""
+    known = model() + "payload"
+    values = np.concatenate([estimate().values, [-9.0, *np.zeros(9)]])
+    poor = replace(given_estimate(arm(), known), values=values, links=None)
+    first, second = recordings()
+    found = validate(poor, dataset(first.replace(payload=True), second), CONTROLLER)
+    assert [run.name for run in found.runs] == ["run2.csv"]
+    (failed,) = found.skipped
+    assert failed.name == "run1.csv" and failed.status == "failed"
+    assert found.errors.of("position") < 1e-3
+
+
+def test_an_unstable_loop_is_a_status_not_an_error() -> None:
+    wild = Controller("pd", 250.0, (4e4, 2e4), (50.0, 8.0))
+    found = validate(estimate(), dataset(), wild)
+    assert found.verdict == "not_simulated" and found.runs == ()
+    assert {one.status for one in found.skipped} == {"failed"}
+    assert found.sentence == "No loop could be simulated."
+    said = found.to_dict()
+    json.dumps(said, allow_nan=False)
+    assert said["error"] is None and said["joints"] == []
+    assert all(one["reason"] for one in said["recordings"])
+    assert "run1.csv" in "\n".join(str(part) for part in found.tables())
+
+
+def test_a_recording_shorter_than_the_transient() -> None:
+    first, second = recordings()
+    found = validate(estimate(), dataset(first.cut(0.0, 0.3), second), CONTROLLER)
+    (short,) = found.skipped
+    assert short.status == "too_short" and "settles only after" in short.reason
+    late = second.replace(window=(0.0, 0.2))
+    (short,) = validate(estimate(), dataset(first, late), CONTROLLER).skipped
+    assert short.status == "too_short" and "before the loop has settled" in short.reason
+
+
+def test_a_limit_that_is_reached_is_said() -> None:
+    limited = replace(CONTROLLER, limit=(30.0, 2.0))
+    found = validate(estimate(), dataset(*recordings(limited)), limited)
+    assert found.saturated[1] > 0.05
+    assert "at the limit" in found.error_table().columns
+    assert any("elbow: the simulated command is at its limit" in note for note in found.notes)
+    assert found.errors.of("position") < 0.03
+
+
+def test_the_window_and_the_time_constant_are_heeded() -> None:
+    mechanism = Experiment(
+        arm(), CONTROLLER, (Run(Fourier.random(arm(), 2.0, 1), 1.0),)
+    ).mechanism()
+    slowest = time_constant(CONTROLLER, mechanism, recordings()[0].q)
+    found = validate(estimate(), dataset(), CONTROLLER)
+    assert found.settling == pytest.approx(5 * slowest, rel=0.1)
+    assert all(run.t[0] >= found.settling for run in found.runs)
+    cut = tuple(r.replace(window=(2.0, 3.0)) for r in recordings())
+    found = validate(estimate(), dataset(*cut), CONTROLLER)
+    assert all(run.t[0] >= 2.0 and run.t[-1] < 3.0 for run in found.runs)
+    # 1 / w_n where the damping is critical, and the slower pole where it is more.
+    inertia = np.array([4.0])
+    slider = Robot.from_text(SLIDER)
+    one = mechanism_of(slider, SLOW)
+    assert time_constant(SLOW, one, np.zeros((3, 1))) == pytest.approx(1 / 10.0)
+    stiff = replace(SLOW, kd=(800.0,))
+    poles = np.roots([inertia[0], 800.0, 400.0])
+    assert time_constant(stiff, one, np.zeros((3, 1))) == pytest.approx(1 / np.abs(poles).min())
+
+
+SLIDER = """<robot name="slider"><link name="base"/>
+  <link name="mass"><inertial><mass value="4"/>
+    <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+  <joint name="slide" type="prismatic"><parent link="base"/><child link="mass"/>
+    <axis xyz="1 0 0"/><limit lower="-1" upper="1" velocity="2" effort="50"/></joint></robot>"""
+SLOW = Controller("pd", 250.0, (400.0,), (80.0,))
+
+
+def mechanism_of(robot: Robot, controller: Controller) -> Mechanism:
+    return Experiment(robot, controller, (Run(Fourier.random(robot, 2.0, 1), 1.0),)).mechanism()
+
+
+def test_the_control_law_at_another_rate_is_near() -> None:
+    """A record at half of the controller's rate."""
+    made = recordings()[0]
+    sparse = made.replace(
+        t=made.t[::2],
+        q=made.q[::2],
+        tau=made.tau[::2],
+        q_ref=made.q_ref[::2],  # type: ignore[index]
+    )
+    torque = law_torque(sparse, CONTROLLER, arm())
+    half = len(torque) // 2
+    error = np.linalg.norm(torque[half:] - sparse.tau[half:]) / np.linalg.norm(sparse.tau[half:])
+    assert error < 0.05
+    found = validate(estimate(), dataset(sparse), CONTROLLER)
+    assert found.errors.of("position") < 1e-4 and found.verdict == "follows"
+
+
+def test_json_and_words() -> None:
+    found = validate(estimate(1.1), dataset(), CONTROLLER)
+    said = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert said["verdict"] == "follows"
+    assert set(said["error"]) == {"position", "velocity", "acceleration", "torque"}
+    assert [joint["name"] for joint in said["joints"]] == ["shoulder", "elbow"]
+    assert said["joints"][1]["error"]["torque"] == pytest.approx(found.errors.joints[3, 1])
+    assert [one["status"] for one in said["recordings"]] == ["simulated"] * 2
+    text = "\n".join(str(part) for part in found.tables())
+    for word in (
+        "position",
+        "torque",
+        "shoulder",
+        "all",
+        "without a model",
+        "PD controller at 250",
+    ):
+        assert word in text
+
+
+def test_joints_of_different_units_are_not_added() -> None:
+    found = validate(estimate(1.1), dataset(), CONTROLLER)
+    mixed = Validation(**{**found.__dict__, "units": ("rad", "m")})
+    expected = np.sqrt(np.mean(found.errors.joints**2, axis=1))
+    np.testing.assert_allclose(mixed.errors.overall, expected)
+    np.testing.assert_array_equal(mixed.errors.joints, found.errors.joints)
+
+
+def test_compare_has_the_loop_beside_the_regression() -> None:
+    right, wrong = estimate(), estimate(1.2)
+    alone = compare(right, dataset(), CONTROLLER)
+    table = alone.tables()[0]
+    assert table.columns[-2:] == ("in loop: torque", "in loop: position")  # type: ignore[union-attr]
+    both = compare({"right": right, "wrong": wrong}, dataset(), CONTROLLER)
+    text = "\n".join(str(part) for part in both.tables())
+    assert "Simulated in closed loop" in text and "wrong: torque" in text
+    models = both.to_dict()["models"]
+    assert models[0]["closed_loop"]["error"]["torque"] < 1e-3 < 0.1
+    assert models[1]["closed_loop"]["error"]["torque"] > 0.1
+    # Without a controller, or a reference, there is no such column and no such key.
+    for plain in (
+        compare(right, dataset()),
+        compare(right, dataset(*(r.replace(q_ref=None) for r in recordings())), CONTROLLER),
+    ):
+        assert "closed_loop" not in plain.to_dict()["models"][0]
+        assert "in loop" not in str(plain.tables()[0])
+    failed = compare(right, dataset(), replace(CONTROLLER, rate_hz=None))
+    assert failed.results[0].error == alone.results[0].error
+    assert "rate is not stated" in str(failed.tables()[0])
+    assert failed.to_dict()["models"][0]["closed_loop"]["verdict"] == "not_simulated"
