@@ -20,6 +20,11 @@ from dynident.inertia import to_drake
 from dynident.robot import Robot
 from dynident.robot.drake import add_to_plant
 
+_FAR = 1e6
+"""rad or m; no pose is beyond."""
+_LOST = 0.01
+"""Least eigenvalue of the inertia over that along the reference, below which it is lost."""
+
 
 def structure(mechanisms: Sequence[Mechanism]) -> Hashable:
     """Return what two groups of mechanisms have in common where one diagram serves both."""
@@ -108,6 +113,11 @@ class Plant:
         self.diagram = builder.Build()
         self.context = self.diagram.CreateDefaultContext()
 
+    @property
+    def count(self) -> int:
+        """Number of mechanisms, K."""
+        return len(self._parts)
+
     def set(self, mechanisms: Sequence[Mechanism], starts: Sequence[float]) -> None:
         """Give the bodies and effects the values of mechanisms of the same structure.
 
@@ -150,24 +160,51 @@ class Plant:
         ------
         SimulationError
         """
-        context, place = self._plant.GetMyMutableContextFromRoot(self.context), self.place
-        coupled = self._inertia - np.diag(np.diag(self._inertia))
+        mass = self._mass(poses)
+        # Motors are in it; the rest makes a matrix that need not be symmetric.
+        rest = self._inertia - np.diag(np.diag(self._inertia))
+        self._least = np.empty(len(self._mechanisms))
+        for k, mechanism in enumerate(self._mechanisms):
+            own = self._columns(k)
+            least = _least_eigenvalues(mass[:, own, own])
+            whole = np.zeros(len(least))
+            sound = least > 0
+            whole[sound], _ = np.linalg.slogdet(mass[sound][:, own, own] + rest[own, own])
+            bad = np.flatnonzero(whole <= 0)
+            if len(bad):
+                at = zip(mechanism.robot.names, poses[bad[0], own], strict=True)
+                raise SimulationError(
+                    "the joint-space inertia is not positive (least eigenvalue "
+                    f"{least[bad[0]]:.3g})",
+                    f"{mechanism.robot.name} at " + ", ".join(f"{j} = {x:.3g}" for j, x in at),
+                    "check the inertias of the robot (dynident check) and of its effects",
+                    reason="inertia",
+                )
+            self._least[k] = least.min()
+
+    def inertia_is_lost(self, pose: np.ndarray, k: int) -> bool:
+        """Whether the inertia of mechanism k nearly vanishes at a pose (N,) of them all.
+
+        Nearly, because accelerations run away before it does.
+        """
+        if not (np.abs(pose) < _FAR).all():
+            return False
+        own = self._columns(k)
+        least = _least_eigenvalues(self._mass(pose[None])[:, own, own])[0]
+        return bool(least < _LOST * self._least[k])
+
+    def _columns(self, k: int) -> slice:
         n = self._mechanisms[0].robot.n
-        for pose in poses:
+        return slice(k * n, k * n + n)
+
+    def _mass(self, poses: np.ndarray) -> np.ndarray:
+        """Return the joint-space inertia with the motors at poses (T, N), (T, N, N)."""
+        context, place = self._plant.GetMyMutableContextFromRoot(self.context), self.place
+        mass = np.empty((len(poses), len(place), len(place)))
+        for one, pose in zip(mass, poses, strict=True):
             self._plant.SetPositions(context, scattered(pose, place))
-            mass = self._plant.CalcMassMatrix(context)[np.ix_(place, place)]
-            whole = mass + coupled
-            for k, mechanism in enumerate(self._mechanisms):
-                own = slice(k * n, k * n + n)
-                least = _least_eigenvalue(mass[own, own])
-                if not (least > 0 and np.linalg.det(whole[own, own]) > 0):
-                    at = zip(mechanism.robot.names, pose[own], strict=True)
-                    raise SimulationError(
-                        f"the joint-space inertia is not positive (least eigenvalue {least:.3g})",
-                        f"{mechanism.robot.name} at " + ", ".join(f"{j} = {x:.3g}" for j, x in at),
-                        "check the inertias of the robot (dynident check) and of its effects",
-                        reason="inertia",
-                    )
+            one[:] = self._plant.CalcMassMatrix(context)[np.ix_(place, place)]
+        return mass
 
     def notes(self) -> tuple[str, ...]:
         """Say what is not evaluated in C++."""
@@ -201,8 +238,12 @@ def _diagonal_blocks(blocks: Sequence[np.ndarray]) -> np.ndarray:
     return full
 
 
-def _least_eigenvalue(matrix: np.ndarray) -> float:
-    return float(np.linalg.eigvalsh(matrix)[0]) if np.isfinite(matrix).all() else float("nan")
+def _least_eigenvalues(matrices: np.ndarray) -> np.ndarray:
+    """Return the least eigenvalue of each (T, n, n); NaN where an entry is not finite."""
+    sound = np.isfinite(matrices).all(axis=(1, 2))
+    least = np.full(len(matrices), np.nan)
+    least[sound] = np.linalg.eigvalsh(matrices[sound])[:, 0]
+    return least
 
 
 def scattered(values: np.ndarray, place: np.ndarray) -> np.ndarray:

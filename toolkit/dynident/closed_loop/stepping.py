@@ -129,7 +129,7 @@ class Stepper:
         every = max(1, total // 200)
         for k in range(total):
             states[k] = x = state.CopyToVector()
-            if not x @ x < beyond:  # true of NaN too
+            if not x.dot(x) < beyond:  # true of NaN too
                 raise self._diverged(time[k], x)
             q = x[place] + noise[k]
             if coarse:
@@ -204,8 +204,11 @@ class Stepper:
         place = self._plant.place
         speeds = x[len(place) + place]
         worst = int(np.argmax(np.where(np.isfinite(speeds), np.abs(speeds), np.inf)))
-        if cause is not None and "positive-definite" in str(cause):
-            task = self._joints[worst].task
+        task = self._joints[worst].task
+        n = len(self._joints) // self._plant.count
+        if (cause is not None and "positive-definite" in str(cause)) or (
+            self._plant.inertia_is_lost(x[place], worst // n)
+        ):
             return SimulationError(
                 "the joint-space inertia is not positive where the motion went",
                 f"{task}, t = {time:.4g} s" if task else f"t = {time:.4g} s",
