@@ -11,6 +11,9 @@ from dynident.errors import SimulationError
 if TYPE_CHECKING:
     from dynident.recording import Recording
 
+SETTLING = 0.1
+"""s, time constant with which a sampled reference comes to rest beyond its samples."""
+
 
 class Reference(Protocol):
     """A motion that a loop can follow."""
@@ -29,8 +32,9 @@ class SampledReference:
     """A reference that is known at samples, with a spline between them.
 
     The spline is cubic: twice continuously differentiable through q alone, or a Hermite spline
-    through q and v where v is given. Time 0 is the first sample; before it and after the last one
-    the reference stands still.
+    through q and v where v is given. Time 0 is the first sample. Before it and after the last one
+    the reference comes from rest and goes to rest, its speed decaying within `SETTLING`: a loop
+    that runs on for the sake of others beside it is not shaken.
 
     Parameters
     ----------
@@ -94,7 +98,9 @@ class SampledReference:
         """Return position, velocity and acceleration at times t (T,) s, each (T, n)."""
         t = np.asarray(t, dtype=float)
         inside = np.clip(t, 0.0, self._end)
-        # The clock of a file has rounding: what is within it of an end is not outside.
-        moving = np.abs(t - inside) <= 1e-9 * self._end
         q, v, a = (piece(inside) for piece in self._pieces)
-        return q, v * moving[:, None], a * moving[:, None]
+        outside = (t - inside)[:, None]
+        fading = np.exp(-np.abs(outside) / SETTLING)
+        q = q + np.sign(outside) * SETTLING * (1.0 - fading) * v
+        a = np.where(outside == 0.0, a, -np.sign(outside) * fading / SETTLING * v)
+        return q, fading * v, a

@@ -107,28 +107,24 @@ def _resampled(recording: Recording, rollout: Rollout, rate: float) -> Recording
     nearest = np.rint(x)
     # Where the clocks agree there is nothing to interpolate.
     x = np.where(np.abs(x - nearest) < _ROUNDING, nearest, x)
-    changes = {}
     if np.array_equal(x, nearest):
         rows = x.astype(int)
         q, v, a, held, torque = (
             y[rows] for y in (rollout.q, rollout.v, rollout.a, rollout.u, rollout.torque)
         )
     else:
-        t = x / rate
-        q = CubicHermiteSpline(rollout.t, rollout.q, rollout.v)(t)
-        v = CubicHermiteSpline(rollout.t, rollout.v, rollout.a)(t)
-        a, torque = _between(x, rollout.a), _between(x, rollout.torque)
-        held = rollout.u[np.floor(x).astype(int)]
+        q = CubicHermiteSpline(rollout.t, rollout.q, rollout.v)(x / rate)
+        k = np.minimum(np.floor(x).astype(int), len(rollout.t) - 2)
+        share = (x - k)[:, None]
+        # The acceleration jumps at samples: only the one just after belongs to the interval.
+        bend = rollout.v[k + 1] - rollout.v[k] - rollout.a[k] / rate
+        v = rollout.v[k] + rollout.a[k] * share / rate + bend * share**2
+        a = rollout.a[k] + 2.0 * bend * share * rate
+        torque = (1.0 - share) * rollout.torque[k] + share * rollout.torque[k + 1]
+        held = rollout.u[k]
     changes = {"q": q, "tau": held if recording.torque == "held_command" else torque}
     if recording.v is not None:
         changes["v"] = v
     if recording.a is not None:
         changes["a"] = a
     return recording.replace(**changes)
-
-
-def _between(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return y (T, n) at x samples, in a straight line between them."""
-    k = np.minimum(np.floor(x).astype(int), len(y) - 2)
-    share = (x - k)[:, None]
-    return (1.0 - share) * y[k] + share * y[k + 1]
