@@ -4,68 +4,20 @@ from __future__ import annotations
 
 import json
 import re
-from functools import cache
-from pathlib import Path
 
 import pytest
 
-from dynident.closed_loop import Controller, Experiment, Fourier, Run, TrueEffect
-from dynident.recording import write
+from loop_studies import LOOP_STUDY as STUDY
+from loop_studies import write_loop_study
 from study_files import edited, listing
-from synthetic import ARM, arm
 
-STUDY = """\
-robot = "arm.urdf"
-joints = ["shoulder", "elbow"]
-effects = ["viscous_friction"]
-torque = "held_command"
-
-[[recordings]]
-file = "train.csv"
-use = "train"
-
-[[recordings]]
-file = "test.csv"
-use = "test"
-
-[controller]
-kind = "pd"
-kp = [400.0, 120.0]
-kd = [50.0, 8.0]
-rate_hz = 250.0
-"""
 CONTROLLER = STUDY[STUDY.index("[controller]") :]
 TEST_ENTRY = STUDY[STUDY.rindex("[[recordings]]") : STUDY.index("[controller]")]
 ERRORS = {"position", "velocity", "acceleration", "torque"}
 
 
-@cache
-def recordings():
-    robot = arm()
-    truth = TrueEffect.of("viscous_friction@shoulder", robot, [2.0])
-    runs = [
-        Run(Fourier.random(robot, 2.0, seed, harmonics=3), 4.0, name)
-        for seed, name in enumerate(("train.csv", "test.csv"))
-    ]
-    controller = Controller("pd", 250.0, (400.0, 120.0), (50.0, 8.0))
-    return Experiment(robot, controller, tuple(runs), truth, lead_in=1.0).run()
-
-
-@pytest.fixture
-def loop_study(tmp_path):
-    def make(text: str = STUDY, *, reference: bool = True) -> Path:
-        (tmp_path / "arm.urdf").write_text(ARM)
-        for made in recordings():
-            write(made if reference else made.replace(q_ref=None), tmp_path / made.name)
-        path = tmp_path / "study.toml"
-        path.write_text(text)
-        return path
-
-    return make
-
-
-def test_four_errors_and_nothing_written(run, loop_study, tmp_path):
-    path = loop_study()
+def test_four_errors_and_nothing_written(run, tmp_path):
+    path = write_loop_study(tmp_path)
     before = listing(tmp_path)
     done = run("simulate", path, "--json")
     assert done.status == 0 and done.err == ""
@@ -84,8 +36,8 @@ def test_four_errors_and_nothing_written(run, loop_study, tmp_path):
         assert word in done.out
 
 
-def test_report_and_picture(run, loop_study, tmp_path):
-    path = loop_study()
+def test_report_and_picture(run, tmp_path):
+    path = write_loop_study(tmp_path)
     done = run("simulate", path, "--report", "loop.html", "--plot", "loop.png")
     assert done.status == 0 and done.err == "report: loop.html\npicture: loop.png\n"
     page = (tmp_path / "loop.html").read_text()
@@ -93,8 +45,8 @@ def test_report_and_picture(run, loop_study, tmp_path):
     assert (tmp_path / "loop.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_saved_estimate_and_a_named_recording(run, loop_study, tmp_path):
-    path = loop_study()
+def test_a_saved_estimate_and_a_named_recording(run, tmp_path):
+    path = write_loop_study(tmp_path)
     assert run("fit", path, "--out", "fit.json").status == 0
     done = run("simulate", path, "--estimate", "fit.json", "--recording", "train.csv", "--json")
     assert done.status == 0
@@ -108,13 +60,13 @@ def test_a_saved_estimate_and_a_named_recording(run, loop_study, tmp_path):
     assert worse.json["error"]["torque"] > 10 * done.json["error"]["torque"]
 
 
-def test_without_test_recordings_the_training_ones_are_simulated(run, loop_study):
-    done = run("simulate", loop_study(edited((TEST_ENTRY, ""), text=STUDY)))
+def test_without_test_recordings_the_training_ones_are_simulated(run, tmp_path):
+    done = run("simulate", write_loop_study(tmp_path, edited((TEST_ENTRY, ""), text=STUDY)))
     assert done.status == 0 and "these are the training recordings" in done.out
 
 
-def test_a_loop_that_cannot_be_simulated_is_status_1(run, loop_study):
-    path = loop_study(edited(("[400.0, 120.0]", "[40000.0, 20000.0]"), text=STUDY))
+def test_a_loop_that_cannot_be_simulated_is_status_1(run, tmp_path):
+    path = write_loop_study(tmp_path, edited(("[400.0, 120.0]", "[40000.0, 20000.0]"), text=STUDY))
     done = run("simulate", path, "--json")
     assert done.status == 1
     said = done.json
@@ -127,7 +79,10 @@ def test_a_loop_that_cannot_be_simulated_is_status_1(run, loop_study):
 
 REFUSED = {
     "no controller": (edited((CONTROLLER, ""), text=STUDY), r"has no \[controller\]"),
-    "no rate": (edited(("rate_hz = 250.0\n", ""), text=STUDY), r"controller.rate_hz: .*not stated"),
+    "no rate": (
+        edited(("rate_hz = 250.0\n", ""), text=STUDY),
+        r"controller.rate_hz: .*not stated",
+    ),
     "both": (
         edited(('use = "test"', 'use = "test"\nduration = 3.0\nwindow = [0.0, 1.0]'), text=STUDY),
         r"is no study \(duration\) and no experiment \(window\)",
@@ -137,20 +92,20 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_the_study_lacks_is_named(run, loop_study, case):
+def test_what_the_study_lacks_is_named(run, tmp_path, case):
     text, message = REFUSED[case]
-    done = run("simulate", loop_study(text))
+    done = run("simulate", write_loop_study(tmp_path, text))
     assert done.status == 2 and done.out == ""
     assert re.fullmatch(rf"error: \S*study.toml: {message}.*\n", done.err)
 
 
-def test_the_missing_column_is_named(run, loop_study):
-    done = run("simulate", loop_study(reference=False))
+def test_the_missing_column_is_named(run, tmp_path):
+    done = run("simulate", write_loop_study(tmp_path, reference=False))
     assert done.status == 2 and "q_ref.<joint>" in done.err and done.err.count("\n") == 1
 
 
-def test_options_that_do_not_fit(run, loop_study, tmp_path):
-    path = loop_study()
+def test_options_that_do_not_fit(run, tmp_path):
+    path = write_loop_study(tmp_path)
     for words, message in (
         (("--out", "here"), "--out is for an experiment"),
         (("--plot", "loop.gif"), "loop.gif: is no kind of picture"),
@@ -167,8 +122,8 @@ def test_options_that_do_not_fit(run, loop_study, tmp_path):
     assert done.status == 2 and "--plot is for a study" in done.err
 
 
-def test_compare_and_report_have_the_loop(run, loop_study, tmp_path):
-    path = loop_study()
+def test_compare_and_report_have_the_loop(run, tmp_path):
+    path = write_loop_study(tmp_path)
     model = run("compare", path, "--json").json["models"][0]
     assert model["closed_loop"]["verdict"] == "follows"
     assert set(model["closed_loop"]["error"]) == ERRORS

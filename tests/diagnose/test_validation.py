@@ -19,7 +19,7 @@ from dynident.closed_loop import (
     Sensors,
     TrueEffect,
 )
-from dynident.diagnose import Validation, compare, validate
+from dynident.diagnose import compare, validate
 from dynident.diagnose.control_law import law_torque, time_constant
 from dynident.errors import SimulationError
 from dynident.fit import Estimate
@@ -284,7 +284,7 @@ def test_json_and_words() -> None:
 
 def test_joints_of_different_units_are_not_added() -> None:
     found = validate(estimate(1.1), dataset(), CONTROLLER)
-    mixed = Validation(**{**found.__dict__, "units": ("rad", "m")})
+    mixed = replace(found, units=("rad", "m"))
     expected = np.sqrt(np.mean(found.errors.joints**2, axis=1))
     np.testing.assert_allclose(mixed.errors.overall, expected)
     np.testing.assert_array_equal(mixed.errors.joints, found.errors.joints)

@@ -11,9 +11,10 @@ import click
 
 from dynident import files
 from dynident.cli.group import commands
+from dynident.cli.methods import Chosen, method_options
 from dynident.cli.output import JSON, print_json, progress, say, show
-from dynident.cli.work import command_line, load_study, require_places
-from dynident.errors import DynidentError, FileError, StudyError
+from dynident.cli.work import command_line, load_study, require_picture, require_places
+from dynident.errors import DynidentError, StudyError
 
 if TYPE_CHECKING:
     from dynident.closed_loop import Controller
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from dynident.study import Study
 
 _PATH = click.Path(path_type=Path)
-_PICTURES = (".png", ".svg", ".pdf")
 _OF_EXPERIMENTS = {"nominal", "seed", "lead_in", "sensors"}
 _OF_STUDIES = {"filter", "noise", "columns"}
 
@@ -35,6 +35,7 @@ _OF_STUDIES = {"filter", "noise", "columns"}
 @click.option("--report", type=_PATH, help="Also write this HTML report.")
 @click.option("--plot", type=_PATH, help="Also write this picture (.png, .svg or .pdf).")
 @click.option("--out", type=_PATH, help="Of an experiment: folder for what is written.")
+@method_options
 @JSON
 @click.pass_context
 def simulate(
@@ -46,6 +47,7 @@ def simulate(
     plot: Path | None,
     out: Path | None,
     as_json: bool,
+    chosen: Chosen,
 ) -> None:
     """Simulate the identified robot in the loop that was recorded, and compare the motion.
 
@@ -71,13 +73,13 @@ def simulate(
             f"--out is for an experiment, and {file} is a study (no recording has a duration)"
         )
     require_places(file, report, plot)
-    if plot is not None and plot.suffix.lower() not in _PICTURES:
-        mend = f"end its name in {', '.join(_PICTURES)}"
-        raise FileError("is no kind of picture that can be written", str(plot), mend)
+    require_picture(plot)
+    if estimate is not None and chosen.method != "least-squares":
+        raise click.UsageError("--estimate is there already: leave out --method")
     study = load_study(file)
     recordings, used = _recordings(study, recording)
     controller = _controller(study, recordings)
-    found = _validation(_estimate(study, estimate), recordings, controller)
+    found = _validation(_estimate(study, estimate, chosen), recordings, controller)
     _write(found, report, plot)
     if as_json:
         print_json({"recordings_used": used, **found.to_dict()})
@@ -156,12 +158,14 @@ def _controller(study: Study, recordings: Dataset) -> Controller:
     return study.controller
 
 
-def _estimate(study: Study, saved: Path | None) -> Estimate:
+def _estimate(study: Study, saved: Path | None, chosen: Chosen) -> Estimate:
     from dynident.fit import LeastSquares, fit, load_estimate
 
     if saved is None:
-        with progress("fitting"):
-            return fit(study.model, study.train, LeastSquares())
+        with progress("fitting") as tell:
+            iv = chosen.method == "iv"
+            method = chosen.iv(study, "joint", tell) if iv else LeastSquares()
+            return fit(study.model, study.train, method)
     found = load_estimate(saved)
     if found.model.robot.names != study.robot.names:
         theirs, ours = ", ".join(found.model.robot.names), ", ".join(study.robot.names)
@@ -189,7 +193,8 @@ def _write(found: Validation, report: Path | None, plot: Path | None) -> None:
         write(found, to=report, command=command_line())
         click.echo(f"report: {report}", err=True)
     if plot is not None and found.runs:
-        from dynident.report.loop_plots import save
+        from dynident.report.loop_plots import simulated_loop
+        from dynident.report.plots import save
 
-        save(found, plot)
+        save(simulated_loop(found), plot)
         click.echo(f"picture: {plot}", err=True)

@@ -9,12 +9,14 @@ from typing import Literal
 import click
 
 from dynident.cli.group import commands
+from dynident.cli.methods import Chosen, method_options
 from dynident.cli.output import JSON, print_json, progress, show
 from dynident.cli.work import (
     STUDY,
     comparison_of,
     diagnosis_of,
     load_study,
+    require_picture,
     require_places,
     write_report,
 )
@@ -71,6 +73,10 @@ def diagnose(study: Path, as_json: bool) -> None:
     show_default=True,
     help="Fit among the robots that can exist (full), with the description as a prior.",
 )
+@method_options
+@click.option(
+    "--plot", type=click.Path(path_type=Path), help="Also write this picture of iv's iterations."
+)
 def fit(
     study: Path,
     as_json: bool,
@@ -79,8 +85,13 @@ def fit(
     ordinary: bool,
     essential: bool,
     consistency: Literal["full", "semi", "none"],
+    chosen: Chosen,
+    plot: Path | None,
 ) -> None:
     """Identify the parameters from the training recordings.
+
+    With --method iv the instruments come from the simulated loop of the study's [controller]; the
+    iterations are in the output.
 
     Example: dynident fit study.toml --out estimate.json --robot identified.urdf
     """
@@ -88,13 +99,20 @@ def fit(
     from dynident.fit import fit as fit_model
     from dynident.nlp import Within
 
-    require_places(study, out, robot)
+    if chosen.method == "iv" and consistency != "none":
+        raise click.UsageError("--consistency goes with least squares, not with --method iv")
+    if plot is not None and chosen.method != "iv":
+        raise click.UsageError("--plot goes with --method iv")
+    require_places(study, out, robot, plot)
+    require_picture(plot)
     loaded = load_study(study)
-    with progress("fitting"):
+    with progress("fitting") as tell:
         weighting = "none" if ordinary else "joint"
         method = LeastSquares(weighting)
         if consistency != "none":
             method = Constrained(Within(consistency), weighting=weighting)
+        if chosen.method == "iv":
+            method = chosen.iv(loaded, weighting, tell)
         estimate = fit_model(loaded.model, loaded.train, method)
         tables, result = list(estimate.tables()), estimate.to_dict()
         if essential:
@@ -114,6 +132,12 @@ def fit(
                 DynidentWarning,
                 stacklevel=1,
             )
+    if plot is not None and estimate.history is not None:
+        from dynident.report.convergence import convergence
+        from dynident.report.plots import save
+
+        save(convergence(estimate.history), plot)
+        click.echo(f"picture: {plot}", err=True)
     if as_json:
         print_json(result)
     else:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from dynident.diagnose import Comparison, Diagnosis
     from dynident.study import Study
 
+_PICTURES = (".png", ".svg", ".pdf")
 STUDY = click.argument("study", type=click.Path(path_type=Path))
 
 
@@ -27,6 +28,13 @@ def require_places(study: Path, *paths: Path | None) -> None:
         files.require_place(path)
         if path.resolve() == study.resolve():
             raise FileError("is the study itself", str(path), "write to another file")
+
+
+def require_picture(path: Path | None) -> None:
+    """Refuse a picture whose suffix is no format, before it is drawn."""
+    if path is not None and path.suffix.lower() not in _PICTURES:
+        mend = f"end its name in {', '.join(_PICTURES)}"
+        raise FileError("is no kind of picture that can be written", str(path), mend)
 
 
 def load_study(path: Path) -> Study:

@@ -11,6 +11,8 @@ from dynident.robot import Robot
 _LEAST_DAMPING = 0.1
 """Damping ratio that a robot has by its friction alone."""
 _POSES = 50
+_RUN_UP = 10
+"""Samples before the first."""
 _ROUNDING = 1e-6
 """Of a sample: instants this near to the controller's are the controller's."""
 
@@ -76,11 +78,15 @@ def law_torque(recording: Recording, controller: Controller, nominal: Robot) -> 
     # On the controller's clock, which as a rule is the record's; followed as the simulator does.
     rate, t = controller.simulated_rate(), recording.t - recording.t[0]
     clock = np.arange(int(np.floor(t[-1] * rate + _ROUNDING)) + 1) / rate
-    drive = Drive(
-        controller, ReferenceSamples(*SampledReference.of(recording).at(clock)), [nominal]
-    )
+    # The drive derives its speed from sample to sample: it is given some before the first.
+    early = np.maximum(np.arange(-_RUN_UP, len(clock)), 0)
+    references = [x[early] for x in SampledReference.of(recording).at(clock)]
     positions = CubicSpline(t, recording.q)(clock)
-    command = np.array([drive.command(k, q) for k, q in enumerate(positions)])
+    slope = (positions[min(_RUN_UP, len(clock) - 1)] - positions[0]) / min(_RUN_UP, len(clock) - 1)
+    before = positions[0] + np.arange(-_RUN_UP, 0)[:, None] * slope
+    drive = Drive(controller, ReferenceSamples(*references), [nominal])
+    followed = np.vstack([before, positions])
+    command = np.array([drive.command(k, q) for k, q in enumerate(followed)])[_RUN_UP:]
     if recording.torque == "measured":
         # The command that acted, in the mean over a sample before and a sample after.
         impulse = np.concatenate([np.zeros((1, controller.n)), np.cumsum(command, axis=0)])
@@ -91,7 +97,6 @@ def law_torque(recording: Recording, controller: Controller, nominal: Robot) -> 
         last = np.floor(t * rate + _ROUNDING).astype(int)
         torque = command[np.minimum(last, len(command) - 1)]
     if controller.ki:
-        # The first sample, at which the drive does not know its speed yet, is no part of it.
         torque = torque + np.median(recording.tau - torque, axis=0)
     return torque
 

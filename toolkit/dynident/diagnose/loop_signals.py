@@ -9,7 +9,6 @@ import numpy as np
 from dynident.closed_loop import Controller
 from dynident.diagnose.control_law import law_torque
 from dynident.diagnose.loop_run import QUANTITIES, LoopRun, Signals
-from dynident.diagnose.noise import differences
 from dynident.errors import RecordingError
 from dynident.fit.sampling import Sampled, sample
 from dynident.model import Model
@@ -49,7 +48,7 @@ def filtered_run(
         _signals(measured),
         _signals(simulated),
         _signals(reference),
-        _noise(recording, measured, dataset),
+        _noise(recording, dataset),
         np.asarray(again.saturated, dtype=float),
     )
 
@@ -58,35 +57,48 @@ def _signals(sampled: Sampled) -> Signals:
     return Signals(sampled.q, sampled.v, sampled.a, sampled.tau)
 
 
-def _noise(recording: Recording, measured: Sampled, dataset: Dataset) -> np.ndarray | None:
-    """Noise of the measured quantities, rms (4, n): of repeated periods, else as stated."""
-    signals = _signals(measured)
-    if recording.period is not None:
-        try:
-            found = periods(len(measured.t), measured.rate_hz, recording.period, recording.where)
-        except RecordingError:
-            found = None
-        if found is not None and mismatch(found.fold(measured.q)) <= _REPEATS:
-            return np.array([_spread(found.fold(signals.of(one))) for one in QUANTITIES])
-    if dataset.noise is None:
+def _noise(recording: Recording, dataset: Dataset) -> np.ndarray | None:
+    """Noise of the measured quantities, rms (4, n): of repeated periods, else as stated.
+
+    The noise alone passes the filters, so that nothing of what they do to the motion at the ends
+    of the record is taken for noise.
+    """
+    alone = _repeated(recording) or _stated(recording, dataset.noise)
+    if alone is None:
         return None
-    noisy = _signals(sample(_with_noise(recording, dataset.noise), dataset.filter))
-    return np.array(
-        [np.sqrt(np.mean((noisy.of(x) - signals.of(x)) ** 2, axis=0)) for x in QUANTITIES]
-    )
+    noise = _signals(sample(alone, dataset.filter))
+    return np.array([np.sqrt(np.mean(noise.of(one) ** 2, axis=0)) for one in QUANTITIES])
 
 
-def _spread(folded: np.ndarray) -> np.ndarray:
-    """Root mean square (n,) of what differs from period to period, (P, S, n)."""
-    n = folded.shape[2]
-    return np.array(
-        [np.sqrt(np.mean(differences(folded[..., j], "repeated") ** 2)) for j in range(n)]
-    )
+def _repeated(recording: Recording) -> Recording | None:
+    """Return what differs from period to period within the recording's window, if it repeats."""
+    if recording.period is None:
+        return None
+    low, high = recording.window or (-np.inf, np.inf)
+    inside = np.flatnonzero((recording.t >= low) & (recording.t < high))
+    try:
+        found = periods(len(inside), recording.rate_hz, recording.period, recording.where)
+    except RecordingError:
+        return None
+    rows = inside[found.index]
+    if mismatch(recording.q[rows]) > _REPEATS:
+        return None
+    grown = np.sqrt(found.count / (found.count - 1))
+    changes = {}
+    for name in ("q", "tau"):
+        measured = getattr(recording, name)
+        folded = measured[rows]
+        noise = np.zeros_like(measured)
+        noise[rows] = (folded - folded.mean(axis=0)) * grown
+        changes[name] = noise
+    return recording.replace(**changes)
 
 
-def _with_noise(recording: Recording, noise: Noise) -> Recording:
-    """Return a recording with one more draw of the stated noise, always the same."""
+def _stated(recording: Recording, noise: Noise | None) -> Recording | None:
+    """Return a draw of the stated noise, always the same."""
+    if noise is None:
+        return None
     stream = np.random.default_rng(0)
-    q = recording.q + noise.position_std * stream.standard_normal(recording.q.shape)
-    tau = recording.tau + noise.torque_std * stream.standard_normal(recording.tau.shape)
+    q = noise.position_std * stream.standard_normal(recording.q.shape)
+    tau = noise.torque_std * stream.standard_normal(recording.tau.shape)
     return recording.replace(q=q, tau=tau)

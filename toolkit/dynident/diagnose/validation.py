@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -68,12 +69,12 @@ class Validation:
 
     # --- numbers -------------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def errors(self) -> Errors:
         """The simulated loop against the measurement."""
         return self._errors([(r.simulated, r.measured) for r in self.runs])
 
-    @property
+    @cached_property
     def without_model(self) -> Errors:
         """What no model is needed for, against the measurement.
 
@@ -82,12 +83,12 @@ class Validation:
         """
         return self._errors([(r.reference, r.measured) for r in self.runs])
 
-    @property
+    @cached_property
     def tracking(self) -> Errors:
         """The simulated loop against the reference (torque: against that of the control law)."""
         return self._errors([(r.simulated, r.reference) for r in self.runs])
 
-    @property
+    @cached_property
     def noise(self) -> Errors | None:
         """Noise of the measurement over the measurement; None where it is unknown."""
         if not self.runs or any(run.noise is None for run in self.runs):
@@ -95,7 +96,7 @@ class Validation:
         square = sum(len(r.t) * np.asarray(r.noise) ** 2 for r in self.runs)
         return self._relative(np.asarray(square), self._power())
 
-    @property
+    @cached_property
     def saturated(self) -> np.ndarray:
         """Share of all samples at which each joint's simulated command was at its limit, (n,)."""
         if not self.runs:

@@ -32,7 +32,12 @@ def plain(words: str) -> str:
     return escape(words).replace("$", "&#36;")
 
 
+def look(height: int, top: int = 10, right: int = 16) -> dict:
+    """The package's look, as settings of a layout; sizes in pixels, the width is the screen's."""
+    margin = {"l": 62, "r": right, "t": top, "b": 46}
+    return {"template": _LOOK, "height": height, "margin": margin}
+
+
 def dressed(figure: go.Figure, height: int, top: int = 10, right: int = 16) -> go.Figure:
     """Give a figure the package's look; sizes in pixels, the width is the screen's."""
-    margin = {"l": 62, "r": right, "t": top, "b": 46}
-    return figure.update_layout(template=_LOOK, height=height, margin=margin)
+    return figure.update_layout(**look(height, top, right))

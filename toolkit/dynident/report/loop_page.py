@@ -16,7 +16,7 @@ _BYTES = 1_600_000
 """What all pictures together may take in the page."""
 _BYTES_PER_POINT = 54
 """Five lines, two single-precision numbers each, in base 64."""
-_MOST_PICTURED = 21
+_MOST_PICTURED = 14
 """Joints times recordings that have pictures."""
 
 

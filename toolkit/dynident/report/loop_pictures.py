@@ -9,7 +9,7 @@ from plotly.subplots import make_subplots
 from dynident.diagnose.loop_run import QUANTITIES, Quantity
 from dynident.diagnose.validation import Validation
 from dynident.report.content import AFTER_COLOUR, GREY
-from dynident.report.look import FAINT, dressed, plain
+from dynident.report.look import FAINT, dressed, look, plain
 from dynident.report.loop_content import (
     MEASURED,
     REFERENCE_COLOUR,
@@ -19,6 +19,8 @@ from dynident.report.loop_content import (
     loop_trace,
     run_of,
 )
+
+_NOISE = "noise (2 rms)"
 
 
 def simulated_loop(
@@ -52,10 +54,10 @@ def simulated_loop(
         trace = loop_trace(validation, run, j, quantity).thinned(points)
         for line in _signals(trace):
             # One legend for all rows; the torque's yardstick is another one.
-            shown = row == 1 or line.name not in (MEASURED, SIMULATED, "reference")
-            figure.add_trace(line.update(showlegend=shown), row=row, col=1)
+            shown = row == 1 or line["name"] not in (MEASURED, SIMULATED, "reference")
+            figure.add_trace({**line, "showlegend": shown}, row=row, col=1)
         for line in _differences(trace):
-            figure.add_trace(line.update(showlegend=False), row=row, col=2)
+            figure.add_trace({**line, "showlegend": False}, row=row, col=2)
         figure.update_yaxes(title=f"{quantity} ({trace.unit})", row=row, col=1)
         figure.update_yaxes(title=f"difference ({trace.unit})", row=row, col=2)
     figure.update_xaxes(title="time (s)", row=count)
@@ -64,20 +66,22 @@ def simulated_loop(
 
 def loop_quantity(trace: LoopTrace) -> go.Figure:
     """One quantity of one joint: the signals, and below them the differences."""
-    figure = make_subplots(
-        rows=2, cols=1, shared_xaxes=True, row_heights=[0.6, 0.4], vertical_spacing=0.06
-    )
-    for line in _signals(trace):
-        figure.add_trace(line, row=1, col=1)
-    for line in _differences(trace):
-        figure.add_trace(line.update(showlegend="noise" in str(line.name)), row=2, col=1)
-    figure.update_xaxes(title="time (s)", row=2, col=1)
-    figure.update_yaxes(title=f"{trace.quantity} ({trace.unit})", row=1, col=1)
-    figure.update_yaxes(title=f"difference ({trace.unit})", row=2, col=1)
-    return dressed(figure, 430, top=34).update_layout(legend={"y": -0.16, "yanchor": "top"})
+    below = [
+        {**line, "yaxis": "y2", "showlegend": line["name"] == _NOISE}
+        for line in _differences(trace)
+    ]
+    # Made at once, not subplot by subplot: a page has many of them.
+    layout = {
+        "xaxis": {"anchor": "y2", "title": {"text": "time (s)"}},
+        "yaxis": {"domain": [0.45, 1.0], "title": {"text": f"{trace.quantity} ({trace.unit})"}},
+        "yaxis2": {"domain": [0.0, 0.38], "title": {"text": f"difference ({trace.unit})"}},
+        "legend": {"y": -0.16, "yanchor": "top"},
+        **look(430, top=34),
+    }
+    return go.Figure([*_signals(trace), *below], layout)
 
 
-def _signals(trace: LoopTrace) -> list[go.Scatter]:
+def _signals(trace: LoopTrace) -> list[dict]:
     drawn = (
         (MEASURED, trace.measured, {"color": GREY, "width": 3}),
         (trace.yardstick_name, trace.yardstick, {"color": REFERENCE_COLOUR, "dash": "dash"}),
@@ -86,7 +90,7 @@ def _signals(trace: LoopTrace) -> list[go.Scatter]:
     return [_line(trace, name, values, line) for name, values, line in drawn]
 
 
-def _differences(trace: LoopTrace) -> list[go.Scatter]:
+def _differences(trace: LoopTrace) -> list[dict]:
     drawn = (
         (trace.yardstick_name, trace.yardstick, {"color": REFERENCE_COLOUR, "dash": "dash"}),
         (SIMULATED, trace.simulated, {"color": AFTER_COLOUR, "width": 1.3}),
@@ -96,29 +100,31 @@ def _differences(trace: LoopTrace) -> list[go.Scatter]:
         return found
     ends = _small(trace.t[[0, -1, -1, 0]])
     edge = 2 * trace.noise * np.array([1, 1, -1, -1])
-    band = go.Scatter(
-        x=ends,
-        y=edge,
-        fill="toself",
-        fillcolor=FAINT,
-        mode="lines",
-        line={"width": 0},
-        hoverinfo="skip",
-        name="noise (2 rms)",
-    )
+    band = {
+        "type": "scatter",
+        "x": ends,
+        "y": edge,
+        "fill": "toself",
+        "fillcolor": FAINT,
+        "mode": "lines",
+        "line": {"width": 0},
+        "hoverinfo": "skip",
+        "name": _NOISE,
+    }
     return [band, *found]
 
 
-def _line(trace: LoopTrace, name: str, values: np.ndarray, line: dict) -> go.Scatter:
-    return go.Scatter(
-        x=_small(trace.t),
-        y=_small(values),
-        mode="lines",
-        name=plain(name),
-        legendgroup=name,
-        line={"width": 1.5, **line},
-        hovertemplate="%{x:.4g} s: %{y:.5g}",
-    )
+def _line(trace: LoopTrace, name: str, values: np.ndarray, line: dict) -> dict:
+    return {
+        "type": "scatter",
+        "x": _small(trace.t),
+        "y": _small(values),
+        "mode": "lines",
+        "name": plain(name),
+        "legendgroup": name,
+        "line": {"width": 1.5, **line},
+        "hovertemplate": "%{x:.4g} s: %{y:.5g}",
+    }
 
 
 def _small(values: np.ndarray) -> np.ndarray:

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from io import BytesIO
-from pathlib import Path
-
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from dynident import files
 from dynident.diagnose.loop_run import QUANTITIES
 from dynident.diagnose.validation import Validation
 from dynident.report.content import AFTER_COLOUR, GREY
@@ -96,17 +92,3 @@ def _draw_differences(axes: Axes, trace: LoopTrace) -> None:
 def _yardstick(axes: Axes, trace: LoopTrace, values) -> None:
     dash = {"color": REFERENCE_COLOUR, "linewidth": 1.0, "linestyle": "--"}
     axes.plot(trace.t, values, label=trace.yardstick_name, **dash)
-
-
-def save(validation: Validation, path: str | Path, recording: str | None = None) -> Path:
-    """Write `simulated_loop` as a picture; the file's suffix is its format.
-
-    Raises
-    ------
-    FileError
-        If it cannot be written; an old one is then untouched.
-    """
-    buffer = BytesIO()
-    kind = Path(path).suffix.lower().removeprefix(".")
-    simulated_loop(validation, recording).savefig(buffer, format=kind)
-    return files.write_bytes(path, buffer.getvalue())

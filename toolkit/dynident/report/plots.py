@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from io import BytesIO
+from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from dynident import files
 from dynident.diagnose.diagnosis import Diagnosis, ResidualMap
 from dynident.report.content import (
     AFTER_COLOUR,
@@ -114,3 +116,16 @@ def _draw(axes: Axes, diagnosis: Diagnosis, one: ResidualMap, given: str) -> Non
 def plain(text: str) -> str:
     """Words as matplotlib shows them: a dollar sign in a joint's name is not mathematics."""
     return text.replace("$", r"\$")
+
+
+def save(figure: Figure, path: str | Path) -> Path:
+    """Write a picture; the file's suffix is its format (.png, .svg, .pdf).
+
+    Raises
+    ------
+    FileError
+        If it cannot be written; an old file is then untouched.
+    """
+    buffer = BytesIO()
+    figure.savefig(buffer, format=Path(path).suffix.lower().removeprefix("."))
+    return files.write_bytes(path, buffer.getvalue())

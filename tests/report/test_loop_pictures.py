@@ -1,0 +1,144 @@
+"""Pictures and pages of simulated loops, and of the iterations of instruments."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from html import escape
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from dynident.diagnose.loop_run import QUANTITIES, Skipped
+from dynident.diagnose.validation import Unsimulated, Validation
+from dynident.errors import DynidentError
+from dynident.fit.history import Convergence, Ending, Round
+from dynident.report.convergence import convergence
+from dynident.report.html import page
+from dynident.report.loop_content import loop_trace
+from dynident.report.loop_pictures import simulated_loop as moving
+from dynident.report.loop_plots import simulated_loop as still
+from dynident.report.plots import save
+from report.fabricated import diagnosis
+from report.fabricated_loop import validation
+
+
+@pytest.fixture(scope="module")
+def found() -> Validation:
+    return validation(skipped=(Skipped("old.csv", "no_reference", "it has no column q_ref"),))
+
+
+def figures_of(html: str) -> dict:
+    text = re.search(r'id="figures">(.*?)</script>', html, re.DOTALL)
+    assert text
+    return json.loads(text[1])
+
+
+def test_thinning_keeps_the_extremes_of_the_differences(found):
+    trace = loop_trace(found, found.runs[0], 0, "position")
+    measured = trace.measured.copy()
+    measured[123] += 3.0
+    trace = replace(trace, measured=measured)
+    thin = trace.thinned(60)
+    assert len(thin.t) <= 60
+    for one in ("simulated", "yardstick"):
+        left, kept = measured - getattr(trace, one), thin.measured - getattr(thin, one)
+        assert left.max() == kept.max() and left.min() == kept.min()
+
+
+def test_moving_picture(found):
+    figure = moving(found, "elbow", "run6.csv", ("position", "torque"))
+    titles = [axis.title.text for axis in figure.select_yaxes()]
+    assert titles == [
+        "position (rad)",
+        "difference (rad)",
+        "torque (N m)",
+        "difference (N m)",
+    ]
+    names = [trace.name for trace in figure.data if trace.showlegend]
+    assert names == ["measured", "reference", "simulated", "by the control law"]
+
+
+@pytest.mark.parametrize("names", [("shoulder", "elbow"), ("a$b$", "<i>")])
+def test_still_picture(names, tmp_path):
+    figure = still(validation(names, samples=60, noise="$" in names[0]), joints=names[:1])
+    assert isinstance(figure, Figure)
+    assert save(figure, tmp_path / "loop.png").stat().st_size > 1000
+
+
+@pytest.mark.parametrize("draw", [lambda v, r: moving(v, "elbow", r), still])
+def test_recordings_that_are_not_there(found, draw):
+    with pytest.raises(DynidentError, match=r"run5\.csv, run6\.csv"):
+        draw(found, "old.csv")
+    with pytest.raises(DynidentError, match="no loop was simulated"):
+        draw(replace(found, runs=()), None)
+    with pytest.raises(DynidentError, match="shoulder, elbow"):
+        moving(found, "wrist")
+
+
+def test_the_report_has_the_section_where_there_is_a_loop(found):
+    small = diagnosis(("slide",), samples=100)
+    assert "Simulated in closed loop" not in page(small)
+    html = page(small, loop=found)
+    assert "Simulated in closed loop" in html and escape(found.sentence) in html
+    for row in found.error_table().rows:
+        assert all(cell in html for cell in row)
+    figures = figures_of(html)
+    pairs = [(i, one) for i in range(4) for one in QUANTITIES]
+    assert {f"loop-{i}-{one}" for i, one in pairs} <= set(figures)
+    assert re.findall(r'data-figure="loop-0-(\w+)"', html) == list(QUANTITIES)
+    html = page(small, loop=Unsimulated("the loop <diverges>"))
+    assert "Not simulated: the loop &lt;diverges&gt;." in html
+
+
+def test_a_page_of_its_own(found):
+    html = page(found, command="dynident simulate study.toml")
+    assert html.count(escape(found.sentence)) == 1
+    assert "dynident simulate study.toml" in html and "old.csv: it has no column q_ref." in html
+    assert len(figures_of(html)) == 16
+    failed = replace(found, runs=())
+    html = page(failed)
+    assert "No loop could be simulated." in html and figures_of(html) == {}
+    hostile = validation(("<script>alert(1)</script>",), samples=50)
+    assert "<script>alert" not in page(hostile)
+
+
+def test_many_joints_stay_small():
+    many = validation(tuple(f"joint{i}" for i in range(7)), runs=5, samples=1000)
+    html = page(many)
+    assert len(html) < 7.5e6
+    assert "Of 3 more recordings there are no pictures" in html
+    assert len(figures_of(html)) == 7 * 2 * 4
+
+
+def history(rounds: int = 3, names: tuple[str, ...] = ("m$1$", "Fv@elbow")) -> Convergence:
+    p = len(names)
+    done = tuple(Round(np.full(p, 2.0 - 0.1**k), 0.1, 0.5 * 0.1**k, 0.9) for k in range(rounds))
+    nothing = np.full(p, np.nan)
+    return Convergence(
+        names, ("kg", "N m s/rad")[:p], np.zeros(p), "regular", done, Ending.CONVERGED, "",
+        np.array([0.1, np.nan])[:p], nothing, nothing, np.zeros(1), np.zeros(1), "given",
+    )  # fmt: skip
+
+
+def test_every_parameter_over_the_iterations(tmp_path):
+    figure = convergence(history(), {"Fv@elbow": 2.0})
+    shown = [axes for axes in figure.axes if axes.get_visible()]
+    assert len(shown) == 3
+    line = np.asarray(shown[0].lines[0].get_ydata())
+    np.testing.assert_allclose(line, [0.0, 1.0, 1.9, 1.99])
+    assert "Fv@elbow" in shown[1].get_title(loc="left")
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels[0] == "95 % interval" and "true value" in labels
+    save(figure, tmp_path / "iterations.svg")
+    both = convergence({"least squares": history(), "regular": history(1)})
+    assert [np.size(line.get_xdata()) for line in both.axes[0].lines] == [4, 2]
+
+
+def test_histories_that_do_not_compare():
+    with pytest.raises(DynidentError, match="different parameters"):
+        convergence({"a": history(), "b": history(names=("m",))})
+    with pytest.raises(DynidentError, match="no iterations"):
+        convergence({})
