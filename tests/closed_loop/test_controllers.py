@@ -15,7 +15,7 @@ from dynident.errors import SimulationError, StudyError
 from dynident.robot import Robot
 
 RATE = 100.0
-Q, Q_REF, V_REF, A_REF = (np.array(x) for x in ([0.1, -0.2], [0.3, 0.1], [1.0, -2.0], [3.0, 1.0]))
+Q, Q_REF, V_REF, A_REF = (np.array(x) for x in ([0.1, -0.2], [0.3, 0.1], [1.0, -2.5], [3.0, 1.0]))
 BEFORE = np.array([0.09, -0.21])
 SPEED = (Q - BEFORE) * RATE
 

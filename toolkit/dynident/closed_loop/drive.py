@@ -38,6 +38,10 @@ class Drive:
     nominal : the model inside the controller, for each robot. Used by a computed torque and by a
         feed-forward only.
     scale : (n,) factor of the feedback; None for 1.
+
+    Attributes
+    ----------
+    limited : whether its torques have a limit.
     """
 
     def __init__(
@@ -54,22 +58,22 @@ class Drive:
         self._kd = np.tile(factor * feedback.speed, count)
         self._ki = np.tile(factor * feedback.integral / rate, count)
         self._integrates = bool(np.any(self._ki))
-        self._q_ref, self._v_ref = reference.q, feedback.follow * reference.v
         self._robots = _distinct(nominal)
         self._through_model = controller.law.through_model
-        self._added = None
+        self._q_ref = reference.q
+        # All that the reference adds to the command is known beforehand.
+        self._ahead = self._kp * reference.q + feedback.follow * self._kd * reference.v
         if self._through_model:
-            self._added = reference.a
+            self._ahead += reference.a
         elif controller.feedforward:
-            self._added = np.empty_like(reference.q)
             for robot, rows in self._robots:
                 for row in rows:
                     own = slice(row * n, row * n + n)
                     motion = (x[:, own] for x in (reference.q, reference.v, reference.a))
-                    self._added[:, own] = robot.inverse_dynamics(*motion)
+                    self._ahead[:, own] += robot.inverse_dynamics(*motion)
         limit = controller.limit
         self._limit = np.full(n * count, np.inf) if limit is None else np.tile(limit, count)
-        self._limited = limit is not None
+        self.limited = limit is not None
         self._saturated = np.zeros(n * count, dtype=bool)
         cutoff = controller.derivative_cutoff_hz
         # Exact for a velocity that is constant from sample to sample.
@@ -90,17 +94,14 @@ class Drive:
             self._v = speed
         else:
             self._v = self._v + self._blend * (speed - self._v)
-        error = self._q_ref[k] - q
-        u = self._kp * error + self._kd * (self._v_ref[k] - self._v)
+        u = self._ahead[k] - self._kp * q - self._kd * self._v
         integral = self._integral
         if self._integrates:
-            integral = integral + self._ki * error
-            u = u + integral
-        if self._added is not None:
-            u = u + self._added[k]
-            if self._through_model:
-                u = self._inverse_dynamics(q, u)
-        if self._limited:
+            integral = integral + self._ki * (self._q_ref[k] - q)
+            u += integral
+        if self._through_model:
+            u = self._inverse_dynamics(q, u)
+        if self.limited:
             self._saturated = np.abs(u) >= self._limit
             integral = np.where(self._saturated, self._integral, integral)
             u = np.minimum(np.maximum(u, -self._limit), self._limit)

@@ -111,10 +111,12 @@ class Stepper:
             If the loop diverges, oscillates, or meets an inertia that is not positive definite.
         """
         plant, rate = self._plant, self._rate
-        place, gain, inputs = plant.place, plant.gain, np.argsort(plant.inputs)
+        place, order = plant.place, np.argsort(plant.inputs)
+        effect = (1.0 / plant.gain)[order]
         total, size = measurement.noise.shape
         resolution, noise = measurement.resolution, measurement.noise
         coarse, fine = bool(np.any(resolution > 0)), resolution == 0
+        noisy, limited = bool(np.any(noise)), drive.limited
         step = np.where(fine, 1.0, resolution)
         beyond = (_RUNAWAY * (1.0 + np.abs(reference.q).max() + np.abs(reference.v).max())) ** 2
 
@@ -122,7 +124,7 @@ class Stepper:
         # The object behind the input stays; asking for it is what tells Drake that it changes.
         data, torque = held.GetMutableData, held.GetMutableData().get_mutable_value()
         diagram, context, advance = plant.diagram, plant.context, simulator.AdvanceTo
-        states, rates = np.empty((total, 2 * size)), np.empty((total, size))
+        states, rates = np.empty((total, 2 * size)), np.empty((total, 2 * size))
         measured, commands = np.empty((total, size)), np.empty((total, size))
         saturated = np.zeros((total, size), dtype=bool)
         late, rest = self._late, self._rest
@@ -131,23 +133,28 @@ class Stepper:
             states[k] = x = state.CopyToVector()
             if not x.dot(x) < beyond:  # true of NaN too
                 raise self._diverged(time[k], x)
-            q = x[place] + noise[k]
+            q = x[place]
+            if noisy:
+                q += noise[k]
             if coarse:
                 q = np.where(fine, q, np.rint(q / step) * step)
             measured[k] = q
-            commands[k] = drive.command(k, q)
-            saturated[k] = drive.saturated
+            commands[k] = u = drive.command(k, q)
+            if limited:
+                saturated[k] = drive.saturated
+            if late:
+                u = commands[max(k - late, 0)]
             try:
                 # Before the first command acts, it is as if it did.
                 if rest and k:
                     data()
-                    torque.SetFromVector((commands[max(k - late - 1, 0)] / gain)[inputs])
-                    rates[k] = diagram.EvalTimeDerivatives(context).CopyToVector()[size:]
+                    torque.SetFromVector(commands[max(k - late - 1, 0)][order] * effect)
+                    rates[k] = diagram.EvalTimeDerivatives(context).CopyToVector()
                     advance(time[k] + rest / rate)
                 data()
-                torque.SetFromVector((commands[max(k - late, 0)] / gain)[inputs])
+                torque.SetFromVector(u[order] * effect)
                 if not (rest and k):
-                    rates[k] = diagram.EvalTimeDerivatives(context).CopyToVector()[size:]
+                    rates[k] = diagram.EvalTimeDerivatives(context).CopyToVector()
                 advance(time[k + 1])
             except (RuntimeError, np.linalg.LinAlgError) as error:
                 raise self._diverged(time[k], state.CopyToVector(), error) from None
@@ -158,7 +165,7 @@ class Stepper:
         return Motion(
             states[:, place],
             states[:, size + place],
-            rates[:, place],
+            rates[:, size + place],
             measured,
             commands,
             self._acting(commands),
