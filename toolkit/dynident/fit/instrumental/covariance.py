@@ -106,14 +106,23 @@ def _carried(
             jacobian.transpose(0, 2, 1) @ back
             for jacobian in (jacobians.by_a, jacobians.by_v, jacobians.by_q)
         )
-        # Central differences are antisymmetric, and their square is symmetric.
-        found = central_difference(central_difference(acceleration, rate) - speed, rate) + position
+        found = _differences(_differences(acceleration, rate) - speed, rate) + position
         if cutoff:
             found = lowpass(found, rate, cutoff)
         torque = back
         if sampled.recording.torque == "held_command":
             torque = np.concatenate([(back[:-1] + back[1:]) / 2, back[-1:] / 2])
         yield found[core], torque[core]
+
+
+def _differences(x: np.ndarray, rate: float) -> np.ndarray:
+    """Minus the adjoint of central differences, which are antisymmetric.
+
+    Of rows that are zero beyond both ends: the one-sided differences there belong to rows that are
+    not used (see `source.prepared`).
+    """
+    padded = np.pad(x, ((2, 2), (0, 0), (0, 0)))
+    return central_difference(padded, rate)[2:-2]
 
 
 def _block(model: Model, sampled: Sampled, raw: slice) -> Block:
