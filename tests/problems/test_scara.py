@@ -26,7 +26,7 @@ def estimate(table: str) -> di.Estimate:
 
 
 @cache
-def entries(table: str) -> dict[str, tables.Entry]:
+def entries(table: str) -> dict:
     return {entry.name: entry for entry in tables.entries(table, estimate(table))}
 
 
