@@ -17,9 +17,10 @@ def test_iterations_and_picture(run, tmp_path):
     assert done.status == 0 and "picture: iv.png" in done.err
     assert "Iterations" in done.out and "Start: " in done.out
     assert (tmp_path / "iv.png").read_bytes().startswith(b"\x89PNG")
-    # A saved estimate by instruments is simulated as any other.
     again = run("simulate", path, "--estimate", "iv.json", "--json")
-    assert again.status == 0 and again.json["error"]["torque"] < 0.01
+    named = run("simulate", path, "--method", "iv", "--start", "description", "--json")
+    assert again.status == 0 and again.json["error"] == pytest.approx(named.json["error"])
+    assert again.json["error"]["torque"] < 0.01
 
 
 @pytest.mark.parametrize(
@@ -32,11 +33,6 @@ def test_instruments_without_a_loop(run, tmp_path, words):
     assert done.status == 0
     values = {one["name"]: one["value"] for one in done.json["parameters"]}
     assert values["Fv@shoulder"] == pytest.approx(2.0, rel=0.02)
-
-
-def test_simulate_by_instruments(run, tmp_path):
-    done = run("simulate", write_loop_study(tmp_path), "--method", "iv", "--json")
-    assert done.status == 0 and done.json["verdict"] == "follows"
 
 
 def test_options_that_do_not_fit(run, tmp_path):

@@ -209,21 +209,13 @@ def test_simulate(run, tmp_path):
     assert 0.01 < found["error"] < 0.9  # the hidden friction
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (("rate_hz = 250.0", ""), "the controller's rate is not stated"),
-        (('kind = "pd"', 'kind = "computed_torque"'), "a computed torque cannot be simulated yet"),
-        (("rate_hz", "feedforward = true\nrate_hz"), "feedforward cannot be simulated yet"),
-        (("rate_hz", "delay_s = 0.01\nrate_hz"), "a delay of 0.01 s cannot be simulated yet"),
-    ],
-)
-def test_what_cannot_be_simulated_is_refused(run, tmp_path, change, message):
+def test_what_cannot_be_simulated_is_refused(run, tmp_path):
     (tmp_path / "arm.urdf").write_text(ARM)
-    (tmp_path / "experiment.toml").write_text(edited(change, text=EXPERIMENT))
+    text = edited(("rate_hz = 250.0", ""), text=EXPERIMENT)
+    (tmp_path / "experiment.toml").write_text(text)
     done = run("simulate", "experiment.toml", "--out", "made")
     assert done.status == 2 and done.out == ""
-    assert done.err.startswith("error: experiment.toml: controller.") and message in done.err
+    assert done.err.startswith("error: experiment.toml: controller.rate_hz: the controller's rate")
     assert not (tmp_path / "made").exists()
 
 

@@ -6,6 +6,7 @@ import json
 import re
 from dataclasses import replace
 from html import escape
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from dynident.fit.history import Convergence, Ending, Round
 from dynident.report.convergence import convergence
 from dynident.report.html import page
 from dynident.report.loop_content import loop_trace
+from dynident.report.loop_page import loop_section
 from dynident.report.loop_pictures import simulated_loop as moving
 from dynident.report.loop_plots import simulated_loop as still
 from dynident.report.plots import save
@@ -57,15 +59,16 @@ def test_moving_picture(found):
         "torque (N m)",
         "difference (N m)",
     ]
-    names = [trace.name for trace in figure.data if trace.showlegend]
+    drawn: Any = figure.data
+    names = [trace.name for trace in drawn if trace.showlegend]
     assert names == ["measured", "reference", "simulated", "by the control law"]
 
 
-@pytest.mark.parametrize("names", [("shoulder", "elbow"), ("a$b$", "<i>")])
-def test_still_picture(names, tmp_path):
-    figure = still(validation(names, samples=60, noise="$" in names[0]), joints=names[:1])
+def test_still_picture(tmp_path):
+    figure = still(validation(("<i>", "a$b$"), samples=60), joints=("a$b$",))
     assert isinstance(figure, Figure)
     assert save(figure, tmp_path / "loop.png").stat().st_size > 1000
+    assert still(validation(samples=60, noise=False), "run6.csv").axes
 
 
 @pytest.mark.parametrize("draw", [lambda v, r: moving(v, "elbow", r), still])
@@ -80,7 +83,6 @@ def test_recordings_that_are_not_there(found, draw):
 
 def test_the_report_has_the_section_where_there_is_a_loop(found):
     small = diagnosis(("slide",), samples=100)
-    assert "Simulated in closed loop" not in page(small)
     html = page(small, loop=found)
     assert "Simulated in closed loop" in html and escape(found.sentence) in html
     for row in found.error_table().rows:
@@ -89,8 +91,9 @@ def test_the_report_has_the_section_where_there_is_a_loop(found):
     pairs = [(i, one) for i in range(4) for one in QUANTITIES]
     assert {f"loop-{i}-{one}" for i, one in pairs} <= set(figures)
     assert re.findall(r'data-figure="loop-0-(\w+)"', html) == list(QUANTITIES)
-    html = page(small, loop=Unsimulated("the loop <diverges>"))
-    assert "Not simulated: the loop &lt;diverges&gt;." in html
+    section = loop_section(Unsimulated("the loop diverges"))
+    assert section is not None and section.failure == "the loop diverges"
+    assert loop_section(None) is None
 
 
 def test_a_page_of_its_own(found):
@@ -123,7 +126,7 @@ def history(rounds: int = 3, names: tuple[str, ...] = ("m$1$", "Fv@elbow")) -> C
     )  # fmt: skip
 
 
-def test_every_parameter_over_the_iterations(tmp_path):
+def test_every_parameter_over_the_iterations():
     figure = convergence(history(), {"Fv@elbow": 2.0})
     shown = [axes for axes in figure.axes if axes.get_visible()]
     assert len(shown) == 3
@@ -132,7 +135,6 @@ def test_every_parameter_over_the_iterations(tmp_path):
     assert "Fv@elbow" in shown[1].get_title(loc="left")
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels[0] == "95 % interval" and "true value" in labels
-    save(figure, tmp_path / "iterations.svg")
     both = convergence({"least squares": history(), "regular": history(1)})
     assert [np.size(line.get_xdata()) for line in both.axes[0].lines] == [4, 2]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 import plotly.graph_objects as go
 
 from dynident.diagnose.loop_run import QUANTITIES, Quantity
@@ -62,7 +63,8 @@ def loop_section(found: Validation | Unsimulated | None) -> LoopSection | None:
     most = max(1, _MOST_PICTURED // n)
     runs = found.runs[:most]
     points = max(16, min(2500, _BYTES // _BYTES_PER_POINT // (len(QUANTITIES) * n * len(runs))))
-    pairs = [(j, run) for run in runs for j in range(n)]
+    worst = np.argsort(-np.nan_to_num(found.errors.joints[QUANTITIES.index("torque")]))
+    pairs = [(int(j), run) for run in runs for j in worst]
     figures = [
         (f"loop-{i}-{quantity}", loop_quantity(loop_trace(found, run, j, quantity).thinned(points)))
         for i, (j, run) in enumerate(pairs)
