@@ -144,7 +144,7 @@ STUDIES = {
     ),
     "controller of no kind": (
         STUDY + edited(('"pd"', '"p"'), text=CONTROLLER),
-        r"controller.kind: .*'pd'",
+        r"controller.kind: no controller of kind 'p'. kinds: pd, pid",
     ),
     "controller without gain": (
         STUDY + edited(("kd = [120.0, 50.0]\n", ""), text=CONTROLLER),
@@ -403,7 +403,7 @@ ARGUMENTS = {
     "unknown command": (("explane",), r"No such command 'explane'. Did you mean 'explain'"),
     "unknown option": (("explain", "study.toml", "--jsn"), r"No such option '--jsn'.*'--json'"),
     "no study": (("explain",), r"Missing argument 'STUDY'. See `dynident explain --help`"),
-    "no folder": (("simulate", "study.toml"), r"Missing option '--out'"),
+    "no controller": (("simulate", "study.toml"), r"study.toml: has no \[controller\]"),
     "effect that is there": (
         ("add", "study.toml", "viscous_friction"),
         r"study.toml: has viscous_friction already. nothing was changed",
@@ -445,7 +445,7 @@ ARGUMENTS = {
     ),
     "study as experiment": (
         ("simulate", "study.toml", "--out", "virtual"),
-        r"study.toml: effects.0: a table is needed here",
+        r"--out is for an experiment, and study.toml is a study",
     ),
 }
 
