@@ -74,6 +74,8 @@ def test_computed_torque_is_the_inverse_dynamics_of_the_wanted_acceleration() ->
         (expected,) = arm().inverse_dynamics(Q[None], SPEED[None], wanted[None])
         u = second_command(controller, np.full(2, factor))
         np.testing.assert_allclose(u, expected, rtol=1e-12)
+    fed = second_command(replace(controller, feedforward=True), np.full(2, factor))
+    np.testing.assert_array_equal(fed, u)
 
 
 def test_feed_forward_adds_the_torque_along_the_reference() -> None:
@@ -143,8 +145,7 @@ def test_filtered_derivative_of_a_ramp_settles_on_its_slope() -> None:
         ({"derivative_cutoff_hz": -1.0}, "derivative_cutoff_hz"),
         ({"delay_s": -1.0}, "delay_s"),
         ({"drive_gain": (1.0, 0.0)}, "drive_gain"),
-        ({"kind": "computed_torque", "feedforward": True}, "makes the model's torque itself"),
-        ({"kind": "computed_torque", "drive_gain": (1.0, 1.0)}, "torque itself"),
+        ({"kind": "computed_torque", "drive_gain": (1.0, 1.0)}, "makes torques, not signals"),
     ],
 )
 def test_what_is_refused(changes: dict[str, Any], words: str) -> None:

@@ -166,6 +166,42 @@ def test_progress_reaches_its_end() -> None:
     assert done[-1] == pytest.approx(told[-1][2]) == pytest.approx(1.5)
 
 
+@pytest.mark.parametrize(
+    "controller",
+    [
+        Controller("computed_torque", RATE, (100.0, 100.0), (20.0, 20.0), delay_s=0.001),
+        Controller("cascade", RATE, (8.0, 8.0), kv=(4.0, 0.5), drive_gain=(10.0, 10.0)),
+        Controller(
+            "pid",
+            RATE,
+            (300.0, 100.0),
+            (40.0, 5.0),
+            ki=(10.0, 10.0),
+            velocity_reference=False,
+            limit=(150.0, 50.0),
+            derivative_cutoff_hz=80.0,
+            feedforward=True,
+        ),
+    ],
+)
+def test_the_study_states_the_controller_as_it_is(tmp_path: Path, controller: Controller) -> None:
+    runs = (replace(small().runs[0], duration=0.1),)
+    write_experiment(small(controller=controller, runs=runs), tmp_path)
+    assert load(tmp_path / "study.toml").controller == controller
+
+
+def test_a_feed_forward_knows_the_nominal_robot_only() -> None:
+    robot = arm()
+    lighter = robot.with_theta(0.7 * robot.theta)
+    fed = Controller("pd", RATE, (300.0, 100.0), (40.0, 5.0), feedforward=True)
+    errors = []
+    for nominal in (None, lighter):
+        found = small(controller=fed, nominal=nominal, sensors=Sensors()).run()[0]
+        assert found.q_ref is not None
+        errors.append(np.abs(found.q - found.q_ref).max())
+    assert errors[1] > 2 * errors[0]
+
+
 # --- files ---------------------------------------------------------------------------------------
 
 

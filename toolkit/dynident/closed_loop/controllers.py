@@ -51,7 +51,7 @@ class Controller:
     limit : (n,) N m or N, greatest magnitude of the command, or None.
     delay_s : s from a sample to when its command acts; any fraction or multiple of a sample.
     feedforward : whether the torque of the robot that the controller believes in, along the
-        reference, is added.
+        reference, is added (a computed torque has it already: there it changes nothing).
     drive_gain : (n,) N m or N per unit of control signal, positive; the gains are then per unit of
         torque above, in units of that signal. None where the gains make torques.
 
@@ -89,11 +89,9 @@ class Controller:
             if value is not None and (len(value) != self.n or not all(x > 0 for x in value)):
                 mend = "give one positive number per joint"
                 raise SimulationError(f"{name} = {list(value)}", f"controller.{name}", mend)
-        if self.law.through_model:
-            for name in ("feedforward", "drive_gain"):
-                if getattr(self, name):
-                    what = f"a {self.kind} makes the model's torque itself"
-                    raise SimulationError(what, f"controller.{name}", "leave it out")
+        if self.law.through_model and self.drive_gain is not None:
+            what = f"the model of a {self.kind} makes torques, not signals"
+            raise SimulationError(what, "controller.drive_gain", "leave it out")
         for name in ("rate_hz", "derivative_cutoff_hz"):
             value = getattr(self, name)
             if value is not None and not (value > 0 and math.isfinite(value)):
