@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
@@ -116,7 +117,7 @@ class Iterations:
     def __init__(self, method: IV, model: Model, source: Source, start: np.ndarray) -> None:
         self._method, self._model, self._source = method, model, source
         self._good: np.ndarray | None = None
-        self._root = np.eye(model.size)
+        self._root: np.ndarray | None = None
         self.values = start
         self.rounds: list[Round] = []
         self.ending, self.message = Ending.ROUNDS_EXHAUSTED, ""
@@ -134,9 +135,7 @@ class Iterations:
             except SimulationError as error:
                 if not self.rounds:
                     raise
-                self.ending, self.message = Ending.NOT_SIMULATED, str(error)
-                # The last estimate that could be simulated is kept.
-                self.values = self._good if self._good is not None else self.values
+                self._keep_last_good(error)
                 return
             self._estimate(step)
             if not self._source.iterates:
@@ -150,6 +149,16 @@ class Iterations:
         if doubt := self._source.verdict():
             self.ending, self.message = Ending.DOUBTFUL_LOOP, doubt
 
+    def _keep_last_good(self, error: SimulationError) -> None:
+        assert self._good is not None
+        self.values = self._good
+        which = "the start" if len(self.rounds) == 1 else f"iteration {len(self.rounds) - 1}"
+        self.ending = Ending.NOT_SIMULATED
+        self.message = (
+            f"the estimate of iteration {len(self.rounds)} has no motion ({str(error).rstrip('.')})"
+            f", nor has any part of the way to it: the values are those of {which}"
+        )
+
     def _renew(self) -> float:
         """Make the instruments of the present estimate, damped or projected if need be.
 
@@ -162,12 +171,10 @@ class Iterations:
         except SimulationError as error:
             reason = error
         if isinstance(self._source, LoopSource):
-            try:
+            with suppress(DynidentError):
                 self.instruments = self._source.projected(self.values, self._root)
                 self._good = self.values
                 return 1.0
-            except DynidentError:
-                pass
         if self._good is None:
             raise reason
         for halving in range(1, _HALVINGS + 1):

@@ -6,6 +6,8 @@ choice gives the same motion, as long as no body has a first moment without a ma
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from dynident.fit.given import given_estimate
@@ -17,6 +19,8 @@ from dynident.nlp import Within
 
 _MASS_STAYS = 1e-3
 """Weight of a mass against the other parameters: where it is not told, it stays as described."""
+_FIRM = 1e3
+"""Weight of the base values against the description: they are kept where a robot can have them."""
 _NEXT_TO_NOTHING = 1e-6
 """Share of the typical mass below which a described mass cannot carry a first moment."""
 
@@ -74,11 +78,9 @@ def consistent(model: Model, values: np.ndarray, root: np.ndarray) -> np.ndarray
     FitError
         If the projection fails.
     """
-    from dataclasses import replace
-
     robot = model.robot
     before = replace(given_estimate(robot), model=model, values=np.array(values))
-    metric = Metric(root, model.names, 0, "the last iteration")
+    metric = Metric(_FIRM * root, model.names, 0, "the last iteration")
     found = project(before, Prior(robot), metric, Within("full"))
     effects = found.values[model.base.rank :]
     return np.concatenate([found.robot.theta, effects])

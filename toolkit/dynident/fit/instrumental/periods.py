@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 from dynident.errors import FitError
 from dynident.fit.instrumental.source import FixedInstruments, Guess, Source, prepared
@@ -19,7 +18,10 @@ class SwappedPeriods:
     instrument for it. Nothing needs to be known of the controller.
     """
 
-    name: ClassVar[str] = "swapped periods"
+    @property
+    def name(self) -> str:
+        """In words."""
+        return "swapped periods"
 
     def prepare(self, model: Model, dataset: Dataset, guess: Guess) -> Source:
         """Return the recordings that repeat, and their instruments.

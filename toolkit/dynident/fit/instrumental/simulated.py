@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -53,7 +53,6 @@ class SimulatedLoop:
     natural_frequency_hz: float | Sequence[float] | None = None
     lift: Literal["minimum_norm", "consistent"] = "minimum_norm"
     nominal: Robot | None = None
-    name: ClassVar[str] = "simulated closed loop"
 
     def __post_init__(self) -> None:
         if not isinstance(self.controller, Controller):
@@ -68,6 +67,11 @@ class SimulatedLoop:
             if given.shape not in ((1,), (self.controller.n,)) or not np.all(given > 0):
                 mend = "give one positive number, or one per joint"
                 raise FitError(f"natural_frequency_hz = {given.tolist()}", "instruments", mend)
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        return "simulated closed loop"
 
     def prepare(self, model: Model, dataset: Dataset, guess: Guess) -> LoopSource:
         """Return the loop of a robot, ready to be simulated at any estimate.
@@ -85,7 +89,7 @@ class SimulatedLoop:
 class LoopSource:
     """The closed loops of some recordings; see `Source`. One diagram serves all estimates."""
 
-    iterates: ClassVar[bool] = True
+    iterates = True
     noise_share = 1.0
 
     def __init__(
@@ -138,12 +142,21 @@ class LoopSource:
     def at(self, values: np.ndarray) -> Dataset:
         """Simulate an estimate; see `Source.at`."""
         if self._settings.lift == "consistent":
-            return self.projected(values, np.diag(self._column_scale()))
+            return self.projected(values)
         self._matrices.require_positive(values)
         return self._simulated(values, lift.minimum_norm(self._model, values))
 
-    def projected(self, values: np.ndarray, root: np.ndarray) -> Dataset:
-        """Simulate the nearest possible robot; `root` (r, p) tells what the data mind."""
+    def projected(self, values: np.ndarray, root: np.ndarray | None = None) -> Dataset:
+        """Simulate the nearest possible robot.
+
+        Parameters
+        ----------
+        values : (p,) an estimate.
+        root : (r, p) of the information that the data hold; None: each parameter by the torque
+            that a unit of it makes.
+        """
+        if root is None:
+            root = np.diag(self._column_scale())
         found = lift.consistent(self._model, values, root)
         theta = found[: 10 * self._model.robot.n]
         rigid = self._model.base.coordinates(theta)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -55,7 +55,8 @@ class Source(Protocol):
     @property
     def noise_share(self) -> float: ...
 
-    iterates: ClassVar[bool]
+    @property
+    def iterates(self) -> bool: ...
 
     def at(self, values: np.ndarray) -> Dataset:
         """Return the instruments of an estimate: `measured` with other positions.
@@ -116,7 +117,7 @@ class FixedInstruments:
     instruments: Dataset
     notes: tuple[str, ...]
     noise_share: float
-    iterates: ClassVar[bool] = False
+    iterates: bool = False
 
     def at(self, values: np.ndarray) -> Dataset:
         """Return the instruments."""

@@ -1,0 +1,104 @@
+"""Iterations whose estimates cannot be simulated: damped, or stopped with the last good one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from dynident.errors import SimulationError
+from dynident.fit import IV
+from dynident.fit.history import Ending
+from dynident.fit.instrumental.source import prepared
+from dynident.model import Model
+from dynident.recording import Dataset, Filter, Recording
+from synthetic import arm, synthetic
+
+
+@dataclass(frozen=True)
+class Stubborn:
+    """The true motion as instruments, for estimates that pass a test."""
+
+    true: Recording
+    passes: Callable[[np.ndarray], bool]
+    name: str = "stub"
+
+    def prepare(self, model, dataset, guess):
+        return StubbornSource(self, prepared(dataset))
+
+
+class StubbornSource:
+    iterates = True
+    notes = ()
+    noise_share = 1.0
+
+    def __init__(self, settings, measured):
+        self.settings, self.measured = settings, measured
+        self.asked = 0
+
+    def at(self, values):
+        self.asked += 1
+        if not self.settings.passes(values):
+            raise SimulationError("it falls apart")
+        return prepared(replace(self.measured, recordings=(self.settings.true,)))
+
+    def verdict(self):
+        return ""
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    return Model(arm()) + "viscous_friction"
+
+
+@pytest.fixture(scope="module")
+def true(model) -> Recording:
+    values = model.given_values()
+    values[model.base.rank :] = (1.0, 0.5)
+    return synthetic(model, values, 1, rate_hz=200.0, duration=8.0)
+
+
+def dataset(true: Recording) -> Dataset:
+    return Dataset((true,), Filter())
+
+
+def test_the_way_to_an_estimate_is_halved(model, true):
+    """Only estimates with little friction can be simulated: half of the way is taken."""
+    friction = model.names.index("Fv@shoulder")
+    source = Stubborn(true, lambda values: bool(values[friction] < 0.6))
+    found = IV(source, start="description", rounds=4).fit(model, dataset(true))
+    assert found.history is not None
+    assert [one.step for one in found.history.rounds][:2] == [1.0, 0.5]
+
+
+def test_the_last_good_estimate_is_kept(model, true):
+    friction = model.names.index("Fv@shoulder")
+    source = Stubborn(true, lambda values: bool(values[friction] < 1e-3))
+    found = IV(source, start="description").fit(model, dataset(true))
+    assert found.history is not None and found.history.ending is Ending.NOT_SIMULATED
+    np.testing.assert_array_equal(found.values, model.given_values())
+    assert "it falls apart" in found.history.message and "start" in found.history.message
+    assert any("no motion" in note for note in found.notes)
+
+
+def test_a_start_that_cannot_be_simulated_is_an_error(model, true):
+    with pytest.raises(SimulationError, match="it falls apart"):
+        IV(Stubborn(true, lambda values: False)).fit(model, dataset(true))
+
+
+def test_too_few_rounds_are_told(model, true):
+    noisy = true.replace(q=true.q + 1e-5 * np.random.default_rng(0).standard_normal(true.q.shape))
+    source = Stubborn(true, lambda values: True)
+    method = IV(source, start="regular", rounds=1)
+    found = method.fit(model, dataset(noisy))
+    assert found.history is not None and found.history.ending is Ending.ROUNDS_EXHAUSTED
+    assert "not converged" in found.status
+
+
+def test_progress_is_told(model, true):
+    heard = []
+    method = IV(Stubborn(true, lambda values: True), tell=lambda *said: heard.append(said))
+    method.fit(model, dataset(true))
+    assert heard and all(done <= total for _, done, total in heard)
