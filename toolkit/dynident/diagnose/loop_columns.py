@@ -39,7 +39,7 @@ def _notes(names: tuple[str, ...], loops: tuple[Loop, ...]) -> tuple[str, ...]:
         if isinstance(loop, Unsimulated):
             found.append(f"{whose}: not simulated. {loop.reason}.")
         elif loop is not None:
-            if loop.verdict == "no_nearer":
+            if loop.verdict != "follows":
                 found.append(f"{whose}: {loop.sentence}")
             found += [f"{whose}: {one.name} left out: {one.reason}." for one in loop.skipped]
     return tuple(found)

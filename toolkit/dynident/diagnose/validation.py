@@ -13,7 +13,7 @@ from dynident.diagnose.loop_run import QUANTITIES, Errors, LoopRun, Signals, Ski
 from dynident.fit.estimate import Source
 from dynident.tables import Table, number, percent, print_tables
 
-Verdict = Literal["follows", "no_nearer", "not_simulated"]
+Verdict = Literal["follows", "no_nearer", "other_controller", "not_simulated"]
 
 ORIENTATION = (
     "For orientation: a two-link robot that was identified well came within 0.5 % of the position, "
@@ -27,7 +27,8 @@ _SAME_AS_NOISE = 1.5
 _BEYOND_NOISE = 3.0
 """Torque error over its noise above which something is missing."""
 _LAW_HOLDS = 0.2
-"""Relative error up to which the stated control law is the one that ran."""
+_LAW_NOISE = 3.0
+"""Relative error, and multiple of the noise, up to which the stated control law may have run."""
 
 
 @dataclass(frozen=True)
@@ -196,80 +197,89 @@ class Validation:
 
     @property
     def verdict(self) -> Verdict:
-        """Whether the simulated loop tells more of the motion than its reference does."""
+        """Whether the loop is the recorded one, and tells more of the motion than its reference."""
         if not self.runs:
             return "not_simulated"
-        return "no_nearer" if any(map(self._lost, range(len(self.joints)))) else "follows"
+        if self._foreign.any():
+            return "other_controller"
+        return "no_nearer" if self._lost.any() else "follows"
 
     @property
     def sentence(self) -> str:
         """The verdict in plain words."""
-        if not self.runs:
-            return "No loop could be simulated."
-        lost = [j for j in range(len(self.joints)) if self._lost(j)]
-        if not lost:
-            return (
-                "At every joint the simulated loop is nearer to the measurement than the reference "
-                "is, or within the noise."
-            )
-        foreign = [j for j in lost if not self.without_model.joints[3, j] <= _LAW_HOLDS]
-        where = ", ".join(self.joints[j] for j in lost)
-        found = f"At {where} the simulated loop is no nearer to the measurement than the reference"
-        if foreign:
-            return f"{found}: the stated controller is not the one that ran."
-        return f"{found}: the model is poor."
+        off = percent(self.errors.of("torque"))
+        match self.verdict:
+            case "not_simulated":
+                return "No loop could be simulated."
+            case "other_controller":
+                return (
+                    f"At {self._names(self._foreign)} the stated controller is not the one that "
+                    "ran, or torque or reference are not what they are said to be."
+                )
+            case "no_nearer":
+                return (
+                    f"At {self._names(self._lost)} the simulated loop is no nearer to the "
+                    "measurement than the reference: the model is poor."
+                )
+        return (
+            "At every joint the simulated loop is nearer to the measurement than the reference is, "
+            f"or within the noise; its torque is {off} off."
+        )
 
     @property
     def notes(self) -> tuple[str, ...]:
         """The sentence, and what it rests on, in plain words."""
         found = [self.sentence]
-        found += [self._loss(j) for j in range(len(self.joints)) if self.runs and self._lost(j)]
-        for joint, share in zip(self.joints, self.saturated, strict=True):
-            if share > 0:
+        for j, joint in enumerate(self.joints if self.runs else ()):
+            law = percent(float(self.without_model.joints[3, j]), 1)
+            own, reference = (e.joints[0, j] for e in (self.errors, self.without_model))
+            if self._foreign[j]:
                 found.append(
-                    f"{joint}: the simulated command is at its limit for {percent(share, 1)} of "
-                    "the samples; there the torque says nothing of the model."
+                    f"{joint}: the stated control law, fed with the recorded positions, does not "
+                    f"give the recorded torque ({law} off): check gains, rate_hz, delay_s, limit, "
+                    "and the units of torque and reference."
                 )
-        found += [
-            f"{joint}: the torque of the simulated loop is {number(ratio, 2)} times the noise off; "
-            "`diagnose` looks for what the model lacks."
-            for joint, ratio in zip(self.joints, self._torque_ratios(), strict=True)
-            if ratio > _BEYOND_NOISE
-        ]
+            elif self._lost[j]:
+                found.append(
+                    f"{joint}: the simulated position is {percent(own, 3)} off the measured one, "
+                    f"the reference {percent(reference, 3)}. The stated control law gives the "
+                    f"recorded torque ({law} off): the model does not respond as the robot does."
+                )
+            if self.saturated[j] > 0:
+                found.append(
+                    f"{joint}: the simulated command is at its limit for "
+                    f"{percent(float(self.saturated[j]), 1)} of the samples; there the torque says "
+                    "nothing of the model."
+                )
+            if (ratio := self._torque_ratios()[j]) > _BEYOND_NOISE:
+                found.append(
+                    f"{joint}: the torque of the simulated loop is off by {ratio:.3g} times the "
+                    "noise; `dynident diagnose` looks for what the model lacks."
+                )
         return (*found, *((ORIENTATION,) if self.runs else ()), *self.remarks)
+
+    def _names(self, which: np.ndarray) -> str:
+        return ", ".join(self.joints[j] for j in np.flatnonzero(which))
+
+    def _of_noise(self, row: int) -> np.ndarray:
+        """Relative noise of one quantity, (n,); zero where it is unknown."""
+        return np.zeros(len(self.joints)) if self.noise is None else self.noise.joints[row]
+
+    @cached_property
+    def _foreign(self) -> np.ndarray:
+        """Joints at which the control law is not the one that made the torque, (n,) bool."""
+        return self.without_model.joints[3] > np.maximum(_LAW_HOLDS, _LAW_NOISE * self._of_noise(3))
+
+    @cached_property
+    def _lost(self) -> np.ndarray:
+        """Joints whose simulated position is no better than the reference, noise aside, (n,)."""
+        own, reference = self.errors.joints[0], self.without_model.joints[0]
+        return (own >= reference) & (own > _SAME_AS_NOISE * self._of_noise(0))
 
     def _torque_ratios(self) -> np.ndarray:
         """Torque error of each joint over its noise, (n,); zero where the noise is unknown."""
-        noise = self.noise
-        if noise is None:
-            return np.zeros(len(self.joints))
-        ratios = self.errors.joints[3] / np.where(noise.joints[3] > 0, noise.joints[3], np.inf)
-        return np.nan_to_num(ratios)
-
-    def _lost(self, j: int) -> bool:
-        """Whether a joint's simulated position is no better than the reference, noise aside."""
-        own, reference = self.errors.joints[0, j], self.without_model.joints[0, j]
-        noise = 0.0 if self.noise is None else self.noise.joints[0, j]
-        return bool(own >= reference and own > _SAME_AS_NOISE * noise)
-
-    def _loss(self, j: int) -> str:
-        """What is wrong at a joint."""
-        own, reference = self.errors.joints[0, j], self.without_model.joints[0, j]
-        found = (
-            f"{self.joints[j]}: the simulated position is {percent(own, 3)} off the measured one, "
-            f"the reference {percent(reference, 3)}"
-        )
-        law = self.without_model.joints[3, j]
-        if law <= _LAW_HOLDS:
-            return (
-                f"{found}. The stated control law gives the recorded torque, {percent(law, 1)} "
-                "off: it is the model that does not respond as the robot does."
-            )
-        return (
-            f"{found}. The stated control law does not give the recorded torque ({percent(law, 1)} "
-            "off): another one ran, with other gains or a delay, or torque or reference are "
-            "recorded in other units."
-        )
+        noise = self._of_noise(3)
+        return np.nan_to_num(self.errors.joints[3] / np.where(noise > 0, noise, np.inf))
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON of `simulate --json`; numbers that are not known are null."""

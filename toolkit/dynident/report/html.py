@@ -35,7 +35,12 @@ _TRACE_BYTES = 2_400_000
 _BYTES_PER_POINT = 54
 """Five lines of a torque picture, two single-precision numbers each, in base 64."""
 
-_KINDS = {"follows": "nothing_missing", "no_nearer": "unexplained", "not_simulated": "unknown"}
+_KINDS = {
+    "follows": "nothing_missing",
+    "no_nearer": "unexplained",
+    "other_controller": "unexplained",
+    "not_simulated": "unknown",
+}
 """Class of the page by verdict: its colour."""
 
 
