@@ -214,6 +214,9 @@ def test_a_limit_that_is_reached_is_said() -> None:
     assert "at the limit" in found.error_table().columns
     assert any("elbow: the simulated command is at its limit" in note for note in found.notes)
     assert found.errors.of("position") < 0.03
+    assert not any("the stated limit" in note for note in found.notes)
+    told = validate(estimate(), dataset(), limited)
+    assert any("elbow: the recorded torque reaches" in note for note in told.notes)
 
 
 def test_the_window_and_the_time_constant_are_heeded() -> None:

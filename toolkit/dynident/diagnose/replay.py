@@ -33,6 +33,9 @@ _INTEGRAL = (
     "begins with none, and position and torque differ until it has grown."
 )
 
+_ROUNDING = 1.05
+"""Share of the limit that noise and resolution of a torque may add to it."""
+
 
 @single_threaded
 def validate(
@@ -177,8 +180,25 @@ def simulate_again(
         skipped=(*nothing.skipped, *skipped, *failed),
         settling=max(settling),
         noise_source=_noise_source(runs, usable),
-        remarks=(*remarks, *((_INTEGRAL,) if controller.ki else ())),
+        remarks=(
+            *_beyond_limit(usable, controller),
+            *remarks,
+            *((_INTEGRAL,) if controller.ki else ()),
+        ),
     )
+
+
+def _beyond_limit(recordings: list[Recording], controller: Controller) -> list[str]:
+    """Joints whose recorded torque is larger than the controller's limit, a sentence each."""
+    if controller.limit is None:
+        return []
+    largest = np.max([np.abs(r.tau).max(axis=0) for r in recordings], axis=0)
+    return [
+        f"{joint}: the recorded torque reaches {most:.4g}, and the stated limit is {limit:.4g}: "
+        "the limit, or the unit of the torque, is another."
+        for joint, most, limit in zip(recordings[0].joints, largest, controller.limit, strict=True)
+        if most > _ROUNDING * limit
+    ]
 
 
 def _words(controller: Controller) -> str:
