@@ -19,6 +19,12 @@ Q, Q_REF, V_REF, A_REF = (np.array(x) for x in ([0.1, -0.2], [0.3, 0.1], [1.0, -
 BEFORE = np.array([0.09, -0.21])
 SPEED = (Q - BEFORE) * RATE
 
+PENDULUM = """<robot name="pendulum"><link name="base"/>
+  <link name="rod"><inertial><origin xyz="0 0 -0.5"/><mass value="2"/>
+    <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.01"/></inertial></link>
+  <joint name="pivot" type="revolute"><parent link="base"/><child link="rod"/>
+    <axis xyz="0 1 0"/><limit lower="-3" upper="3" velocity="20" effort="50"/></joint></robot>"""
+
 
 def constant(samples: int, q: Any, v: Any, a: Any = 0.0) -> ReferenceSamples:
     rows = (
@@ -109,6 +115,16 @@ def test_pid_integrates_and_stops_at_the_limit() -> None:
     released = float(drive.command(1000, one)[0])
     assert abs(released) <= 0.5, "the integral has wound up"
     assert not drive.saturated.any()
+
+
+def test_an_integral_may_begin_settled() -> None:
+    gains: dict[str, Any] = {"kp": (1.0,), "ki": (10.0,), "kd": (2.0,)}
+    reference = constant(2, [1.0], [3.0])
+    for feedforward in (False, True):
+        controller = Controller("pid", RATE, **gains, feedforward=feedforward)
+        nominal = Robot.from_text(PENDULUM)
+        drive = Drive(controller, reference, [nominal], None, np.array([7.0]))
+        np.testing.assert_allclose(drive.command(0, reference.q[0]), [7.0], rtol=1e-12)
 
 
 def test_limit_binds_both_ways() -> None:

@@ -233,6 +233,16 @@ def test_a_right_model_makes_the_loop_follow_and_a_wrong_one_less() -> None:
     assert errors["fed wrong"] > 20 * errors["fed"]
 
 
+def test_a_loop_with_an_integral_begins_where_it_would_have_settled() -> None:
+    """An arm under gravity that is to stand still does so from the first sample on."""
+    robot = arm()
+    load = TrueEffect.of("joint_spring", robot, [3.0, 1.0])
+    still = SampledReference(np.array([0.0, 1.0]), np.full((2, 2), [0.3, 0.2]))
+    pid = Controller("pid", 500.0, (400.0, 100.0), (30.0, 6.0), ki=(100.0, 100.0))
+    (run,) = simulate([Task(Mechanism.of(robot, load), still, 0.5)], pid, lead_in=0.0)
+    np.testing.assert_allclose(run.q, run.q_ref, atol=1e-6)
+
+
 # --- iterates of a fit --------------------------------------------------------------------------
 
 
