@@ -10,9 +10,9 @@ from dynident.closed_loop import Controller
 from dynident.diagnose.control_law import law_torque
 from dynident.diagnose.loop_run import QUANTITIES, LoopRun, Signals
 from dynident.errors import RecordingError
-from dynident.fit.sampling import Sampled, sample
+from dynident.fit.sampling import LEAST_ROWS, Sampled, sample
 from dynident.model import Model
-from dynident.recording import Dataset, Noise, Recording, mismatch, periods
+from dynident.recording import Dataset, Noise, Recording, away_from_edges, mismatch, periods
 
 if TYPE_CHECKING:
     from dynident.closed_loop.retrace import Retraced
@@ -42,22 +42,35 @@ def filtered_run(
     simulated = sample(again.recording.replace(window=window), dataset.filter)
     law = law_torque(recording, controller, model.robot)
     reference = sample(recording.replace(q=recording.q_ref, tau=law), dataset.filter)
+    kept = _inside(measured)
     return LoopRun(
         recording.name,
-        measured.t,
-        _signals(measured),
-        _signals(simulated),
-        _signals(reference),
-        _noise(recording, dataset),
+        measured.t[kept],
+        _signals(measured, kept),
+        _signals(simulated, kept),
+        _signals(reference, kept),
+        _noise(recording, dataset, kept),
         np.asarray(again.saturated, dtype=float),
     )
 
 
-def _signals(sampled: Sampled) -> Signals:
-    return Signals(sampled.q, sampled.v, sampled.a, sampled.tau)
+def _inside(sampled: Sampled) -> np.ndarray:
+    """Rows for which the filter saw nothing beyond the record's ends, (T,) bool.
+
+    There it makes up what it does not know from the last sample, noise and all. A record too short
+    for that keeps every row.
+    """
+    inside = away_from_edges(sampled.motion.t, sampled.parallel.transient)
+    first, last = sampled.motion.t[inside][[0, -1]] if inside.any() else (np.inf, -np.inf)
+    kept = (sampled.t >= first) & (sampled.t <= last)
+    return kept if kept.sum() >= LEAST_ROWS else np.ones(len(kept), dtype=bool)
 
 
-def _noise(recording: Recording, dataset: Dataset) -> np.ndarray | None:
+def _signals(sampled: Sampled, kept: np.ndarray) -> Signals:
+    return Signals(sampled.q[kept], sampled.v[kept], sampled.a[kept], sampled.tau[kept])
+
+
+def _noise(recording: Recording, dataset: Dataset, kept: np.ndarray) -> np.ndarray | None:
     """Noise of the measured quantities, rms (4, n): of repeated periods, else as stated.
 
     The noise alone passes the filters, so that nothing of what they do to the motion at the ends
@@ -66,7 +79,7 @@ def _noise(recording: Recording, dataset: Dataset) -> np.ndarray | None:
     alone = _repeated(recording) or _stated(recording, dataset.noise)
     if alone is None:
         return None
-    noise = _signals(sample(alone, dataset.filter))
+    noise = _signals(sample(alone, dataset.filter), kept)
     return np.array([np.sqrt(np.mean(noise.of(one) ** 2, axis=0)) for one in QUANTITIES])
 
 

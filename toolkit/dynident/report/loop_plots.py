@@ -43,7 +43,17 @@ def simulated_loop(
     """
     run = run_of(validation, recording)
     shown = [joint_of(validation, joint) for joint in joints or validation.joints]
-    figure = Picture(figsize=(14.0, 0.9 + 3.5 * len(shown)), layout="constrained")
+    # A fixed grid: laying out the text of a seven-joint arm would take longer than drawing it.
+    width, height = 14.0, 1.2 + 3.6 * len(shown)
+    figure = Picture(figsize=(width, height))
+    figure.subplots_adjust(
+        left=0.85 / width,
+        right=1 - 0.15 / width,
+        bottom=0.5 / height,
+        top=1 - 0.8 / height,
+        wspace=0.38,
+        hspace=0.28,
+    )
     grid = figure.subplots(2 * len(shown), len(QUANTITIES), sharex=True, squeeze=False)
     errors = validation.error_of(run)
     for row, j in enumerate(shown):
@@ -65,11 +75,9 @@ def simulated_loop(
     for axes in (*grid[0], *grid[1]):
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             found.setdefault(label, handle)
-    figure.legend(
-        found.values(), found.keys(), loc="outside upper right", ncols=len(found), frameon=False
-    )
+    figure.legend(found.values(), found.keys(), loc="upper right", ncols=len(found), frameon=False)
     title = f"{plain(run.name)}: {validation.controller}"
-    figure.suptitle(title, fontsize="medium", ha="left", x=0.005)
+    figure.suptitle(title, fontsize="medium", ha="left", x=0.01, y=1 - 0.18 / height)
     return figure
 
 
