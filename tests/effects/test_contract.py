@@ -134,6 +134,30 @@ def test_payload_acts_only_where_it_is_on_board(effect: Effect) -> None:
 
 
 @EVERY
+def test_terms_of_the_simulator_are_the_simulated_force(effect: Effect) -> None:
+    """For values of either sign: an estimate on its way has no bounds."""
+    values = np.random.default_rng(7).normal(size=len(effect.parameters(ROBOT)))
+    terms = effect.simulated_terms(tuple(values), ROBOT)
+    if terms is None:  # it is evaluated in Python
+        return
+    block = block_of(7)
+    laws = {
+        "constant": lambda x, v: np.ones(SAMPLES),
+        "position": lambda x, v: x,
+        "speed": lambda x, v: v,
+        "sign": lambda x, v: block.sign(v),
+        "magnitude": lambda x, v: np.abs(v),
+    }
+    total = np.zeros_like(block.q)
+    for term in terms:
+        of = list(term.of)
+        motion = block.q[:, of].sum(axis=1), block.v[:, of].sum(axis=1)
+        total[:, term.at] += term.coefficient * laws[term.law](*motion)
+    expected = effect.simulated_force(values.tolist(), block)
+    np.testing.assert_allclose(total, expected, rtol=1e-12, atol=1e-13)
+
+
+@EVERY
 def test_units_are_those_of_a_torque(effect: Effect) -> None:
     """A column's unit times its parameter's is N m at a revolute joint and N at a prismatic one."""
     parameters = effect.parameters(ROBOT)
