@@ -12,6 +12,7 @@ import pytest
 from dynident import LeastSquares, diagnose, load
 from dynident import fit as fit_model
 from dynident.fit import Estimate
+from problem_scripts import script
 
 ROOT = Path(__file__).parents[2]
 PROBLEM = ROOT / "problems" / "emps"
@@ -21,6 +22,7 @@ needs_data = pytest.mark.skipif(
     not HERE, reason="the EMPS record is not in DYNIDENT_DATA or ../shared/data"
 )
 PUBLISHED = tomllib.loads((PROBLEM / "published.toml").read_text())
+closed_loop = script("emps", "closed_loop")
 
 
 def reproduced(part: str) -> Estimate:
@@ -105,3 +107,22 @@ def test_missing_data_is_said_with_the_ways_to_get_it(tmp_path, monkeypatch) -> 
     monkeypatch.delenv("DYNIDENT_DATA", raising=False)
     with pytest.raises(FileError, match=r"DYNIDENT_DATA.*nonlinear-benchmarks"):
         load(tmp_path / "study.toml")
+
+
+@needs_data
+def test_the_simulated_loop_is_as_near_to_the_record_as_the_published_one() -> None:
+    found = closed_loop.loop_errors(closed_loop.load())
+    for quantity, published in PUBLISHED["closed_loop"].items():
+        assert found[quantity] <= published, quantity
+
+
+@needs_data
+def test_a_noisier_encoder_takes_the_mass_from_least_squares_and_not_from_instruments() -> None:
+    study, said = closed_loop.load(), PUBLISHED["noise"]
+    true = PUBLISHED["symmetric"]["values"]["m.carriage"]
+    # Two of the record's four repetitions.
+    noisy = closed_loop.noisier(study, duration=12.48)
+    mass = fit_model(study.model, noisy, LeastSquares("none")).value("m.carriage")
+    assert 1.0 - mass / true == pytest.approx(said["least_squares_loss"], abs=0.05)
+    found = fit_model(study.model, noisy, closed_loop.instruments(study))
+    assert found.value("m.carriage") == pytest.approx(true, rel=said["instruments_tolerance"])
