@@ -15,16 +15,12 @@ SCRIPTS = (
     "least_squares_memory.py",
     "constrained_fit.py",
     "chain_length.py",
+    "closed_loop.py",
 )
 
 
 def main() -> None:
-    for script in (
-        "hidden_effects.py",
-        "least_squares_memory.py",
-        "constrained_fit.py",
-        "chain_length.py",
-    ):
+    for script in SCRIPTS:
         print(f"--- {script}", flush=True)
         subprocess.run([sys.executable, str(HERE / script)], check=True)
 
