@@ -19,7 +19,7 @@ import numpy as np
 
 import dynident as di
 from dynident.fit.instrumental import SimulatedLoop
-from dynident.tables import Table, number, print_tables
+from dynident.tables import Table, number, percent, print_tables
 
 HERE = Path(__file__).parent
 PAPER = tomllib.loads((HERE / "published.toml").read_text())
@@ -175,6 +175,23 @@ def table_of(table: str, found: di.Estimate) -> Table:
     return Table(title, columns, tuple(rows), notes)
 
 
+def loop_errors(found: di.Estimate) -> dict[str, float]:
+    """Relative errors of the simulated motion against the measured one, filtered alike."""
+    study = di.load(HERE / "study.toml")
+    assert study.controller is not None
+    overall = di.validate(found, study.train, study.controller).errors.overall
+    return dict(zip(("position", "velocity", "acceleration"), overall, strict=False))
+
+
+def loop_table(found: di.Estimate) -> Table:
+    """The simulated motion of an estimate beside the paper's."""
+    rows = tuple(
+        (name, percent(PAPER["limits"][f"loop_error_{name}"], 1), percent(float(error), 2))
+        for name, error in loop_errors(found).items()
+    )
+    return Table("Simulated against measured motion", ("", "paper", "ours"), rows)
+
+
 def choice_of_truth() -> Table:
     """What the paper's tables leave to a robot that agrees with all of them."""
     rows = []
@@ -195,7 +212,10 @@ def main() -> None:
     unknown = [name for name in asked if name not in PAPER["tables"]]
     if unknown:
         parser.error(f"no table {unknown[0]}: choose of {', '.join(PAPER['tables'])}")
-    print_tables(choice_of_truth(), *(table_of(name, estimate(name)) for name in asked))
+    estimates = {name: estimate(name) for name in asked}
+    print_tables(choice_of_truth(), *(table_of(*each) for each in estimates.items()))
+    if "3" in estimates:
+        print_tables(loop_table(estimates["3"]))
 
 
 if __name__ == "__main__":

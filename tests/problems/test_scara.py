@@ -90,6 +90,12 @@ def test_the_bias_of_dry_friction_is_said_with_its_size() -> None:
     assert entries("6")["Fc1"].ours > true["Fc1"]
 
 
+def test_the_simulated_motion_is_as_near_to_the_measured_one_as_the_papers() -> None:
+    limits = tables.PAPER["limits"]
+    for name, error in tables.loop_errors(estimate("3")).items():
+        assert error <= limits[f"loop_error_{name}"], name
+
+
 @pytest.mark.slow
 def test_half_the_bandwidth_is_enough() -> None:
     found, full = estimate("7"), estimate("3")
