@@ -54,7 +54,7 @@ def test_messages_and_resampled_recordings_name_the_record(tmp_path):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ({"columns": np.array(NAMES)}, "no record 'run0'. did you mean 'run1'"),
+        ({"columns": np.array(NAMES)}, r"no record 'run0'. did you mean 'run1'"),
         ({}, "no array 'columns' names its columns"),
         ({"columns": np.arange(5.0), "run0": 0}, "does not hold names"),
         ({"columns": np.array(["t", "t", "q.a"]), "run0": 0}, "the name 't' twice"),
@@ -97,5 +97,5 @@ def test_a_study_names_records(tmp_path):
         np.testing.assert_array_equal(one.recordings[0].q, other.recordings[0].q)
         np.testing.assert_array_equal(one.recordings[0].tau, other.recordings[0].tau)
     (tmp_path / "study.toml").write_text(text.replace('record = "train"', 'record = "trian"'))
-    with pytest.raises(RecordingError, match="no record 'trian'. did you mean 'train'"):
+    with pytest.raises(RecordingError, match=r"no record 'trian'. did you mean 'train'"):
         load(tmp_path / "study.toml")
