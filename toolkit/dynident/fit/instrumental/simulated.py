@@ -24,7 +24,8 @@ from dynident.recording import Dataset, Recording, within
 from dynident.robot import Robot
 
 _SETTLED = 5.0
-"""Transient in units of 1/w_n: what of it is left is below 1 % of where it began."""
+"""Transient in units of 1/w_n, as in the paper: of an offset at the start, (1 + 5) exp(-5) = 4 % is
+left at critical damping."""
 _DOUBT = 1.0
 """Distance of the simulated from the measured motion over that of the reference from it."""
 
