@@ -171,8 +171,8 @@ class ClosedLoop:
         measurement = Measurement(noise, np.tile(resolution, len(tasks)))
         motion = stepper.run(time, reference, drive, measurement, tell)
         return [
-            _rollout(motion, reference, slice(before, before + length), k, n, rate, resolution)
-            for k, length in enumerate(kept)
+            _rollout(motion, reference, slice(before, before + length), k, task, rate, resolution)
+            for k, (task, length) in enumerate(zip(tasks, kept, strict=True))
         ]
 
     def _plant(self, tasks: Sequence[Task]) -> Plant:
@@ -195,26 +195,29 @@ class ClosedLoop:
 
 
 def _rollout(
-    motion: Motion, reference, rows: slice, k: int, n: int, rate: float, resolution: np.ndarray
+    motion: Motion, reference, rows: slice, k: int, task: Task, rate: float, resolution: np.ndarray
 ) -> Rollout:
+    n = task.mechanism.robot.n
     columns = slice(k * n, k * n + n)
     own = (rows, columns)
     first = rows.start
-    acting = motion.acting[max(first - 1, 0) : rows.stop, columns]
+    mean = motion.mean[max(first - 1, 0) : rows.stop, columns]
     if not first:
-        acting = np.vstack([acting[:1], acting])
+        mean = np.vstack([mean[:1], mean])
     return Rollout(
         t=np.arange(rows.stop - first) / rate,
         q=motion.q[own],
         v=motion.v[own],
-        a=motion.a[own],
         q_measured=rounded(motion.measured[own], resolution),
         q_ref=reference.q[own],
         v_ref=reference.v[own],
         u=motion.u[own],
         u_before=motion.u[max(first - 1, 0), columns],
-        torque=(acting[:-1] + acting[1:]) / 2,
+        torque=(mean[:-1] + mean[1:]) / 2,
+        acting=motion.acting[own],
         saturated=motion.saturated[own].mean(axis=0),
+        start=task.start,
+        mechanism=task.mechanism,
     )
 
 

@@ -224,6 +224,17 @@ class Mechanism:
         rigid = self.robot.inverse_dynamics(q, v, a)
         return self.gain * (rigid + a @ self.inertia.T + self.force(t, q, v))
 
+    def acceleration(
+        self, t: np.ndarray, q: np.ndarray, v: np.ndarray, u: np.ndarray
+    ) -> np.ndarray:
+        """Return the acceleration that a recorded torque gives, (T, n); inverse of `command`."""
+        still, unit = np.zeros_like(q), np.eye(self.robot.n)
+        weight = self.robot.inverse_dynamics(q, still, still)
+        mass = [self.robot.inverse_dynamics(q, still, still + e) - weight for e in unit]
+        inertia = np.stack(mass, axis=2) + self.inertia
+        load = u / self.gain - self.robot.inverse_dynamics(q, v, still) - self.force(t, q, v)
+        return np.linalg.solve(inertia, load[:, :, None])[:, :, 0]
+
 
 def _ordered(effect: Effect, robot: Robot, values) -> tuple[float, ...]:
     parameters = effect.parameters(robot)

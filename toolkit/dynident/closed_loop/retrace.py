@@ -107,24 +107,23 @@ def _resampled(recording: Recording, rollout: Rollout, rate: float) -> Recording
     nearest = np.rint(x)
     # Where the clocks agree there is nothing to interpolate.
     x = np.where(np.abs(x - nearest) < _ROUNDING, nearest, x)
+    changes = {}
+    derivatives = [name for name in ("v", "a") if getattr(recording, name) is not None]
     if np.array_equal(x, nearest):
         rows = x.astype(int)
-        q, v, a, held, torque = (
-            y[rows] for y in (rollout.q, rollout.v, rollout.a, rollout.u, rollout.torque)
-        )
+        q, held, torque = rollout.q[rows], rollout.u[rows], rollout.torque[rows]
+        changes = {name: getattr(rollout, name)[rows] for name in derivatives}
     else:
         q = CubicHermiteSpline(rollout.t, rollout.q, rollout.v)(x / rate)
         k = np.minimum(np.floor(x).astype(int), len(rollout.t) - 2)
         share = (x - k)[:, None]
-        # The acceleration jumps at samples: only the one just after belongs to the interval.
-        bend = rollout.v[k + 1] - rollout.v[k] - rollout.a[k] / rate
-        v = rollout.v[k] + rollout.a[k] * share / rate + bend * share**2
-        a = rollout.a[k] + 2.0 * bend * share * rate
+        if derivatives:
+            # The acceleration jumps at samples: only the one just after belongs to the interval.
+            bend = rollout.v[k + 1] - rollout.v[k] - rollout.a[k] / rate
+            v = rollout.v[k] + rollout.a[k] * share / rate + bend * share**2
+            both = {"v": v, "a": rollout.a[k] + 2.0 * bend * share * rate}
+            changes = {name: both[name] for name in derivatives}
         torque = (1.0 - share) * rollout.torque[k] + share * rollout.torque[k + 1]
         held = rollout.u[k]
-    changes = {"q": q, "tau": held if recording.torque == "held_command" else torque}
-    if recording.v is not None:
-        changes["v"] = v
-    if recording.a is not None:
-        changes["a"] = a
-    return recording.replace(**changes)
+    tau = held if recording.torque == "held_command" else torque
+    return recording.replace(q=q, tau=tau, **changes)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -46,25 +47,37 @@ class Rollout:
     Attributes
     ----------
     t : (T,) s, from the first sample.
-    q, v, a : (T, n) true position, rad or m, and its derivatives. The acceleration jumps where a
-        command begins to act; at a sample it is the one just after.
+    q, v : (T, n) true position and velocity, rad or m.
     q_measured : (T, n) position as the encoder gives it.
     q_ref, v_ref : (T, n) reference.
     u : (T, n) command; N m or N. It acts, after the controller's delay, until the next one does.
     u_before : (n,) command of the sample before the first.
     torque : (T, n) command that acted, in the mean over the sample before and the one after, as a
         sensor of limited bandwidth has it.
+    acting : (T, n) command that acts just after each sample.
     saturated : (n,) share of the commands that are at the controller's limit.
+    start : s, when the first sample is taken in the session.
+    mechanism : what moved.
     """
 
     t: np.ndarray
     q: np.ndarray
     v: np.ndarray
-    a: np.ndarray
     q_measured: np.ndarray
     q_ref: np.ndarray
     v_ref: np.ndarray
     u: np.ndarray
     u_before: np.ndarray
     torque: np.ndarray
+    acting: np.ndarray
     saturated: np.ndarray
+    start: float
+    mechanism: Mechanism
+
+    @cached_property
+    def a(self) -> np.ndarray:
+        """True acceleration, (T, n) rad/s^2 or m/s^2; it jumps where a command begins to act.
+
+        At a sample it is the one just after.
+        """
+        return self.mechanism.acceleration(self.t + self.start, self.q, self.v, self.acting)

@@ -43,19 +43,19 @@ class Motion:
 
     Attributes
     ----------
-    q, v, a : true motion.
+    q, v : true motion.
     measured : position as the controller gets it.
     u : command as the controller gives it.
-    acting : command in the mean from a sample to the next.
+    acting, mean : command that acts just after a sample, and in the mean until the next one.
     saturated : whether the command is at its limit.
     """
 
     q: np.ndarray
     v: np.ndarray
-    a: np.ndarray
     measured: np.ndarray
     u: np.ndarray
     acting: np.ndarray
+    mean: np.ndarray
     saturated: np.ndarray
 
 
@@ -123,8 +123,8 @@ class Stepper:
         simulator, state, held = self._start(time[0], reference)
         # The object behind the input stays; asking for it is what tells Drake that it changes.
         data, torque = held.GetMutableData, held.GetMutableData().get_mutable_value()
-        diagram, context, advance = plant.diagram, plant.context, simulator.AdvanceTo
-        states, rates = np.empty((total, 2 * size)), np.empty((total, 2 * size))
+        advance = simulator.AdvanceTo
+        states = np.empty((total, 2 * size))
         measured, commands = np.empty((total, size)), np.empty((total, size))
         saturated = np.zeros((total, size), dtype=bool)
         late, rest = self._late, self._rest
@@ -149,12 +149,9 @@ class Stepper:
                 if rest and k:
                     data()
                     torque.SetFromVector(commands[max(k - late - 1, 0)][order] * effect)
-                    rates[k] = diagram.EvalTimeDerivatives(context).CopyToVector()
                     advance(time[k] + rest / rate)
                 data()
                 torque.SetFromVector(u[order] * effect)
-                if not (rest and k):
-                    rates[k] = diagram.EvalTimeDerivatives(context).CopyToVector()
                 advance(time[k + 1])
             except (RuntimeError, np.linalg.LinAlgError) as error:
                 raise self._diverged(time[k], state.CopyToVector(), error) from None
@@ -165,10 +162,9 @@ class Stepper:
         return Motion(
             states[:, place],
             states[:, size + place],
-            rates[:, size + place],
             measured,
             commands,
-            self._acting(commands),
+            *self._arrived(commands),
             saturated,
         )
 
@@ -188,10 +184,11 @@ class Stepper:
         simulator.Initialize()
         return simulator, context.get_continuous_state_vector(), held
 
-    def _acting(self, commands: np.ndarray) -> np.ndarray:
+    def _arrived(self, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return `Motion.acting` and `Motion.mean` of the commands."""
         rows = np.arange(len(commands)) - self._late
         now, before = commands[np.maximum(rows, 0)], commands[np.maximum(rows - 1, 0)]
-        return (1.0 - self._rest) * now + self._rest * before
+        return before if self._rest else now, (1.0 - self._rest) * now + self._rest * before
 
     # --- what goes wrong -----------------------------------------------------------------------
 
