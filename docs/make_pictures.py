@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -27,6 +29,53 @@ def main() -> None:
     waterfall(right, diagnosis)
     figure.savefig(HERE / "hidden_effect.png", dpi=150, facecolor="white")
     impossible_links()
+    noisy_positions()
+
+
+def noisy_positions() -> None:
+    """Least squares and instruments on one recording, while its filter is opened."""
+    study = di.load(HERE.parent / "problems" / "scara" / "study.toml")
+    assert study.controller is not None
+    raw = replace(study.train, filter=di.Filter())
+    loop = di.IV(study.controller)
+    found = di.fit(study.model, raw, method=loop)
+    figure = Figure(figsize=(10.0, 3.6), layout=ConstrainedLayoutEngine(wspace=0.06))
+    left, right = figure.subplots(1, 2, width_ratios=[1.25, 1.0])
+    (run,) = di.validate(found, raw, study.controller).runs
+    rows = (run.t >= 20.0) & (run.t <= 26.0)
+    measured, simulated = run.measured.acceleration, run.simulated.acceleration
+    left.plot(run.t[rows] - 20.0, measured[rows, 0], ".", color=GREY, ms=2, label="measured")
+    name = "simulated in the same loop"
+    left.plot(run.t[rows] - 20.0, simulated[rows, 0], color=AFTER_COLOUR, lw=2, label=name)
+    left.set_xlabel("time (s)")
+    left.set_ylabel("acceleration of the shoulder (rad/s²)")
+    left.set_ylim(-4.5, 5.5)
+    left.set_title("Positions, differentiated twice", loc="left", weight="bold")
+    left.legend(loc="upper right", ncols=2, frameon=False)
+    openings = {c: di.Filter(position_cutoff_hz=c) for c in (20.0, 30.0, 40.0, 60.0, 80.0)}
+    names, truth = ("Izz.arm", "mx.forearm"), study.model.given_values()
+    methods = (
+        ("least squares", di.LeastSquares(), BEFORE_COLOUR, "o"),
+        ("instruments", loop, AFTER_COLOUR, "D"),
+    )
+    for title, method, colour, marker in methods:
+        fits = [di.fit(study.model, replace(raw, filter=f), method) for f in openings.values()]
+        for name, line in zip(names, ("-", "--"), strict=True):
+            i = study.model.names.index(name)
+            shares = [100 * fit.values[i] / truth[i] for fit in fits]
+            label = f"{title}: {name}"
+            style = {"color": colour, "ls": line, "marker": marker, "ms": 4}
+            right.plot(list(openings), shares, label=label, **style)
+    right.axhline(100.0, color=GREY, lw=0.8)
+    right.set_ylim(0.0, 145.0)
+    right.set_yticks(np.arange(0, 101, 25))
+    right.set_xlabel("cut-off of the positions' filter (Hz)")
+    right.set_ylabel("estimate over truth (%)")
+    right.set_title("What is estimated", loc="left", weight="bold")
+    right.legend(loc="upper right", ncols=2, frameon=False, fontsize="small")
+    for axes in (left, right):
+        axes.spines[["top", "right"]].set_visible(False)
+    figure.savefig(HERE / "noisy_positions.png", dpi=150, facecolor="white")
 
 
 def impossible_links() -> None:
