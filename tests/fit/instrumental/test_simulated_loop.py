@@ -172,3 +172,16 @@ def test_history_prints_saves_and_is_left_out_when_read_back(noisy, tmp_path):
     back = di.load_estimate(found.save(tmp_path / "estimate.json"))
     np.testing.assert_array_equal(back.values, found.values)
     assert back.history is None and back.status == found.status
+
+
+def test_a_start_that_noise_has_emptied_gives_way_to_the_regular_one():
+    """Noise of 3e-3 rad leaves least squares next to no inertia: not worth simulating."""
+    quiet = loops.dataset(loops.experiment(1, 0.0))
+    (one,) = quiet.recordings
+    noise = 3e-3 * np.random.default_rng(0).standard_normal(one.q.shape)
+    noisy = replace(quiet, recordings=(one.replace(q=one.q + noise),))
+    model = loops.model(coulomb=False)
+    found = di.fit(model, noisy, IV(loops.LOOP))
+    assert found.history is not None and found.history.start_name.startswith("regular")
+    true = loops.inertial(loops.truth(model), model)
+    assert np.linalg.norm(loops.inertial(found.values, model) - true) < 0.2 * np.linalg.norm(true)

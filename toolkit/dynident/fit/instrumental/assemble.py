@@ -30,9 +30,9 @@ _WEAK = 0.02
 
 
 def assemble(
-    method: IV, model: Model, source: Source, iterations: Iterations, start: np.ndarray
+    method: IV, model: Model, source: Source, iterations: Iterations, start_name: str
 ) -> Estimate:
-    """Return the estimate of finished iterations."""
+    """Return the estimate of finished iterations; `start_name` is in words."""
     found, solution, values = iterations.found, iterations.solution, iterations.values
     noise, bias = _noise(model, source, iterations)
     covariance = carried_covariance(model, values, iterations.instruments, solution, noise)
@@ -41,12 +41,11 @@ def assemble(
     variance = float(np.sum((norms * solution.weights) ** 2)) / freedom
     textbook = textbook_covariance(model, solution, variance)
     torques = found.factors.torque_norms
-    start_name = "an earlier estimate" if isinstance(method.start, Estimate) else method.start
     history = Convergence(
         names=model.names,
         units=model.units,
-        start=start,
-        start_name=start_name.replace("_", " "),
+        start=iterations.start,
+        start_name=start_name,
         rounds=tuple(iterations.rounds),
         ending=iterations.ending,
         message=iterations.message,

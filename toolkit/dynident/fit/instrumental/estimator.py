@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -97,9 +97,18 @@ class IV:
         start = start_values(self.start, model, first)
         guess = Guess(start, (model.given_values(), first.values), self.tell)
         source = self.chosen.prepare(model, dataset, guess)
+        name = "an earlier estimate" if isinstance(self.start, Estimate) else self.start
+        if self.start == "least_squares" and _hopeless(source, start):
+            start = start_values("regular", model, first)
+            name = "regular (least squares has lost the inertias in noise)"
+            source = self.chosen.prepare(model, dataset, replace(guess, start=start))
         iterations = Iterations(self, model, source, start)
         iterations.run()
-        return assemble(self, model, source, iterations, start)
+        return assemble(self, model, source, iterations, name.replace("_", " "))
+
+
+def _hopeless(source: Source, start: np.ndarray) -> bool:
+    return isinstance(source, LoopSource) and source.next_to_massless(start)
 
 
 class Iterations:
@@ -107,6 +116,7 @@ class Iterations:
 
     Attributes
     ----------
+    start : (p,) where they began.
     values : (p,) the present estimate.
     rounds : one for each iteration done.
     ending, message : how they ended.
@@ -117,6 +127,7 @@ class Iterations:
     def __init__(self, method: IV, model: Model, source: Source, start: np.ndarray) -> None:
         self._method, self._model, self._source = method, model, source
         self._good: np.ndarray | None = None
+        self.start = start
         self._root: np.ndarray | None = None
         self.values = start
         self.rounds: list[Round] = []

@@ -26,6 +26,8 @@ from dynident.robot import Robot
 _SETTLED = 5.0
 """Transient in units of 1/w_n, as in the paper: of an offset at the start, (1 + 5) exp(-5) = 4 % is
 left at critical damping."""
+_MASSLESS = 0.02
+"""Share of the believed inertia below which a start is not worth a simulation."""
 _DOUBT = 1.0
 """Distance of the simulated from the measured motion over that of the reference from it."""
 
@@ -139,6 +141,14 @@ class LoopSource:
                 "samples: there the loop does not have these natural frequencies."
             )
         return (*found, *self._loop.notes)
+
+    def next_to_massless(self, values: np.ndarray) -> bool:
+        """Whether a joint's inertia is far below what is believed of it.
+
+        Noise that least squares cannot cope with makes that of it: such a robot under real
+        friction takes steps of microseconds to simulate.
+        """
+        return bool(np.any(self._matrices.joint_inertias(values) < _MASSLESS * self._believed))
 
     def at(self, values: np.ndarray) -> Dataset:
         """Simulate an estimate; see `Source.at`."""
