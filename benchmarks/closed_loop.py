@@ -39,7 +39,7 @@ from pydrake.systems.framework import BasicVector, DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import Adder, LogVectorOutput
 
 import dynident as di
-from dynident.closed_loop import ClosedLoop, Mechanism, Task
+from dynident.closed_loop import ClosedLoop, Task
 from dynident.closed_loop.plant import Plant
 from dynident.threads import single_threaded
 
@@ -98,8 +98,7 @@ def loop() -> Loop:
     return Loop(task, experiment.controller, urdf, q, v, *found.values(), width=width)
 
 
-Result = tuple[np.ndarray, np.ndarray]
-"""Positions and commands at the controller's samples, (T, n)."""
+Result = tuple[np.ndarray, np.ndarray]  # positions and commands at the samples, (T, n)
 
 
 def ours(one: Loop, accuracy: float) -> Callable[[], Result]:
@@ -112,16 +111,12 @@ def ours(one: Loop, accuracy: float) -> Callable[[], Result]:
     return run
 
 
-# --- by hand, in Drake ---------------------------------------------------------------------------
-
-
 class HandController(LeafSystem):
     """A PD law with a held command and a backward difference."""
 
     def __init__(self, one: Loop) -> None:
         super().__init__()
-        self.loop: Loop = one
-        n = one.q_ref.shape[1]
+        self.loop, n = one, one.q_ref.shape[1]
         self.DeclareVectorInputPort("state", 2 * n)
         declare: Any = self.DeclareDiscreteState
         command = declare(np.zeros(n))
@@ -143,8 +138,7 @@ class HandFriction(LeafSystem):
 
     def __init__(self, one: Loop) -> None:
         super().__init__()
-        self.loop: Loop = one
-        self.n = one.q_ref.shape[1]
+        self.loop, self.n = one, one.q_ref.shape[1]
         self.DeclareVectorInputPort("state", 2 * self.n)
         self.DeclareVectorOutputPort("torque", BasicVector(self.n), self.torque)
 
@@ -197,9 +191,6 @@ def drake_by_hand(one: Loop, accuracy: float) -> Callable[[], Result]:
         )
 
     return run
-
-
-# --- by hand, with Pinocchio ---------------------------------------------------------------------
 
 
 def pinocchio_by_hand(one: Loop, steps: int) -> Callable[[], Result]:
@@ -273,9 +264,9 @@ def reparametrised(one: Loop, repeats: int) -> None:
     mechanism = one.task.mechanism
     build, plant = timed(lambda: Plant([mechanism]), repeats)
     heavier = replace(mechanism, robot=mechanism.robot.with_theta(1.1 * mechanism.robot.theta))
-    others: list[Mechanism] = [heavier, mechanism]
+    others = (heavier, mechanism)
     give, _ = timed(lambda: [plant.set([other], [0.0]) for other in others], repeats)
-    print(f"other parameters: {give / len(others):.2f} ms; another diagram: {build:.1f} ms")
+    print(f"other parameters: {give / 2:.2f} ms; another diagram: {build:.1f} ms")
 
 
 def scara(repeats: int) -> None:
