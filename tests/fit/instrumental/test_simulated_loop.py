@@ -9,6 +9,7 @@ import pytest
 
 import dynident as di
 import loops
+from dynident.closed_loop import Controller
 from dynident.errors import DynidentError, FitError, SimulationError
 from dynident.fit import IV, LeastSquares, SimulatedLoop
 from dynident.fit.history import Ending
@@ -158,6 +159,12 @@ def test_a_controller_for_another_robot_is_refused(noisy):
         di.fit(loops.model(coulomb=False), noisy, IV(other))
 
 
+def test_a_joint_without_position_gain_is_named(noisy):
+    loose = replace(loops.LOOP, kp=(loops.LOOP.kp[0], 0.0))
+    with pytest.raises(SimulationError, match="kp = 0 at joint 'elbow'"):
+        di.fit(loops.model(coulomb=False), noisy, IV(loose))
+
+
 def test_lost_rank_is_refused_by_name(noisy):
     """An elbow that never moved, with instruments that do: no direction is made up."""
     (recording,) = noisy.recordings
@@ -185,3 +192,26 @@ def test_a_start_that_noise_has_emptied_gives_way_to_the_regular_one():
     assert found.history is not None and found.history.start_name.startswith("regular")
     true = loops.inertial(loops.truth(model), model)
     assert np.linalg.norm(loops.inertial(found.values, model) - true) < 0.2 * np.linalg.norm(true)
+
+
+@pytest.mark.parametrize("kind", ["cascade", "computed_torque", "drive"])
+def test_every_controller_keeps_its_poles(kind):
+    """The same poles stated in other ways: the regular start's gains follow in each."""
+    w = 2 * np.pi * np.array(loops.FREQUENCY_HZ)
+    inertia = np.array([1.36, 0.0621])
+    if kind == "cascade":
+        kp, kv = tuple(w / 2), tuple(2 * inertia * w)
+        controller = Controller("cascade", loops.RATE, kp=kp, kv=kv)
+    elif kind == "computed_torque":
+        controller = Controller(kind, loops.RATE, tuple(w**2), tuple(2 * w))
+    else:
+        kp, kd = (tuple(np.array(k) / 5) for k in (loops.LOOP.kp, loops.LOOP.kd))
+        controller = replace(loops.LOOP, kp=kp, kd=kd, drive_gain=(5.0, 5.0))
+    noisy = loops.dataset(loops.experiment(2, 3e-5, controller=controller))
+    model = loops.model(coulomb=False)
+    true = loops.inertial(loops.truth(model), model)
+    for instruments in (SimulatedLoop(controller), SimulatedLoop(controller, loops.FREQUENCY_HZ)):
+        found = di.fit(model, noisy, IV(instruments, start="regular"))
+        assert found.history is not None and found.history.ending is Ending.CONVERGED
+        error = np.linalg.norm(loops.inertial(found.values, model) - true)
+        assert error < 0.005 * np.linalg.norm(true)

@@ -70,14 +70,13 @@ class InertiaMatrices:
             )
 
 
-def stiffness(controller: Controller) -> np.ndarray:
-    """Feedback torque per position error, (n,) N m/rad or N/m; of a computed torque 1/s^2."""
-    kp = np.array(controller.kp)
-    return kp * np.array(controller.kv) if controller.kind == "cascade" else kp
+def stiffness(controller: Controller, nominal_inertias: np.ndarray) -> np.ndarray:
+    """Feedback torque per position error, (n,) N m/rad or N/m.
 
-
-def natural_frequencies(controller: Controller, inertias: np.ndarray) -> np.ndarray:
-    """w_n of each joint's double integrator under its feedback, (n,) rad/s (equation 44)."""
-    if controller.kind == "computed_torque":
-        return np.sqrt(stiffness(controller))
-    return np.sqrt(stiffness(controller) / inertias)
+    Parameters
+    ----------
+    controller : Controller
+    nominal_inertias : (n,) of the joints, for a law whose feedback is an acceleration.
+    """
+    position = controller.feedback().position
+    return position * nominal_inertias if controller.law.through_model else position

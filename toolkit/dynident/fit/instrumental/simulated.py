@@ -13,7 +13,6 @@ from dynident.errors import FitError, SimulationError
 from dynident.fit.instrumental import lift
 from dynident.fit.instrumental.gains import (
     InertiaMatrices,
-    natural_frequencies,
     poses_of,
     stiffness,
 )
@@ -108,7 +107,13 @@ class LoopSource:
         self._matrices = InertiaMatrices(model, poses_of(references))
         self._start = guess.start
         self._believed = self._believed_inertias(guess)
-        frequencies = natural_frequencies(controller, self._believed)
+        self._stiffness = stiffness(controller, self._believed)
+        for joint, k in zip(model.robot.names, self._stiffness, strict=True):
+            if not k > 0:
+                mend = "nothing holds it at its reference: choose other instruments"
+                raise SimulationError(f"kp = 0 at joint '{joint}'", "controller", mend)
+        # Of a double integrator under this feedback (equation 44).
+        frequencies = np.sqrt(self._stiffness / self._believed)
         if settings.natural_frequency_hz is not None:
             given = 2 * np.pi * np.asarray(settings.natural_frequency_hz, dtype=float)
             frequencies = np.broadcast_to(given, (n,)).copy()
@@ -228,9 +233,7 @@ class LoopSource:
     def _feedback_scale(self, values: np.ndarray) -> np.ndarray:
         inertias = self._matrices.joint_inertias(values)
         if self._settings.natural_frequency_hz is not None:
-            if self._settings.controller.kind == "computed_torque":
-                return self._frequencies**2 / stiffness(self._settings.controller)
-            return inertias * self._frequencies**2 / stiffness(self._settings.controller)
+            return inertias * self._frequencies**2 / self._stiffness
         if np.array_equal(values, self._start):
             return inertias / self._believed
         return np.ones(len(inertias))
