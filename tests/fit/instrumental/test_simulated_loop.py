@@ -215,3 +215,15 @@ def test_every_controller_keeps_its_poles(kind):
         assert found.history is not None and found.history.ending is Ending.CONVERGED
         error = np.linalg.norm(loops.inertial(found.values, model) - true)
         assert error < 0.005 * np.linalg.norm(true)
+
+
+@pytest.mark.parametrize("settings", [Filter(), FILTERED], ids=["unfiltered", "filtered"])
+def test_the_bias_of_sampling_is_foreseen(settings):
+    """Without noise the whole error is that of differences and held torques: known to 5 %."""
+    dataset = loops.dataset(loops.experiment(0, 0.0, coulomb=True, seconds=20.0), settings)
+    model = loops.model(coulomb=True)
+    found = di.fit(model, dataset, IV(loops.LOOP))
+    assert found.history is not None
+    error, foreseen = found.values - loops.truth(model), found.history.sampling_bias
+    assert np.linalg.norm(error - foreseen) < 0.05 * np.linalg.norm(error)
+    assert any("Sampling" in note for note in found.notes)

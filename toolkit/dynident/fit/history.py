@@ -59,6 +59,8 @@ class Convergence:
     expected_bias : (p,) what the encoders' noise does to the estimate in the mean, since no
         instrument mends columns that bend within the noise (dry friction); NaN where it is not
         told from zero.
+    sampling_bias : (p,) what central differences and held torques do to it, without any noise; NaN
+        where the instruments are not simulated.
     position_std : (n,) encoder noise behind `sigma`, rad or m.
     torque_std : (n,) white torque noise behind it, N m or N.
     noise_source : "given" or "measured".
@@ -74,6 +76,7 @@ class Convergence:
     sigma: np.ndarray
     textbook_sigma: np.ndarray
     expected_bias: np.ndarray
+    sampling_bias: np.ndarray
     position_std: np.ndarray
     torque_std: np.ndarray
     noise_source: str
@@ -131,7 +134,7 @@ class Convergence:
 
     def sigma_table(self) -> Table:
         """Standard deviations, carried and textbook."""
-        columns = (self.sigma, self.textbook_sigma, self.expected_bias)
+        columns = (self.sigma, self.textbook_sigma, self.expected_bias, self.sampling_bias)
         rows = tuple(
             (name, *(number(float(x[i]), 3) for x in columns), self.units[i])
             for i, name in enumerate(self.names)
@@ -139,10 +142,11 @@ class Convergence:
         stds = ", ".join(number(float(x), 3) for x in self.position_std)
         torque = ", ".join(number(float(x), 3) for x in self.torque_std)
         notes = (
-            f"carried: encoder noise ({stds}) and torque noise ({torque}), {self.noise_source}, "
-            "through derivatives and filters. textbook: errors of the rows as if independent.",
+            f"sigma: encoder noise ({stds}) and torque noise ({torque}), {self.noise_source}, "
+            "through derivatives and filters. textbook: errors of the rows as if independent. "
+            "bias: expected, and not subtracted.",
         )
-        heads = ("parameter", "sigma, carried", "sigma, textbook", "bias expected", "unit")
+        heads = ("parameter", "sigma", "textbook sigma", "bias, noise", "bias, sampling", "unit")
         return Table("Standard deviations", heads, rows, notes)
 
     def to_dict(self) -> dict[str, Any]:
@@ -164,6 +168,7 @@ class Convergence:
             "sigma": _listed(self.sigma),
             "textbook_sigma": _listed(self.textbook_sigma),
             "expected_bias": _listed(self.expected_bias),
+            "sampling_bias": _listed(self.sampling_bias),
             "noise": {
                 "source": self.noise_source,
                 "position_std": _listed(self.position_std),

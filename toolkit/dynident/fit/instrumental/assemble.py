@@ -52,6 +52,7 @@ def assemble(
         sigma=np.sqrt(np.diag(covariance)),
         textbook_sigma=np.sqrt(np.diag(textbook)),
         expected_bias=np.where(_sure(bias), bias.values, np.nan),
+        sampling_bias=bias.sampling,
         position_std=noise.position_std,
         torque_std=noise.torque_std,
         noise_source=noise.source,
@@ -79,7 +80,12 @@ def _noise(model: Model, source: Source, iterations: Iterations) -> tuple[NoiseL
     position = given.position_std if given else position_noise(source, iterations.instruments)
     position = np.asarray(position, dtype=float)
     bias = expected_bias(
-        model, iterations.values, iterations.instruments, iterations.solution, position
+        model,
+        iterations.values,
+        iterations.instruments,
+        iterations.solution,
+        position,
+        iterations.simulated,
     )
     if given:
         torque = np.asarray(given.torque_std, dtype=float)
@@ -120,6 +126,15 @@ def _notes(model: Model, solution, history: Convergence, bias: ExpectedBias) -> 
         notes.append(
             "Expected bias, from adding encoder noise of this size to the instruments' own "
             f"motion (not subtracted): {listed}."
+        )
+    clock = np.flatnonzero(np.abs(bias.sampling) > history.sigma)
+    if clock.size:
+        listed = ", ".join(
+            f"{model.names[i]} {number(float(bias.sampling[i]), 2)} {model.units[i]}" for i in clock
+        )
+        notes.append(
+            "Sampling (central differences, held torques, filters) shifts some parameters by more "
+            f"than their noise, which the intervals do not hold (not subtracted): {listed}."
         )
     return tuple(notes)
 

@@ -122,12 +122,15 @@ class Iterations:
     ending, message : how they ended.
     found, solution : of the last round.
     instruments : recordings behind the last round.
+    simulated : (p,) values whose simulation these are; None where they are none, or that of the
+        nearest possible robot.
     """
 
     def __init__(self, method: IV, model: Model, source: Source, start: np.ndarray) -> None:
         self._method, self._model, self._source = method, model, source
         self._good: np.ndarray | None = None
         self.start = start
+        self.simulated: np.ndarray | None = None
         self._root: np.ndarray | None = None
         self.values = start
         self.rounds: list[Round] = []
@@ -176,15 +179,14 @@ class Iterations:
         Returns the share of the last step that was taken.
         """
         try:
-            self.instruments = self._source.at(self.values)
-            self._good = self.values
+            self._make(self.values)
             return 1.0
         except SimulationError as error:
             reason = error
         if isinstance(self._source, LoopSource):
             with suppress(DynidentError):
                 self.instruments = self._source.projected(self.values, self._root)
-                self._good = self.values
+                self._good, self.simulated = self.values, None
                 return 1.0
         if self._good is None:
             raise reason
@@ -192,12 +194,17 @@ class Iterations:
             share = 0.5**halving
             values = self._good + share * (self.values - self._good)
             try:
-                self.instruments = self._source.at(values)
-                self._good = self.values = values
+                self._make(values)
+                self.values = values
                 return share
             except SimulationError:
                 continue
         raise reason
+
+    def _make(self, values: np.ndarray) -> None:
+        self.instruments = self._source.at(values)
+        self._good = values
+        self.simulated = values if self._source.iterates else None
 
     def _estimate(self, step: float) -> None:
         model, measured = self._model, self._source.measured

@@ -8,11 +8,23 @@ from typing import Protocol
 
 import numpy as np
 
+from dynident.errors import RecordingError
+from dynident.fit.sampling import LEAST_ROWS
 from dynident.model import Model
-from dynident.recording import Dataset, Recording, uniform
+from dynident.recording import (
+    Dataset,
+    Filter,
+    ParallelFilter,
+    Recording,
+    default_filter,
+    uniform,
+)
 
 Tell = Callable[[str, float, float], None]
 """(what is being done, how much is done, how much there is to do)."""
+
+_PERIODS = 3.0
+"""Of the position's cut-off, after which its filter no longer shows an end (to 1 %)."""
 
 
 def silent(what: str, done: float, total: float) -> None:
@@ -93,20 +105,34 @@ class Instruments(Protocol):
 
 
 def prepared(dataset: Dataset) -> Dataset:
-    """Return the recordings on uniform clocks, without the rows whose derivatives are one-sided.
+    """Return the recordings on uniform clocks, their windows away from the ends.
 
-    Instruments then have the same time stamps. One-sided differences at the very ends would pass
-    several times the noise of central ones, and nothing beside them cancels it.
+    Instruments then have the same time stamps. At the very ends differences are one-sided and pass
+    several times the noise of central ones, and filters make up what they do not see; measured and
+    simulated motion end differently.
     """
-    return replace(dataset, recordings=tuple(_central(uniform(r)) for r in dataset.recordings))
+    recordings = (uniform(recording) for recording in dataset.recordings)
+    return replace(
+        dataset, recordings=tuple(_away_from_ends(one, dataset.filter) for one in recordings)
+    )
 
 
-def _central(recording: Recording) -> Recording:
-    first, last = recording.window or (-np.inf, np.inf)
+def _away_from_ends(recording: Recording, settings: Filter | None) -> Recording:
+    rate = recording.rate_hz
+    settings = settings or default_filter(rate)
+    parallel = ParallelFilter(settings, rate, recording.period, recording.where)
+    cutoff = settings.position_cutoff_hz
+    margin = parallel.transient + (_PERIODS / cutoff if cutoff else 0.0)
     # Half a sample more: a window's end is no matter of rounding.
-    first = max(first, float(recording.t[2] + recording.t[1]) / 2)
-    last = min(last, float(recording.t[-3] + recording.t[-2]) / 2)
-    return recording.replace(window=(first, last)) if first < last else recording
+    margin = max(margin, 1.5 / rate)
+    first, last = recording.window or (-np.inf, np.inf)
+    first = max(first, float(recording.t[0]) + margin)
+    last = min(last, float(recording.t[-1]) - margin)
+    if last - first < LEAST_ROWS / rate:
+        what = f"{recording.duration:.4g} s are next to nothing between the filter's ends"
+        mend = f"it needs {margin:.3g} s at each: record longer, or raise the cut-offs"
+        raise RecordingError(what, recording.where, mend)
+    return recording.replace(window=(first, last))
 
 
 @dataclass(frozen=True, eq=False)
