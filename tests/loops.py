@@ -36,8 +36,8 @@ def controller(factor: float = 1.0) -> Controller:
     """PD without reference velocity, damping 1 at the largest joint inertias."""
     inertia = np.array([1.36, 0.0621]) * factor
     w = 2 * np.pi * np.array(FREQUENCY_HZ)
-    gains = {"kp": tuple(inertia * w**2), "kd": tuple(2 * inertia * w)}
-    return Controller("pd", RATE, **gains, velocity_reference=False)
+    kp, kd = tuple(inertia * w**2), tuple(2 * inertia * w)
+    return Controller("pd", RATE, kp=kp, kd=kd, velocity_reference=False)
 
 
 def model(*, coulomb: bool) -> Model:
