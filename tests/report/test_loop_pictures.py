@@ -122,7 +122,7 @@ def history(rounds: int = 3, names: tuple[str, ...] = ("m$1$", "Fv@elbow")) -> C
     nothing = np.full(p, np.nan)
     return Convergence(
         names, ("kg", "N m s/rad")[:p], np.zeros(p), "regular", done, Ending.CONVERGED, "",
-        np.array([0.1, np.nan])[:p], nothing, nothing, np.zeros(1), np.zeros(1), "given",
+        np.array([0.1, np.nan])[:p], nothing, nothing, nothing, np.zeros(1), np.zeros(1), "given",
     )  # fmt: skip
 
 
