@@ -42,7 +42,10 @@ class StubbornSource:
         self.asked += 1
         if not self.settings.passes(values):
             raise SimulationError("it falls apart")
-        return prepared(replace(self.measured, recordings=(self.settings.true,)))
+        true = self.settings.true
+        # Another motion each time, or the second iteration would be the last.
+        other = true.replace(q=true.q * (1.0 + 0.05 * self.asked))
+        return prepared(replace(self.measured, recordings=(other,)))
 
     def verdict(self):
         return ""
@@ -65,22 +68,38 @@ def dataset(true: Recording) -> Dataset:
 
 
 def test_the_way_to_an_estimate_is_halved(model, true):
-    """Only estimates with little friction can be simulated: half of the way is taken."""
+    """Only estimates with little friction can be simulated: half of the way is taken, no more."""
     friction = model.names.index("Fv@shoulder")
     source = Stubborn(true, lambda values: bool(values[friction] < 0.6))
     found = IV(source, start="description", rounds=4).fit(model, dataset(true))
     assert found.history is not None
-    assert [one.step for one in found.history.rounds][:2] == [1.0, 0.5]
+    assert [one.way.share for one in found.history.rounds][:2] == [1.0, 0.5]
+    # The estimate itself was never simulated: that is no fixed point.
+    assert found.history.ending is Ending.ROUNDS_EXHAUSTED
+    assert "approached" in found.history.message
 
 
 def test_the_last_good_estimate_is_kept(model, true):
+    """The second estimate cannot be simulated, nor any part of the way to it."""
+    friction, asked = model.names.index("Fv@shoulder"), []
+
+    def passes(values):
+        asked.append(values[friction])
+        return len(asked) < 3
+
+    estimate = IV(Stubborn(true, passes), start="description").fit(model, dataset(true))
+    assert estimate.history is not None and estimate.history.ending is Ending.NOT_SIMULATED
+    assert estimate.value("Fv@shoulder") == asked[1]
+    assert len(estimate.history.rounds) == 1
+    assert "it falls apart" in estimate.history.message
+    assert any("no motion" in note for note in estimate.notes)
+
+
+def test_a_start_is_never_passed_off_as_an_estimate(model, true):
     friction = model.names.index("Fv@shoulder")
     source = Stubborn(true, lambda values: bool(values[friction] < 1e-3))
-    found = IV(source, start="description").fit(model, dataset(true))
-    assert found.history is not None and found.history.ending is Ending.NOT_SIMULATED
-    np.testing.assert_array_equal(found.values, model.given_values())
-    assert "it falls apart" in found.history.message and "start" in found.history.message
-    assert any("no motion" in note for note in found.notes)
+    with pytest.raises(SimulationError, match=r"first estimate has no motion.*it falls apart"):
+        IV(source, start="description").fit(model, dataset(true))
 
 
 def test_a_start_that_cannot_be_simulated_is_an_error(model, true):

@@ -59,6 +59,8 @@ def test_errors_are_a_tenth_of_those_of_least_squares(trials):
 def test_intervals_cover_what_they_say(trials):
     inside = np.abs(trials.values - trials.truth) < 1.96 * trials.sigma
     assert 0.92 < np.mean(inside) < 0.98
+    # One parameter alone: 0.95 within 3 standard errors of 200 draws.
+    assert np.all(np.mean(inside, axis=0) > 0.90)
 
 
 @pytest.mark.slow

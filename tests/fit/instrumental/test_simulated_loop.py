@@ -41,8 +41,10 @@ def test_without_noise_it_is_least_squares(coulomb, rate):
     same = replace(dataset, recordings=tuple(r.replace(window=window) for r in dataset.recordings))
     theirs = di.fit(model, same, LeastSquares())
     assert ours.rows == theirs.rows
-    difference = np.linalg.norm(ours.values - theirs.values)
-    assert difference < 1e-6 * np.linalg.norm(theirs.values)
+    # Each parameter by the torque that it makes, so that units do not decide.
+    scale = theirs.basis.scale
+    torque = np.linalg.norm(scale * theirs.values)
+    assert np.max(scale * np.abs(ours.values - theirs.values)) < 1e-6 * torque
 
 
 def _window(dataset: Dataset, model: Model) -> tuple[float, float]:
@@ -111,6 +113,8 @@ def test_a_start_that_cannot_move_is_projected(noisy):
     values = first.values.copy()
     values[: model.base.rank] *= -1.0
     found = di.fit(model, noisy, IV(loops.LOOP, start=replace(first, values=values)))
+    assert found.history is not None and found.history.rounds[0].way.projected
+    assert any("nearest possible robot" in note for note in found.notes)
     true = loops.inertial(loops.truth(model), model)
     assert np.linalg.norm(loops.inertial(found.values, model) - true) < 0.01 * np.linalg.norm(true)
 
@@ -227,3 +231,21 @@ def test_the_bias_of_sampling_is_foreseen(settings):
     error, foreseen = found.values - loops.truth(model), found.history.sampling_bias
     assert np.linalg.norm(error - foreseen) < 0.05 * np.linalg.norm(error)
     assert any("Sampling" in note for note in found.notes)
+
+
+def test_good_tracking_within_the_noise_is_not_doubted():
+    """Reference, motion and simulation differ by less than the encoder's noise."""
+    stiff = Controller("computed_torque", loops.RATE, kp=(3600.0, 3600.0), kd=(90.0, 90.0))
+    dataset = loops.dataset(loops.experiment(3, 3e-4, controller=stiff))
+    found = di.fit(loops.model(coulomb=False), dataset, IV(stiff))
+    assert found.history is not None and found.history.ending is Ending.CONVERGED
+
+
+def test_half_of_the_bandwidth_keeps_the_damping():
+    from dynident.fit.instrumental.gains import retuned
+
+    ratio = np.array([0.5, 2.0])
+    for one in (loops.LOOP, Controller("cascade", 200.0, kp=(10.0, 20.0), kv=(3.0, 4.0))):
+        before, after = one.feedback(), retuned(one, ratio).feedback()
+        np.testing.assert_allclose(after.position, before.position * ratio**2)
+        np.testing.assert_allclose(after.speed, before.speed * ratio)

@@ -41,12 +41,14 @@ class Law:
     Attributes
     ----------
     gains : the names of its gains.
+    powers : of a natural frequency that each gain goes with, its damping kept.
     feedback : what they make of the errors.
     through_model : whether the feedback is an acceleration, to which that of the reference is
         added before the nominal robot's inverse dynamics turns it into a torque.
     """
 
     gains: tuple[str, ...]
+    powers: tuple[int, ...]
     feedback: Callable[[Controller], Feedback]
     through_model: bool = False
 
@@ -64,10 +66,10 @@ def _cascade(controller: Controller) -> Feedback:
 
 
 LAWS: dict[str, Law] = {
-    "pd": Law(("kp", "kd"), _parallel),
-    "pid": Law(("kp", "ki", "kd"), _parallel),
-    "cascade": Law(("kp", "kv"), _cascade),
-    "computed_torque": Law(("kp", "kd"), _parallel, through_model=True),
+    "pd": Law(("kp", "kd"), (2, 1), _parallel),
+    "pid": Law(("kp", "ki", "kd"), (2, 3, 1), _parallel),
+    "cascade": Law(("kp", "kv"), (1, 1), _cascade),
+    "computed_torque": Law(("kp", "kd"), (2, 1), _parallel, through_model=True),
 }
 """The kinds by name."""
 GAINS = tuple(dict.fromkeys(name for law in LAWS.values() for name in law.gains))

@@ -186,7 +186,7 @@ class Estimate:
             f"{self.method}; {self.rows} equations, {len(self.basis.independent)} of "
             f"{self.model.size} parameters identified ({_decision(self.basis)}), "
             f"condition number {self.condition_number:.6g}; {self.status}.",
-            "sigma carries the noise of the encoders; what the model lacks is not in it."
+            "sigma carries the noise of encoders and torque; what the model lacks is not in it."
             if self.history
             else "sigma takes the errors of the equations as independent: what the model lacks is "
             "not in it.",

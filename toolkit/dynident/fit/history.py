@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
@@ -22,6 +22,20 @@ class Ending(StrEnum):
 
 
 @dataclass(frozen=True)
+class Way:
+    """How the instruments of an iteration came from the estimate before it.
+
+    Attributes
+    ----------
+    share : of the way from the last estimate that was taken: 1 but for damped iterations.
+    projected : whether the nearest possible robot was simulated in place of the estimate.
+    """
+
+    share: float
+    projected: bool = False
+
+
+@dataclass(frozen=True)
 class Round:
     """One iteration.
 
@@ -31,15 +45,14 @@ class Round:
     error_measured : norm of y - W x over the norm of y, W the regressor as it was measured.
     error_simulated : the same with the instruments V in place of W.
     correlation : smallest canonical correlation of instruments and regressor.
-    step : how much of the way from the last estimate was taken before this round's instruments
-        were made (1 but for damped iterations).
+    way : how its instruments were made.
     """
 
     values: np.ndarray
     error_measured: float
     error_simulated: float
     correlation: float
-    step: float = 1.0
+    way: Way = field(default_factory=lambda: Way(1.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,9 +153,12 @@ class Convergence:
             for i, name in enumerate(self.names)
         )
         stds = ", ".join(number(float(x), 3) for x in self.position_std)
+        what = "torque noise"
+        if self.noise_source == "measured":
+            what = "the rest of the residual, taken as white torque noise"
         torque = ", ".join(number(float(x), 3) for x in self.torque_std)
         notes = (
-            f"sigma: encoder noise ({stds}) and torque noise ({torque}), {self.noise_source}, "
+            f"sigma: encoder noise ({stds}) and {what} ({torque}), {self.noise_source}, "
             "through derivatives and filters. textbook: errors of the rows as if independent. "
             "bias: expected, and not subtracted.",
         )
@@ -159,7 +175,8 @@ class Convergence:
                     "error_measured": one.error_measured,
                     "error_simulated": one.error_simulated,
                     "correlation": one.correlation,
-                    "step": one.step,
+                    "step": one.way.share,
+                    "projected": one.way.projected,
                 }
                 for one in self.rounds
             ],

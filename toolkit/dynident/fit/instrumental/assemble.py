@@ -106,6 +106,12 @@ def _notes(model: Model, solution, history: Convergence, bias: ExpectedBias) -> 
         )
     if history.message:
         notes.append(f"{history.ending.value.capitalize()}: {history.message}.".replace("?.", "?"))
+    if any(one.way.projected for one in history.rounds):
+        last = "the last" if history.rounds[-1].way.projected else "some"
+        notes.append(
+            f"The estimate before {last} of the iterations has no motion (its inertia matrix is "
+            "not positive definite, say): the nearest possible robot was simulated in its place."
+        )
     if history.rounds and history.rounds[-1].correlation < _WEAK:
         notes.append(
             "Weak instruments: in one direction they have next to nothing in common with the "

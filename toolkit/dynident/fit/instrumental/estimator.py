@@ -11,7 +11,7 @@ import numpy as np
 from dynident.closed_loop import Controller
 from dynident.errors import DynidentError, FitError, SimulationError
 from dynident.fit.estimate import Estimate
-from dynident.fit.history import Ending, Round
+from dynident.fit.history import Ending, Round, Way
 from dynident.fit.instrumental.assemble import assemble
 from dynident.fit.instrumental.moments import InstrumentalSolution, Moments, moments, solve
 from dynident.fit.instrumental.simulated import LoopSource, SimulatedLoop
@@ -111,6 +111,18 @@ def _hopeless(source: Source, start: np.ndarray) -> bool:
     return isinstance(source, LoopSource) and source.next_to_massless(start)
 
 
+@dataclass(frozen=True, eq=False)
+class _Past:
+    """What one iteration found; see `Iterations`."""
+
+    values: np.ndarray
+    simulated: np.ndarray | None
+    found: Moments
+    solution: InstrumentalSolution
+    instruments: Dataset
+    rounds: list[Round]
+
+
 class Iterations:
     """The fixed-point iteration at work, and what it has found so far.
 
@@ -134,6 +146,7 @@ class Iterations:
         self._root: np.ndarray | None = None
         self.values = start
         self.rounds: list[Round] = []
+        self._past: list[_Past] = []
         self.ending, self.message = Ending.ROUNDS_EXHAUSTED, ""
         self.found: Moments
         self.solution: InstrumentalSolution
@@ -145,13 +158,13 @@ class Iterations:
         for count in range(limit):
             self._method.tell("instrumental variables", count, limit)
             try:
-                step = self._renew()
+                way = self._renew()
             except SimulationError as error:
                 if not self.rounds:
                     raise
                 self._keep_last_good(error)
                 return
-            self._estimate(step)
+            self._estimate(way)
             if not self._source.iterates:
                 self.ending = Ending.DIRECT
                 return
@@ -160,34 +173,43 @@ class Iterations:
                 break
         if self.ending is Ending.ROUNDS_EXHAUSTED:
             self.message = f"the residual still changes after {limit} iterations"
+            if self.rounds[-1].way.share < 1.0:
+                self.message = f"the estimates of {limit} iterations could only be approached"
         if doubt := self._source.verdict():
             self.ending, self.message = Ending.DOUBTFUL_LOOP, doubt
 
     def _keep_last_good(self, error: SimulationError) -> None:
-        assert self._good is not None
-        self.values = self._good
-        which = "the start" if len(self.rounds) == 1 else f"iteration {len(self.rounds) - 1}"
+        """Go back to the last estimate that could be simulated, and what was found there."""
+        if len(self._past) < 2:
+            what = f"the first estimate has no motion, nor has any part of the way to it: {error}"
+            mend = "choose another start, or look for what the model lacks"
+            raise SimulationError(what.rstrip("."), "IV", mend, reason=error.reason) from None
+        lost = len(self.rounds)
+        self._restore(self._past[-2])
         self.ending = Ending.NOT_SIMULATED
         self.message = (
-            f"the estimate of iteration {len(self.rounds)} has no motion ({str(error).rstrip('.')})"
-            f", nor has any part of the way to it: the values are those of {which}"
+            f"the estimate of iteration {lost} has no motion ({str(error).rstrip('.')}), nor has "
+            f"any part of the way to it: the values are those of iteration {lost - 1}"
         )
 
-    def _renew(self) -> float:
-        """Make the instruments of the present estimate, damped or projected if need be.
+    def _restore(self, past: _Past) -> None:
+        self.values, self.simulated = past.values, past.simulated
+        self.found, self.solution = past.found, past.solution
+        self.instruments, self.rounds = past.instruments, past.rounds
 
-        Returns the share of the last step that was taken.
-        """
+    def _renew(self) -> Way:
+        """Make the instruments of the present estimate, projected or damped if need be."""
         try:
             self._make(self.values)
-            return 1.0
+            return Way(1.0)
         except SimulationError as error:
             reason = error
         if isinstance(self._source, LoopSource):
             with suppress(DynidentError):
-                self.instruments = self._source.projected(self.values, self._root)
-                self._good, self.simulated = self.values, None
-                return 1.0
+                nearest = self._source.projected(self.values, self._root)
+                self.instruments = nearest.instruments
+                self._good = self.simulated = nearest.values
+                return Way(1.0, projected=True)
         if self._good is None:
             raise reason
         for halving in range(1, _HALVINGS + 1):
@@ -196,7 +218,7 @@ class Iterations:
             try:
                 self._make(values)
                 self.values = values
-                return share
+                return Way(share)
             except SimulationError:
                 continue
         raise reason
@@ -206,7 +228,7 @@ class Iterations:
         self._good = values
         self.simulated = values if self._source.iterates else None
 
-    def _estimate(self, step: float) -> None:
+    def _estimate(self, way: Way) -> None:
         model, measured = self._model, self._source.measured
         found = moments(model, measured, self.instruments, self.values)
         given = model.given_values()
@@ -222,10 +244,17 @@ class Iterations:
                 found.relative(found.residual_norms(values)),
                 found.relative(found.simulated_norms(values)),
                 solution.correlation,
-                step,
+                way,
             )
         )
 
+        self._past.append(
+            _Past(values, self.simulated, found, solution, self.instruments, list(self.rounds))
+        )
+
     def _settled(self) -> bool:
+        """Whether the residual stays, at estimates that were simulated as they are."""
+        if any(one.way.share < 1.0 for one in self.rounds[-2:]):
+            return False
         before, now = (one.error_simulated for one in self.rounds[-2:])
         return abs(now - before) <= self._method.tolerance * before

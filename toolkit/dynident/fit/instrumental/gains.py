@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -80,3 +81,17 @@ def stiffness(controller: Controller, nominal_inertias: np.ndarray) -> np.ndarra
     """
     position = controller.feedback().position
     return position * nominal_inertias if controller.law.through_model else position
+
+
+def retuned(controller: Controller, ratio: np.ndarray) -> Controller:
+    """Return the controller with its natural frequencies times a ratio (n,), its damping kept.
+
+    See Janot et al., equations 45 to 47: a proportional gain goes with the square of the natural
+    frequency, a derivative gain with itself.
+    """
+    law = controller.law
+    gains = {
+        name: tuple(np.array(getattr(controller, name)) * ratio**power)
+        for name, power in zip(law.gains, law.powers, strict=True)
+    }
+    return replace(controller, **gains)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynident.fit.instrumental.source import Source
-from dynident.fit.sampling import sample
+from dynident.fit.sampling import Sampled, sample
 from dynident.recording import Dataset, within
 
 _DIFFERENCES = 3
@@ -66,13 +66,14 @@ def torque_noise(
 
 def _torque_gain(measured: Dataset) -> float:
     """Variance in a row of the regression per variance of white noise in the raw torque."""
-    sampled = sample(measured.recordings[0], measured.filter)
-    samples = sampled.motion.samples
-    impulse = np.zeros((samples, 1))
-    middle = samples // 2
-    if measured.recordings[0].torque == "held_command":
+    return float(np.mean([_gain(sample(one, measured.filter)) for one in measured.recordings]))
+
+
+def _gain(sampled: Sampled) -> float:
+    impulse = np.zeros((sampled.motion.samples, 1))
+    middle = sampled.motion.samples // 2
+    if sampled.recording.torque == "held_command":
         impulse[middle - 1 : middle + 1] = 0.5
     else:
         impulse[middle] = 1.0
-    response = sampled.parallel.low_pass(impulse)
-    return float(np.sum(response**2))
+    return float(np.sum(sampled.parallel.low_pass(impulse) ** 2))

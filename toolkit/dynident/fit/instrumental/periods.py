@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from dynident.errors import FitError
 from dynident.fit.instrumental.source import FixedInstruments, Guess, Source, prepared
 from dynident.model import Model
@@ -42,7 +44,7 @@ class SwappedPeriods:
             notes += (f"Without a period, and left out: {', '.join(skipped)}.",)
         measured = replace(dataset, recordings=tuple(one for one, _ in pairs))
         instruments = replace(dataset, recordings=tuple(other for _, other in pairs))
-        share = 1.0 + 1.0 / (_count(told[0]) - 1)
+        share = float(np.mean([1.0 + 1.0 / (_count(one) - 1) for one in told]))
         return FixedInstruments(measured, instruments, notes, share)
 
 

@@ -14,8 +14,10 @@ from dynident.fit.instrumental import lift
 from dynident.fit.instrumental.gains import (
     InertiaMatrices,
     poses_of,
+    retuned,
     stiffness,
 )
+from dynident.fit.instrumental.noise import position_noise
 from dynident.fit.instrumental.source import Guess, prepared
 from dynident.fit.sampling import LEAST_ROWS
 from dynident.model import Model
@@ -27,7 +29,7 @@ _SETTLED = 5.0
 left at critical damping."""
 _MASSLESS = 0.02
 """Share of the believed inertia below which a start is not worth a simulation."""
-_DOUBT = 1.0
+_DOUBT = 1.1
 """Distance of the simulated from the measured motion over that of the reference from it."""
 
 
@@ -41,11 +43,10 @@ class SimulatedLoop:
     Attributes
     ----------
     controller : of the recorded loop: its structure must be the real one's.
-    natural_frequency_hz : (n,) or one number; poles that the simulated loop keeps: after each
-        iteration the feedback torque is multiplied by J w_n^2 / (its stiffness), J the joint's
-        largest inertia (equations 45 to 47; the damping stays that of the stated gains at the
-        inertia they were designed for). None: the gains as stated, which are the real loop's;
-        only the start, if its inertia is not the believed one, gets gains in proportion.
+    natural_frequency_hz : (n,) or one number; poles that the simulated loop keeps, with the damping
+        of the stated gains: at each iteration its gains belong to the inertia of the estimate
+        (equations 45 to 47). None: the gains as stated, which are the real loop's; only those of
+        the start, if its inertia is not the believed one, are in proportion.
     lift : how base parameters become bodies: "minimum_norm" (nearest to the description, possible
         or not) or "consistent" (the nearest possible robot).
     nominal : the robot inside a computed torque or a feed-forward; None: the description.
@@ -88,6 +89,14 @@ class SimulatedLoop:
         return LoopSource(self, model, prepared(dataset), guess)
 
 
+@dataclass(frozen=True, eq=False)
+class Projected:
+    """The nearest possible robot: its parameters (p,), and the instruments that it makes."""
+
+    values: np.ndarray
+    instruments: Dataset
+
+
 class LoopSource:
     """The closed loops of some recordings; see `Source`. One diagram serves all estimates."""
 
@@ -116,7 +125,9 @@ class LoopSource:
         frequencies = np.sqrt(self._stiffness / self._believed)
         if settings.natural_frequency_hz is not None:
             given = 2 * np.pi * np.asarray(settings.natural_frequency_hz, dtype=float)
+            controller = retuned(controller, given / frequencies)
             frequencies = np.broadcast_to(given, (n,)).copy()
+        self._controller = controller
         self._frequencies = frequencies
         self.transient = float(_SETTLED / frequencies.min())
         cut = tuple(_without_transient(one, self.transient) for one in dataset.recordings)
@@ -158,11 +169,12 @@ class LoopSource:
     def at(self, values: np.ndarray) -> Dataset:
         """Simulate an estimate; see `Source.at`."""
         if self._settings.lift == "consistent":
-            return self.projected(values)
+            return self.projected(values).instruments
         self._matrices.require_positive(values)
-        return self._simulated(values, lift.minimum_norm(self._model, values))
+        theta = lift.minimum_norm(self._model, values)
+        return self._simulated(values, theta, self._feedback_scale(values, values))
 
-    def projected(self, values: np.ndarray, root: np.ndarray | None = None) -> Dataset:
+    def projected(self, values: np.ndarray, root: np.ndarray | None = None) -> Projected:
         """Simulate the nearest possible robot.
 
         Parameters
@@ -178,37 +190,44 @@ class LoopSource:
         rigid = self._model.base.coordinates(theta)
         nearest = np.concatenate([rigid, found[len(theta) :]])
         self._matrices.require_positive(nearest)
-        return self._simulated(nearest, theta)
+        scale = self._feedback_scale(values, nearest)
+        return Projected(nearest, self._simulated(nearest, theta, scale))
 
     def verdict(self) -> str:
-        """Return which joints' simulated motion is no nearer to the measurement than the reference.
+        """Return which joints are further from the measured motion than the reference is.
 
-        The encoder's noise is in both distances.
+        The encoder's noise is in both distances and is taken off; within it nothing is told.
         """
         names = self._model.robot.names
-        simulated, reference = np.zeros(len(names)), np.zeros(len(names))
+        simulated, reference, rows = np.zeros(len(names)), np.zeros(len(names)), 0
         for one, retraced in zip(self.measured.recordings, self._last, strict=True):
-            window = one.window or (one.t[0], one.t[-1])
-            rows = within(one.t, *window, one.where)
+            inside = within(one.t, *(one.window or (one.t[0], one.t[-1])), one.where)
             assert one.q_ref is not None
-            simulated += np.sum((retraced.recording.q - one.q)[rows] ** 2, axis=0)
-            reference += np.sum((one.q_ref - one.q)[rows] ** 2, axis=0)
+            simulated += np.sum((retraced.recording.q - one.q)[inside] ** 2, axis=0)
+            reference += np.sum((one.q_ref - one.q)[inside] ** 2, axis=0)
+            rows += int(np.count_nonzero(inside))
+        again = replace(self.measured, recordings=tuple(one.recording for one in self._last))
+        noise = rows * position_noise(self, again) ** 2
+        far, near = simulated - noise, np.maximum(reference - noise, noise)
         bad = [
             f"{name} ({np.sqrt(s / r):.2g} times as far)"
-            for name, s, r in zip(names, simulated, reference, strict=True)
-            if s > _DOUBT * r > 0
+            for name, s, r in zip(names, far, near, strict=True)
+            if s > _DOUBT**2 * r > 0
         ]
         if not bad:
             return ""
+        what = "this the controller of the recorded loop (structure, gains, rate, delay)"
+        if self._settings.natural_frequency_hz is not None:
+            what = "this the controller of the recorded loop, and are its natural frequencies these"
         return (
             "the simulated motion is further from the measured one than the reference is, at "
             + ", ".join(bad)
-            + ": is this the controller of the recorded loop (structure, gains, rate, delay)?"
+            + f": is {what}?"
         )
 
     # --- inside --------------------------------------------------------------------------------
 
-    def _simulated(self, values: np.ndarray, theta: np.ndarray) -> Dataset:
+    def _simulated(self, values: np.ndarray, theta: np.ndarray, scale: np.ndarray) -> Dataset:
         recordings, model = self.measured.recordings, self._model
         bodies = {
             carries: Mechanism.of_model(model, values, theta, carries_payload=carries)
@@ -223,20 +242,19 @@ class LoopSource:
             self._loop,
             [bodies[bool(one.payload)] for one in recordings],
             recordings,
-            self._settings.controller,
+            self._controller,
             nominal=self._settings.nominal or model.robot,
-            feedback_scale=self._feedback_scale(values),
+            feedback_scale=scale,
             progress=progress,
         )
         return replace(self.measured, recordings=tuple(one.recording for one in self._last))
 
-    def _feedback_scale(self, values: np.ndarray) -> np.ndarray:
-        inertias = self._matrices.joint_inertias(values)
-        if self._settings.natural_frequency_hz is not None:
-            return inertias * self._frequencies**2 / self._stiffness
-        if np.array_equal(values, self._start):
-            return inertias / self._believed
-        return np.ones(len(inertias))
+    def _feedback_scale(self, asked: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Feedback of these values, (n,) times the stated; `asked` is what they were made of."""
+        started = np.array_equal(asked, self._start)
+        if started or self._settings.natural_frequency_hz is not None:
+            return self._matrices.joint_inertias(values) / self._believed
+        return np.ones(len(self._believed))
 
     def _believed_inertias(self, guess: Guess) -> np.ndarray:
         """Joint inertias before the first iteration: the largest that is believed of each.
