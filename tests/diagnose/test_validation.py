@@ -21,9 +21,11 @@ from dynident.closed_loop import (
 )
 from dynident.diagnose import compare, validate
 from dynident.diagnose.control_law import law_torque, time_constant
+from dynident.diagnose.loop_signals import _noise
 from dynident.errors import SimulationError
 from dynident.fit import Estimate
 from dynident.fit.given import given_estimate
+from dynident.fit.sampling import sample
 from dynident.model import Model
 from dynident.recording import Dataset, Noise, Recording
 from dynident.robot import Robot
@@ -99,11 +101,11 @@ def test_every_controller_is_simulated_and_recognised(kind: str) -> None:
     }[kind]
     made = recordings(controller, torque="measured" if kind == "measured" else "held_command")
     found = validate(estimate(), dataset(made[0]), controller)
-    # A slow loop, or an integral whose past is not recorded, has not quite forgotten its start.
+    # A slow loop, or an integral that begins at its reference, has not quite forgotten its start.
     assert found.errors.of("position") < 0.02
     assert found.errors.of("torque") < 0.01
     assert found.without_model.of("torque") < 1e-3
-    assert any("integral" in note for note in found.notes) == (kind == "pid")
+    assert found.remarks == ()
     assert found.verdict == "follows"
 
 
@@ -129,6 +131,120 @@ def test_a_poor_model_is_told_from_a_wrong_controller() -> None:
     # Stiffer than the real one: the simulated position is near, and the law is none the less told.
     stiff = replace(CONTROLLER, kp=(800.0, 240.0))
     assert validate(estimate(), dataset(), stiff).verdict == "other_controller"
+
+
+UNFOLLOWED = replace(CONTROLLER, velocity_reference=False)
+
+
+@pytest.mark.parametrize("factor", [1.01, 1.02, 1.1, 2.0, 0.5])
+def test_a_gain_that_is_a_little_off_accuses_nobody(factor: float) -> None:
+    """Without reference velocity kp e and kd v nearly cancel: kp's error is many times larger."""
+    made = recordings(UNFOLLOWED)[0]
+    stated = replace(UNFOLLOWED, kp=tuple(factor * x for x in UNFOLLOWED.kp))
+    found = validate(estimate(), dataset(made), stated)
+    assert np.all(found.law_terms > 5.0)
+    assert np.all(found.without_model.joints[3] > 5.0 * abs(factor - 1))
+    slight = 0.9 < factor < 1.2
+    assert found.verdict == ("follows" if slight else "other_controller")
+    assert any("a gain that is a little off" in one for one in found.notes) == (factor == 1.1)
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_a_healthy_model_is_not_called_poor_within_the_noise(stated: bool) -> None:
+    """A loop that follows better than its encoders can tell, and a model half their noise off."""
+    made = recordings(noise=1e-4)[0].replace(period=None)
+    noise = Noise(np.full(2, 1e-4), np.full(2, 0.1)) if stated else None
+    found = validate(estimate(), dataset(made, noise=noise), CONTROLLER)
+    assert found.noise_source == ("given" if stated else "unknown")
+    # The encoder's noise is found, stated or not: twice, but for what the filters make of it.
+    silent = validate(estimate(), dataset(made), CONTROLLER)
+    np.testing.assert_allclose(found.position_noise, silent.position_noise, rtol=1.0)
+    assert found.verdict == "follows"
+    (run,) = found.runs
+    off = shifted(run.simulated, 0.5 * found.position_noise)
+    doubtful = replace(found, runs=(replace(run, simulated=off, reference=run.simulated),))
+    assert np.all(doubtful.errors.joints[0] > doubtful.without_model.joints[0])
+    assert doubtful.verdict == "follows" and "it cannot be told whether" in doubtful.sentence
+
+
+def shifted(signals: Any, share: np.ndarray) -> Any:
+    """Signals whose position is off by a share of its rms."""
+    rms = np.sqrt(np.mean(signals.position**2, axis=0))
+    return replace(signals, position=signals.position + share * rms)
+
+
+def test_no_nearer_demands_a_clear_ratio() -> None:
+    found = validate(estimate(), dataset(), CONTROLLER)
+    (run,) = found.runs
+    for factor, verdict in ((1.1, "follows"), (1.5, "no_nearer")):
+        away = run.measured.position + factor * (run.reference.position - run.measured.position)
+        other = replace(run, simulated=replace(run.simulated, position=away))
+        judged = replace(found, runs=(other,))
+        assert judged.verdict == verdict
+        assert ("cannot be told" in judged.sentence) == (verdict == "follows")
+
+
+def test_a_healthy_torque_is_not_accused() -> None:
+    """What the controller makes of the encoders' noise is noise; a hundredth is not material."""
+    made = recordings(noise=1e-4)[0].replace(period=None)
+    quiet = dataset(made, noise=Noise(np.full(2, 1e-4), np.zeros(2)))
+    assert not any(
+        "times the noise" in one for one in validate(estimate(), quiet, CONTROLLER).notes
+    )
+    tiny = dataset(noise=Noise(np.full(2, 1e-9), np.full(2, 1e-9)))
+    near = validate(estimate(1.002), tiny, CONTROLLER)
+    assert near.noise is not None and np.all(near.errors.joints[3] > 3 * near.noise.joints[3])
+    assert not any("times the noise" in one for one in near.notes)
+
+
+def test_noise_of_rows_that_do_not_repeat_is_not_zero() -> None:
+    """Of 6 s, two periods of 2.4 s fold; the remainder says nothing of the noise."""
+    rng = np.random.default_rng(0)
+    t = np.arange(1500) / 250.0
+    made = recordings()[0]
+    motion = np.sin(2 * np.pi * t / 2.4)[:, None] * np.ones(2)
+    noisy = made.replace(
+        t=t,
+        q=motion + 1e-3 * rng.standard_normal(motion.shape),
+        tau=motion + 1e-2 * rng.standard_normal(motion.shape),
+        q_ref=motion,
+        period=2.4,
+    )
+    every = np.ones(len(sample(noisy, None).t), dtype=bool)
+    found = _noise(noisy, Dataset((noisy,)), every, lambda one: one.tau)
+    # The same with two whole periods and nothing besides.
+    rows = t >= t[-1] - 4.8 + 1e-9
+    whole = noisy.replace(**{x: getattr(noisy, x)[rows] for x in ("t", "q", "tau", "q_ref")})
+    every = np.ones(len(sample(whole, None).t), dtype=bool)
+    other = _noise(whole, Dataset((whole,)), every, lambda one: one.tau)
+    assert found is not None and other is not None
+    np.testing.assert_allclose(found[[0, 3]], other[[0, 3]], rtol=0.03)
+
+
+def test_the_rows_are_told_as_they_are() -> None:
+    found = validate(estimate(), dataset(), CONTROLLER)
+    (run,) = found.runs
+    (note,) = found.error_table().notes
+    assert f"Rows from {run.t[0]:.4g} s to {run.t[-1]:.4g} s" in note
+    assert "the ends of a record" in note
+
+
+def test_a_joint_that_nothing_holds_is_named() -> None:
+    loose = replace(CONTROLLER, kp=(400.0, 0.0))
+    (one,) = validate(estimate(), dataset(), loose).skipped
+    assert "nothing holds elbow at its reference" in one.reason and "inf" not in one.reason
+
+
+def test_the_slowest_body_says_when_a_loop_has_settled() -> None:
+    known = model() + "payload"
+    values = np.concatenate([estimate().values, [9.0, *np.zeros(9)]])
+    heavy = replace(given_estimate(arm(), known), values=values, links=None)
+    first, second = recordings()
+    weak = replace(CONTROLLER, kd=(20.0, 4.0))
+    light = validate(heavy, dataset(first), weak)
+    both = validate(heavy, dataset(first, second.replace(payload=True)), weak)
+    turned = validate(heavy, dataset(second.replace(payload=True), first), weak)
+    assert both.settling == pytest.approx(turned.settling) and both.settling > light.settling
 
 
 def test_noise_is_stated_and_counts() -> None:
@@ -193,6 +309,10 @@ def test_an_unstable_loop_is_a_status_not_an_error() -> None:
     json.dumps(said, allow_nan=False)
     assert said["error"] is None and said["joints"] == []
     assert all(one["reason"] for one in said["recordings"])
+    (reason,) = (one.reason for one in found.skipped)
+    assert not reason.startswith("run1.csv")
+    assert reason.endswith("are gains, rate_hz and delay_s those of the recorded loop?")
+    assert "run1.csv: run1.csv" not in str(found.recording_table())
     assert "run1.csv" in "\n".join(str(part) for part in found.tables())
 
 

@@ -46,6 +46,8 @@ def validation(
                 _signals(t, reference, law),
                 np.outer([1e-5, 5e-4, 0.02, 0.05], np.ones(n)) if noise else None,
                 np.where(np.arange(n) == 0, 0.02 * (k == 0), 0.0),
+                np.full(n, 5.0),
+                np.full(n, 1e-5),
             )
         )
     return Validation(

@@ -90,9 +90,16 @@ def retrace(
                 nominal,
             )
         )
-    rollouts = loop.simulate(
-        tasks, controller, lead_in=0.0, feedback_scale=feedback_scale, progress=progress
-    )
+    try:
+        rollouts = loop.simulate(
+            tasks, controller, lead_in=0.0, feedback_scale=feedback_scale, progress=progress
+        )
+    except SimulationError as error:
+        if error.reason != "unstable":
+            raise
+        # The recorded loop did run: it is not its gains that are to be lowered.
+        mend = "are gains, rate_hz and delay_s those of the recorded loop?"
+        raise SimulationError(error.what, error.where, mend, reason=error.reason) from error
     return tuple(
         Retraced(_resampled(recording, rollout, rate), rollout, rollout.saturated)
         for recording, rollout in zip(recordings, rollouts, strict=True)

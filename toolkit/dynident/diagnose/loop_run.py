@@ -48,6 +48,9 @@ class LoopRun:
         positions, no model of the robot involved.
     noise : (4, n) noise of the measured quantities, rms; None where it is unknown.
     saturated : (n,) share of the samples at which the simulated command was at its limit.
+    law_terms : (n,) N m or N, what the gains of the control law make of the errors, each on its
+        own: root of the sum of their mean squares. Larger than the torque where they cancel.
+    encoder_noise : (n,) rad or m, rms; from what the simulation leaves of the measured positions.
     """
 
     name: str
@@ -57,6 +60,8 @@ class LoopRun:
     reference: Signals
     noise: np.ndarray | None
     saturated: np.ndarray
+    law_terms: np.ndarray
+    encoder_noise: np.ndarray
 
 
 @dataclass(frozen=True)

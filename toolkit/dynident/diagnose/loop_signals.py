@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,13 +14,16 @@ from dynident.diagnose.loop_run import QUANTITIES, LoopRun, Signals
 from dynident.errors import RecordingError
 from dynident.fit.sampling import LEAST_ROWS, Sampled, sample
 from dynident.model import Model
-from dynident.recording import Dataset, Noise, Recording, away_from_edges, mismatch, periods
+from dynident.recording import Dataset, Noise, Recording, away_from_edges, mismatch, periods, within
 
 if TYPE_CHECKING:
     from dynident.closed_loop.retrace import Retraced
 
 _REPEATS = 0.3
 """Mismatch of two periods, relative to the motion, above which nothing repeats."""
+_DIFFERENCES = 3
+_GAIN = 20.0
+"""Variance of the third difference of white noise of variance 1."""
 
 
 def filtered_run(
@@ -43,15 +48,57 @@ def filtered_run(
     law = law_torque(recording, controller, model.robot)
     reference = sample(recording.replace(q=recording.q_ref, tau=law), dataset.filter)
     kept = _inside(measured)
+    noise = _noise(recording, dataset, kept, lambda one: law_torque(one, controller, model.robot))
     return LoopRun(
         recording.name,
         measured.t[kept],
         _signals(measured, kept),
         _signals(simulated, kept),
         _signals(reference, kept),
-        _noise(recording, dataset, kept),
+        noise,
         np.asarray(again.saturated, dtype=float),
+        _law_terms(recording, law, controller, model, dataset, kept),
+        _encoder_noise(recording, again.recording, dataset, kept),
     )
+
+
+def _law_terms(
+    recording: Recording,
+    law: np.ndarray,
+    controller: Controller,
+    model: Model,
+    dataset: Dataset,
+    kept: np.ndarray,
+) -> np.ndarray:
+    """What each gain makes of the errors, as one more of it would add to the torque, rms (n,)."""
+    square = np.zeros(controller.n)
+    free = replace(controller, limit=None)
+    if controller.limit is not None:
+        law = law_torque(recording, free, model.robot)
+    for name in controller.law.gains:
+        doubled = replace(free, **{name: tuple(2.0 * x for x in getattr(free, name))})
+        term = law_torque(recording, doubled, model.robot) - law
+        tau = sample(recording.replace(tau=term), dataset.filter).tau[kept]
+        square += np.mean(tau**2, axis=0)
+    return np.sqrt(square)
+
+
+def _encoder_noise(
+    recording: Recording, simulated: Recording, dataset: Dataset, kept: np.ndarray
+) -> np.ndarray:
+    """Noise of the filtered positions, rms (n,), if that of the raw ones is white.
+
+    From third differences of what the simulation leaves of them: the motion that an imperfect
+    model misses is smooth, and leaves next to nothing in them.
+    """
+    rows = within(recording.t, *(recording.window or (-np.inf, np.inf)), recording.where)
+    rough = np.diff((recording.q - simulated.q)[rows], _DIFFERENCES, axis=0)
+    if not len(rough):
+        return np.zeros(recording.n)
+    noise = Noise(np.sqrt(np.mean(rough**2, axis=0) / _GAIN), np.zeros(recording.n))
+    alone = _stated(recording, noise, lambda one: one.tau)
+    assert alone is not None
+    return np.sqrt(np.mean(sample(alone, dataset.filter).q[kept] ** 2, axis=0))
 
 
 def _inside(sampled: Sampled) -> np.ndarray:
@@ -70,16 +117,26 @@ def _signals(sampled: Sampled, kept: np.ndarray) -> Signals:
     return Signals(sampled.q[kept], sampled.v[kept], sampled.a[kept], sampled.tau[kept])
 
 
-def _noise(recording: Recording, dataset: Dataset, kept: np.ndarray) -> np.ndarray | None:
+def _noise(
+    recording: Recording,
+    dataset: Dataset,
+    kept: np.ndarray,
+    law: Callable[[Recording], np.ndarray],
+) -> np.ndarray | None:
     """Noise of the measured quantities, rms (4, n): of repeated periods, else as stated.
 
     The noise alone passes the filters, so that nothing of what they do to the motion at the ends
-    of the record is taken for noise.
+    of the record is taken for noise. Its mean is over the rows that repeat.
     """
-    alone = _repeated(recording) or _stated(recording, dataset.noise)
+    alone = _repeated(recording) or _stated(recording, dataset.noise, law)
     if alone is None:
         return None
-    noise = _signals(sample(alone, dataset.filter), kept)
+    sampled = sample(alone, dataset.filter)
+    there = alone.t[np.any(alone.q != 0, axis=1) | np.any(alone.tau != 0, axis=1)]
+    if len(there):
+        folded = kept & (sampled.t >= there[0]) & (sampled.t <= there[-1])
+        kept = folded if folded.any() else kept
+    noise = _signals(sampled, kept)
     return np.array([np.sqrt(np.mean(noise.of(one) ** 2, axis=0)) for one in QUANTITIES])
 
 
@@ -107,11 +164,15 @@ def _repeated(recording: Recording) -> Recording | None:
     return recording.replace(**changes)
 
 
-def _stated(recording: Recording, noise: Noise | None) -> Recording | None:
-    """Return a draw of the stated noise, always the same."""
+def _stated(
+    recording: Recording, noise: Noise | None, law: Callable[[Recording], np.ndarray]
+) -> Recording | None:
+    """Return a draw of the stated noise, always the same; the torque's with what the law makes."""
     if noise is None:
         return None
     stream = np.random.default_rng(0)
     q = noise.position_std * stream.standard_normal(recording.q.shape)
     tau = noise.torque_std * stream.standard_normal(recording.tau.shape)
-    return recording.replace(q=q, tau=tau)
+    # The controller answers to the noise of the encoder with torque.
+    answer = law(recording.replace(q=recording.q + q)) - law(recording)
+    return recording.replace(q=q, tau=tau + answer)

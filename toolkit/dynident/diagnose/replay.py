@@ -28,11 +28,6 @@ if TYPE_CHECKING:
 Progress = Callable[[float, float], None]
 """(s simulated, s to simulate)."""
 
-_INTEGRAL = (
-    "What the controller's integral held when a recording began is not recorded: the simulation "
-    "begins with none, and position and torque differ until it has grown."
-)
-
 _ROUNDING = 1.05
 """Share of the limit that noise and resolution of a torque may add to it."""
 
@@ -117,7 +112,7 @@ def loop_of(
         return Unsimulated(str(error))
     if found.runs:
         return found
-    return Unsimulated("; ".join(dict.fromkeys(one.reason for one in found.skipped)))
+    return Unsimulated("; ".join(f"{one.name}: {one.reason}" for one in found.skipped))
 
 
 def simulate_again(
@@ -153,14 +148,21 @@ def simulate_again(
         "unknown",
         sources_of(Dataset(tuple(usable), dataset.filter)),
     )
+    free = [robot.names[j] for j in np.flatnonzero(controller.feedback().position == 0)]
+    if free:
+        what = f"nothing holds {', '.join(free)} at its reference (a gain of position is 0)"
+        failed = [Skipped(r.name, "failed", f"{what}: its loop never settles") for r in usable]
+        return replace(nothing, skipped=(*nothing.skipped, *failed))
     try:
         bodies = {
             carries: judged.mechanism(carries_payload=carries)
             for carries in {bool(r.payload) for r in usable}
         }
-        slowest = time_constant(controller, next(iter(bodies.values())), usable[0].q)
+        times = [time_constant(controller, bodies[bool(r.payload)], r.q) for r in usable]
+        # Not finite where an inertia is negative: that loop will not be simulated.
+        slowest = max((x for x in times if np.isfinite(x)), default=0.0)
     except DynidentError as error:
-        failed = [Skipped(r.name, "failed", str(error)) for r in usable]
+        failed = [Skipped(r.name, "failed", _reason(error, r)) for r in usable]
         return replace(nothing, skipped=(*nothing.skipped, *failed))
     settling = [_settling(r, slowest) for r in usable]
     pairs = list(zip(usable, settling, strict=True))
@@ -173,18 +175,14 @@ def simulate_again(
             drop = _settling(recording, slowest)
             runs.append(filtered_run(recording, one, controller, judged.model, dataset, drop))
         except RecordingError as error:
-            skipped.append(Skipped(recording.name, "too_short", str(error)))
+            skipped.append(Skipped(recording.name, "too_short", _reason(error, recording)))
     return replace(
         nothing,
         runs=tuple(runs),
         skipped=(*nothing.skipped, *skipped, *failed),
         settling=max(settling),
         noise_source=_noise_source(runs, usable),
-        remarks=(
-            *_beyond_limit(usable, controller),
-            *remarks,
-            *((_INTEGRAL,) if controller.ki else ()),
-        ),
+        remarks=(*_beyond_limit(usable, controller), *remarks),
     )
 
 
@@ -244,13 +242,17 @@ def _retraced(
         return follow(recordings), [], tuple(loop.notes)
     except SimulationError as error:
         if len(recordings) == 1:
-            return [], [Skipped(recordings[0].name, "failed", str(error))], tuple(loop.notes)
+            return (
+                [],
+                [Skipped(recordings[0].name, "failed", _reason(error, recordings[0]))],
+                tuple(loop.notes),
+            )
     found, failed = [], []
     for recording in recordings:
         try:
             found += follow([recording])
         except SimulationError as error:
-            failed.append(Skipped(recording.name, "failed", str(error)))
+            failed.append(Skipped(recording.name, "failed", _reason(error, recording)))
     return found, failed, tuple(loop.notes)
 
 
@@ -259,4 +261,14 @@ def _column(robot) -> str:
 
 
 def _too_short(recording: Recording, settling: float) -> str:
-    return f"it is {recording.duration:.3g} s long, and the loop settles only after {settling:.3g}"
+    return (
+        f"it is {recording.duration:.3g} s long, and the loop settles only after {settling:.3g} s"
+    )
+
+
+def _reason(error: DynidentError, recording: Recording) -> str:
+    """Return the message without the recording's name, which stands beside it already."""
+    said = str(error)
+    for name in filter(None, (recording.where, recording.name)):
+        said = said.removeprefix(f"{name}, ").removeprefix(f"{name}: ")
+    return said

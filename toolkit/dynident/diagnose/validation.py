@@ -10,25 +10,11 @@ import numpy as np
 
 from dynident.diagnose.diagnosis import NoiseSource
 from dynident.diagnose.loop_run import QUANTITIES, Errors, LoopRun, Signals, Skipped
+from dynident.diagnose.loop_verdict import Judgement, judge, notes, sentence
 from dynident.fit.estimate import Source
 from dynident.tables import Table, number, percent, print_tables
 
 Verdict = Literal["follows", "no_nearer", "other_controller", "not_simulated"]
-
-ORIENTATION = (
-    "For orientation: a two-link robot that was identified well came within 0.5 % of the position, "
-    "5 % of the velocity and 10 % of the acceleration, all filtered; the EMPS benchmark is "
-    "published with 0.014 %, 0.23 %, 8.6 % and 5.8 % of the force."
-)
-"""Janot et al., instrumental variables for a SCARA robot; and the benchmark's own figures."""
-
-_SAME_AS_NOISE = 1.5
-"""A difference up to so many times the noise may be the noise."""
-_BEYOND_NOISE = 3.0
-"""Torque error over its noise above which something is missing."""
-_LAW_HOLDS = 0.2
-_LAW_NOISE = 3.0
-"""Relative error, and multiple of the noise, up to which the stated control law may have run."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +84,28 @@ class Validation:
         return self._relative(np.asarray(square), self._power())
 
     @cached_property
+    def law_terms(self) -> np.ndarray:
+        """Terms that the control law adds up over the measured torque, (n,)."""
+        return self._mean(np.array([run.law_terms for run in self.runs]), 3)
+
+    @cached_property
+    def position_noise(self) -> np.ndarray:
+        """Noise of the measured position over the position, (n,).
+
+        That of the encoder alone, measured, where no noise is known.
+        """
+        if self.noise is not None:
+            return self.noise.joints[0]
+        return self._mean(np.array([run.encoder_noise for run in self.runs]), 0)
+
+    def _mean(self, rms: np.ndarray, quantity: int) -> np.ndarray:
+        """Root mean square over the recordings of (runs, n), over the measurement, (n,)."""
+        square = np.zeros((len(QUANTITIES), len(self.joints)))
+        for run, one in zip(self.runs, rms, strict=True):
+            square[quantity] += len(run.t) * one**2
+        return self._relative(square, self._power()).joints[quantity]
+
+    @cached_property
     def saturated(self) -> np.ndarray:
         """Share of all samples at which each joint's simulated command was at its limit, (n,)."""
         if not self.runs:
@@ -118,9 +126,10 @@ class Validation:
         return self._relative(square, power)
 
     def _power(self) -> np.ndarray:
-        return np.array(
-            [sum(np.sum(r.measured.of(one) ** 2, axis=0) for r in self.runs) for one in QUANTITIES]
-        )
+        power = np.zeros((len(QUANTITIES), len(self.joints)))
+        for run in self.runs:
+            power += [np.sum(run.measured.of(one) ** 2, axis=0) for one in QUANTITIES]
+        return power
 
     def _relative(self, square: np.ndarray, power: np.ndarray) -> Errors:
         """Errors from sums of squares, (4, n) each."""
@@ -160,10 +169,22 @@ class Validation:
         rows.append(("all", *_percents(self.errors.overall), *[""][: len(columns) - 5]))
         note = (
             f"{self.controller}. Norm of simulated less measured over norm of measured, both "
-            f"through the same filter, after {number(self.settling, 2)} s for the loop to settle."
+            f"through the same filter. {self._rows_words()}"
         )
         title = "Simulated in closed loop, against the measurement"
         return Table(title, columns, tuple(rows), (note,))
+
+    def _rows_words(self) -> str:
+        if not self.runs:
+            return "There are no rows."
+        spans = [(float(run.t[0]), float(run.t[-1])) for run in self.runs]
+        first, last = min(a for a, _ in spans), max(b for _, b in spans)
+        most = ("", "") if len(set(spans)) == 1 else (" at the earliest", " at the latest")
+        return (
+            f"Rows from {first:.4g} s{most[0]} to {last:.4g} s{most[1]}: left out are the first "
+            f"{number(self.settling, 2)} s, in which the loop settles, the ends of a record, where "
+            "the filter makes up what it does not know, and what is not in a window."
+        )
 
     def yardstick_table(self) -> Table:
         """What the errors are to be held against: the reference, the control law, the noise."""
@@ -192,7 +213,10 @@ class Validation:
         """Errors of each recording, and the recordings without."""
         rows = [(r.name, "simulated", *_percents(self.error_of(r).overall)) for r in self.runs]
         rows += [(s.name, s.status.replace("_", " "), *[""] * 4) for s in self.skipped]
-        notes = tuple(f"{one.name}: {one.reason}." for one in self.skipped)
+        notes = tuple(
+            f"{one.name}: {one.reason}" + "." * (one.reason[-1:] not in ("?", "."))
+            for one in self.skipped
+        )
         return Table("Recordings", ("recording", "status", *QUANTITIES), tuple(rows), notes)
 
     @property
@@ -200,86 +224,24 @@ class Validation:
         """Whether the loop is the recorded one, and tells more of the motion than its reference."""
         if not self.runs:
             return "not_simulated"
-        if self._foreign.any():
+        if self.judgement.foreign.any():
             return "other_controller"
-        return "no_nearer" if self._lost.any() else "follows"
+        return "no_nearer" if self.judgement.lost.any() else "follows"
+
+    @cached_property
+    def judgement(self) -> Judgement:
+        """What is the matter with each joint."""
+        return judge(self)
 
     @property
     def sentence(self) -> str:
         """The verdict in plain words."""
-        off = percent(self.errors.of("torque"))
-        match self.verdict:
-            case "not_simulated":
-                return "No loop could be simulated."
-            case "other_controller":
-                return (
-                    f"At {self._names(self._foreign)} the stated controller is not the one that "
-                    "ran, or torque or reference are not what they are said to be."
-                )
-            case "no_nearer":
-                return (
-                    f"At {self._names(self._lost)} the simulated loop is no nearer to the "
-                    "measurement than the reference: the model is poor."
-                )
-        return (
-            "At every joint the simulated loop is nearer to the measurement than the reference is, "
-            f"or within the noise; its torque is {off} off."
-        )
+        return sentence(self)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """The sentence, and what it rests on, in plain words."""
-        found = [self.sentence]
-        for j, joint in enumerate(self.joints if self.runs else ()):
-            law = percent(float(self.without_model.joints[3, j]), 1)
-            own, reference = (e.joints[0, j] for e in (self.errors, self.without_model))
-            if self._foreign[j]:
-                found.append(
-                    f"{joint}: the stated control law, fed with the recorded positions, does not "
-                    f"give the recorded torque ({law} off): check gains, rate_hz, delay_s, limit, "
-                    "and the units of torque and reference."
-                )
-            elif self._lost[j]:
-                found.append(
-                    f"{joint}: the simulated position is {percent(own, 3)} off the measured one, "
-                    f"the reference {percent(reference, 3)}. The stated control law gives the "
-                    f"recorded torque ({law} off): the model does not respond as the robot does."
-                )
-            if self.saturated[j] > 0:
-                found.append(
-                    f"{joint}: the simulated command is at its limit for "
-                    f"{percent(float(self.saturated[j]), 1)} of the samples; there the torque says "
-                    "nothing of the model."
-                )
-            if (ratio := self._torque_ratios()[j]) > _BEYOND_NOISE:
-                found.append(
-                    f"{joint}: the torque of the simulated loop is off by {ratio:.3g} times the "
-                    "noise; `dynident diagnose` looks for what the model lacks."
-                )
-        return (*found, *((ORIENTATION,) if self.runs else ()), *self.remarks)
-
-    def _names(self, which: np.ndarray) -> str:
-        return ", ".join(self.joints[j] for j in np.flatnonzero(which))
-
-    def _of_noise(self, row: int) -> np.ndarray:
-        """Relative noise of one quantity, (n,); zero where it is unknown."""
-        return np.zeros(len(self.joints)) if self.noise is None else self.noise.joints[row]
-
-    @cached_property
-    def _foreign(self) -> np.ndarray:
-        """Joints at which the control law is not the one that made the torque, (n,) bool."""
-        return self.without_model.joints[3] > np.maximum(_LAW_HOLDS, _LAW_NOISE * self._of_noise(3))
-
-    @cached_property
-    def _lost(self) -> np.ndarray:
-        """Joints whose simulated position is no better than the reference, noise aside, (n,)."""
-        own, reference = self.errors.joints[0], self.without_model.joints[0]
-        return (own >= reference) & (own > _SAME_AS_NOISE * self._of_noise(0))
-
-    def _torque_ratios(self) -> np.ndarray:
-        """Torque error of each joint over its noise, (n,); zero where the noise is unknown."""
-        noise = self._of_noise(3)
-        return np.nan_to_num(self.errors.joints[3] / np.where(noise > 0, noise, np.inf))
+        return notes(self)
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON of `simulate --json`; numbers that are not known are null."""
