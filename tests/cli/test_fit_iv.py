@@ -54,3 +54,12 @@ def test_options_that_do_not_fit(run, tmp_path):
         done = run("fit", path, *words)
         assert done.status == 2 and message in done.err and done.err.count("\n") == 1, done
         assert done.out == ""
+
+
+def test_what_the_loop_lacks_is_named_in_the_words_of_the_shell(run, tmp_path):
+    path = write_loop_study(tmp_path, edited(("rate_hz = 250.0\n", ""), text=LOOP_STUDY))
+    done = run("fit", path, "--method", "iv")
+    assert done.status == 2 and "study.toml: controller.rate_hz: " in done.err
+    done = run("fit", write_loop_study(tmp_path, reference=False), "--method", "iv")
+    assert done.status == 2 and done.err.count("\n") == 1
+    assert "q_ref.shoulder" in done.err and "--instruments periods" in done.err

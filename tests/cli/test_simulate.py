@@ -70,9 +70,19 @@ def test_a_loop_that_cannot_be_simulated_is_status_1(run, tmp_path):
     said = done.json
     assert said["verdict"] == "not_simulated" and said["error"] is None
     assert said["recordings"][0]["status"] == "failed" and said["recordings"][0]["reason"]
+    done = run("simulate", path, "--plot", "loop.png")
+    assert "no picture loop.png: no loop could be simulated" in done.err
+    assert not (tmp_path / "loop.png").exists()
     # The other judge is not moved by that.
     done = run("compare", path)
     assert done.status == 0 and "In loop: not simulated." in " ".join(done.out.split())
+
+
+def test_a_controller_that_did_not_run_is_status_1(run, tmp_path):
+    path = write_loop_study(tmp_path, edited(("[400.0, 120.0]", "[150.0, 40.0]"), text=STUDY))
+    done = run("simulate", path, "--json")
+    assert done.status == 1 and done.json["verdict"] == "other_controller"
+    assert "Exit status 1" in run("simulate", "--help").out
 
 
 REFUSED = {

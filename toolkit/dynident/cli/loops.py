@@ -11,10 +11,10 @@ import click
 
 from dynident import files
 from dynident.cli.group import commands
-from dynident.cli.methods import Chosen, method_options
+from dynident.cli.methods import Chosen, method_options, require_rate
 from dynident.cli.output import JSON, print_json, progress, say, show
 from dynident.cli.work import command_line, load_study, require_picture, require_places
-from dynident.errors import DynidentError, StudyError
+from dynident.errors import StudyError
 
 if TYPE_CHECKING:
     from dynident.closed_loop import Controller
@@ -52,7 +52,10 @@ def simulate(
     """Simulate the identified robot in the loop that was recorded, and compare the motion.
 
     STUDY needs a [controller], and recordings with their reference (q_ref). Errors of position,
-    velocity, acceleration and torque are relative. Exit status 1 if a loop could not be simulated.
+    velocity, acceleration and torque are relative.
+
+    Exit status 1 if a loop could not be simulated, the stated controller is not the one that ran,
+    or the simulated loop is no nearer to the measurement than its reference.
 
     Of an EXPERIMENT it makes virtual measurements: recordings, and a study that hides what is
     hidden (dynident simulate experiment.toml --out virtual/).
@@ -87,7 +90,7 @@ def simulate(
         words = {"train": "No recording is for testing: these are the training recordings."}
         show(*found.tables(), *([words[used]] if used in words else []))
     failed = any(one.status != "no_reference" for one in found.skipped)
-    context.exit(1 if failed else 0)
+    context.exit(1 if failed or found.verdict != "follows" else 0)
 
 
 def _make(file: Path, out: Path, as_json: bool) -> None:
@@ -146,10 +149,7 @@ def _controller(study: Study, recordings: Dataset) -> Controller:
     if study.controller is None:
         mend = "state the one that ran: kind, gains, rate_hz"
         raise StudyError("has no [controller], so that its loop is not known", str(path), mend)
-    try:
-        study.controller.simulated_rate()
-    except DynidentError as error:
-        raise StudyError(error.what, f"{path}: {error.where}", error.mend) from None
+    require_rate(study, study.controller)
     if all(r.q_ref is None for r in recordings.recordings):
         column = f"q_ref.{names[0]}" if len(names) == 1 else "q_ref.<joint>"
         what = f"no recording has the reference that the controller followed, {column}"
@@ -192,7 +192,9 @@ def _write(found: Validation, report: Path | None, plot: Path | None) -> None:
 
         write(found, to=report, command=command_line())
         click.echo(f"report: {report}", err=True)
-    if plot is not None and found.runs:
+    if plot is not None and not found.runs:
+        click.echo(f"no picture {plot}: no loop could be simulated", err=True)
+    elif plot is not None:
         from dynident.report.loop_plots import simulated_loop
         from dynident.report.plots import save
 

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from dynident.errors import StudyError
+from dynident.errors import DynidentError, StudyError
 
 if TYPE_CHECKING:
+    from dynident.closed_loop import Controller
     from dynident.fit import IV
     from dynident.study import Study
 
@@ -50,7 +51,8 @@ class Chosen:
         Raises
         ------
         StudyError
-            If the loop is to be simulated, and the study does not know its controller.
+            If the loop is to be simulated, and the study does not know its controller, its rate
+            or the reference of a training recording.
         """
         from dynident.fit import IV, Filtered, SwappedPeriods
 
@@ -65,7 +67,29 @@ class Chosen:
             mend = "state the one that ran, or choose --instruments periods or filtered"
             what = "has no [controller], so that its loop cannot be simulated for instruments"
             raise StudyError(what, str(study.path), mend)
+        require_rate(study, study.controller)
+        for recording in study.train.recordings:
+            if recording.q_ref is None:
+                mend = (
+                    f"add columns q_ref.{recording.joints[0]}, ..., or choose --instruments "
+                    "periods or --instruments filtered --cutoff HZ"
+                )
+                raise StudyError("the recording has no reference", recording.where, mend)
         return IV(study.controller, start=start, weighting=weighting, tell=tell)
+
+
+def require_rate(study: Study, controller: Controller) -> None:
+    """Refuse a controller that cannot be simulated, under the name of its file.
+
+    Raises
+    ------
+    StudyError
+        If its rate is not stated.
+    """
+    try:
+        controller.simulated_rate()
+    except DynidentError as error:
+        raise StudyError(error.what, f"{study.path}: {error.where}", error.mend) from None
 
 
 def method_options(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -91,7 +91,7 @@ def fit(
     """Identify the parameters from the training recordings.
 
     With --method iv the instruments come from the simulated loop of the study's [controller]; the
-    iterations are in the output.
+    iterations are in the output. Exit status 0 even where they do not converge: the output says so.
 
     Example: dynident fit study.toml --out estimate.json --robot identified.urdf
     """
