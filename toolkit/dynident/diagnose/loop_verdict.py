@@ -151,8 +151,9 @@ def _of_joint(found: Validation, j: int) -> list[str]:
         off = found.errors.joints[3, j]
         lines.append(
             f"the torque of the simulated loop is {percent(float(off), 1)} off, "
-            f"{off / found.noise.joints[3, j]:.3g} times the noise: more than noise is between "
-            "model and robot; `dynident diagnose` looks for what the model lacks."
+            f"{off / found.noise.joints[3, j]:.3g} times the noise: the model lacks "
+            "something (`dynident diagnose` looks for what), or the stated loop is not quite the "
+            "recorded one."
         )
     return lines
 
