@@ -120,7 +120,7 @@ def test_the_simulated_loop_is_as_near_to_the_record_as_the_published_one() -> N
 def test_a_noisier_encoder_takes_the_mass_from_least_squares_and_not_from_instruments() -> None:
     study, said = closed_loop.load(), PUBLISHED["noise"]
     true = PUBLISHED["symmetric"]["values"]["m.carriage"]
-    noisy = closed_loop.noisier(study, duration=8.0)
+    noisy = closed_loop.noisier(study)
     mass = fit_model(study.model, noisy, LeastSquares("none")).value("m.carriage")
     assert 1.0 - mass / true == pytest.approx(said["least_squares_loss"], abs=0.05)
     found = fit_model(study.model, noisy, closed_loop.instruments(study))
