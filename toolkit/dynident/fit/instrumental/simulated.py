@@ -295,6 +295,6 @@ def _without_transient(recording: Recording, transient: float) -> Recording:
         what = (
             f"{recording.duration:.4g} s are shorter than the loop's transient, {transient:.3g} s"
         )
-        mend = "record longer, or state the loop's natural_frequency_hz"
+        mend = "record longer, leave it out, or state the loop's natural_frequency_hz"
         raise FitError(what, recording.where, mend)
     return recording.replace(window=(first, last))
