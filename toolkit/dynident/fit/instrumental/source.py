@@ -130,7 +130,9 @@ def _away_from_ends(recording: Recording, settings: Filter | None) -> Recording:
     last = min(last, float(recording.t[-1]) - margin)
     if last - first < LEAST_ROWS / rate:
         what = f"{recording.duration:.4g} s are next to nothing between the filter's ends"
-        mend = f"it needs {margin:.3g} s at each: record longer, raise the cut-offs, or leave it out"
+        mend = (
+            f"it needs {margin:.3g} s at each: record longer, raise the cut-offs, or leave it out"
+        )
         raise RecordingError(what, recording.where, mend)
     return recording.replace(window=(first, last))
 
