@@ -12,6 +12,7 @@ from dynident.closed_loop import Controller
 from dynident.diagnose.control_law import law_torque
 from dynident.diagnose.loop_run import QUANTITIES, LoopRun, Signals
 from dynident.errors import RecordingError
+from dynident.fit.instrumental.noise import white_variance
 from dynident.fit.sampling import LEAST_ROWS, Sampled, sample
 from dynident.model import Model
 from dynident.recording import Dataset, Noise, Recording, away_from_edges, mismatch, periods, within
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
 
 _REPEATS = 0.3
 """Mismatch of two periods, relative to the motion, above which nothing repeats."""
-_DIFFERENCES = 3
-_GAIN = 20.0
-"""Variance of the third difference of white noise of variance 1."""
 
 
 def filtered_run(
@@ -92,10 +90,8 @@ def _encoder_noise(
     model misses is smooth, and leaves next to nothing in them.
     """
     rows = within(recording.t, *(recording.window or (-np.inf, np.inf)), recording.where)
-    rough = np.diff((recording.q - simulated.q)[rows], _DIFFERENCES, axis=0)
-    if not len(rough):
-        return np.zeros(recording.n)
-    noise = Noise(np.sqrt(np.mean(rough**2, axis=0) / _GAIN), np.zeros(recording.n))
+    white = np.sqrt(white_variance((recording.q - simulated.q)[rows]))
+    noise = Noise(white, np.zeros(recording.n))
     alone = _stated(recording, noise, lambda one: one.tau)
     assert alone is not None
     return np.sqrt(np.mean(sample(alone, dataset.filter).q[kept] ** 2, axis=0))

@@ -13,8 +13,9 @@ from dynident.errors import DynidentError, FitError, SimulationError
 from dynident.fit.estimate import Estimate
 from dynident.fit.history import Ending, Round, Way
 from dynident.fit.instrumental.assemble import assemble
+from dynident.fit.instrumental.loop_source import LoopSource
 from dynident.fit.instrumental.moments import InstrumentalSolution, Moments, moments, solve
-from dynident.fit.instrumental.simulated import LoopSource, SimulatedLoop
+from dynident.fit.instrumental.simulated import SimulatedLoop
 from dynident.fit.instrumental.source import Guess, Instruments, Source, Tell, silent
 from dynident.fit.instrumental.starts import START_NAMES, Start, start_values
 from dynident.fit.least_squares import LeastSquares

@@ -33,19 +33,25 @@ class NoiseLevel:
     source: str
 
 
+def white_variance(x: np.ndarray) -> np.ndarray:
+    """Variance of the white noise in a smooth signal (T, n), from its third differences, (n,)."""
+    rough = np.diff(x, _DIFFERENCES, axis=0)
+    return np.sum(rough**2, axis=0) / (_GAIN * max(len(rough), 1))
+
+
 def position_noise(source: Source, instruments: Dataset) -> np.ndarray:
     """Measure the encoder's white noise, (n,) rad or m.
 
-    From third differences of what the instruments leave of the measured positions: the motion
-    that an imperfect model misses is smooth, and leaves next to nothing in them.
+    In what the instruments leave of the measured positions: the motion that an imperfect model
+    misses is smooth, and leaves next to nothing in its third differences.
     """
     squares, count = np.zeros(instruments.recordings[0].n), 0
     for one, other in zip(source.measured.recordings, instruments.recordings, strict=True):
         rows = within(one.t, *(one.window or (one.t[0], one.t[-1])), one.where)
-        rough = np.diff((one.q - other.q)[rows], _DIFFERENCES, axis=0)
-        squares += np.sum(rough**2, axis=0)
-        count += len(rough)
-    return np.sqrt(squares / max(count, 1) / _GAIN / source.noise_share)
+        length = int(np.count_nonzero(rows))
+        squares += length * white_variance((one.q - other.q)[rows])
+        count += length
+    return np.sqrt(squares / max(count, 1) / source.noise_share)
 
 
 def torque_noise(
