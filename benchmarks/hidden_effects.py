@@ -162,9 +162,10 @@ def _recordings(
 
 def _scaled(case: Case, robot: Robot, known: list[TrueEffect], hidden: TrueEffect) -> TrueEffect:
     """Scale an effect so that it leaves `strength` times the noise in the residual."""
-    from dynident.diagnose.evidence import ColumnStore, gather
+    from dynident.diagnose.evidence import ColumnStore
     from dynident.diagnose.held_out import on_recordings
     from dynident.diagnose.present import fit_present
+    from dynident.diagnose.runs import gather
 
     model = Model(robot, tuple(one.effect for one in known))
     for _ in range(3):

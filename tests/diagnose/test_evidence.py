@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynident.diagnose.evidence import ColumnStore, gather
+from dynident.diagnose.evidence import ColumnStore
+from dynident.diagnose.runs import gather
 from dynident.effects import catalogue
 from dynident.model import Model
 from dynident.recording import Dataset

@@ -8,13 +8,14 @@ from typing import Any
 
 from dynident.closed_loop import Controller
 from dynident.diagnose.diagnosis import finite
-from dynident.diagnose.evidence import ColumnStore, gather
+from dynident.diagnose.evidence import ColumnStore
 from dynident.diagnose.held_out import HeldOut, on_blocks, on_recordings
 from dynident.diagnose.loop_columns import loop_columns
 from dynident.diagnose.loop_json import loop_json
 from dynident.diagnose.maps import residual_maps
 from dynident.diagnose.present import fit_present
 from dynident.diagnose.replay import Judged, loop_of
+from dynident.diagnose.runs import gather
 from dynident.diagnose.validation import Unsimulated, Validation
 from dynident.errors import FitError
 from dynident.fit.estimate import Estimate

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynident.diagnose.evidence import ColumnStore, Signals
+from dynident.diagnose.evidence import ColumnStore
 from dynident.diagnose.moments import Moments, Solution, moments, solve
 from dynident.diagnose.noise import (
     NoiseModel,
@@ -15,6 +15,7 @@ from dynident.diagnose.noise import (
     measure_noise,
     systematic_square,
 )
+from dynident.diagnose.runs import Signals
 from dynident.model import Model
 
 _ROUNDS = 3  # fit, measure the noise, fit again: the noise model settles at once

@@ -9,9 +9,10 @@ import numpy as np
 
 from dynident.diagnose.blunting import blunted
 from dynident.diagnose.diagnosis import Diagnosis
-from dynident.diagnose.evidence import ColumnStore, flagged_run, gather
+from dynident.diagnose.evidence import ColumnStore
 from dynident.diagnose.held_out import on_recordings
 from dynident.diagnose.present import Present, fit_present
+from dynident.diagnose.runs import flagged_run, gather
 from dynident.diagnose.scoring import Score
 from dynident.diagnose.search import (
     Ranking,
@@ -20,7 +21,6 @@ from dynident.diagnose.search import (
     indistinguishable,
     rank,
     refined,
-    variants,
 )
 from dynident.diagnose.telling import RESOLUTION, Found, Search, told
 from dynident.effects import Effect
@@ -65,7 +65,7 @@ def diagnose(
     store = ColumnStore(given, gather(train))
     held = ColumnStore(given, gather(test)) if test is not None and len(test) else None
     tell("evaluating every effect")
-    everything = [v for effect in candidates(given) for v in variants(effect, given)]
+    everything = [v for effect in candidates(given) for v in effect.variants(given.robot)]
     store.prepare([*given.effects, *everything])
     start = blunted(store, _shaped(store, given))
     rounds = [rank(store, start, 0, tell)]

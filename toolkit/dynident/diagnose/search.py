@@ -9,8 +9,9 @@ from itertools import product
 import numpy as np
 from scipy.optimize import fminbound, minimize
 
-from dynident.diagnose.evidence import ColumnStore, Run
+from dynident.diagnose.evidence import ColumnStore
 from dynident.diagnose.present import Present
+from dynident.diagnose.runs import Run
 from dynident.diagnose.scoring import Score, candidate_moments, carried, cross_validate, score
 from dynident.effects import Effect, catalogue
 from dynident.model import Model
@@ -63,13 +64,6 @@ def candidates(model: Model) -> list[Effect]:
     for effect in catalogue().values():
         found += [e.on(model.robot) for e in effect.candidates(model.robot) if e not in model]
     return found
-
-
-def variants(effect: Effect, model: Model) -> Iterator[Effect]:
-    """An effect with every combination of its shape grids."""
-    grids = [shape.grid for shape in effect.shape_parameters(model.robot)]
-    for shape in product(*grids):
-        yield effect.shaped(*shape)
 
 
 def rank(
@@ -162,7 +156,7 @@ def best_shape(store: ColumnStore, present: Present, effect: Effect) -> Effect:
 
     `present` is the model without it.
     """
-    tried = [effect, *variants(effect, present.model)]
+    tried = [effect, *effect.variants(present.model.robot)]
     found = candidate_moments(store, present, tried)
     scores = (score(present, one, *parts, 1) for one, parts in zip(tried, found, strict=True))
     best = max(scores, key=lambda one: one.drop)
@@ -191,7 +185,7 @@ def _score_variants(store: ColumnStore, present: Present, effect: Effect) -> Ite
             # A load has mass: of two complementary choices only one can be meant.
             yield one if not _impossible(one, present.model) else replace(one, penalised=-np.inf)
         return
-    shapes = list(variants(effect, present.model))
+    shapes = list(effect.variants(present.model.robot))
     found = candidate_moments(store, present, shapes)
     for shaped, parts in zip(shapes, found, strict=True):
         yield score(present, shaped, *parts, grid=len(shapes))

@@ -18,10 +18,11 @@ from dynident.diagnose.diagnosis import (
     Trace,
     Verdict,
 )
-from dynident.diagnose.evidence import ColumnStore, flagged_run
+from dynident.diagnose.evidence import ColumnStore
 from dynident.diagnose.held_out import HeldOut, on_blocks, on_recordings, with_noise_of
 from dynident.diagnose.maps import residual_maps
 from dynident.diagnose.present import Present, fit_present, residuals
+from dynident.diagnose.runs import flagged_run
 from dynident.diagnose.scoring import Score
 from dynident.diagnose.search import Ranking
 from dynident.effects import Effect

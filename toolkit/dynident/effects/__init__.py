@@ -12,15 +12,11 @@ import pkgutil
 from functools import cache
 from types import MappingProxyType
 
-from dynident.effects.base import (
-    FRICTION_WIDTH,
-    Block,
-    Effect,
-    JointEffect,
-    Parameter,
-    ShapeParameter,
-)
+from dynident.effects.base import Effect, JointEffect
+from dynident.effects.block import FRICTION_WIDTH, Block
+from dynident.effects.parameters import Parameter, ShapeParameter
 from dynident.effects.terms import Term
+from dynident.effects.transmission import Transmission
 from dynident.errors import EffectError
 
 __all__ = [
@@ -31,6 +27,7 @@ __all__ = [
     "Parameter",
     "ShapeParameter",
     "Term",
+    "Transmission",
     "catalogue",
     "effects_of",
 ]
@@ -72,6 +69,8 @@ def effects_of(label: str, robot) -> tuple[Effect, ...]:
         hint = f"did you mean '{close[0]}'?" if close else f"effects: {', '.join(known)}"
         raise EffectError(f"no effect is named '{name}'", mend=hint)
     effect = known[name]
+    if not place and effect.place == "joint or robot":
+        return (effect().on(robot),)
     if not place:
         return tuple(one.on(robot) for one in effect.candidates(robot))
     joint, source = _joints(place, robot.names)

@@ -15,83 +15,21 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
+from dynident.effects.block import Block
+from dynident.effects.parameters import Parameter, ShapeParameter
 from dynident.effects.terms import Term
+from dynident.effects.transmission import Transmission
 from dynident.errors import EffectError
 
 if TYPE_CHECKING:
     from typing import Self
 
     from dynident.robot import Robot
-
-FRICTION_WIDTH = 0.01
-"""Speed (rad/s, or m/s for a prismatic joint) over which dry friction changes its sign.
-
-The one law of dry friction in this package, in regression and in simulation, is
-tanh(v / FRICTION_WIDTH); a study may set another width for all of its joints at once.
-"""
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A linear parameter of an effect: its name, unit and physical bounds."""
-
-    name: str
-    unit: str
-    lower: float = -np.inf
-    upper: float = np.inf
-
-
-@dataclass(frozen=True)
-class ShapeParameter:
-    """A parameter in which the columns are not linear, with the grid on which it is screened."""
-
-    name: str
-    unit: str
-    grid: tuple[float, ...]
-    lower: float
-    upper: float
-
-
-@dataclass(frozen=True)
-class Block:
-    """Consecutive samples of one recording, as effects see them.
-
-    Attributes
-    ----------
-    t : (T,) s, from the start of the session.
-    q, v, a : (T, n) rad or m, and their derivatives.
-    names : the joints, in the order of the columns of q.
-    friction_width : rad/s or m/s, see `FRICTION_WIDTH`.
-    carries_payload : whether the payload under study is on the robot.
-    tip : column of the joint that carries the last link, where a payload is mounted.
-    rigid : (T, n, 10 n) the rigid-body regressor; None where no effect in use needs it.
-    torque : (T, n) N m or N, torque that the present model predicts; None where none needs it.
-    """
-
-    t: np.ndarray
-    q: np.ndarray
-    v: np.ndarray
-    a: np.ndarray
-    names: tuple[str, ...]
-    friction_width: float = FRICTION_WIDTH
-    carries_payload: bool = False
-    tip: int = -1
-    rigid: np.ndarray | None = None
-    torque: np.ndarray | None = None
-
-    def index(self, joint: str | None) -> int:
-        """Column of a joint."""
-        if joint not in self.names:
-            raise EffectError(f"no joint '{joint}'", mend=f"joints: {', '.join(self.names)}")
-        return self.names.index(joint)
-
-    def sign(self, speed: np.ndarray) -> np.ndarray:
-        """Smoothed sign of a speed, the package's one law of dry friction."""
-        return np.tanh(speed / self.friction_width)
 
 
 @dataclass(frozen=True)
@@ -103,14 +41,18 @@ class Effect(ABC):
     joint : the joint whose torque changes (first); None for an effect of the whole robot.
     source : the other joint of a coupling.
     shape : values of `shape_parameters`, in their order.
+    point : values of `parameters` at which columns are taken that are not linear in them: secants
+        through this point, so that there they are exact; empty for derivatives at zero.
     """
 
     joint: str | None = None
     source: str | None = None
     shape: tuple[float, ...] = ()
+    point: tuple[float, ...] = ()
 
     name: ClassVar[str]
-    place: ClassVar[Literal["joint", "pair", "robot"]] = "joint"
+    place: ClassVar[Literal["joint", "pair", "robot", "joint or robot"]] = "joint"
+    """Where it sits; "joint or robot" is common to all joints where no joint is named."""
     law: ClassVar[str]
     """The torque as a formula, for tables."""
     sign_of: ClassVar[str]
@@ -124,10 +66,17 @@ class Effect(ABC):
     """Those of `contains` whose column may belong to either: they are named first where they do
     most of the work."""
     needs: ClassVar[frozenset[str]] = frozenset()
-    """What `Block` must carry: "rigid", "torque"; "payload" where runs with and without differ."""
+    """What `Block` must carry: "rigid", "torque", "body"; "whole" where it must be the whole
+    recording at its full rate; "payload" where runs with and without differ."""
     linear_in_torque: ClassVar[bool] = False
     """Whether its columns are linear in the predicted torque and depend on nothing else: then it
     does not matter whether they are filtered or made of filtered torque, which is quicker."""
+    secant: ClassVar[bool] = False
+    """Whether its torque is not linear in its parameters, so that columns are taken at `point`."""
+    found_by: ClassVar[Literal["residual", "repetition"]] = "residual"
+    """Where it shows: in what repetitions have in common, or in what differs between them."""
+    memory: ClassVar[int] = 0
+    """Number of internal states that a simulation of it keeps."""
 
     # --- what it is ---------------------------------------------------------------------------
 
@@ -135,12 +84,12 @@ class Effect(ABC):
     def candidates(cls, robot: Robot) -> Iterator[Self]:
         """Every place of a robot where the effect may sit."""
         names = robot.names
-        if cls.place == "robot":
+        if cls.place in ("robot", "joint or robot"):
             yield cls()
-        elif cls.place == "joint":
+        if cls.place in ("joint", "joint or robot"):
             for joint in names:
                 yield cls(joint)
-        else:
+        if cls.place == "pair":
             for joint in names:
                 for source in names:
                     if source != joint:
@@ -163,8 +112,11 @@ class Effect(ABC):
             If the joint or the source is missing, unknown or out of place, or a shape parameter
             is outside its bounds.
         """
+        with_joint = self.place != "robot"
+        if self.place == "joint or robot":
+            with_joint = self.joint is not None
         for role, value, expected in (
-            ("joint", self.joint, self.place != "robot"),
+            ("joint", self.joint, with_joint),
             ("source", self.source, self.place == "pair"),
         ):
             if (value is not None) != expected:
@@ -188,6 +140,15 @@ class Effect(ABC):
     def shaped(self, *shape: float) -> Self:
         """Return the effect with other shape parameters."""
         return replace(self, shape=tuple(float(value) for value in shape))
+
+    def variants(self, robot: Robot) -> Iterator[Self]:
+        """With every combination of its shape grids, to be screened."""
+        for shape in product(*(one.grid for one in self.shape_parameters(robot))):
+            yield self.shaped(*shape)
+
+    def at(self, values: Sequence[float]) -> Self:
+        """Return the effect with its columns taken at other values; itself where it is linear."""
+        return replace(self, point=tuple(float(x) for x in values)) if self.secant else self
 
     @property
     def label(self) -> str:
@@ -215,7 +176,16 @@ class Effect(ABC):
     def columns(self, block: Block) -> np.ndarray:
         """Torque per unit of each linear parameter, (T, n, k) in N m or N."""
 
-    # --- how it is simulated: the four ways in which an effect can act on a plant --------------
+    def sensitivities(self, block: Block) -> np.ndarray | None:
+        """Derivatives of the columns by the logarithm of each of s shape parameters.
+
+        Returns
+        -------
+        (T, n, k, s) exact derivatives; None where none are known, and shapes are sought without.
+        """
+        return None
+
+    # --- how it is simulated: the ways in which an effect can act on a plant -------------------
 
     def simulated_force(self, values: Sequence[float], block: Block) -> np.ndarray:
         """Torque that it takes from the drives, (T, n), from t, q and v alone."""
@@ -239,6 +209,22 @@ class Effect(ABC):
     def simulated_gain(self, values: Sequence[float], robot: Robot) -> np.ndarray:
         """Recorded torque per torque that acts, (n,)."""
         return np.ones(robot.n)
+
+    def simulated_rate(self, values: Sequence[float], block: Block) -> np.ndarray:
+        """Rate of its internal states, (T, memory) per s, from t, q, v and `block.memory`."""
+        return np.zeros((len(block.t), self.memory))
+
+    def simulated_transmission(self, values: Sequence[float], robot: Robot) -> Transmission | None:
+        """What it puts between a motor and its link; None for nothing."""
+        return None
+
+    def simulated_loss(self, values: Sequence[float], robot: Robot) -> np.ndarray:
+        """Dry friction per transmitted torque, (n,): torque needed + loss abs(torque) sign(v)."""
+        return np.zeros(robot.n)
+
+    def simulated_delay(self, values: Sequence[float], robot: Robot) -> np.ndarray:
+        """Time by which the recorded torque is late, (n,) s: it is that which acted then."""
+        return np.zeros(robot.n)
 
 
 class JointEffect(Effect):
@@ -267,5 +253,11 @@ def force_unit(robot: Robot, joint: str | None) -> str:
 
 
 def _form(effect: type[Effect]) -> str:
-    form = {"joint": "@JOINT", "pair": "@JOINT:SOURCE", "robot": ""}[effect.place]
+    forms = {
+        "joint": "@JOINT",
+        "pair": "@JOINT:SOURCE",
+        "robot": "",
+        "joint or robot": " or, at one joint, @JOINT",
+    }
+    form = forms[effect.place]
     return f"write it {effect.name}{form}"

@@ -1,0 +1,70 @@
+"""Samples of a recording as effects see them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dynident.errors import EffectError
+
+if TYPE_CHECKING:
+    from dynident.robot import Robot
+
+FRICTION_WIDTH = 0.01
+"""Speed (rad/s, or m/s for a prismatic joint) over which dry friction changes its sign.
+
+The one law of dry friction in this package, in regression and in simulation, is
+tanh(v / FRICTION_WIDTH); a study may set another width for all of its joints at once.
+"""
+
+
+@dataclass(frozen=True)
+class Block:
+    """Consecutive samples of one recording, as effects see them.
+
+    Attributes
+    ----------
+    t : (T,) s, from the start of the session.
+    q, v, a : (T, n) rad or m, and their derivatives.
+    names : the joints, in the order of the columns of q.
+    friction_width : rad/s or m/s, see `FRICTION_WIDTH`.
+    carries_payload : whether the payload under study is on the robot.
+    tip : column of the joint that carries the last link, where a payload is mounted.
+    rigid : (T, n, 10 n) the rigid-body regressor; None where no effect in use needs it.
+    torque : (T, n) N m or N, torque that the present model predicts; None where none needs it.
+    body : the robot with the inertias of the present model, and with its payload where that is on
+        board; None where no effect in use needs it.
+    rotor : (n,) kg m^2 or kg, motor inertia that the present model adds to the bodies'; with
+        `body`.
+    number : of the recording in its study, from 1; 0 where that does not matter.
+    temperature : (T, n) degrees Celsius of the motors, NaN where it is not recorded; or None.
+    memory : (T, m) internal state of the one effect that is simulated; None otherwise.
+    """
+
+    t: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    names: tuple[str, ...]
+    friction_width: float = FRICTION_WIDTH
+    carries_payload: bool = False
+    tip: int = -1
+    rigid: np.ndarray | None = None
+    torque: np.ndarray | None = None
+    body: Robot | None = None
+    rotor: np.ndarray | None = None
+    number: int = 0
+    temperature: np.ndarray | None = None
+    memory: np.ndarray | None = None
+
+    def index(self, joint: str | None) -> int:
+        """Column of a joint."""
+        if joint not in self.names:
+            raise EffectError(f"no joint '{joint}'", mend=f"joints: {', '.join(self.names)}")
+        return self.names.index(joint)
+
+    def sign(self, speed: np.ndarray) -> np.ndarray:
+        """Smoothed sign of a speed, the package's one law of dry friction."""
+        return np.tanh(speed / self.friction_width)
