@@ -16,12 +16,11 @@ from dynident.diagnose.runs import flagged_run, gather
 from dynident.diagnose.scoring import Score
 from dynident.diagnose.search import (
     Ranking,
-    best_shape,
     candidates,
     indistinguishable,
     rank,
-    refined,
 )
+from dynident.diagnose.shaping import best_shape, refined
 from dynident.diagnose.telling import RESOLUTION, Found, Search, told
 from dynident.effects import Effect
 from dynident.fit.estimate import Estimate

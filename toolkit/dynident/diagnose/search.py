@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from scipy.optimize import fminbound, minimize
 
+from dynident.diagnose.confidence_set import confidence_set
 from dynident.diagnose.evidence import ColumnStore
 from dynident.diagnose.present import Present
 from dynident.diagnose.runs import Run
 from dynident.diagnose.scoring import Score, candidate_moments, carried, cross_validate, score
+from dynident.diagnose.shaping import refined
 from dynident.effects import Effect, catalogue
 from dynident.model import Model
 
@@ -27,7 +28,6 @@ LEAST_SHARE = (0.006, 0.02)
 
 _CONFIDENT = 1.5  # standard errors of the held-out gain
 _MOST_BLOCKS = 0.65  # share of blocks in which the held-out residual must fall otherwise
-_TELL_APART = 2.0  # standard errors between two effects' held-out residuals
 _ALIKE = 0.015  # two drops within this share of the larger are alike
 _MOST_CARRIERS = 6  # recordings up to which every choice of payload carriers is tried
 
@@ -59,10 +59,11 @@ class Ranking:
 
 
 def candidates(model: Model) -> list[Effect]:
-    """Every effect of the catalogue at every place where the model has none of its label."""
+    """Every effect that shows in residuals, wherever the model has none of its label."""
     found = []
     for effect in catalogue().values():
-        found += [e.on(model.robot) for e in effect.candidates(model.robot) if e not in model]
+        if effect.found_by == "residual":
+            found += [e.on(model.robot) for e in effect.candidates(model.robot) if e not in model]
     return found
 
 
@@ -102,65 +103,30 @@ def rank(
 
 
 def indistinguishable(ranking: Ranking, winner: Score) -> tuple[Effect, ...]:
-    """Effects whose held-out residuals the data cannot tell from the winner's.
+    """Effects that the data cannot tell from the winner.
 
-    An effect that contains the winner and adds nothing to it is not named.
+    Those of the model confidence set of all material effects, and those that explain the same. An
+    effect that contains the winner and adds nothing to it is not named.
     """
-    found = []
-    assert winner.losses is not None
-    for other in ranking.material:
-        if other.effect == winner.effect or other.losses is None:
-            continue
-        same_place = other.effect.joint == winner.effect.joint
-        if same_place and winner.effect.name in other.effect.contains:
-            continue
-        difference = other.losses - winner.losses
-        error = difference.std(ddof=1) * np.sqrt(len(difference))
-        apart = difference.sum() > _TELL_APART * error
-        alike = abs(winner.drop - other.drop) <= _ALIKE * winner.drop
-        if alike or not apart:
-            found.append(other.effect)
-    return tuple(found)
-
-
-def refined(store: ColumnStore, present: Present, one: Score) -> Score:
-    """Return a score at the shape parameters that fit best."""
-    shapes = one.effect.shape_parameters(present.model.robot)
-    if not shapes or not one.drop > 0:
-        return one
-    grid = int(np.prod([len(s.grid) for s in shapes]))
-
-    def at(shape: np.ndarray) -> Score:
-        effect = one.effect.shaped(*np.exp(np.atleast_1d(shape)))
-        result = _score_at(store, present, effect, grid, one.carriers)
-        store.forget(effect)
-        return result
-
-    def loss(shape: np.ndarray) -> float:
-        return -at(shape).drop
-
-    if len(shapes) == 1:
-        low, high = _neighbours(shapes[0], one.effect.shape[0])
-        span = (float(np.log(low)), float(np.log(high)))
-        found = np.atleast_1d(np.asarray(fminbound(loss, *span, xtol=2e-3)))
-    else:
-        bounds = [(np.log(s.lower), np.log(s.upper)) for s in shapes]
-        start = np.log(one.effect.shape)
-        found = minimize(loss, start, bounds=bounds, method="Nelder-Mead").x
-    better = at(found)
-    return better if better.drop > one.drop else one
-
-
-def best_shape(store: ColumnStore, present: Present, effect: Effect) -> Effect:
-    """Return an effect at the shape at which it explains most; as it is where it explains nothing.
-
-    `present` is the model without it.
-    """
-    tried = [effect, *effect.variants(present.model.robot)]
-    found = candidate_moments(store, present, tried)
-    scores = (score(present, one, *parts, 1) for one, parts in zip(tried, found, strict=True))
-    best = max(scores, key=lambda one: one.drop)
-    return refined(store, present, best).effect if best.drop > 0 else effect
+    rivals = [
+        other
+        for other in ranking.material
+        if other.losses is not None
+        and other.effect != winner.effect
+        and not (
+            other.effect.joint == winner.effect.joint
+            and winner.effect.name in other.effect.contains
+        )
+    ]
+    if not rivals:
+        return ()
+    losses = np.column_stack([one.losses for one in (winner, *rivals) if one.losses is not None])
+    kept = confidence_set(losses)
+    return tuple(
+        other.effect
+        for k, other in enumerate(rivals, 1)
+        if k in kept or abs(winner.drop - other.drop) <= _ALIKE * winner.drop
+    )
 
 
 def carrier_choices(runs: tuple[Run, ...]) -> list[tuple[bool, ...]]:
@@ -189,13 +155,6 @@ def _score_variants(store: ColumnStore, present: Present, effect: Effect) -> Ite
     found = candidate_moments(store, present, shapes)
     for shaped, parts in zip(shapes, found, strict=True):
         yield score(present, shaped, *parts, grid=len(shapes))
-
-
-def _score_at(store, present, effect: Effect, grid: int, carriers) -> Score:
-    (parts,) = candidate_moments(store, present, [effect])
-    if carriers is not None:
-        parts = tuple(carried(part, store, carriers) for part in parts)
-    return score(present, effect, *parts, grid=grid, carriers=carriers)
 
 
 def _confirm(store: ColumnStore, present: Present, one: Score) -> Score:
@@ -240,11 +199,3 @@ def _impossible(one: Score, model: Model) -> str:
         if value < parameter.lower - 3 * sigma or value > parameter.upper + 3 * sigma:
             return f"would need {parameter.name} = {value:.3g} {parameter.unit}"
     return ""
-
-
-def _neighbours(shape, value: float) -> tuple[float, float]:
-    grid = np.array(shape.grid)
-    i = int(np.argmin(np.abs(grid - value)))
-    low = grid[i - 1] if i > 0 else max(shape.lower, grid[0] ** 2 / grid[1])
-    high = grid[i + 1] if i + 1 < len(grid) else min(shape.upper, grid[-1] ** 2 / grid[-2])
-    return float(low), float(high)

@@ -1,0 +1,31 @@
+"""The model confidence set keeps what may be the best and drops what is not."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.diagnose.confidence_set import confidence_set
+
+BLOCKS = 20
+
+
+def losses(excess: tuple[float, ...], seed: int) -> np.ndarray:
+    """Losses that vary together from block to block, as those of models do."""
+    rng = np.random.default_rng(seed)
+    common = rng.normal(100.0, 30.0, (BLOCKS, 1))
+    return common + rng.normal(0.0, 5.0, (BLOCKS, len(excess))) + np.array(excess)
+
+
+def test_what_is_clearly_worse_is_dropped_and_equals_stay_together() -> None:
+    assert confidence_set(losses((0.0, 0.0, 40.0), 0)) == (0, 1)
+
+
+def test_the_best_is_kept_at_the_level_asked_for() -> None:
+    kept = [0 in confidence_set(losses((0.0, 2.0, 4.0), seed)) for seed in range(60)]
+    assert np.mean(kept) >= 0.9
+
+
+def test_one_model_or_identical_ones_are_all_kept() -> None:
+    one = losses((0.0,), 0)
+    assert confidence_set(one) == (0,)
+    assert confidence_set(np.hstack([one, one])) == (0, 1)

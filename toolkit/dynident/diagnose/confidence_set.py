@@ -1,0 +1,43 @@
+"""Which effects the data cannot tell from the best one: a model confidence set.
+
+Hansen, Lunde and Nason (2011): models are taken out of a set, the worst first, as long as the
+differences between their held-out losses are more than chance. What stays contains the best model
+with the confidence asked for.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+LEVEL = 0.05
+"""Chance that the best model is not in the set."""
+
+_DRAWS = 1000  # of the bootstrap
+_BLOCK = 2  # consecutive blocks of time that are drawn together: neighbours share their motion
+_SEED = 20_110
+
+
+def confidence_set(losses: np.ndarray, level: float = LEVEL) -> tuple[int, ...]:
+    """Return the columns that may be the best.
+
+    Parameters
+    ----------
+    losses : (B, k)
+        Held-out loss of each model in each block of time.
+    level : chance that the best one is left out.
+
+    Returns
+    -------
+    Indices of columns, ascending.
+    """
+    if losses.shape[1] < 2 or losses.shape[0] < 3:
+        return tuple(range(losses.shape[1]))
+    # Loaded where two effects compete: it takes a second.
+    from arch.bootstrap import MCS
+
+    varied = losses - losses.mean(axis=1, keepdims=True)
+    if not np.any(varied):
+        return tuple(range(losses.shape[1]))
+    found = MCS(losses, size=level, reps=_DRAWS, block_size=_BLOCK, method="max", seed=_SEED)
+    found.compute()
+    return tuple(sorted(int(str(i)) for i in found.included))

@@ -1,0 +1,213 @@
+"""Shape parameters and points of secants at which a candidate explains most."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from scipy.optimize import fminbound, minimize
+
+from dynident.diagnose.evidence import ColumnStore
+from dynident.diagnose.moments import Moments
+from dynident.diagnose.present import Present
+from dynident.diagnose.scoring import Score, candidate_moments, carried, score
+from dynident.effects import Block, Effect, Parameter
+
+_SECANTS = 3  # times that columns are taken at the values just found
+_SETTLED = 0.02  # relative change of values at which secants count as settled
+_EVALUATIONS = 25  # of a gradient search, at most
+_PRECISION = 1e-3  # of the logarithm of a shape parameter
+
+
+@dataclass(frozen=True)
+class Tangent(Effect):
+    """An effect's columns, then their derivatives by the logarithm of each shape parameter."""
+
+    of: Effect | None = None
+    name: ClassVar[str] = "tangent"
+
+    @classmethod
+    def to(cls, effect: Effect) -> Tangent:
+        """Return the columns and derivatives of an effect."""
+        return cls(effect.joint, effect.source, effect.shape, effect.point, effect)
+
+    @property
+    def needs(self) -> frozenset[str]:  # type: ignore[override]
+        """As the effect."""
+        assert self.of is not None
+        return self.of.needs
+
+    def parameters(self, robot) -> tuple[Parameter, ...]:
+        """As the effect."""
+        assert self.of is not None
+        return self.of.parameters(robot)
+
+    def columns(self, block: Block) -> np.ndarray:
+        """Columns (T, n, k), then derivatives, shape by shape, (T, n, k + s k)."""
+        assert self.of is not None
+        plain, slopes = self.of.columns(block), self.of.sensitivities(block)
+        assert slopes is not None
+        turned = np.moveaxis(slopes, 3, 2).reshape(*slopes.shape[:2], -1)
+        return np.concatenate([plain, turned], axis=2)
+
+
+def score_at(store: ColumnStore, present: Present, effect: Effect, like: Score, grid: int) -> Score:
+    """Score an effect with other columns; carriers of a payload as in `like`."""
+    (parts,) = candidate_moments(store, present, [effect])
+    if like.carriers is not None:
+        parts = tuple(carried(part, store, like.carriers) for part in parts)
+    return score(present, effect, *parts, grid=grid, carriers=like.carriers)
+
+
+def refined(store: ColumnStore, present: Present, one: Score) -> Score:
+    """Return a score at the shape parameters and secants that fit best."""
+    if not one.drop > 0:
+        return one
+    if one.effect.secant:
+        one = _at_its_values(store, present, one)
+    if not one.effect.shape_parameters(present.model.robot):
+        return one
+    has_slopes = type(one.effect).sensitivities is not Effect.sensitivities
+    search = _by_gradient if has_slopes else _by_trial
+    better = search(store, present, one)
+    if better.drop <= one.drop:
+        return one
+    return _at_its_values(store, present, better) if one.effect.secant else better
+
+
+def _at_its_values(store: ColumnStore, present: Present, one: Score) -> Score:
+    """Take secants through the values found, until they settle."""
+    for _ in range(_SECANTS):
+        if not one.values or not np.any(one.values):
+            return one
+        effect = one.effect.at(_within_bounds(one, present))
+        old = one.effect.point or (0.0,) * len(effect.point)
+        change = np.linalg.norm(np.subtract(effect.point, old))
+        if change <= _SETTLED * np.linalg.norm(effect.point):
+            break
+        better = score_at(store, present, effect, one, _grid(one.effect, present))
+        store.forget(effect)
+        if not better.drop > 0.5 * one.drop:
+            break  # the secant has left the range in which the law is what it is
+        one = better
+    return one
+
+
+def _within_bounds(one: Score, present: Present) -> list[float]:
+    limits = one.effect.parameters(present.model.robot)
+    return np.clip(one.values, [p.lower for p in limits], [p.upper for p in limits]).tolist()
+
+
+def _grid(effect: Effect, present: Present) -> int:
+    return sum(1 for _ in effect.variants(present.model.robot))
+
+
+def _by_gradient(store: ColumnStore, present: Present, one: Score) -> Score:
+    """Minimise the residual over the shapes with exact derivatives, linear parameters solved for.
+
+    At the best linear parameters the derivative of the residual by a shape is the partial one
+    (variable projection).
+    """
+    effect, k = one.effect, len(one.values)
+    shapes = effect.shape_parameters(present.model.robot)
+    grid = _grid(effect, present)
+    best = one
+
+    def loss(logarithm: np.ndarray) -> tuple[float, np.ndarray]:
+        nonlocal best
+        trial = effect.shaped(*np.clip(np.exp(logarithm), *_limits(shapes)))
+        tangent = Tangent.to(trial)
+        ((with_model, with_self),) = candidate_moments(store, present, [tangent])
+        store.forget(tangent)
+        plain = slice(0, k)
+        found = score(
+            present,
+            trial,
+            Moments(with_model.signal[:, :, plain], with_model.total[:, :, plain]),
+            Moments(with_self.signal[:, plain, plain], with_self.total[:, plain, plain]),
+            grid=grid,
+        )
+        if found.drop > best.drop:
+            best = found
+        values = np.array(found.values or (0.0,) * k)
+        slope = _slope(present, with_model.sums()[0], with_self.sums()[0], values)
+        return -found.drop / one.drop, slope / one.drop
+
+    bounds = [(np.log(s.lower), np.log(s.upper)) for s in shapes]
+    options = {"maxfun": _EVALUATIONS, "ftol": 1e-5}
+    minimize(
+        loss, np.log(effect.shape), jac=True, bounds=bounds, method="L-BFGS-B", options=options
+    )
+    return best
+
+
+def _limits(shapes) -> tuple[list[float], list[float]]:
+    return [s.lower for s in shapes], [s.upper for s in shapes]
+
+
+def _slope(
+    present: Present, with_model: np.ndarray, with_self: np.ndarray, values: np.ndarray
+) -> np.ndarray:
+    """Derivative of the squared residual by each shape, (s,), from signal moments.
+
+    Parameters
+    ----------
+    with_model : (p + 1, k + s k) of the model's columns and the torque with the tangent's columns.
+    with_self : (k + s k, k + s k) of the tangent's columns with themselves.
+    values : (k,) the effect's parameters.
+    """
+    p, k = len(present.values), len(values)
+    back = present.solution.project(with_model[:p, :k])
+    model = np.append(-(present.values - back @ values), 1.0)
+    # Residual with each derivative column, of the model refitted beside the effect.
+    moment = model @ with_model[:, k:] - values @ with_self[:k, k:]
+    return -2.0 * moment.reshape(-1, k) @ values
+
+
+def _by_trial(store: ColumnStore, present: Present, one: Score) -> Score:
+    shapes = one.effect.shape_parameters(present.model.robot)
+    grid = _grid(one.effect, present)
+
+    def at(shape: np.ndarray) -> Score:
+        effect = one.effect.shaped(*np.exp(np.atleast_1d(shape)))
+        result = score_at(store, present, effect, one, grid)
+        store.forget(effect)
+        return result
+
+    def loss(shape: np.ndarray) -> float:
+        return -at(shape).drop
+
+    return at(_minimum(loss, shapes, one.effect.shape))
+
+
+def _minimum(loss: Callable[[np.ndarray], float], shapes, start) -> np.ndarray:
+    if len(shapes) == 1:
+        low, high = _neighbours(shapes[0], start[0])
+        span = (float(np.log(low)), float(np.log(high)))
+        return np.atleast_1d(np.asarray(fminbound(loss, *span, xtol=2 * _PRECISION)))
+    bounds = [(np.log(s.lower), np.log(s.upper)) for s in shapes]
+    return minimize(loss, np.log(start), bounds=bounds, method="Nelder-Mead").x
+
+
+def best_shape(store: ColumnStore, present: Present, effect: Effect) -> Effect:
+    """Return an effect at the shape at which it explains most; as it is where it explains nothing.
+
+    `present` is the model without it.
+    """
+    tried = [effect, *effect.variants(present.model.robot)]
+    found = candidate_moments(store, present, tried)
+    scores = (score(present, one, *parts, 1) for one, parts in zip(tried, found, strict=True))
+    best = max(scores, key=lambda one: one.drop)
+    return refined(store, present, best).effect if best.drop > 0 else effect
+
+
+def _neighbours(shape, value: float) -> tuple[float, float]:
+    grid = np.array(shape.grid)
+    if len(grid) < 2:
+        return shape.lower, shape.upper
+    i = int(np.argmin(np.abs(grid - value)))
+    low = grid[i - 1] if i > 0 else max(shape.lower, grid[0] ** 2 / grid[1])
+    high = grid[i + 1] if i + 1 < len(grid) else min(shape.upper, grid[-1] ** 2 / grid[-2])
+    return float(low), float(high)
