@@ -17,11 +17,13 @@ def losses(excess: tuple[float, ...], seed: int) -> np.ndarray:
 
 
 def test_what_is_clearly_worse_is_dropped_and_equals_stay_together() -> None:
-    assert confidence_set(losses((0.0, 0.0, 40.0), 0)) == (0, 1)
+    kept = [confidence_set(losses((0.0, 0.0, 40.0), seed)) for seed in range(20)]
+    assert not any(2 in one for one in kept)
+    assert np.mean([one == (0, 1) for one in kept]) >= 0.8
 
 
 def test_the_best_is_kept_at_the_level_asked_for() -> None:
-    kept = [0 in confidence_set(losses((0.0, 2.0, 4.0), seed)) for seed in range(60)]
+    kept = [0 in confidence_set(losses((0.0, 2.0, 4.0), seed)) for seed in range(40)]
     assert np.mean(kept) >= 0.9
 
 
