@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dynident.closed_loop import Controller
 from dynident.diagnose.blunting import blunted
 from dynident.diagnose.diagnosis import Diagnosis
 from dynident.diagnose.evidence import ColumnStore
@@ -20,7 +21,8 @@ from dynident.diagnose.search import (
     indistinguishable,
     rank,
 )
-from dynident.diagnose.shaping import best_shape, refined
+from dynident.diagnose.shaping import best_shape, reshaped
+from dynident.diagnose.simulated import motion_of_loop
 from dynident.diagnose.telling import RESOLUTION, Found, Search, told
 from dynident.effects import Effect
 from dynident.fit.estimate import Estimate
@@ -40,6 +42,7 @@ def diagnose(
     train: Dataset,
     test: Dataset | None = None,
     *,
+    controller: Controller | None = None,
     most: int = MOST_EFFECTS,
     tell: Callable[[str], None] = lambda _: None,
 ) -> Diagnosis:
@@ -51,6 +54,8 @@ def diagnose(
         the motion repeats).
     train : recordings to fit.
     test : recordings to judge by; without any, blocks of the training recordings are held out.
+    controller : of the closed loop behind the recordings; where nothing repeats, the simulated
+        loop gives the instruments.
     most : effects that are added at most.
     tell : told what is being done, for a progress display.
 
@@ -61,7 +66,8 @@ def diagnose(
     """
     given = model.model if isinstance(model, Estimate) else model
     tell("reading the motion")
-    store = ColumnStore(given, gather(train))
+    loop = motion_of_loop(given, train, controller, tell)
+    store = ColumnStore(given, loop.runs or gather(train))
     held = ColumnStore(given, gather(test)) if test is not None and len(test) else None
     tell("evaluating every effect")
     everything = [v for effect in candidates(given) for v in effect.variants(given.robot)]
@@ -77,12 +83,14 @@ def diagnose(
         found.append(chosen)
         _carry(store, chosen.score)
         present = blunted(store, _refitted(store, present.model + chosen.score.effect))
+        if loop.renew(store, present):
+            present = blunted(store, _refitted(store, present.model))
         rounds.append(rank(store, present, len(found), tell))
         found[-1] = _alternatives_only(chosen, rounds[-1])
     kept = _without_superfluous(store, present, found, tell)
     if len(kept.found) < len(found):
         rounds.append(rank(store, kept.final, len(kept.found), tell))
-    search = Search(store, start, kept.final, tuple(kept.found), tuple(rounds))
+    search = Search(store, start, kept.final, tuple(kept.found), tuple(rounds), loop.notes)
     return told(search, train, test, held)
 
 
@@ -150,8 +158,8 @@ def _refitted(store: ColumnStore, model: Model) -> Present:
         return present
     for effect in shaped:
         others = fit_present(store, present.model - effect)
-        better = refined(store, others, Score(effect, None, absorbed=False, drop=1e-300))
-        present = fit_present(store, present.model.with_shapes((better.effect,)))
+        better = reshaped(store, others, effect)
+        present = fit_present(store, present.model.with_shapes((better,)))
     return present
 
 

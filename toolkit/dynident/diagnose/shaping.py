@@ -191,6 +191,13 @@ def _minimum(loss: Callable[[np.ndarray], float], shapes, start) -> np.ndarray:
     return minimize(loss, np.log(start), bounds=bounds, method="Nelder-Mead").x
 
 
+def reshaped(store: ColumnStore, present: Present, effect: Effect) -> Effect:
+    """Return an effect at the shape that fits best near its own; `present` is without it."""
+    blank = Score(effect, None, absorbed=False)
+    now = score_at(store, present, effect, blank, _grid(effect, present))
+    return refined(store, present, now).effect
+
+
 def best_shape(store: ColumnStore, present: Present, effect: Effect) -> Effect:
     """Return an effect at the shape at which it explains most; as it is where it explains nothing.
 
