@@ -251,7 +251,7 @@ def _recordings(said: _StudyFile, path: Path, robot: Robot) -> list[Recording]:
         }
     known: dict[tuple[Path, str | None], Recording] = {}
     found = []
-    for entry in said.recordings:
+    for number, entry in enumerate(said.recordings, start=1):
         file = find_data(entry.file, path.parent)
         key = (file, entry.record)
         if key not in known:
@@ -265,6 +265,7 @@ def _recordings(said: _StudyFile, path: Path, robot: Robot) -> list[Recording]:
                 window=entry.window,
                 payload=entry.payload,
                 torque=said.torque,
+                number=number,
             )
         )
     return found

@@ -148,7 +148,7 @@ class Experiment:
         }
         tasks = [
             Task(
-                bodies[run.payload],
+                bodies[run.payload].numbered(index + 1),
                 run.trajectory,
                 run.duration,
                 run.start,
@@ -216,6 +216,7 @@ class Experiment:
             payload=run.payload if self.tells_payload else None,
             torque=self.torque,
             name=run.file,
+            number=index + 1,
         )
 
     def _stream(self, index: int, purpose: int) -> np.random.Generator:

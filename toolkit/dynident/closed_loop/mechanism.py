@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from dynident.effects import FRICTION_WIDTH, Block, Effect, Term, effects_of
+from dynident.effects import FRICTION_WIDTH, Block, Effect, Term, Transmission, effects_of
 from dynident.errors import EffectError, SimulationError
 from dynident.model import Model
 from dynident.robot import Robot
@@ -71,12 +71,14 @@ class Mechanism:
     effects : that act.
     friction_width : rad/s or m/s, see `dynident.effects.FRICTION_WIDTH`.
     carries_payload : whether the payload is on board.
+    number : of the recording that is made, from 1; 0 where no effect asks for it.
     """
 
     robot: Robot
     effects: tuple[TrueEffect, ...] = ()
     friction_width: float = FRICTION_WIDTH
     carries_payload: bool = False
+    number: int = 0
 
     @classmethod
     def of(
@@ -159,6 +161,12 @@ class Mechanism:
         made._check_gain()
         return made
 
+    def numbered(self, number: int) -> Mechanism:
+        """Return it as it is in one recording; itself where no effect tells recordings apart."""
+        if any(one.effect.found_by == "repetition" for one in self.effects):
+            return replace(self, number=number)
+        return self
+
     def _check_gain(self) -> None:
         for joint, gain in zip(self.robot.names, self.gain, strict=True):
             if not (gain > 0 and np.isfinite(gain)):
@@ -209,30 +217,137 @@ class Mechanism:
             self.robot.names,
             self.friction_width,
             self.carries_payload,
+            number=self.number,
         )
 
-    def force(self, t: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Return what effects take from the torque that acts, from t (T,), q and v (T, n)."""
-        block = self.block(t, q, v)
-        total = np.zeros(q.shape)
+    @cached_property
+    def transmissions(self) -> tuple[Transmission, ...]:
+        """What gives way between motors and links, with the inertia of each motor.
+
+        Raises
+        ------
+        SimulationError
+            If there are two at one joint, or a motor has no inertia.
+        """
+        found: dict[int, Transmission] = {}
         for one in self.effects:
+            made = one.effect.simulated_transmission(one.values, self.robot)
+            if made is None:
+                continue
+            where = f"joint '{self.robot.names[made.joint]}'"
+            if made.joint in found:
+                raise SimulationError("two transmissions give way", where, "leave one of them out")
+            own = float(self.inertia[made.joint, made.joint])
+            made = replace(made, rotor=own) if own > 0 else made
+            if not made.rotor > 0:
+                mend = "give it rotor_inertia, or the effect a rotor share above 0"
+                raise SimulationError("a motor without inertia before a spring", where, mend)
+            found[made.joint] = made
+        return tuple(found[joint] for joint in sorted(found))
+
+    @cached_property
+    def loss(self) -> np.ndarray:
+        """Dry friction per torque that acts, (n,)."""
+        total = np.zeros(self.robot.n)
+        for one in self.effects:
+            total += one.effect.simulated_loss(one.values, self.robot)
+        return total
+
+    @property
+    def memory(self) -> int:
+        """Number of internal states of the effects, one effect after the other."""
+        return sum(one.effect.memory for one in self.effects)
+
+    def force(
+        self, t: np.ndarray, q: np.ndarray, v: np.ndarray, memory: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Return what effects take from the torque that acts.
+
+        Parameters
+        ----------
+        t : (T,) s.
+        q, v : (T, n) of the motors.
+        memory : (T, m) internal states; None for zero.
+        """
+        total = np.zeros(q.shape)
+        for one, block in self._blocks(t, q, v, memory):
             total = total + one.effect.simulated_force(one.values, block)
         return total
 
+    def memory_rate(
+        self, t: np.ndarray, q: np.ndarray, v: np.ndarray, memory: np.ndarray
+    ) -> np.ndarray:
+        """Return the rates of the internal states (T, m), per s; see `force`."""
+        rates = [np.zeros((len(q), 0))]
+        for one, block in self._blocks(t, q, v, memory):
+            if one.effect.memory:
+                rates.append(one.effect.simulated_rate(one.values, block))
+        return np.hstack(rates)
+
+    def _blocks(self, t, q, v, memory):
+        """Yield each effect, and the samples as it sees them."""
+        block, first = self.block(t, q, v), 0
+        for one in self.effects:
+            own = block
+            if count := one.effect.memory:
+                rows = np.zeros((len(q), count))
+                if memory is not None:
+                    rows = memory[:, first : first + count]
+                own, first = replace(block, memory=rows), first + count
+            yield one, own
+
     def command(self, t: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
-        """Return the recorded torque that a motion takes, (T, n) N m or N."""
+        """Return the recorded torque that a motion takes, (T, n) N m or N.
+
+        Raises
+        ------
+        SimulationError
+            If it depends on what went before: a transmission gives way, or an effect remembers.
+        """
+        self._require_no_past()
+        return self.stiff_command(t, q, v, a)
+
+    def stiff_command(
+        self, t: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray
+    ) -> np.ndarray:
+        """Return `command` as if nothing gave way and internal states were zero."""
         rigid = self.robot.inverse_dynamics(q, v, a)
-        return self.gain * (rigid + a @ self.inertia.T + self.force(t, q, v))
+        load = rigid + a @ self.inertia.T + self.force(t, q, v)
+        return self.gain * (load + self.loss * np.abs(load) * self._sign(v))
+
+    def _sign(self, v: np.ndarray) -> np.ndarray:
+        return np.tanh(v / self.friction_width)
+
+    def _require_no_past(self) -> None:
+        acting = [one for one in self.effects if np.any(one.values)]
+        for one in acting:
+            gives = one.effect.simulated_transmission(one.values, self.robot) is not None
+            if gives or one.effect.memory:
+                raise SimulationError(
+                    "its torque is not a function of the motion at an instant",
+                    one.effect.label,
+                    "simulate it in a closed loop",
+                )
 
     def acceleration(
         self, t: np.ndarray, q: np.ndarray, v: np.ndarray, u: np.ndarray
     ) -> np.ndarray:
-        """Return the acceleration that a recorded torque gives, (T, n); inverse of `command`."""
+        """Return the acceleration that a recorded torque gives, (T, n); inverse of `command`.
+
+        Raises
+        ------
+        SimulationError
+            See `command`.
+        """
+        self._require_no_past()
         still, unit = np.zeros_like(q), np.eye(self.robot.n)
         weight = self.robot.inverse_dynamics(q, still, still)
         mass = [self.robot.inverse_dynamics(q, still, still + e) - weight for e in unit]
         inertia = np.stack(mass, axis=2) + self.inertia
-        load = u / self.gain - self.robot.inverse_dynamics(q, v, still) - self.force(t, q, v)
+        acting = u / self.gain
+        if np.any(self.loss):
+            acting = acting / (1.0 + self.loss * self._sign(v) * np.sign(acting))
+        load = acting - self.robot.inverse_dynamics(q, v, still) - self.force(t, q, v)
         return np.linalg.solve(inertia, load[:, :, None])[:, :, 0]
 
 

@@ -32,7 +32,7 @@ def structure(mechanisms: Sequence[Mechanism]) -> Hashable:
     for one in mechanisms:
         terms = frozenset((term.at, term.law, term.of) for term in one.terms)
         others = tuple((other.effect, len(other.values)) for other in one.others)
-        said = (one.friction_width, one.carries_payload) if others else ()
+        said = (one.friction_width, one.carries_payload, one.number) if others else ()
         parts.append((_kinematics(one.robot), terms, others, said))
     return tuple(parts), any(_is_coupled(one.inertia) for one in mechanisms)
 

@@ -81,7 +81,7 @@ def retrace(
         samples = int(np.ceil(recording.duration * rate - _ROUNDING)) + 2
         tasks.append(
             Task(
-                mechanism,
+                mechanism.numbered(recording.number),
                 reference,
                 samples / rate,
                 recording.start,

@@ -27,11 +27,12 @@ from dynident.recording.motion_check import (
 from dynident.recording.parallel import FilterBlock, ParallelFilter, choose_factor
 from dynident.recording.periods import Periods, mismatch, periods, require_repetition
 from dynident.recording.read import SUFFIXES, read
-from dynident.recording.recording import Provenance, Recording
+from dynident.recording.recording import SIGNALS, Provenance, Recording
 from dynident.recording.uniform import uniform
 from dynident.recording.write import write
 
 __all__ = [
+    "SIGNALS",
     "SUFFIXES",
     "Column",
     "Dataset",

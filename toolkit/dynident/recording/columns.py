@@ -14,6 +14,8 @@ from dynident.errors import RecordingError
 
 REQUIRED = ("q", "tau")
 OPTIONAL = ("v", "a", "q_ref")
+PARTIAL = ("temperature",)
+"""Optional ones that need not be there for every joint."""
 
 _INDEXED = re.compile(r"^(?P<name>.+)\[(?P<index>\d+)\]$")
 
@@ -100,7 +102,7 @@ def resolve(
     Returns
     -------
     ours -> the column as the table names it: `t`, `q.<joint>` and `tau.<joint>`, then whichever
-    optional ones are there (for all joints).
+    optional ones are there (for all joints; temperatures for whichever joints have them).
 
     Raises
     ------
@@ -115,6 +117,9 @@ def resolve(
         names = [f"{signal}.{joint}" for joint in joints]
         if any(name in mapping or _find(table, name) for name in names):
             found |= _located(table, names, mapping)
+    for name in (f"{signal}.{joint}" for signal in PARTIAL for joint in joints):
+        if name in mapping or _find(table, name):
+            found |= _located(table, [name], mapping)
     return found
 
 
@@ -169,7 +174,7 @@ def _located(
 def _checked(
     columns: Mapping[str, Column | str], joints: Sequence[str], file: str
 ) -> dict[str, Column]:
-    signals = (*REQUIRED, *OPTIONAL)
+    signals = (*REQUIRED, *OPTIONAL, *PARTIAL)
     valid = ["t", *(f"{signal}.{joint}" for signal in signals for joint in joints)]
     for ours in columns:
         if ours not in valid:

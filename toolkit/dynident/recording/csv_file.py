@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 import warnings
 from collections.abc import Sequence
 
@@ -37,7 +38,7 @@ def open_csv(data: bytes, file: str) -> Table:
     if not text:
         raise RecordingError("is empty", file, "the first line names the columns: t, q.<joint> ...")
     first, _, body = text.partition("\n")
-    separator = max(",;\t", key=first.count)
+    separator = _separator(first, body.partition("\n")[0])
     names = _header(first, separator, file)
 
     def load(wanted: Sequence[str]) -> dict[str, np.ndarray]:
@@ -51,6 +52,13 @@ def open_csv(data: bytes, file: str) -> Table:
         return {name: values[:, i] for i, name in enumerate(wanted)}
 
     return Table(file, names, load)
+
+
+def _separator(header: str, row: str) -> str:
+    """What separates the columns; names may hold other separators, which no row of numbers has."""
+    bare = re.sub('"[^"]*"', "", header)
+    both = [mark for mark in ",;\t" if 0 < bare.count(mark) == row.count(mark)]
+    return max(both or ",;\t", key=bare.count)
 
 
 def _header(line: str, separator: str, file: str) -> tuple[str, ...]:

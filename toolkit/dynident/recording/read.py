@@ -12,7 +12,15 @@ import numpy as np
 from dynident import files
 from dynident.errors import RecordingError
 from dynident.recording.binary_files import open_mat, open_npz, open_parquet
-from dynident.recording.columns import OPTIONAL, REQUIRED, Column, joints_in, load, resolve
+from dynident.recording.columns import (
+    OPTIONAL,
+    PARTIAL,
+    REQUIRED,
+    Column,
+    joints_in,
+    load,
+    resolve,
+)
 from dynident.recording.csv_file import open_csv
 from dynident.recording.recording import Provenance, Recording, _joint_names
 from dynident.recording.records import pick
@@ -34,7 +42,8 @@ def read(
     Parameters
     ----------
     path : file with `t` (s) and, for each joint, `q.<joint>` and `tau.<joint>`; optionally
-        `v.<joint>`, `a.<joint>`, `q_ref.<joint>`; SI units. In MAT files `q_<joint>` and so on,
+        `v.<joint>`, `a.<joint>`, `q_ref.<joint>`, and `temperature.<joint>` (degrees Celsius) at
+        any of the joints; SI units. In MAT files `q_<joint>` and so on,
         since names of variables hold no dots. Whatever else it holds is ignored.
     joints : names, the order of the columns; by default every joint of the file, in its order.
     columns : ours -> theirs for files with other names or units, as
@@ -81,6 +90,11 @@ def read(
         for signal in (*REQUIRED, *OPTIONAL)
         if f"{signal}.{names[0]}" in found
     }
+    missing = np.full(len(found["t"]), np.nan)
+    for signal in PARTIAL:
+        parts = [found.get(f"{signal}.{joint}", missing) for joint in names]
+        if any(part is not missing for part in parts):
+            signals[signal] = np.column_stack(parts)
     recording = Recording(
         t=found["t"],
         joints=names,

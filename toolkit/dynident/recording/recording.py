@@ -17,7 +17,8 @@ USES = ("train", "test")
 TORQUES = ("measured", "held_command")
 LARGEST = 1e100
 """Magnitude beyond which a number can be no measurement, and squares overflow."""
-SIGNALS = ("q", "tau", "v", "a", "q_ref")
+SIGNALS = ("q", "tau", "v", "a", "q_ref", "temperature")
+"""What a sample holds at each joint."""
 
 
 @dataclass(frozen=True)
@@ -50,12 +51,15 @@ class Recording:
     joints : n names, the order of the columns.
     v, a : (T, n) recorded velocity and acceleration, or None.
     q_ref : (T, n) reference position, or None.
+    temperature : (T, n) degrees Celsius of the motors, NaN at joints where it is not recorded; None
+        where it is recorded at no joint.
     period : s after which the excitation repeats, or None.
     start : s, when the recording began in the session (for effects of warm-up).
     window : (t0, t1) s on the clock of `t`, or None: what to use of it once the whole is filtered.
     use : "train" or "test".
     payload : whether the payload under study was on board; None where there is none.
     torque : "measured", or "held_command" where the torque of sample k acts until sample k + 1.
+    number : its place among the recordings of a study, from 1; 0 where that does not matter.
     name : for tables; the file's name without its suffix by default.
     provenance : file, hash, filter.
 
@@ -74,12 +78,14 @@ class Recording:
     v: np.ndarray | None = None
     a: np.ndarray | None = None
     q_ref: np.ndarray | None = None
+    temperature: np.ndarray | None = None
     period: float | None = None
     start: float = 0.0
     window: tuple[float, float] | None = None
     use: Literal["train", "test"] = "train"
     payload: bool | None = None
     torque: Literal["measured", "held_command"] = "measured"
+    number: int = 0
     name: str = ""
     provenance: Provenance = field(default_factory=Provenance)
 
@@ -98,6 +104,8 @@ class Recording:
             value = getattr(self, signal)
             if value is not None or signal in ("q", "tau"):
                 object.__setattr__(self, signal, self._signal(signal, value))
+        if self.temperature is not None and np.isnan(self.temperature).all():
+            object.__setattr__(self, "temperature", None)
         self._check_finite()
         self._check_time()
         self._check_settings()
@@ -227,7 +235,12 @@ class Recording:
             x = getattr(self, signal)
             if x is None or (np.abs(x) < LARGEST).all():
                 continue
-            row, joint = (int(i) for i in np.argwhere(~(np.abs(x) < LARGEST))[0])
+            bad = ~(np.abs(x) < LARGEST)
+            if signal == "temperature":
+                bad &= ~np.isnan(x).all(axis=0)
+            if not bad.any():
+                continue
+            row, joint = (int(i) for i in np.argwhere(bad)[0])
             self._not_finite(f"{signal}.{self.joints[joint]}", row, x[row, joint])
 
     def _not_finite(self, column: str, row: int, value: float) -> None:
@@ -271,6 +284,9 @@ class Recording:
                 mend = "give two times in s, the earlier one first"
                 raise RecordingError(f"window = {self.window!r}", self.where, mend)
             object.__setattr__(self, "window", window)
+        if isinstance(self.number, bool) or self.number not in range(2**31):
+            mend = "give its place, from 1, or 0"
+            raise RecordingError(f"number = {self.number!r}", self.where, mend)
         for key, valid in (("use", USES), ("torque", TORQUES)):
             if getattr(self, key) not in valid:
                 choices = " or ".join(f'"{one}"' for one in valid)

@@ -62,7 +62,7 @@ def uniform(recording: Recording) -> Recording:
     signals = {
         signal: None
         if (x := getattr(recording, signal)) is None
-        else CubicSpline(t, x[fresh])(grid)
+        else _interpolated(t, x[fresh], grid)
         for signal in SIGNALS
     }
     if recording.torque == "held_command":
@@ -80,6 +80,14 @@ def uniform(recording: Recording) -> Recording:
     source = recording.provenance
     history = f"{source.filter}, {done}" if source.filter else done
     return recording.replace(t=grid, provenance=replace(source, filter=history), **signals)
+
+
+def _interpolated(t: np.ndarray, x: np.ndarray, grid: np.ndarray) -> np.ndarray:
+    """Splines of x (T, n) at other times; columns that are not recorded stay so."""
+    found = np.full((len(grid), x.shape[1]), np.nan)
+    recorded = np.isfinite(x).all(axis=0)
+    found[:, recorded] = CubicSpline(t, x[:, recorded])(grid)
+    return found
 
 
 def _step(recording: Recording) -> float | None:

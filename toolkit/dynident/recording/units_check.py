@@ -16,6 +16,8 @@ WIDEST_TURN = 8 * np.pi
 """rad that a revolute joint travels beyond which its position is rather in degrees."""
 LONGEST_STROKE = 20.0
 """m that a prismatic joint travels beyond which its position is rather in mm."""
+HOTTEST = 200.0
+"""Degrees Celsius of a motor beyond which its temperature is rather in kelvin."""
 
 
 def warn_of_units(recording: Recording, kinds: Sequence[str] | None = None) -> None:
@@ -36,6 +38,8 @@ def warn_of_units(recording: Recording, kinds: Sequence[str] | None = None) -> N
     for column, oddity in found or _velocity_oddities(recording):
         where = f"{recording.where}, column {column}"
         mend = "convert it, or give its scale in the column mapping"
+        if column.startswith("temperature."):
+            mend = "subtract 273.15"
         warnings.warn(f"{where}: {oddity} If so, {mend}", DynidentWarning, stacklevel=3)
 
 
@@ -52,6 +56,10 @@ def _oddities(recording: Recording, kinds: Sequence[str] | None):
             yield name, f"{turns}: is the position in degrees?"
         if kind == "prismatic" and travel > LONGEST_STROKE:
             yield name, f"travels {travel:.4g} m: is the position in mm?"
+    highest = [] if recording.temperature is None else recording.temperature.max(axis=0)
+    for name, hottest in zip(recording.joints, highest, strict=False):
+        if hottest > HOTTEST:
+            yield f"temperature.{name}", f"is up to {hottest:.4g}: is it in kelvin?"
 
 
 def _velocity_oddities(recording: Recording):

@@ -52,7 +52,9 @@ def _columns(recording: Recording) -> dict[str, np.ndarray]:
     for signal in SIGNALS:
         x = getattr(recording, signal)
         if x is not None:
-            found |= {f"{signal}.{joint}": x[:, i] for i, joint in enumerate(recording.joints)}
+            named = ((f"{signal}.{joint}", x[:, i]) for i, joint in enumerate(recording.joints))
+            # A column without a number in it was not recorded.
+            found |= {name: column for name, column in named if not np.isnan(column).all()}
     return found
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from dynident.errors import FitError
 from dynident.fit.instrumental.source import FixedInstruments, Guess, Source, prepared
 from dynident.model import Model
-from dynident.recording import Dataset, Recording, periods, require_repetition
+from dynident.recording import SIGNALS, Dataset, Recording, periods, require_repetition
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def _swapped(recording: Recording) -> tuple[Recording, Recording]:
     own = recording.replace(
         **{
             name: None if (x := getattr(recording, name)) is None else x[rows]
-            for name in ("t", "q", "tau", "v", "a", "q_ref")
+            for name in ("t", *SIGNALS)
         }
     )
     return own, own.replace(q=others.reshape(own.q.shape), v=None, a=None)
