@@ -50,7 +50,8 @@ def diagnosis_of(study: Study) -> Diagnosis:
     from dynident.diagnose import diagnose as search
 
     with progress("diagnosing") as tell:
-        return search(study.model, study.train, study.test, tell=tell)
+        controller = study.controller
+        return search(study.model, study.train, study.test, controller=controller, tell=tell)
 
 
 def comparison_of(study: Study, additions: tuple[str, ...]) -> Comparison:

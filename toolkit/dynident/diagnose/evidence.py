@@ -59,6 +59,17 @@ class ColumnStore:
         """Drop the columns of an effect, tried once and not needed again."""
         self._known.pop(effect, None)
 
+    def renew(self, runs: tuple[Run, ...]) -> None:
+        """Take runs whose last versions, the simulated motions, are new."""
+        fresh = ColumnStore(self.model, tuple(replace(r, versions=r.versions[-1:]) for r in runs))
+        fresh.prepare(self._known)
+        for r in range(len(runs)):
+            self._rigid[r][-1] = fresh._rigid[r][0]
+            for effect, columns in self._known.items():
+                columns[r][-1] = fresh._known[effect][r][0]
+        self._torque.clear()
+        self.runs = runs
+
     def rigid(self, run: int) -> Signals:
         """Columns of the base parameters, (T, n, b) for each version."""
         return self._rigid[run]

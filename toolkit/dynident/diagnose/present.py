@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynident.diagnose.evidence import ColumnStore
-from dynident.diagnose.moments import Moments, Solution, moments, solve
+from dynident.diagnose.moments import Moments, Solution, solve
 from dynident.diagnose.noise import (
     NoiseModel,
     differences,
@@ -79,20 +79,20 @@ def fit_present(store: ColumnStore, model: Model) -> Present:
     ]
     noise = tuple(flat_noise(std or 1.0) for std in torque_std)
     known = any(run.kind != "single" for run in store.runs)
-    columns = []
+    columns, values = [], at
     for round in range(_LOAD_ROUNDS if model.needs_torque else _ROUNDS):
         if not columns or model.needs_torque:
             columns = [
                 [model_columns(store, model, r, j, at) for j in range(n)]
                 for r in range(len(store.runs))
             ]
-        values, _ = _solve(_moments(store, _whiten(store, columns, noise)))
+        values, _ = _solve(_moments(store, _whiten(store, columns, noise, values)))
         noise = tuple(_noise(store, columns, values, j) for j in range(n))
         change = float(np.linalg.norm(values - at))
         if round >= _ROUNDS and change <= _LOAD_TOLERANCE * np.linalg.norm(values):
             break
         at = model.settled(at, values)
-    white = _whiten(store, columns, noise)
+    white = _whiten(store, columns, noise, values)
     summed = _moments(store, white)
     values, solution = _solve(summed)
     rows = sum(
@@ -136,9 +136,9 @@ def residuals(store: ColumnStore, model: Model, values: np.ndarray) -> list[np.n
     return found
 
 
-def _whiten(store: ColumnStore, columns, noise) -> tuple[tuple[np.ndarray, ...], ...]:
+def _whiten(store: ColumnStore, columns, noise, values) -> tuple[tuple[np.ndarray, ...], ...]:
     return tuple(
-        tuple(run.whitened(c, j, noise[j]) for j, c in enumerate(joints))
+        tuple(run.whitened(run.moved(c, values), j, noise[j]) for j, c in enumerate(joints))
         for run, joints in zip(store.runs, columns, strict=True)
     )
 
@@ -146,7 +146,7 @@ def _whiten(store: ColumnStore, columns, noise) -> tuple[tuple[np.ndarray, ...],
 def _moments(store: ColumnStore, white) -> Moments:
     found = None
     for run, joints in zip(store.runs, white, strict=True):
-        parts = [moments(w, w, run.edges, run.kind) for w in joints]
+        parts = [run.moments(w, w) for w in joints]
         here = Moments(np.sum([p.signal for p in parts], 0), np.sum([p.total for p in parts], 0))
         found = here if found is None else found + here
     assert found is not None

@@ -108,9 +108,7 @@ class Run:
         return moments(left, right, self.edges, "single" if plain else self.kind)
 
 
-def gather(
-    dataset: Dataset, seed: int = 0, *, simulated: Dataset | None = None
-) -> tuple[Run, ...]:
+def gather(dataset: Dataset, seed: int = 0, *, simulated: Dataset | None = None) -> tuple[Run, ...]:
     """Arrange the recordings of a dataset in versions; see the module.
 
     Parameters

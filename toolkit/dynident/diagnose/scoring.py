@@ -9,7 +9,7 @@ import numpy as np
 from scipy import stats
 
 from dynident.diagnose.evidence import ColumnStore, joints_of
-from dynident.diagnose.moments import Moments, moments, solve
+from dynident.diagnose.moments import Moments, solve
 from dynident.diagnose.present import Present
 from dynident.effects import Effect
 
@@ -75,8 +75,8 @@ def candidate_moments(
         one, two = [], []
         for position, joint in enumerate(joints):
             white = run.whitened([s[:, position] for s in signals], joint, present.noise[joint])
-            one.append(moments(present.white[r][joint], white, run.edges, run.kind))
-            two.append(moments(white, white, run.edges, run.kind))
+            one.append(run.moments(present.white[r][joint], white))
+            two.append(run.moments(white, white))
         sums = [
             Moments(np.sum([m.signal for m in part], 0), np.sum([m.total for m in part], 0))
             for part in (one, two)

@@ -64,13 +64,17 @@ class Found:
 
 @dataclass(frozen=True)
 class Search:
-    """What a search did: the evidence, the fits, the effects added, the ranking of each round."""
+    """What a search did: the evidence, the fits, the effects added, the ranking of each round.
+
+    `notes` are on its instruments, where they come from a simulation or could not.
+    """
 
     store: ColumnStore
     start: Present
     final: Present
     found: tuple[Found, ...]
     rounds: tuple[Ranking, ...]
+    notes: tuple[str, ...] = ()
 
 
 def told(
@@ -128,7 +132,7 @@ def told(
         _estimate(store, stages[-1], train),
         residual_maps(given, before, after),
         _traces(given, before, after),
-        _notes(store, held, stages[-1], source),
+        (*_notes(store, held, stages[-1], source), *search.notes),
         sources_of(test) if test is not None else (),
     )
 
@@ -224,11 +228,18 @@ def _estimate(store: ColumnStore, present: Present, train: Dataset) -> Estimate:
         fitted.error,
         float(np.linalg.cond(told[:, kept])),
         present.rows,
-        _METHODS[_noise_source(store, None)],
+        _method(store),
         "solved",
         (),
         sources_of(train),
     )
+
+
+def _method(store: ColumnStore) -> str:
+    """How the model was fitted, in words."""
+    if store.runs[0].columns_from == "simulation":
+        return "instrumental variables from the simulated closed loop"
+    return _METHODS[_noise_source(store, None)]
 
 
 def _traces(given: Model, before: HeldOut, after: HeldOut) -> tuple[Trace, ...]:
@@ -275,7 +286,13 @@ def _notes(store, held, present: Present, source: NoiseSource) -> tuple[str, ...
         notes.append("The test recordings do not repeat: the noise is that of the training ones.")
     if source == "given":
         notes.append("The noise is the study's word, not measured: record a repeated motion.")
-    if _noise_source(store, None) == "unknown":
+    simulated = store.runs[0].columns_from == "simulation"
+    if _noise_source(store, None) == "unknown" and simulated:
+        notes.append(
+            "Nothing repeats in the training recordings and no noise is stated: the instruments "
+            "are simulated, and there is no noise floor."
+        )
+    elif _noise_source(store, None) == "unknown":
         floor = ", and no noise floor" if source == "unknown" else ""
         notes.append(
             "Nothing repeats in the training recordings and no noise is stated: plain least "

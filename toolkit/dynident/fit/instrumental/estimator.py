@@ -92,6 +92,11 @@ class IV:
         SimulationError
             If not even the start can be simulated.
         """
+        iterations = self.iterated(model, dataset)
+        return assemble(self, model, iterations.source, iterations, iterations.start_name)
+
+    def iterated(self, model: Model, dataset: Dataset) -> Iterations:
+        """Return the iterations of a fit, done; raises what `fit` raises."""
         if not dataset.recordings:
             raise FitError("no recording to fit", mend='mark some recordings use = "train"')
         first = LeastSquares(self.weighting).fit(model, dataset)
@@ -103,9 +108,9 @@ class IV:
             start = start_values("regular", model, first)
             name = "regular (least squares has lost the inertias in noise)"
             source = self.chosen.prepare(model, dataset, replace(guess, start=start))
-        iterations = Iterations(self, model, source, start)
+        iterations = Iterations(self, model, source, start, name.replace("_", " "))
         iterations.run()
-        return assemble(self, model, source, iterations, name.replace("_", " "))
+        return iterations
 
 
 def _hopeless(source: Source, start: np.ndarray) -> bool:
@@ -129,7 +134,8 @@ class Iterations:
 
     Attributes
     ----------
-    start : (p,) where they began.
+    source : of the instruments.
+    start, start_name : (p,) where they began, and what that is in words.
     values : (p,) the present estimate.
     rounds : one for each iteration done.
     ending, message : how they ended.
@@ -139,10 +145,12 @@ class Iterations:
         nearest possible robot.
     """
 
-    def __init__(self, method: IV, model: Model, source: Source, start: np.ndarray) -> None:
-        self._method, self._model, self._source = method, model, source
+    def __init__(
+        self, method: IV, model: Model, source: Source, start: np.ndarray, start_name: str
+    ) -> None:
+        self._method, self._model, self.source = method, model, source
         self._good: np.ndarray | None = None
-        self.start = start
+        self.start, self.start_name = start, start_name
         self.simulated: np.ndarray | None = None
         self._root: np.ndarray | None = None
         self.values = start
@@ -155,7 +163,7 @@ class Iterations:
 
     def run(self) -> None:
         """Iterate until the residual stays, or an estimate cannot be simulated."""
-        limit = self._method.rounds if self._source.iterates else 1
+        limit = self._method.rounds if self.source.iterates else 1
         for count in range(limit):
             self._method.tell("instrumental variables", count, limit)
             try:
@@ -166,7 +174,7 @@ class Iterations:
                 self._keep_last_good(error)
                 return
             self._estimate(way)
-            if not self._source.iterates:
+            if not self.source.iterates:
                 self.ending = Ending.DIRECT
                 return
             if len(self.rounds) > 1 and self._settled():
@@ -176,7 +184,7 @@ class Iterations:
             self.message = f"the residual still changes after {limit} iterations"
             if self.rounds[-1].way.share < 1.0:
                 self.message = f"the estimates of {limit} iterations could only be approached"
-        if doubt := self._source.verdict():
+        if doubt := self.source.verdict():
             self.ending, self.message = Ending.DOUBTFUL_LOOP, doubt
 
     def _keep_last_good(self, error: SimulationError) -> None:
@@ -205,9 +213,9 @@ class Iterations:
             return Way(1.0)
         except SimulationError as error:
             reason = error
-        if isinstance(self._source, LoopSource):
+        if isinstance(self.source, LoopSource):
             with suppress(DynidentError):
-                nearest = self._source.projected(self.values, self._root)
+                nearest = self.source.projected(self.values, self._root)
                 self.instruments = nearest.instruments
                 self._good = self.simulated = nearest.values
                 return Way(1.0, projected=True)
@@ -225,12 +233,12 @@ class Iterations:
         raise reason
 
     def _make(self, values: np.ndarray) -> None:
-        self.instruments = self._source.at(values)
+        self.instruments = self.source.at(values)
         self._good = values
-        self.simulated = values if self._source.iterates else None
+        self.simulated = values if self.source.iterates else None
 
     def _estimate(self, way: Way) -> None:
-        model, measured = self._model, self._source.measured
+        model, measured = self._model, self.source.measured
         found = moments(model, measured, self.instruments, self.values)
         given = model.given_values()
         solution = solve(found, model.names, given, self._method.weighting)
