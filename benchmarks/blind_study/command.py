@@ -1,0 +1,137 @@
+"""The command line of the blind study.
+
+    python benchmarks/blind_study run --count 400 --seed 10000 --jobs 2
+    python benchmarks/blind_study table
+
+`run` draws the cases of a seed, makes them, asks `dynident explain` about each, and appends what it
+says to answers.jsonl; cases that are in there are not asked again. `table` compares the answers
+with the truth. With `--backend dask` joblib spreads the cases over the cluster whose scheduler
+`--scheduler` names (its workers need this package and `benchmarks` on their PYTHONPATH, and the
+folder in common).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from joblib import Parallel, delayed, parallel_config
+
+from blind_study.cases import SHARES, Case, draw
+from blind_study.make import Size
+from blind_study.table import show
+from blind_study.worker import Place, answer
+
+USUAL = Path("blind_study_results")
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the study, or show what it found."""
+    parser = argparse.ArgumentParser(
+        "blind_study",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    commands = parser.add_subparsers(dest="command", required=True)
+    run = commands.add_parser("run", help="make cases and ask about them")
+    run.add_argument("--seed", type=int, default=0, help="development: 0 to 999")
+    run.add_argument("--count", type=int, default=400, help="cases to draw")
+    run.add_argument("--first", type=int, default=0, help="number of the first one")
+    run.add_argument("--joints", type=int, nargs="*", choices=(2, 6, 7), help="only these robots")
+    run.add_argument("--kinds", nargs="*", choices=tuple(SHARES), help="only these kinds")
+    run.add_argument("--effects", nargs="*", help="only cases that hide one of these")
+    run.add_argument("--numbers", type=int, nargs="*", help="only these cases")
+    run.add_argument("--jobs", type=int, default=2)
+    run.add_argument("--backend", default="loky", help="of joblib: loky, dask ...")
+    run.add_argument("--scheduler", help="address of a Dask scheduler")
+    run.add_argument("--data", choices=("keep", "drop"), default="drop", help="recordings")
+    run.add_argument(
+        "--rates", type=float, nargs=2, default=(500.0, 250.0), metavar=("TWO", "MANY")
+    )
+    table = commands.add_parser("table", help="compare the answers with the truth")
+    for one in (run, table):
+        one.add_argument("--out", type=Path, default=USUAL, help="folder of the study")
+    options = parser.parse_args(arguments)
+    if options.command == "run":
+        place = Place(options.out.resolve(), options.data)
+        size = Size(*options.rates)
+        run_study(_chosen(options), place, size, options)
+    show(options.out)
+
+
+def _chosen(options: argparse.Namespace) -> list[Case]:
+    found = draw(options.seed, options.count, options.first)
+    for name in ("joints", "kinds", "effects", "numbers"):
+        wanted = getattr(options, name)
+        if wanted is not None:
+            found = [case for case in found if _fits(case, name, set(wanted))]
+    return found
+
+
+def _fits(case: Case, name: str, wanted: set) -> bool:
+    if name == "effects":
+        return any(one.effect in wanted for one in case.hidden)
+    return getattr(case, {"kinds": "kind", "numbers": "number"}.get(name, name)) in wanted
+
+
+def answered(place: Place) -> set[str]:
+    """Names of the cases that have an answer; those that were skipped are tried again."""
+    if not place.answers.exists():
+        return set()
+    lines = (json.loads(line) for line in place.answers.read_text().splitlines() if line)
+    return {line["name"] for line in lines if "skipped" not in line}
+
+
+def run_study(cases: list[Case], place: Place, size: Size, options: argparse.Namespace) -> None:
+    """Answer every case that has no answer yet; only this process writes them down."""
+    place.folder.mkdir(parents=True, exist_ok=True)
+    done = answered(place)
+    todo = [case for case in cases if case.name not in done]
+    settings: dict[str, Any] = {}
+    if options.scheduler:
+        from dask.distributed import Client  # type: ignore[import-not-found]
+
+        settings["client"] = Client(options.scheduler)
+        options.backend = "dask"
+        del settings["client"]  # joblib finds the client that was made last
+    with parallel_config(options.backend, n_jobs=options.jobs, **settings):
+        stream = Parallel(return_as="generator_unordered")(
+            delayed(answer)(case, place, size) for case in todo
+        )
+        with place.answers.open("a") as handle, _progress(len(todo)) as tell:
+            for said in stream:
+                assert said is not None
+                handle.write(json.dumps(said) + "\n")
+                handle.flush()
+                tell(said)
+
+
+@contextmanager
+def _progress(total: int) -> Iterator:
+    """A bar on a terminal; a line per case in a pipe."""
+    if not sys.stderr.isatty():
+
+        def line(said: dict[str, Any]) -> None:
+            what = said.get("skipped") or said.get("error") or _summary(said["answer"])
+            print(f"{said['name']}: {what} ({said.get('cpu_s', 0.0):.1f} s)", file=sys.stderr)
+
+        yield line
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+    from rich.progress import TimeRemainingColumn as Remaining
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Remaining())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("cases", total=total)
+        yield lambda said: bar.update(task, advance=1, description=said["name"])
+
+
+def _summary(said: dict[str, Any]) -> str:
+    added = [f"{s['effect']}@{s['joint']}" for s in said["steps"]]
+    return f"{said['verdict']} {', '.join(added)}"

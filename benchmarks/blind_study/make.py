@@ -1,0 +1,245 @@
+"""A case made: its effects scaled, its recordings written, its truth told apart from them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomlkit
+
+from blind_study import strengths
+from blind_study.cases import Case, Hidden
+from blind_study.experiments import PAUSE, PERIOD, Laboratory, Plan, SensorError
+from blind_study.foreign import EFFECTS, SENSOR_ERRORS
+from blind_study.robots import TWO, specimen
+from dynident.closed_loop import TrueEffect, write_experiment
+from dynident.effects import FRICTION_WIDTH, Effect, catalogue
+from dynident.fit import fit, rows
+from dynident.model import Model
+from dynident.recording import Dataset
+
+ALWAYS_KNOWN = ("viscous_friction", "coulomb_friction", "rotor_inertia")
+_CLOSE = 1.3
+_STEP = (0.02, 50.0)
+
+
+@dataclass(frozen=True)
+class Size:
+    """How large the recordings of a study are.
+
+    Attributes
+    ----------
+    rate_of_two, rate_of_many : Hz, of robots with two joints and with more.
+    runs, tests : recordings to fit and to judge by.
+    repetitions : periods in a recording.
+    """
+
+    rate_of_two: float = 500.0
+    rate_of_many: float = 250.0
+    runs: int = 4
+    tests: int = 2
+    repetitions: int = 2
+
+
+@dataclass(frozen=True)
+class _Secret:
+    """One thing hidden: an effect, or an error of a sensor."""
+
+    label: Hidden
+    effects: tuple[TrueEffect, ...]
+    errors: tuple[SensorError, ...]
+    most: float
+
+    def scaled(self, factor: float) -> _Secret:
+        effects = tuple(_scaled(one, factor) for one in self.effects)
+        errors = tuple(replace(one, size=one.size * factor) for one in self.errors)
+        return replace(self, effects=effects, errors=errors, most=self.most / factor)
+
+
+def unavailable(case: Case) -> str:
+    """Name an effect of a case that the catalogue does not have; empty if it has all."""
+    known = {**catalogue(), **EFFECTS, **dict.fromkeys(SENSOR_ERRORS)}
+    return next((one.effect for one in case.hidden if one.effect not in known), "")
+
+
+def make(case: Case, folder: Path, size: Size) -> dict[str, Any]:
+    """Write the recordings, robot and study of a case into a folder; return its truth.
+
+    Raises
+    ------
+    SimulationError
+        If the robot cannot be simulated.
+    """
+    rng = np.random.default_rng([case.seed, case.number, 4])
+    rate = size.rate_of_two if case.joints == TWO else size.rate_of_many
+    made = specimen(case.joints, rate, rng)
+    plan = Plan(case, made, (), rate, size.runs, size.tests, size.repetitions)
+    plan = replace(plan, known=_known(plan, rng))
+    secrets = [_secret(plan, one, rng) for one in case.hidden]
+    noise = _residual(plan, plan.short((), (), noisy=True))
+    floor = float(np.max(_residual(plan, plan.short((), (), noisy=False)) / noise))
+    ratios, found = [], []
+    for secret in secrets:
+        scaled, ratio = _to_target(plan, secret, noise)
+        found.append(_moved(plan, scaled, rng))
+        ratios.append(ratio)
+    effects = tuple(one for secret in found for one in secret.effects)
+    errors = tuple(one for secret in found for one in secret.errors)
+    write_experiment(plan.whole(effects, errors), folder)
+    _state_width(folder / "study.toml", case.stated_width)
+    return {
+        "case": case.to_dict(),
+        "joints": list(made.robot.names),
+        "planar": made.planar,
+        "hidden": [
+            {**_place(plan, secret.label), "ratio": ratio, **_numbers(secret)}
+            for secret, ratio in zip(found, ratios, strict=True)
+        ],
+        "ratio": max([floor, *ratios]),
+        "ratio_without": floor,
+        "noise_rms": [float(x) for x in noise],
+    }
+
+
+def _known(plan: Plan, rng: np.random.Generator) -> tuple[TrueEffect, ...]:
+    case, made = plan.case, plan.made
+    gone = {(one.effect, one.joint) for one in case.hidden}
+    bristles = {one.joint for one in case.hidden if one.effect == "lugre_friction"}
+    found = []
+    sizes = (made.viscous, made.dry, made.rotor)
+    for name, values in zip(ALWAYS_KNOWN, sizes, strict=True):
+        for j, joint in enumerate(made.robot.names):
+            if (name, j) in gone:
+                continue
+            # Bristles take the place of the Coulomb friction that the study goes on to state.
+            value = 0.0 if name == "coulomb_friction" and j in bristles else float(values[j])
+            effect = catalogue()[name](joint).on(made.robot)
+            found.append(TrueEffect(effect, (value,)))
+    if case.payload:
+        load = strengths.start("payload", made, 0, 0, rng, case.width)
+        values = tuple(v * 3.0 for v in load.values)
+        found.append(TrueEffect(catalogue()["payload"]().on(made.robot), values))
+    return tuple(found)
+
+
+def _secret(plan: Plan, hidden: Hidden, rng: np.random.Generator) -> _Secret:
+    begin = strengths.start(
+        hidden.effect, plan.made, hidden.joint, hidden.source, rng, plan.case.width
+    )
+    if hidden.effect in SENSOR_ERRORS:
+        error = SensorError(hidden.effect, hidden.joint, begin.values[0])
+        return _Secret(hidden, (), (error,), begin.most)
+    kind: Callable[..., Effect] = {**catalogue(), **EFFECTS}[hidden.effect]
+    place = _place(plan, hidden)
+    effect = kind(place["joint"], place["source"], begin.shape).on(plan.made.robot)
+    return _Secret(hidden, (TrueEffect(effect, begin.values, hidden=True),), (), begin.most)
+
+
+def _place(plan: Plan, hidden: Hidden) -> dict[str, str | None]:
+    names = plan.made.robot.names
+    kind = {**catalogue(), **EFFECTS}.get(hidden.effect)
+    placed = kind.place if kind is not None else "joint"
+    joint = None if placed == "robot" or hidden.joint < 0 else names[hidden.joint]
+    source = names[hidden.source] if placed == "pair" else None
+    return {"effect": hidden.effect, "joint": joint, "source": source}
+
+
+def _numbers(secret: _Secret) -> dict[str, list[float]]:
+    values = [v for one in secret.effects for v in one.values]
+    shape = [s for one in secret.effects for s in one.effect.shape]
+    return {"values": [*values, *(one.size for one in secret.errors)], "shape": shape}
+
+
+def _scaled(one: TrueEffect, factor: float) -> TrueEffect:
+    values = tuple(float(v * factor) for v in one.values)
+    effect = one.effect
+    if effect.name == "joint_elasticity":
+        # A softer spring has a lower resonance.
+        resonance, *rest = effect.shape
+        effect = effect.shaped(resonance / np.sqrt(factor), *rest)
+    return replace(one, effect=effect, values=values)
+
+
+def _to_target(plan: Plan, secret: _Secret, noise: np.ndarray) -> tuple[_Secret, float]:
+    """Scale what is hidden until it leaves its target ratio; return the ratio that it leaves."""
+    ratio = _ratio(plan, secret, noise)
+    target = secret.label.ratio
+    if not target:  # it leaves nothing, whatever its size: make it large
+        scaled = secret.scaled(min(5.0, secret.most))
+        return scaled, _ratio(plan, scaled, noise)
+    for _ in range(2):
+        factor = float(np.clip(target / max(ratio, 1e-6), *_STEP))
+        factor = min(factor, secret.most)
+        if 1 / _CLOSE < factor < _CLOSE:
+            break
+        secret = secret.scaled(factor)
+        ratio = _ratio(plan, secret, noise)
+    return secret, ratio
+
+
+def _ratio(plan: Plan, secret: _Secret, noise: np.ndarray) -> float:
+    """Systematic residual over noise, root mean square, at the joint where it is largest."""
+    laboratory = plan.short(secret.effects, secret.errors, noisy=False)
+    during = None
+    for one in secret.effects:
+        if one.effect.name == "contact":
+            _, time, width = one.effect.shape
+            during = (time - 2 * width, time + 2 * width)
+    return float(np.max(_residual(plan, laboratory, during) / noise))
+
+
+def _residual(
+    plan: Plan, laboratory: Laboratory, during: tuple[float, float] | None = None
+) -> np.ndarray:
+    """Residual of the study's model fitted to an experiment, root mean square, (n,) N m.
+
+    `during` narrows it to some time of the first recording.
+    """
+    data = Dataset(laboratory.run())
+    effects = tuple(one.effect for one in plan.known)
+    model = Model(plan.made.nominal, effects, plan.case.stated_width)
+    values = fit(model, data).values
+    parts = [columns @ values - torque for columns, torque in rows(model, data, values)]
+    residual = np.concatenate(parts)
+    if during is not None:
+        first = parts[0]
+        t = np.linspace(0.0, PERIOD, len(first), endpoint=False)
+        residual = first[(t >= during[0]) & (t <= during[1])]
+    return np.sqrt(np.mean(residual**2, axis=0))
+
+
+def _moved(plan: Plan, secret: _Secret, rng: np.random.Generator) -> _Secret:
+    """Move a contact from the first recording to any, and to any of its periods."""
+    number = int(rng.integers(1, plan.runs + plan.tests + 1))
+    later = PAUSE * (number - 1) + PERIOD * float(rng.integers(plan.repetitions))
+
+    def moved(one: TrueEffect) -> TrueEffect:
+        if one.effect.name != "contact":
+            return one
+        _, time, width = one.effect.shape
+        return replace(one, effect=one.effect.shaped(float(number), time + later, width))
+
+    return replace(secret, effects=tuple(moved(one) for one in secret.effects))
+
+
+def _state_width(study: Path, width: float) -> None:
+    """Let a study say this width of dry friction, whatever it truly is."""
+    document = tomlkit.parse(study.read_text())
+    document.pop("friction_width", None)
+    text = tomlkit.dumps(document)
+    if width != FRICTION_WIDTH:
+        text = text.replace("\ntorque =", f"\nfriction_width = {width!r}\ntorque =", 1)
+    study.write_text(text)
+
+
+def write_truth(truth: dict[str, Any], path: Path) -> None:
+    """Write what was hidden, apart from the data."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(truth, indent=1) + "\n")
+
+
+__all__ = ["Size", "asdict", "make", "unavailable", "write_truth"]

@@ -1,0 +1,82 @@
+"""One case from its drawing to the answer of `dynident explain`, in one process."""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+import time
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from blind_study.cases import Case
+from blind_study.make import Size, make, unavailable, write_truth
+from dynident.errors import DynidentError
+from dynident.threads import single_threaded
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a study keeps what: the data, and the truth apart from it.
+
+    Attributes
+    ----------
+    folder : of everything.
+    data : "keep", or "drop" to delete a case's recordings once it is answered.
+    """
+
+    folder: Path
+    data: str = "keep"
+
+    def data_of(self, case: Case) -> Path:
+        return self.folder / "data" / case.name
+
+    def truth_of(self, case: Case) -> Path:
+        return self.folder / "truth" / f"{case.name}.json"
+
+    @property
+    def answers(self) -> Path:
+        return self.folder / "answers.jsonl"
+
+
+@single_threaded
+def answer(case: Case, place: Place, size: Size) -> dict[str, Any]:
+    """Make a case, ask for an explanation as a user would, and return what was said."""
+    said: dict[str, Any] = {"name": case.name, "seed": case.seed, "number": case.number}
+    missing = unavailable(case)
+    if missing:
+        return {**said, "skipped": f"no effect {missing} in the catalogue"}
+    folder = place.data_of(case)
+    started = time.process_time()
+    try:
+        truth = make(case, folder, size)
+    except DynidentError as error:
+        return {**said, "skipped": f"not simulated: {error}"}
+    write_truth(truth, place.truth_of(case))
+    said["made_s"] = time.process_time() - started
+    said |= explain(folder / "study.toml")
+    if place.data == "drop":
+        shutil.rmtree(folder)
+    return said
+
+
+def explain(study: Path) -> dict[str, Any]:
+    """Run `dynident explain --json`; return its answer and its processor time."""
+    from dynident.cli import main
+
+    out, err, status = io.StringIO(), io.StringIO(), 0
+    started = time.process_time()
+    with redirect_stdout(out), redirect_stderr(err):
+        try:
+            main(["explain", str(study), "--json"])
+        except SystemExit as stop:
+            status = int(stop.code or 0)
+        except Exception as error:  # a traceback is an answer too: a wrong one
+            status, message = -1, f"{type(error).__name__}: {error}"
+            err.write(message)
+    found: dict[str, Any] = {"cpu_s": time.process_time() - started, "status": status}
+    if status == 0:
+        return {**found, "answer": json.loads(out.getvalue())}
+    return {**found, "error": err.getvalue().strip()[-500:]}
