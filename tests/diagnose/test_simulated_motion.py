@@ -1,0 +1,102 @@
+"""Where nothing repeats: the simulated loop in place of repetitions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dynident.closed_loop import Controller, Experiment, Fourier, Sensors, TrueEffect
+from dynident.closed_loop import Run as Motion
+from dynident.diagnose import diagnose
+from dynident.diagnose.evidence import ColumnStore
+from dynident.diagnose.present import fit_present, model_columns
+from dynident.diagnose.simulated import motion_of_loop
+from dynident.model import Model
+from dynident.recording import Dataset
+from synthetic import arm
+
+CONTROLLER = Controller("pd", 500.0, (400.0, 40.0), (30.0, 2.5), derivative_cutoff_hz=80.0)
+FRICTION = {"viscous_friction": (1.2, 0.5), "coulomb_friction": (1.0, 0.6)}
+NOISY = Sensors(position_std=1e-3, torque_std=0.05)
+
+
+def known() -> list[TrueEffect]:
+    robot = arm()
+    return [
+        one
+        for name, values in FRICTION.items()
+        for joint, value in zip(robot.names, values, strict=True)
+        for one in TrueEffect.of(f"{name}@{joint}", robot, [value])
+    ]
+
+
+def recordings(seed: int, count: int, hidden: tuple[TrueEffect, ...] = ()) -> Dataset:
+    """Closed-loop recordings of no period, encoders noisy enough to mislead least squares."""
+    robot = arm()
+    motions = tuple(
+        Motion(
+            Fourier.random(robot, 9.7 + r, [seed, r], amplitude=1.6, speed=3.0), 9.0, f"run{r}.csv"
+        )
+        for r in range(count)
+    )
+    made = Experiment(robot, CONTROLLER, motions, (*known(), *hidden), NOISY, seed=seed).run()
+    return Dataset(tuple(one.replace(period=None) for one in made))
+
+
+def model() -> Model:
+    return Model(arm(), tuple(one.effect for one in known()))
+
+
+@pytest.fixture(scope="module")
+def healthy() -> Dataset:
+    return recordings(2, 2)
+
+
+def test_a_healthy_robot_is_accused_by_least_squares_and_not_by_simulated_instruments(
+    healthy: Dataset,
+) -> None:
+    assert diagnose(model(), healthy, most=1).steps
+    found = diagnose(model(), healthy, controller=CONTROLLER)
+    assert found.verdict == "nothing_missing" and not found.steps
+    assert "simulated" in found.before.method
+    assert any("simulated closed loop" in note for note in found.notes)
+
+
+def test_moved_torque_makes_plain_regression_instrumental(healthy: Dataset) -> None:
+    loop = motion_of_loop(model(), healthy, CONTROLLER)
+    store = ColumnStore(model(), loop.runs)
+    store.prepare(store.model.effects)
+    present = fit_present(store, store.model)
+    # V' (y - W x), both whitened as the fit has it, over the norms of what is multiplied.
+    V, e = [], []
+    for r, run in enumerate(store.runs):
+        for j, noise in enumerate(present.noise):
+            measured, simulated = model_columns(store, store.model, r, j, present.values)
+            residual = measured @ np.append(-present.values, 1.0)
+            speed = run.versions[-1].v[:, j]
+            e.append(noise.whiten(residual[:, None], speed)[run.index[0], 0])
+            V.append(noise.whiten(simulated[:, :-1], speed)[run.index[0]])
+    V, e = np.concatenate(V), np.concatenate(e)
+    correlation = (V.T @ e) / (np.linalg.norm(V, axis=0) * np.linalg.norm(e))
+    assert np.abs(correlation).max() < 1e-4
+    truth = [v for values in FRICTION.values() for v in values]
+    assert np.allclose(present.values[-4:], truth, atol=0.12)
+
+
+def test_a_hidden_offset_is_found(healthy: Dataset) -> None:
+    hidden = TrueEffect.of("torque_offset@elbow", arm(), [0.5], hidden=True)
+    found = diagnose(model(), recordings(0, 2, hidden), controller=CONTROLLER)
+    assert [step.effect.label for step in found.steps] == ["torque_offset@elbow"]
+    assert found.steps[0].values == pytest.approx([0.5], abs=0.05)
+    assert found.verdict == "explained"
+
+
+def test_without_references_least_squares_and_why(healthy: Dataset) -> None:
+    blind = replace(
+        healthy, recordings=tuple(one.replace(q_ref=None) for one in healthy.recordings)
+    )
+    loop = motion_of_loop(model(), blind, CONTROLLER)
+    assert not loop.runs and "q_ref" in loop.notes[0]
+    assert not motion_of_loop(model(), healthy, None).notes
