@@ -20,6 +20,7 @@ class AsymmetricFriction(JointEffect):
     law = "dFv |v| + dFc"
     sign_of = "slopes against velocity that differ between the two directions"
     confounded_with = ("torque_offset", "quadratic_drag")
+    shown_by = "speed"
     experiment = "move {joint} at several constant speeds in both directions"
     contains = ("torque_offset",)
     stands_in_for = ("torque_offset",)

@@ -31,6 +31,23 @@ if TYPE_CHECKING:
 
     from dynident.robot import Robot
 
+Motion = Literal[
+    "speed",
+    "slow",
+    "reversals",
+    "tiny reversals",
+    "position range",
+    "acceleration",
+    "load",
+    "session",
+    "source alone",
+    "payload",
+    "repetition",
+]
+"""What shows an effect: a wide range of speeds; slow motion; many changes of direction; those of
+less than 0.01 rad; a wide range of positions; high accelerations; a wide range of loads; a long
+session; its source moving alone; recordings with and without the payload; a repeated period."""
+
 
 @dataclass(frozen=True)
 class Effect(ABC):
@@ -60,6 +77,8 @@ class Effect(ABC):
     confounded_with: ClassVar[tuple[str, ...]] = ()
     experiment: ClassVar[str]
     """The experiment that shows it: a sentence in which {joint} and {source} are filled in."""
+    shown_by: ClassVar[Motion] = "speed"
+    """The kind of motion or experiment that shows it, for advice with a robot's numbers."""
     contains: ClassVar[tuple[str, ...]] = ()
     """Simpler effects whose columns are among this one's."""
     stands_in_for: ClassVar[tuple[str, ...]] = ()

@@ -17,6 +17,7 @@ class Contact(JointEffect):
     name = "contact"
     law = "A exp(-((t - time)/width)^2/2), in one recording"
     sign_of = "a burst in one repetition only"
+    shown_by = "repetition"
     experiment = "record {joint} once more, over several periods, with nothing in its way"
     found_by = "repetition"
 

@@ -15,6 +15,7 @@ class CoulombFriction(JointEffect):
     law = "Fc sign(v)"
     sign_of = "a step at zero velocity"
     confounded_with = ("viscous_friction", "stribeck_friction")
+    shown_by = "reversals"
     experiment = "reverse {joint} many times and move it at several speeds"
 
     def parameters(self, robot):

@@ -19,6 +19,7 @@ class DriveGain(JointEffect):
     law = "e tau"
     sign_of = "a tilted line against load"
     confounded_with = ("payload", "rotor_inertia")
+    shown_by = "load"
     experiment = "move {joint} through loads that the other joints feel too, or weigh a known mass"
     needs = frozenset({"torque"})
     linear_in_torque = True

@@ -21,6 +21,7 @@ class JointCoupling(JointEffect):
     law = "cv v_i + cc sign(v_i) + ca a_i + cs sign(v_i + v_j)"
     sign_of = "a residual that follows another joint's motion"
     confounded_with = ("rotor_inertia", "viscous_friction", "coulomb_friction")
+    shown_by = "source alone"
     experiment = "move {source} with {joint} still, slowly and fast"
 
     def parameters(self, robot):

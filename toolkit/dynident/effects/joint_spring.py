@@ -15,6 +15,7 @@ class JointSpring(JointEffect):
     law = "k q + c"
     sign_of = "a ramp against position"
     confounded_with = ("torque_ripple", "torque_offset")
+    shown_by = "position range"
     experiment = "move {joint} slowly over its whole range"
     contains = ("torque_offset",)
 

@@ -24,6 +24,7 @@ class Payload(Effect):
     law = "Y_last(q, v, a) [mass, mx, ...]"
     sign_of = "a residual like gravity and inertia of the last link, in some recordings only"
     confounded_with = ("drive_gain",)
+    shown_by = "payload"
     experiment = "repeat one recording with the payload and one without"
     needs = frozenset({"rigid", "payload"})
 

@@ -14,6 +14,7 @@ class QuadraticDrag(JointEffect):
     law = "Fq v |v|"
     sign_of = "a curve against velocity, steeper at speed"
     confounded_with = ("viscous_friction", "coulomb_friction")
+    shown_by = "speed"
     experiment = "move {joint} from slow to its highest speed in both directions"
 
     def parameters(self, robot):

@@ -13,6 +13,7 @@ class RotorInertia(JointEffect):
     name = "rotor_inertia"
     law = "Ia a"
     sign_of = "a slope against the joint's own acceleration"
+    shown_by = "acceleration"
     experiment = (
         "accelerate {joint} hard together with the other joints (at the first joint of an arm it "
         "cannot be told from the inertia of the links)"

@@ -21,6 +21,7 @@ class StribeckFriction(JointEffect):
     law = "Fs sign(v) exp(-(v/vs)^2)"
     sign_of = "spikes on both sides of zero velocity"
     confounded_with = ("coulomb_friction", "viscous_friction")
+    shown_by = "slow"
     experiment = "move {joint} slowly, at speeds below 0.1 rad/s (or 0.01 m/s), in both directions"
 
     def parameters(self, robot):

@@ -33,6 +33,7 @@ class ThermalFriction(JointEffect):
     law = "h (Fvt v + Fct sign(v)), h = exp(-t/T) or (temperature - 25 C)/10 K"
     sign_of = "slopes and steps against velocity that change in the course of the session"
     confounded_with = ("viscous_friction", "coulomb_friction", "torque_drift")
+    shown_by = "session"
     experiment = (
         "repeat one recording of {joint} from a cold start until it is warm, with its temperature "
         "if there is a sensor"

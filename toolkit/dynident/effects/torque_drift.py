@@ -14,6 +14,7 @@ class TorqueDrift(JointEffect):
     law = "rate t"
     sign_of = "a ramp against the time of the session, whatever the joint does"
     confounded_with = ("torque_offset", "thermal_friction")
+    shown_by = "session"
     experiment = "repeat one recording of {joint} early and late in a long session"
 
     def parameters(self, robot):

@@ -15,6 +15,7 @@ class TorqueOffset(JointEffect):
     law = "offset"
     sign_of = "a constant, whatever the joint does"
     confounded_with = ("asymmetric_friction", "joint_spring")
+    shown_by = "position range"
     experiment = "move {joint} over a wide range in both directions, so that gravity changes"
 
     def parameters(self, robot):

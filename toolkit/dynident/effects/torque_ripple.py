@@ -24,6 +24,7 @@ class TorqueRipple(JointEffect):
     law = "As sin(k q) + Ac cos(k q)"
     sign_of = "a comb against position, one line in cycles per revolution"
     confounded_with = ("joint_spring",)
+    shown_by = "slow"
     experiment = "sweep {joint} slowly over its whole range"
 
     def parameters(self, robot):

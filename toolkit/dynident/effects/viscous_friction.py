@@ -15,6 +15,7 @@ class ViscousFriction(JointEffect):
     law = "Fv v"
     sign_of = "a slope against velocity"
     confounded_with = ("coulomb_friction", "quadratic_drag")
+    shown_by = "speed"
     experiment = "move {joint} at several constant speeds in both directions"
 
     def parameters(self, robot):
