@@ -53,13 +53,14 @@ def main(arguments: list[str] | None = None) -> None:
     run.add_argument(
         "--rates", type=float, nargs=2, default=(500.0, 250.0), metavar=("TWO", "MANY")
     )
+    run.add_argument("--runs", type=int, nargs=2, default=(4, 2), metavar=("TRAIN", "TEST"))
     table = commands.add_parser("table", help="compare the answers with the truth")
     for one in (run, table):
         one.add_argument("--out", type=Path, default=USUAL, help="folder of the study")
     options = parser.parse_args(arguments)
     if options.command == "run":
         place = Place(options.out.resolve(), options.data)
-        size = Size(*options.rates)
+        size = Size(*options.rates, *options.runs)
         run_study(_chosen(options), place, size, options)
     show(options.out)
 
@@ -92,14 +93,7 @@ def run_study(cases: list[Case], place: Place, size: Size, options: argparse.Nam
     place.folder.mkdir(parents=True, exist_ok=True)
     done = answered(place)
     todo = [case for case in cases if case.name not in done]
-    settings: dict[str, Any] = {}
-    if options.scheduler:
-        from dask.distributed import Client  # type: ignore[import-not-found]
-
-        settings["client"] = Client(options.scheduler)
-        options.backend = "dask"
-        del settings["client"]  # joblib finds the client that was made last
-    with parallel_config(options.backend, n_jobs=options.jobs, **settings):
+    with _spread(options.backend, options.scheduler, options.jobs):
         stream = Parallel(return_as="generator_unordered")(
             delayed(answer)(case, place, size) for case in todo
         )
@@ -109,6 +103,16 @@ def run_study(cases: list[Case], place: Place, size: Size, options: argparse.Nam
                 handle.write(json.dumps(said) + "\n")
                 handle.flush()
                 tell(said)
+
+
+def _spread(backend: str, scheduler: str | None, jobs: int) -> Any:
+    """Return the joblib context that says where cases are worked on."""
+    if backend != "dask":
+        return parallel_config(backend, n_jobs=jobs)
+    from dask.distributed import Client  # pyright: ignore[reportMissingImports]
+
+    Client(scheduler)  # joblib finds the client that was made last
+    return parallel_config("dask")
 
 
 @contextmanager

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -81,10 +81,12 @@ def make(case: Case, folder: Path, size: Size) -> dict[str, Any]:
     plan = replace(plan, known=_known(plan, rng))
     secrets = [_secret(plan, one, rng) for one in case.hidden]
     noise = _residual(plan, plan.short((), (), noisy=True))
-    floor = float(np.max(_residual(plan, plan.short((), (), noisy=False)) / noise))
+    floor = 0.0
+    if not secrets or case.width != case.stated_width:
+        floor = _ratio(plan, None, noise)
     ratios, found = [], []
     for secret in secrets:
-        scaled, ratio = _to_target(plan, secret, noise)
+        scaled, ratio = _to_target(plan, secret, noise, floor)
         found.append(_moved(plan, scaled, rng))
         ratios.append(ratio)
     effects = tuple(one for secret in found for one in secret.effects)
@@ -164,28 +166,38 @@ def _scaled(one: TrueEffect, factor: float) -> TrueEffect:
     return replace(one, effect=effect, values=values)
 
 
-def _to_target(plan: Plan, secret: _Secret, noise: np.ndarray) -> tuple[_Secret, float]:
-    """Scale what is hidden until it leaves its target ratio; return the ratio that it leaves."""
-    ratio = _ratio(plan, secret, noise)
+def _to_target(
+    plan: Plan, secret: _Secret, noise: np.ndarray, floor: float
+) -> tuple[_Secret, float]:
+    """Scale what is hidden until it leaves its target ratio; return the ratio that it leaves.
+
+    `floor` is what the study's model leaves without it.
+    """
+
+    def left(one: _Secret) -> float:
+        return float(np.sqrt(max(_ratio(plan, one, noise) ** 2 - floor**2, 0.0)))
+
     target = secret.label.ratio
     if not target:  # it leaves nothing, whatever its size: make it large
         scaled = secret.scaled(min(5.0, secret.most))
-        return scaled, _ratio(plan, scaled, noise)
+        return scaled, left(scaled)
+    ratio = left(secret)
     for _ in range(2):
         factor = float(np.clip(target / max(ratio, 1e-6), *_STEP))
         factor = min(factor, secret.most)
         if 1 / _CLOSE < factor < _CLOSE:
             break
         secret = secret.scaled(factor)
-        ratio = _ratio(plan, secret, noise)
+        ratio = left(secret)
     return secret, ratio
 
 
-def _ratio(plan: Plan, secret: _Secret, noise: np.ndarray) -> float:
+def _ratio(plan: Plan, secret: _Secret | None, noise: np.ndarray) -> float:
     """Systematic residual over noise, root mean square, at the joint where it is largest."""
-    laboratory = plan.short(secret.effects, secret.errors, noisy=False)
+    effects, errors = (secret.effects, secret.errors) if secret else ((), ())
+    laboratory = plan.short(effects, errors, noisy=False)
     during = None
-    for one in secret.effects:
+    for one in effects:
         if one.effect.name == "contact":
             _, time, width = one.effect.shape
             during = (time - 2 * width, time + 2 * width)
@@ -240,6 +252,3 @@ def write_truth(truth: dict[str, Any], path: Path) -> None:
     """Write what was hidden, apart from the data."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(truth, indent=1) + "\n")
-
-
-__all__ = ["Size", "asdict", "make", "unavailable", "write_truth"]
