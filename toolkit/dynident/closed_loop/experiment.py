@@ -12,9 +12,10 @@ import numpy as np
 from dynident.closed_loop.controllers import Controller
 from dynident.closed_loop.mechanism import Mechanism, TrueEffect
 from dynident.closed_loop.rollout import LEAD_IN, Rollout, Task
-from dynident.closed_loop.sensors import Sensors, rounded
+from dynident.closed_loop.sensors import Sensors, delayed, rounded
 from dynident.closed_loop.trajectories import Fourier
 from dynident.effects import FRICTION_WIDTH
+from dynident.effects.thermal_friction import ThermalFriction
 from dynident.errors import SimulationError
 from dynident.recording import Recording
 from dynident.robot import Robot
@@ -201,6 +202,7 @@ class Experiment:
     def _record(self, index: int, run: Run, rollout: Rollout) -> Recording:
         n = self.robot.n
         tau = rollout.torque if self.torque == "measured" else rollout.u
+        tau = delayed(tau, rollout.t, rollout.mechanism.delay, run.trajectory.period)
         noise = self._stream(index, 1).standard_normal(tau.shape)
         tau = tau + self.sensors.each("torque_std", n) * noise
         return Recording(
@@ -208,6 +210,7 @@ class Experiment:
             q=rollout.q_measured,
             tau=rounded(tau, self.sensors.each("torque_resolution", n)),
             joints=self.robot.names,
+            temperature=self._temperature(index, rollout),
             # The reference is known in steps of the encoder too.
             q_ref=rounded(rollout.q_ref, self.sensors.each("position_resolution", n)),
             period=run.trajectory.period,
@@ -218,6 +221,21 @@ class Experiment:
             name=run.file,
             number=index + 1,
         )
+
+    def _temperature(self, index: int, rollout: Rollout) -> np.ndarray | None:
+        """Recorded temperatures, (T, n) C: of thermal friction's own law, at every joint."""
+        if self.sensors.temperature_std is None:
+            return None
+        t, names = rollout.t + rollout.start, self.robot.names
+        laws = {joint: ThermalFriction(joint).on(self.robot) for joint in names}
+        laws |= {
+            str(one.effect.joint): one.effect
+            for one in self.effects
+            if isinstance(one.effect, ThermalFriction)
+        }
+        true = np.column_stack([laws[joint].temperature(t) for joint in names])
+        noise = self._stream(index, 2).standard_normal(true.shape)
+        return true + self.sensors.each("temperature_std", len(names)) * noise
 
     def _stream(self, index: int, purpose: int) -> np.random.Generator:
         """Return the noise of one recording and one sensor, independent of all others."""

@@ -31,6 +31,7 @@ class _SensorsEntry(Table):
     position_resolution: float | list[float] = 0.0
     torque_std: float | list[float] = 0.0
     torque_resolution: float | list[float] = 0.0
+    temperature_std: float | list[float] | None = None
 
 
 class _TrajectoryEntry(Table):
@@ -73,9 +74,10 @@ def load_experiment(path: str | Path) -> Experiment:
     Keys: `robot` (the true one; paths are relative to the file), `nominal` (given to the user;
     default the true one), `joints`, `gravity`, `seed`, `friction_width`, `torque`, `lead_in`;
     [[effects]] `effect`, `values`, `shape`, `hidden`; [controller] as in a study; [sensors]
-    `position_std`, `position_resolution`, `torque_std`, `torque_resolution` (a number, or one per
-    joint); [[recordings]] `file`, `use`, `duration`, `period`, `start`, `payload`, `trajectory`
-    with `harmonics`, `seed`, `amplitude`, `speed`, `acceleration`, `centre`.
+    `position_std`, `position_resolution`, `torque_std`, `torque_resolution`, `temperature_std` (a
+    number, or one per joint; without the last there are no temperatures); [[recordings]] `file`,
+    `use`, `duration`, `period`, `start`, `payload`, `trajectory` with `harmonics`, `seed`,
+    `amplitude`, `speed`, `acceleration`, `centre`.
 
     Raises
     ------

@@ -190,6 +190,14 @@ class Mechanism:
         return total
 
     @cached_property
+    def delay(self) -> np.ndarray:
+        """Time by which the recorded torque is late, (n,) s."""
+        total = np.zeros(self.robot.n)
+        for one in self.effects:
+            total += one.effect.simulated_delay(one.values, self.robot)
+        return total
+
+    @cached_property
     def terms(self) -> tuple[Term, ...]:
         """The force of all effects that a simulator evaluates natively."""
         return tuple(

@@ -22,12 +22,15 @@ class Sensors:
     position_resolution : rad or m, one step of the encoder; 0 for none.
     torque_std : N m or N, white noise of each recorded torque.
     torque_resolution : N m or N, one step of the record; 0 for none.
+    temperature_std : K, white noise of the motors' recorded temperatures; None where they are not
+        recorded.
     """
 
     position_std: PerJoint = 0.0
     position_resolution: PerJoint = 0.0
     torque_std: PerJoint = 0.0
     torque_resolution: PerJoint = 0.0
+    temperature_std: PerJoint | None = None
 
     def each(self, name: str, n: int) -> np.ndarray:
         """Return an attribute for each of n joints, (n,).
@@ -37,7 +40,8 @@ class Sensors:
         SimulationError
             If it is negative, not finite, or of another number of joints.
         """
-        value = np.atleast_1d(np.asarray(getattr(self, name), dtype=float))
+        given = getattr(self, name)
+        value = np.atleast_1d(np.asarray(0.0 if given is None else given, dtype=float))
         where = f"sensors.{name}"
         if value.shape not in ((1,), (n,)):
             mend = "give one number, or one per joint"
@@ -45,6 +49,21 @@ class Sensors:
         if not (np.isfinite(value).all() and (value >= 0).all()):
             raise SimulationError(f"{value.tolist()}", where, "choose numbers of 0 or above")
         return np.broadcast_to(value, (n,)).copy()
+
+
+def delayed(tau: np.ndarray, t: np.ndarray, delay: np.ndarray, period: float) -> np.ndarray:
+    """Return torques (T, n) as they were some time before (n,) s; after it where that is negative.
+
+    Between samples they are interpolated: a measured torque is taken to be straight, and a held
+    one is averaged over each step, which is the same. What lies outside the record is taken a
+    period further inside, or from its end where it is shorter.
+    """
+    late = np.empty_like(tau)
+    for joint, d in enumerate(delay):
+        at = t - d
+        at = np.where(at < t[0], at + period, np.where(at > t[-1], at - period, at))
+        late[:, joint] = np.interp(at, t, tau[:, joint]) if d else tau[:, joint]
+    return late
 
 
 def rounded(x: np.ndarray, resolution: np.ndarray) -> np.ndarray:
