@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from dynident.effects import FRICTION_WIDTH, Block, Effect, effects_of
 from dynident.errors import EffectError
-from dynident.robot import BaseParameters, Robot, structural_base
+from dynident.robot import BaseParameters, Robot, nearest_parameters, structural_base
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,15 @@ class Model:
     def with_shapes(self, effects: tuple[Effect, ...]) -> Model:
         """Return the model with these effects in place of those of the same labels."""
         by_label = {effect.label: effect for effect in effects}
-        return replace(self, effects=tuple(by_label.get(e.label, e) for e in self.effects))
+        made = replace(self, effects=tuple(by_label.get(e.label, e) for e in self.effects))
+        made.__dict__["base"] = self.base  # the costly part, and the same
+        return made
+
+    def at(self, values: np.ndarray) -> Model:
+        """Return the model with the columns of its secant effects taken at other values, (p,)."""
+        secants = (e.at(_plain(values[self.slices[e.label]])) for e in self.effects if e.secant)
+        moved = tuple(one for one in secants)
+        return self.with_shapes(moved) if moved else self
 
     # --- parameters ----------------------------------------------------------------------------
 
@@ -105,13 +114,24 @@ class Model:
         return len(self.names)
 
     @cached_property
-    def needs_torque(self) -> bool:
-        """Whether some column depends on the torque that the model predicts."""
-        return any("torque" in effect.needs for effect in self.effects)
+    def needs_values(self) -> bool:
+        """Whether some columns depend on the parameters: they are taken at values, and again."""
+        return any(e.secant or e.needs & {"torque", "body"} for e in self.effects)
 
     # --- torque --------------------------------------------------------------------------------
 
-    def block(self, t, q, v, a, *, carries_payload: bool = False, rigid: bool = True) -> Block:
+    def block(
+        self,
+        t,
+        q,
+        v,
+        a,
+        *,
+        carries_payload: bool = False,
+        rigid: bool = True,
+        number: int = 0,
+        temperature: np.ndarray | None = None,
+    ) -> Block:
         """Samples as effects see them; see `Block` for shapes.
 
         `rigid` says whether the rigid-body regressor, the costly part, is evaluated.
@@ -126,9 +146,16 @@ class Model:
             carries_payload,
             self.robot.tip,
             rigid=self.robot.regressor(q, v, a) if rigid else None,
+            number=number,
+            temperature=temperature,
         )
 
-    def columns(self, block: Block, values: np.ndarray | None = None) -> np.ndarray:
+    def columns(
+        self,
+        block: Block,
+        values: np.ndarray | None = None,
+        known: Mapping[str, np.ndarray] | None = None,
+    ) -> np.ndarray:
         """Torque per unit of each parameter.
 
         Parameters
@@ -136,8 +163,11 @@ class Model:
         block : Block
             With its rigid-body regressor, as `Model.block` makes it.
         values : (p,), optional
-            Parameter values at which columns that depend on the predicted torque are taken;
-            without them those columns are zero.
+            Parameter values at which columns that depend on the present model are taken; without
+            them those that depend on its torque are zero, and its bodies are as described.
+        known : label -> (T, n, k), optional
+            Columns of effects that need the whole recording, see `whole_columns`; without them
+            the block is taken for it.
 
         Returns
         -------
@@ -147,23 +177,56 @@ class Model:
         full = np.zeros((len(block.t), self.robot.n, self.size))
         rigid = len(self.base.independent)
         full[:, :, :rigid] = np.take(block.rigid, self.base.independent, axis=2)
+        known = known or {}
+        waiting = []
         for effect in self.effects:
-            if "torque" not in effect.needs:
-                full[:, :, self.slices[effect.label]] = effect.columns(block)
-        if self.needs_torque and values is not None:
-            # Their own columns are still zero here: the torque is that of all the rest.
-            loaded = replace(block, torque=full @ values)
-            for effect in self.effects:
-                if "torque" in effect.needs:
-                    full[:, :, self.slices[effect.label]] = effect.columns(loaded)
+            if effect.label in known:
+                full[:, :, self.slices[effect.label]] = known[effect.label]
+            elif "torque" in effect.needs:
+                waiting.append(effect)
+            else:
+                own = effect.columns(self.ready(effect, block, values))
+                full[:, :, self.slices[effect.label]] = own
+        if waiting and values is not None:
+            loaded = replace(block, torque=full @ self._without_loads(values))
+            for effect in waiting:
+                own = effect.columns(self.ready(effect, loaded, values))
+                full[:, :, self.slices[effect.label]] = own
         return full
+
+    def whole_columns(
+        self, block: Block, values: np.ndarray | None = None
+    ) -> dict[str, np.ndarray]:
+        """Columns of the effects that need the whole recording, by their labels.
+
+        Parameters
+        ----------
+        block : Block
+            The whole recording at its full rate; no regressor is needed.
+        values : as for `columns`.
+
+        Returns
+        -------
+        label -> (T, n, k)
+        """
+        known: dict[str, np.ndarray] = {}
+        whole = [e for e in self.effects if "whole" in e.needs]
+        for effect in whole:
+            if "torque" not in effect.needs:
+                known[effect.label] = effect.columns(self.ready(effect, block, values))
+        loads = [e for e in whole if "torque" in e.needs]
+        if loads:
+            loaded = replace(block, torque=self.torque_without_loads(block, values, known))
+            for effect in loads:
+                known[effect.label] = effect.columns(self.ready(effect, loaded, values))
+        return known
 
     def torque(self, block: Block, values: np.ndarray) -> np.ndarray:
         """Predicted torque, (T, n) in N m or N."""
         return self.columns(block, values) @ values
 
     def settled(self, at: np.ndarray, found: np.ndarray) -> np.ndarray:
-        """Values at which to take columns that depend on the predicted torque next.
+        """Values at which to take columns that depend on the present model next.
 
         Where a share e is added to the torque, the plain repetition (at `found`) shrinks its error
         by -e only, and grows it from e = 1 on. This step shrinks it by e / (2 + e) at worst.
@@ -173,24 +236,115 @@ class Model:
         at : (p,) values at which these columns were taken.
         found : (p,) values fitted with them.
         """
-        loads = (found[self.slices[e.label]] for e in self.effects if "torque" in e.needs)
+        loads = (found[self.slices[e.label]] for e in self.effects if e.linear_in_torque)
         shares = np.concatenate([np.zeros(1), *loads])
         return at + 2.0 / max(2.0 + shares.min() + shares.max(), 0.1) * (found - at)
 
-    def torque_without_loads(self, block: Block, values: np.ndarray | None) -> np.ndarray:
-        """Predicted torque, but for effects that scale with it, (T, n) in N m or N.
+    def torque_without_loads(
+        self,
+        block: Block,
+        values: np.ndarray | None,
+        known: Mapping[str, np.ndarray] | None = None,
+    ) -> np.ndarray:
+        """Predicted torque, but for effects that depend on it, (T, n) in N m or N.
 
         By recursive inverse dynamics: `block` needs no regressor unless an effect does.
+
+        Parameters
+        ----------
+        values, known : as for `columns`; without values the torque is zero.
         """
         if values is None:
-            values = np.zeros(self.size)
-        theta = np.zeros(10 * self.robot.n)
-        theta[list(self.base.independent)] = values[: len(self.base.independent)]
-        torque = self.robot.inverse_dynamics(block.q, block.v, block.a, theta)
+            return np.zeros(block.q.shape)
+        carries = block.carries_payload
+        bodies = self._bodies(values, carries_payload=carries)
+        torque = bodies.inverse_dynamics(block.q, block.v, block.a)
         for effect in self.effects:
-            if "torque" not in effect.needs:
-                torque = torque + effect.columns(block) @ values[self.slices[effect.label]]
+            if effect.needs & {"torque", "payload"}:
+                continue
+            own = (known or {}).get(effect.label)
+            if own is None:
+                own = effect.columns(self.ready(effect, block, values))
+            torque = torque + own @ values[self.slices[effect.label]]
         return torque
+
+    # --- the robot that the parameters describe -------------------------------------------------
+
+    def ready(self, effect: Effect, block: Block, values: np.ndarray | None) -> Block:
+        """Return a block with what an effect needs of the present model, but for its torque.
+
+        Parameters
+        ----------
+        effect : of this model, or a candidate for it.
+        block : of any length.
+        values : (p,); None for the robot as described.
+        """
+        if "body" in effect.needs and block.body is None:
+            values = self.given_values() if values is None else values
+            carries = block.carries_payload
+            body = self.present_robot(values, effect, carries_payload=carries)
+            block = replace(block, body=body, rotor=self.rotor(values))
+        if "rigid" in effect.needs and block.rigid is None:
+            block = replace(block, rigid=self.robot.regressor(block.q, block.v, block.a))
+        return block
+
+    def present_robot(
+        self, values: np.ndarray, before: Effect | None = None, *, carries_payload: bool = False
+    ) -> Robot:
+        """Return the robot with the bodies, and the changes of them, that the parameters say.
+
+        Each effect that changes the robot builds on those before it in the model, so that
+        together they are the torque of the robot with all of them.
+
+        Parameters
+        ----------
+        values : (p,); what base parameters leave open is as near to the description as it can be.
+        before : an effect of the model: without it and those after it.
+        carries_payload : whether the payload is on board.
+        """
+        robot = self._bodies(values, carries_payload=carries_payload)
+        for effect in self.effects:
+            if before is not None and effect.label == before.label:
+                break
+            if "body" in effect.needs:
+                robot = effect.simulated_robot(_plain(values[self.slices[effect.label]]), robot)
+        return robot
+
+    def rotor(self, values: np.ndarray) -> np.ndarray:
+        """Inertia that effects add at each joint, (n,) kg m^2 or kg."""
+        total = np.zeros(self.robot.n)
+        for effect in self.effects:
+            own = _plain(values[self.slices[effect.label]])
+            total += np.diag(effect.simulated_inertia(own, self.robot))
+        return total
+
+    def _bodies(self, values: np.ndarray, *, carries_payload: bool) -> Robot:
+        """The robot with its base parameters and payload; the last ones asked for are kept."""
+        key = (values.tobytes(), carries_payload)
+        if key not in self._made:
+            if len(self._made) > 1:
+                self._made.clear()
+            base = values[: self.base.rank]
+            robot = self.robot.with_theta(
+                nearest_parameters(self.base, self.robot.theta, np.asarray(base))
+            )
+            for effect in self.effects:
+                if "payload" in effect.needs and carries_payload:
+                    robot = effect.simulated_robot(_plain(values[self.slices[effect.label]]), robot)
+            self._made[key] = robot
+        return self._made[key]
+
+    @cached_property
+    def _made(self) -> dict[tuple[bytes, bool], Robot]:
+        return {}
+
+    def _without_loads(self, values: np.ndarray) -> np.ndarray:
+        """Values with those of effects that depend on the predicted torque at zero."""
+        without = np.array(values)
+        for effect in self.effects:
+            if "torque" in effect.needs:
+                without[self.slices[effect.label]] = 0.0
+        return without
 
     def given_values(self) -> np.ndarray:
         """Parameter values of the robot description, effects at zero, (p,)."""
@@ -209,3 +363,7 @@ class Model:
                     head = f"{effect.name}.{head}"
                 found.append(head + tail)
         return tuple(found)
+
+
+def _plain(values: np.ndarray) -> tuple[float, ...]:
+    return tuple(float(x) for x in values)

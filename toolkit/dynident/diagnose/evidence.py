@@ -16,6 +16,9 @@ from dynident.effects import Block, Effect, JointEffect
 from dynident.fit.sampling import Sampled
 from dynident.model import Model
 
+_SHARED = 50_000
+"""Samples up to which a recording's torque and its derivatives are kept for several effects."""
+
 
 @dataclass
 class ColumnStore:
@@ -28,11 +31,17 @@ class ColumnStore:
     runs: tuple[Run, ...]
     _rigid: list[Signals] = field(default_factory=list)
     _known: dict[Effect, list[Signals]] = field(default_factory=dict)
-    _torque: dict[tuple[Hashable, int], list[np.ndarray]] = field(default_factory=dict)
+    _now: Hashable = None
+    _present: dict[Hashable, Signals] = field(default_factory=dict)
+    _blocks: dict[Hashable, Block] = field(default_factory=dict)
 
     def prepare(self, effects: Iterable[Effect]) -> None:
-        """Compute the rigid body's columns and those of many effects in one pass."""
-        wanted = [e for e in effects if e not in self._known and "torque" not in e.needs]
+        """Compute the rigid body's columns and those of many effects in one pass.
+
+        Effects that depend on the present model, or need the whole recording, are left for `of`.
+        """
+        later = {"torque", "body", "whole"}
+        wanted = [e for e in effects if e not in self._known and not e.needs & later]
         base = self.model.base.independent
         self._rigid = []
         for effect in wanted:
@@ -58,16 +67,18 @@ class ColumnStore:
     def forget(self, effect: Effect) -> None:
         """Drop the columns of an effect, tried once and not needed again."""
         self._known.pop(effect, None)
+        for run in range(len(self.runs)):
+            self._present.pop((effect, run), None)
 
     def renew(self, runs: tuple[Run, ...]) -> None:
         """Take runs whose last versions, the simulated motions, are new."""
         fresh = ColumnStore(self.model, tuple(replace(r, versions=r.versions[-1:]) for r in runs))
         fresh.prepare(self._known)
         for r in range(len(runs)):
-            self._rigid[r][-1] = fresh._rigid[r][0]
+            self._rigid[r][-1] = fresh.rigid(r)[0]
             for effect, columns in self._known.items():
-                columns[r][-1] = fresh._known[effect][r][0]
-        self._torque.clear()
+                columns[r][-1] = fresh.of(effect, r, self.model, None)[0]
+        self._now = None
         self.runs = runs
 
     def rigid(self, run: int) -> Signals:
@@ -77,37 +88,63 @@ class ColumnStore:
     def of(self, effect: Effect, run: int, model: Model, values: np.ndarray | None) -> Signals:
         """Columns of an effect at the joints where it acts, (T, J, k) for each version.
 
-        `model` and its parameters are those whose predicted torque some columns depend on.
+        `model` and its parameters are those whose torque and bodies some columns depend on.
         """
-        if "torque" in effect.needs:
-            return self._loaded(effect, run, model, values)
+        if effect.linear_in_torque:
+            rows = zip(self.runs[run].versions, self._filtered(run, model, values), strict=True)
+            return [acting(effect, replace(self._rows(v), torque=torque)) for v, torque in rows]
+        if effect.needs & {"torque", "body"}:
+            return self._of_present(effect, run, model, values)
         if effect not in self._known:
             self._known[effect] = [[self._plain(effect, v) for v in r.versions] for r in self.runs]
         return self._known[effect][run]
 
     def _plain(self, effect: Effect, version: Sampled) -> np.ndarray:
+        if "whole" in effect.needs:
+            block = replace(version.block(self.model, rigid=False), carries_payload=True)
+            return version.filtered(acting(effect, self.model.ready(effect, block, None)))
         return version.decimate(
             self.model,
             lambda block: [acting(effect, replace(block, carries_payload=True))],
             rigid="rigid" in effect.needs,
         )[0]
 
-    def _loaded(self, effect: Effect, run: int, model: Model, values: np.ndarray | None) -> Signals:
-        """Columns that depend on the predicted torque."""
-        versions = self.runs[run].versions
-        if effect.linear_in_torque:
-            return [
-                acting(effect, replace(self._rows(v), torque=torque))
-                for v, torque in zip(versions, self._filtered(run, model, values), strict=True)
+    def _of_present(
+        self, effect: Effect, run: int, model: Model, values: np.ndarray | None
+    ) -> Signals:
+        """Columns that depend on the present model; kept until another is the present one."""
+        values = np.zeros(model.size) if values is None else values
+        carries = tuple(bool(one.recording.payload) for one in self.runs)
+        now = (model.effects, values.tobytes(), carries)
+        if now != self._now:
+            self._now = now
+            self._present.clear()
+            self._blocks.clear()
+        if (effect, run) not in self._present:
+            count = len(self.runs[run].versions)
+            blocks = [self._block(effect, run, i, model, values) for i in range(count)]
+            self._present[effect, run] = [
+                version.filtered(acting(effect, block))
+                for version, block in zip(self.runs[run].versions, blocks, strict=True)
             ]
-        torques = self._predicted(run, model, values)
-        found = []
-        for version, torque in zip(versions, torques, strict=True):
-            motion = version.motion
-            block = self.model.block(motion.t, motion.q, motion.v, motion.a, rigid=False)
-            columns = acting(effect, replace(block, torque=torque))
-            found.append(version.parallel.apply(columns)[version.kept])
-        return found
+        return self._present[effect, run]
+
+    def _block(
+        self, effect: Effect, run: int, version: int, model: Model, values: np.ndarray
+    ) -> Block:
+        """A whole version with what an effect needs of the present model; shared by many."""
+        sampled = self.runs[run].versions[version]
+        # What comes before an effect of the model is another robot than what a candidate sees.
+        label = effect.label if "body" in effect.needs and effect in model else ""
+        key = (run, version, effect.needs & {"body", "rigid", "torque"}, label)
+        if key in self._blocks:
+            return self._blocks[key]
+        block = model.ready(effect, sampled.block(model, rigid=False), values)
+        if "torque" in effect.needs:
+            block = replace(block, torque=model.torque_without_loads(block, values))
+        if sampled.motion.samples <= _SHARED:
+            self._blocks[key] = block
+        return block
 
     def _rows(self, version: Sampled) -> Block:
         return self.model.block(version.t, version.q, version.v, version.a, rigid=False)
@@ -127,21 +164,6 @@ class ColumnStore:
             for torque, columns in zip(found, self.of(effect, run, model, values), strict=True):
                 torque[:, joints] += columns @ own
         return found
-
-    def _predicted(self, run: int, model: Model, values: np.ndarray | None) -> list[np.ndarray]:
-        """Torque at the full rate that the model predicts with these parameters."""
-        values = np.zeros(model.size) if values is None else values
-        carries = tuple(bool(one.recording.payload) for one in self.runs)
-        key = ((model.effects, values.tobytes(), carries), run)
-        if key not in self._torque:
-            if key[0] not in {known for known, _ in self._torque}:
-                self._torque.clear()
-            rigid = any("rigid" in one.needs for one in model.effects)
-            self._torque[key] = [
-                v.full_rate(model, lambda b: model.torque_without_loads(b, values), rigid=rigid)
-                for v in self.runs[run].versions
-            ]
-        return self._torque[key]
 
 
 def joints_of(effect: Effect, model: Model) -> tuple[int, ...]:

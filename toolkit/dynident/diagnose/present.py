@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynident.diagnose.evidence import ColumnStore
+from dynident.diagnose.evidence import ColumnStore, joints_of
 from dynident.diagnose.moments import Moments, Solution, solve
 from dynident.diagnose.noise import (
     NoiseModel,
@@ -16,11 +16,12 @@ from dynident.diagnose.noise import (
     systematic_square,
 )
 from dynident.diagnose.runs import Signals
+from dynident.fit.settling import Settling
 from dynident.model import Model
 
 _ROUNDS = 3  # fit, measure the noise, fit again: the noise model settles at once
-_LOAD_ROUNDS = 30  # at most, until columns that depend on the predicted torque settle as well
-_LOAD_TOLERANCE = 1e-6
+_PRESENT_ROUNDS = 30  # at most, until columns that depend on the model's values settle as well
+_PRESENT_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -79,9 +80,10 @@ def fit_present(store: ColumnStore, model: Model) -> Present:
     ]
     noise = tuple(flat_noise(std or 1.0) for std in torque_std)
     known = any(run.kind != "single" for run in store.runs)
-    columns, values = [], at
-    for round in range(_LOAD_ROUNDS if model.needs_torque else _ROUNDS):
-        if not columns or model.needs_torque:
+    columns, values, settling = [], at, Settling()
+    for round in range(_PRESENT_ROUNDS if model.needs_values else _ROUNDS):
+        if not columns or model.needs_values:
+            model = model.at(at)
             columns = [
                 [model_columns(store, model, r, j, at) for j in range(n)]
                 for r in range(len(store.runs))
@@ -89,9 +91,9 @@ def fit_present(store: ColumnStore, model: Model) -> Present:
         values, _ = _solve(_moments(store, _whiten(store, columns, noise, values)))
         noise = tuple(_noise(store, columns, values, j) for j in range(n))
         change = float(np.linalg.norm(values - at))
-        if round >= _ROUNDS and change <= _LOAD_TOLERANCE * np.linalg.norm(values):
+        if round >= _ROUNDS and change <= _PRESENT_TOLERANCE * np.linalg.norm(values):
             break
-        at = model.settled(at, values)
+        at = settling.following(model, at, values)
     white = _whiten(store, columns, noise, values)
     summed = _moments(store, white)
     values, solution = _solve(summed)
@@ -100,6 +102,7 @@ def fit_present(store: ColumnStore, model: Model) -> Present:
         for run, joints in zip(store.runs, white, strict=True)
         for part in joints
     )
+    model = model.at(values)
     return Present(model, values, solution.covariance, solution, noise, known, white, summed, rows)
 
 
@@ -110,12 +113,11 @@ def model_columns(
     recording = store.runs[run].recording
     parts = [[rigid[:, joint] for rigid in store.rigid(run)]]
     for effect in model.effects:
-        columns = store.of(effect, run, model, values)
-        if columns[0].shape[1] == 1 and effect.place != "robot":
-            here = model.robot.names.index(str(effect.joint)) == joint
-            at = [c[:, 0] * float(here) for c in columns]
+        columns, joints = store.of(effect, run, model, values), joints_of(effect, model)
+        if joint in joints:
+            at = [c[:, joints.index(joint)] for c in columns]
         else:
-            at = [c[:, joint] for c in columns]
+            at = [np.zeros_like(c[:, 0]) for c in columns]
         if "payload" in effect.needs:
             at = [c * float(bool(recording.payload)) for c in at]
         parts.append(at)

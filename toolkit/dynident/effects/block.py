@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ from dynident.errors import EffectError
 
 if TYPE_CHECKING:
     from dynident.robot import Robot
+    from dynident.robot.dynamics import TorqueDerivatives
 
 FRICTION_WIDTH = 0.01
 """Speed (rad/s, or m/s for a prismatic joint) over which dry friction changes its sign.
@@ -64,6 +66,25 @@ class Block:
         if joint not in self.names:
             raise EffectError(f"no joint '{joint}'", mend=f"joints: {', '.join(self.names)}")
         return self.names.index(joint)
+
+    def present(self, label: str) -> Robot:
+        """The present model's robot; `label` names the effect that needs it.
+
+        Raises
+        ------
+        EffectError
+            If the block has none.
+        """
+        if self.body is None:
+            raise EffectError("needs the present model's robot in the block", label)
+        return self.body
+
+    @cached_property
+    def derivatives(self) -> TorqueDerivatives:
+        """Derivatives of the torque of `body` by q, v and a; made once, for all effects."""
+        return self.present("the derivatives of the torque").torque_derivatives(
+            self.q, self.v, self.a
+        )
 
     def sign(self, speed: np.ndarray) -> np.ndarray:
         """Smoothed sign of a speed, the package's one law of dry friction."""

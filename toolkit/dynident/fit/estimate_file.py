@@ -76,6 +76,7 @@ def to_dict(estimate: Estimate) -> dict[str, Any]:
                     "joint": effect.joint,
                     "source": effect.source,
                     "shape": list(effect.shape),
+                    "point": list(effect.point),
                 }
                 for effect in model.effects
             ],
@@ -165,7 +166,8 @@ def _model(given: ModelPart, where: str) -> Model:
     try:
         robot = Robot.from_text(given.robot, where, given.joints, given.gravity)
         effects = tuple(
-            known[one.effect](one.joint, one.source, tuple(one.shape)) for one in given.effects
+            known[one.effect](one.joint, one.source, tuple(one.shape), tuple(one.point))
+            for one in given.effects
         )
         model = Model(robot, effects, given.friction_width)
         # The names are found from the dynamics: some descriptions fail only there.

@@ -68,6 +68,7 @@ class _Effect(_Part):
     joint: str | None
     source: str | None
     shape: list[_Number]
+    point: list[_Number] = []
 
 
 class ModelPart(_Part):

@@ -50,7 +50,7 @@ def input_noise(model: Model, dataset: Dataset) -> InputNoise:
     gram, seen, used = np.zeros((p, p)), 0, 0
     for recording in dataset.recordings:
         sampled = sample(recording, dataset.filter)
-        columns = sampled.decimate(model, lambda block: [model.columns(block)])[0]
+        columns = np.concatenate(list(sampled.columns(model)))
         used += len(columns)
         if recording.period is None:
             continue

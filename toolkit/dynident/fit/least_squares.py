@@ -12,6 +12,7 @@ from dynident.errors import FitError
 from dynident.fit.estimate import Estimate, Source
 from dynident.fit.factors import Factors, factorise
 from dynident.fit.sampling import rows
+from dynident.fit.settling import Settling, unsettled
 from dynident.model import Model
 from dynident.recording import Dataset, default_filter
 from dynident.robot import BaseParameters, base_parameters
@@ -20,8 +21,8 @@ from dynident.threads import single_threaded
 RANK_TOLERANCE = 1e-8
 """Share of the largest diagonal of R (unit columns) below which data do not excite a direction."""
 
-_LOAD_ROUNDS = 30  # of columns that depend on the predicted torque, until they settle
-_LOAD_TOLERANCE = 1e-9
+_ROUNDS = 30  # of columns that depend on the model's own values, until they settle
+_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -51,16 +52,26 @@ class LeastSquares:
             raise FitError("no recording to fit", mend='mark some recordings use = "train"')
         factors = factorise(rows(model, dataset))
         solution = solve_factors(model, factors, self.weighting)
-        if model.needs_torque:
-            values = solution.values
-            for _ in range(_LOAD_ROUNDS):
-                factors = factorise(rows(model, dataset, values))
-                solution = solve_factors(model, factors, self.weighting)
-                change = np.linalg.norm(solution.values - values)
-                if change <= _LOAD_TOLERANCE * np.linalg.norm(values):
-                    break
-                values = model.settled(values, solution.values)
+        if model.needs_values:
+            model, factors, solution = self._settle(model, dataset, solution.values)
         return estimate_of(self.name, self.weighting, model, dataset, factors, solution)
+
+    def _settle(
+        self, model: Model, dataset: Dataset, values: np.ndarray
+    ) -> tuple[Model, Factors, Solution]:
+        """Fit with columns at the values fitted before, until both agree."""
+        settling = Settling()
+        for _ in range(_ROUNDS):
+            model = model.at(values)
+            factors = factorise(rows(model, dataset, values))
+            solution = solve_factors(model, factors, self.weighting)
+            change = np.linalg.norm(solution.values - values) / np.linalg.norm(values)
+            if change <= _TOLERANCE:
+                break
+            values = settling.following(model, values, solution.values)
+        else:
+            solution = replace(solution, notes=(*solution.notes, unsettled(float(change))))
+        return model.at(solution.values), factors, solution
 
 
 @dataclass(frozen=True, eq=False)

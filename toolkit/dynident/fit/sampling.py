@@ -77,34 +77,73 @@ class Sampled:
         rigid : whether `evaluate` needs the rigid-body regressor.
         size : samples at a time.
         """
-        for plan in self.parallel.blocks(self.motion.samples, size):
-            columns = evaluate(self._block(model, plan.raw, rigid))
-            low, high = max(plan.kept.start, self.kept.start), min(plan.kept.stop, self.kept.stop)
-            if high <= low:
-                continue
-            rows = slice(low - plan.kept.start, high - plan.kept.start)
-            short = FilterBlock(plan.raw, plan.rows[rows], slice(low, high))
-            yield [self.parallel.apply_block(one, short) for one in columns]
+        for plan in self._plans(size):
+            columns = evaluate(self.block(model, plan.raw, rigid=rigid))
+            yield [self.parallel.apply_block(one, plan) for one in columns]
+
+    def columns(self, model: Model, values: np.ndarray | None = None) -> Iterator[np.ndarray]:
+        """Columns of a model block by block, (T, n, p) as decimated rows.
+
+        Effects that need the whole recording see it once; the regressor is made in blocks.
+
+        Parameters
+        ----------
+        values : (p,) parameters at which columns that depend on the present model are taken.
+        """
+        known = self.whole_columns(model, values)
+        for plan in self._plans(BLOCK):
+            here = {label: own[plan.raw] for label, own in known.items()}
+            columns = model.columns(self.block(model, plan.raw), values, here)
+            yield self.parallel.apply_block(columns, plan)
+
+    def whole_columns(
+        self, model: Model, values: np.ndarray | None = None
+    ) -> dict[str, np.ndarray]:
+        """Columns at the full rate of the effects that need the whole recording, by label."""
+        if not any("whole" in effect.needs for effect in model.effects):
+            return {}
+        return model.whole_columns(self.block(model, rigid=False), values)
+
+    def filtered(self, columns: np.ndarray) -> np.ndarray:
+        """Decimated rows of columns at the full rate, (T, ...)."""
+        return self.parallel.apply(columns)[self.kept]
 
     def decimate(self, model: Model, evaluate: Evaluate, *, rigid: bool = True) -> list[np.ndarray]:
         """All decimated rows of some columns; see `blocks`."""
         parts = list(self.blocks(model, evaluate, rigid=rigid))
         return [np.concatenate(pieces) for pieces in zip(*parts, strict=True)]
 
-    def full_rate(
-        self, model: Model, evaluate: Callable[[Block], np.ndarray], *, rigid: bool = True
-    ) -> np.ndarray:
-        """Evaluate at the full rate, neither filtered nor decimated, (T, ...)."""
-        starts = range(0, self.motion.samples, BLOCK)
-        return np.concatenate(
-            [evaluate(self._block(model, slice(i, i + BLOCK), rigid)) for i in starts]
+    def block(self, model: Model, raw: slice = slice(None), *, rigid: bool = True) -> Block:
+        """Samples at the full rate as effects see them; all of them by default.
+
+        Parameters
+        ----------
+        model : for the robot.
+        raw : which samples.
+        rigid : whether the rigid-body regressor is evaluated.
+        """
+        motion, recording = self.motion, self.recording
+        temperature = getattr(recording, "temperature", None)
+        if temperature is not None:
+            temperature = temperature[motion.first : motion.first + motion.samples][raw]
+        return model.block(
+            motion.t[raw] + recording.start,
+            motion.q[raw],
+            motion.v[raw],
+            motion.a[raw],
+            carries_payload=bool(recording.payload),
+            rigid=rigid,
+            number=getattr(recording, "number", 0),
+            temperature=temperature,
         )
 
-    def _block(self, model: Model, raw: slice, rigid: bool) -> Block:
-        motion = self.motion
-        t = motion.t[raw] + self.recording.start
-        q, v, a = motion.q[raw], motion.v[raw], motion.a[raw]
-        return model.block(t, q, v, a, carries_payload=bool(self.recording.payload), rigid=rigid)
+    def _plans(self, size: int) -> Iterator[FilterBlock]:
+        """Blocks whose rows lie in the recording's window."""
+        for plan in self.parallel.blocks(self.motion.samples, size):
+            low, high = max(plan.kept.start, self.kept.start), min(plan.kept.stop, self.kept.stop)
+            if high > low:
+                rows = slice(low - plan.kept.start, high - plan.kept.start)
+                yield FilterBlock(plan.raw, plan.rows[rows], slice(low, high))
 
 
 def sample(recording: Recording, settings: Filter | None) -> Sampled:
@@ -150,7 +189,7 @@ def rows(
 
     Parameters
     ----------
-    values : (p,) parameters at which columns that depend on the predicted torque are taken.
+    values : (p,) parameters at which columns that depend on the present model are taken.
 
     Yields
     ------
@@ -159,7 +198,7 @@ def rows(
     for recording in dataset.recordings:
         sampled = sample(recording, dataset.filter)
         start = 0
-        for (columns,) in sampled.blocks(model, lambda block: [model.columns(block, values)]):
+        for columns in sampled.columns(model, values):
             stop = start + len(columns)
             yield columns, sampled.tau[start:stop]
             start = stop

@@ -1,6 +1,7 @@
 """Robot descriptions in and out, the regressor, and base parameters."""
 
 from dynident.robot.base import BaseParameters, base_parameters, structural_base
+from dynident.robot.lift import nearest_parameters
 from dynident.robot.robot import Robot
 from dynident.robot.tree import Description, Joint, Link
 
@@ -11,5 +12,6 @@ __all__ = [
     "Link",
     "Robot",
     "base_parameters",
+    "nearest_parameters",
     "structural_base",
 ]

@@ -29,10 +29,9 @@ _WEAK = 0.02
 """Canonical correlation below which instruments and regressor hardly have to do with each other."""
 
 
-def assemble(
-    method: IV, model: Model, source: Source, iterations: Iterations, start_name: str
-) -> Estimate:
+def assemble(method: IV, source: Source, iterations: Iterations, start_name: str) -> Estimate:
     """Return the estimate of finished iterations; `start_name` is in words."""
+    model = iterations.model
     found, solution, values = iterations.found, iterations.solution, iterations.values
     noise, bias = _noise(model, source, iterations)
     covariance = carried_covariance(model, values, iterations.instruments, solution, noise)
@@ -154,10 +153,11 @@ def _is_dry(model: Model, label: str) -> bool:
     from dataclasses import replace
 
     effect = next(e for e in model.effects if e.label == label)
-    if "torque" in effect.needs:
+    if "whole" in effect.needs:
         return False
     n = model.robot.n
     speed = np.full((1, n), model.friction_width)
     block = model.block(np.zeros(1), np.zeros((1, n)), speed, np.zeros((1, n)))
+    block = replace(model.ready(effect, block, None), torque=np.ones((1, n)))
     wider = replace(block, friction_width=2.0 * model.friction_width)
     return bool(np.any(effect.columns(block) != effect.columns(wider)))

@@ -107,22 +107,17 @@ class _Sums:
         self, clean: Recording, dataset: Dataset, values: np.ndarray, noisy: list[Recording]
     ) -> None:
         """Add the rows of a recording, clean and under each draw of noise."""
-
-        def columns(block):
-            return [self._model.columns(block, values)]
-
         prepared = [sample(one, dataset.filter) for one in (clean, *noisy)]
         torque, start = prepared[0].tau, 0
-        for (V,), *drawn in zip(
-            *(one.blocks(self._model, columns) for one in prepared), strict=True
-        ):
+        blocks = (one.columns(self._model, values) for one in prepared)
+        for V, *drawn in zip(*blocks, strict=True):
             stop = start + len(V)
             left = torque[start:stop] - V @ values
             start = stop
             instruments = V[:, :, self._kept] * (self._weights**2)[:, None]
             self.count += len(V)
             self.sampled += np.einsum("tij,ti->j", instruments, left)
-            for draw, (W,) in enumerate(drawn):
+            for draw, W in enumerate(drawn):
                 self.crossed[draw] += np.einsum(
                     "tij,tik->jk", instruments, W[:, :, self._kept], optimize=True
                 )

@@ -91,12 +91,14 @@ def _carried(
     # Each filter is passed twice: forth to the rows, and back.
     margin = 2 * parallel.overlap + (round(2 * rate / cutoff) if cutoff else 0) + 8
     kept_rows = parallel.rows(motion.samples)[sampled.kept]
+    known = sampled.whole_columns(model, values)
     for start in range(0, motion.samples, _BLOCK):
         stop = min(start + _BLOCK, motion.samples)
         first, last = max(0, start - margin), min(motion.samples, stop + margin)
         raw, core = slice(first, last), slice(start - first, stop - first)
-        block = _block(model, sampled, raw)
-        V = model.columns(block, values)[:, :, kept]
+        block = sampled.block(model, raw)
+        here = {label: own[raw] for label, own in known.items()}
+        V = model.columns(block, values, here)[:, :, kept]
         weighted = np.zeros_like(V)
         inside = kept_rows[(kept_rows >= first) & (kept_rows < last)] - first
         weighted[inside] = parallel.low_pass(V)[inside] * (weights**2)[:, None]
@@ -125,17 +127,10 @@ def _differences(x: np.ndarray, rate: float) -> np.ndarray:
     return central_difference(padded, rate)[2:-2]
 
 
-def _block(model: Model, sampled: Sampled, raw: slice) -> Block:
-    motion = sampled.motion
-    t = motion.t[raw] + sampled.recording.start
-    payload = bool(sampled.recording.payload)
-    return model.block(t, motion.q[raw], motion.v[raw], motion.a[raw], carries_payload=payload)
-
-
 def _jacobians(
     model: Model, values: np.ndarray, block: Block, speed_noise: np.ndarray
 ) -> TorqueDerivatives:
-    """Derivatives of the predicted torque, without what scales with it."""
+    """Derivatives of the predicted torque, but for effects of it or of the whole recording."""
     q, v, a, n = block.q, block.v, block.a, model.robot.n
     found = model.robot.torque_derivatives(q, v, a, minimum_norm(model, values))
     here = _effects(model, values, block, q, v, a)
@@ -161,9 +156,8 @@ def _effects(
     """Torque of the effects alone, (T, n)."""
     total = np.zeros(q.shape)
     for effect in model.effects:
-        if "torque" in effect.needs:
+        if effect.needs & {"torque", "whole"}:
             continue
-        rigid = model.robot.regressor(q, v, a) if "rigid" in effect.needs else None
-        moved = replace(block, q=q, v=v, a=a, rigid=rigid)
+        moved = model.ready(effect, replace(block, q=q, v=v, a=a, rigid=None), values)
         total += effect.columns(moved) @ values[model.slices[effect.label]]
     return total

@@ -19,11 +19,14 @@ from dynident.fit.instrumental.simulated import SimulatedLoop
 from dynident.fit.instrumental.source import Guess, Instruments, Source, Tell, silent
 from dynident.fit.instrumental.starts import START_NAMES, Start, start_values
 from dynident.fit.least_squares import LeastSquares
+from dynident.fit.settling import Settling
 from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.threads import single_threaded
 
 _HALVINGS = 5
+_COLUMNS = 1e-3
+"""Share of the tolerance within which columns that depend on the estimate settle."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +96,7 @@ class IV:
             If not even the start can be simulated.
         """
         iterations = self.iterated(model, dataset)
-        return assemble(self, model, iterations.source, iterations, iterations.start_name)
+        return assemble(self, iterations.source, iterations, iterations.start_name)
 
     def iterated(self, model: Model, dataset: Dataset) -> Iterations:
         """Return the iterations of a fit, done; raises what `fit` raises."""
@@ -137,6 +140,7 @@ class Iterations:
     source : of the instruments.
     start, start_name : (p,) where they began, and what that is in words.
     values : (p,) the present estimate.
+    model : with its columns at the present estimate.
     rounds : one for each iteration done.
     ending, message : how they ended.
     found, solution : of the last round.
@@ -148,7 +152,8 @@ class Iterations:
     def __init__(
         self, method: IV, model: Model, source: Source, start: np.ndarray, start_name: str
     ) -> None:
-        self._method, self._model, self.source = method, model, source
+        self._method, self.model, self.source = method, model, source
+        self._settling = Settling()
         self._good: np.ndarray | None = None
         self.start, self.start_name = start, start_name
         self.simulated: np.ndarray | None = None
@@ -203,6 +208,7 @@ class Iterations:
 
     def _restore(self, past: _Past) -> None:
         self.values, self.simulated = past.values, past.simulated
+        self.model = self.model.at(past.values)
         self.found, self.solution = past.found, past.solution
         self.instruments, self.rounds = past.instruments, past.rounds
 
@@ -238,13 +244,20 @@ class Iterations:
         self.simulated = values if self.source.iterates else None
 
     def _estimate(self, way: Way) -> None:
-        model, measured = self._model, self.source.measured
-        found = moments(model, measured, self.instruments, self.values)
-        given = model.given_values()
-        solution = solve(found, model.names, given, self._method.weighting)
-        values = solution.values
-        if model.needs_torque:
-            values = model.settled(self.values, values)
+        found, solution = self._solved()
+        model, values = self.model, solution.values
+        if model.needs_values:
+            values = self._settling.following(model, self.values, values)
+            if not self.source.iterates:
+                # The instruments stay: only the columns are taken anew.
+                for _ in range(self._method.rounds):
+                    change = np.linalg.norm(values - self.values)
+                    self.values = values
+                    if change <= self._method.tolerance * _COLUMNS * np.linalg.norm(values):
+                        break
+                    found, solution = self._solved()
+                    values = self._settling.following(model, self.values, solution.values)
+            self.model = model.at(values)
         R = found.factors.pooled(solution.weights)[: model.size, : model.size]
         self.found, self.solution, self._root, self.values = found, solution, R, values
         self.rounds.append(
@@ -261,9 +274,20 @@ class Iterations:
             _Past(values, self.simulated, found, solution, self.instruments, list(self.rounds))
         )
 
+    def _solved(self) -> tuple[Moments, InstrumentalSolution]:
+        """The solution with columns at the present values."""
+        self.model = self.model.at(self.values)
+        found = moments(self.model, self.source.measured, self.instruments, self.values)
+        given, weighting = self.model.given_values(), self._method.weighting
+        return found, solve(found, self.model.names, given, weighting)
+
     def _settled(self) -> bool:
         """Whether the residual stays, at estimates that were simulated as they are."""
         if any(one.way.share < 1.0 for one in self.rounds[-2:]):
             return False
+        if self.model.needs_values:
+            last, one = self.rounds[-1].values, self.rounds[-2].values
+            if np.linalg.norm(last - one) > self._method.tolerance * np.linalg.norm(last):
+                return False
         before, now = (one.error_simulated for one in self.rounds[-2:])
         return abs(now - before) <= self._method.tolerance * before

@@ -34,12 +34,19 @@ class InertiaMatrices:
     def __init__(self, model: Model, poses: np.ndarray) -> None:
         count, n = poses.shape
         t, still = np.zeros(count), np.zeros((count, n))
-        rest = model.columns(model.block(t, poses, still, still))
+        # Poses are no recording: effects that need a whole one change no inertia here.
+        whole = {
+            e.label: np.zeros((count, n, len(e.parameters(model.robot))))
+            for e in model.effects
+            if "whole" in e.needs
+        }
+        rest = model.columns(model.block(t, poses, still, still), known=whole)
         self._columns = np.empty((count, n, n, model.size))
         for j in range(n):
             a = still.copy()
             a[:, j] = 1.0
-            self._columns[:, :, j] = model.columns(model.block(t, poses, still, a)) - rest
+            block = model.block(t, poses, still, a)
+            self._columns[:, :, j] = model.columns(block, known=whole) - rest
         self._poses, self._names = poses, model.robot.names
 
     def of(self, values: np.ndarray) -> np.ndarray:

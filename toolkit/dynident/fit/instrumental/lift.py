@@ -16,13 +16,10 @@ from dynident.fit.prior import Prior
 from dynident.fit.projection import project
 from dynident.model import Model
 from dynident.nlp import Within
+from dynident.robot import nearest_parameters
 
-_MASS_STAYS = 1e-3
-"""Weight of a mass against the other parameters: where it is not told, it stays as described."""
 _FIRM = 1e3
 """Weight of the base values against the description: they are kept where a robot can have them."""
-_NEXT_TO_NOTHING = 1e-6
-"""Share of the typical mass below which a described mass cannot carry a first moment."""
 
 
 def minimum_norm(model: Model, values: np.ndarray) -> np.ndarray:
@@ -39,22 +36,7 @@ def minimum_norm(model: Model, values: np.ndarray) -> np.ndarray:
     -------
     (10 n,) parameters of the moving bodies, each in its joint's frame.
     """
-    base = model.base
-    theta = np.array(model.robot.theta)
-    masses = theta[0::10]
-    known = masses[np.isfinite(masses) & (masses > 0)]
-    typical = float(np.median(known)) if known.size else 1.0
-    theta[0::10] = np.where(masses > _NEXT_TO_NOTHING * typical, masses, typical)
-    theta = np.where(np.isfinite(theta), theta, 0.0)
-    weight = np.divide(1.0, base.scale, out=np.zeros_like(base.scale), where=base.scale > 0)
-    weight[0::10] *= _MASS_STAYS
-    B = base.combination * weight
-    wanted = values[: base.rank]
-    correction = np.linalg.lstsq(B, wanted - base.coordinates(theta), rcond=None)[0]
-    theta = theta + weight * correction
-    # One step of refinement puts what rounding is left into the independent parameters.
-    theta[list(base.independent)] += wanted - base.coordinates(theta)
-    return theta
+    return nearest_parameters(model.base, model.robot.theta, values[: model.base.rank])
 
 
 def consistent(model: Model, values: np.ndarray, root: np.ndarray) -> np.ndarray:

@@ -65,15 +65,10 @@ def moments(
 def _rows(
     model: Model, measured: Dataset, instruments: Dataset, values: np.ndarray | None
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    def columns(block):
-        return [model.columns(block, values)]
-
     for one, other in zip(measured.recordings, instruments.recordings, strict=True):
         own, instrument = sample(one, measured.filter), sample(other, instruments.filter)
         start = 0
-        for (V,), (W,) in zip(
-            instrument.blocks(model, columns), own.blocks(model, columns), strict=True
-        ):
+        for V, W in zip(instrument.columns(model, values), own.columns(model, values), strict=True):
             stop = start + len(W)
             yield np.concatenate([V, W], axis=2), own.tau[start:stop]
             start = stop

@@ -1,0 +1,38 @@
+"""Repetition of a fit whose columns depend on its result, until both agree."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.model import Model
+
+_SHRUNK = 0.9
+"""Share of the change before which a change has to stay below, or the next step is shorter."""
+_SHORTEST = 0.1
+
+
+class Settling:
+    """Where the columns are taken next, with shorter steps while the values swing.
+
+    A step that does not shrink the change overshoots: a half of it does.
+    """
+
+    def __init__(self) -> None:
+        self._share, self._change = 1.0, np.inf
+
+    def following(self, model: Model, at: np.ndarray, found: np.ndarray) -> np.ndarray:
+        """Return the values (p,) after `at`, where the columns were taken, and `found`."""
+        step = model.settled(at, found) - at
+        change = float(np.linalg.norm(step))
+        if change > _SHRUNK * self._change:
+            self._share = max(self._share / 2, _SHORTEST)
+        self._change = change
+        return at + self._share * step
+
+
+def unsettled(change: float) -> str:
+    """Say that values did not settle; `change` is the last one, relative."""
+    return (
+        "The columns that depend on the parameters themselves have not settled: in the last round "
+        f"the values still changed by {100 * change:.2g} %."
+    )
