@@ -232,13 +232,13 @@ class Trials:
         if motion not in self._blocks:
             name, joint = motion
             robot = self.model.robot
-            speed = np.array([self.pace(j) for j in range(robot.n)])
+            speed = [self.pace(j) for j in range(robot.n)]
             (period, harmonics), seed = _WIDE, 1
             if name == "fast":
                 (period, harmonics), seed = _FAST, 2
             if name == "slow":
                 (period, harmonics), seed = _UNHURRIED, 3
-                speed = np.minimum(speed, [SLOW[kind] for kind in robot.kinds])
+                speed = [min(v, SLOW[kind]) for v, kind in zip(speed, robot.kinds, strict=True)]
             path = Fourier.random(robot, period, seed, harmonics, speed=speed)
             if joint is not None:
                 moves = np.array([one == joint for one in robot.names])[:, None]
