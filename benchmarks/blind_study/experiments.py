@@ -108,7 +108,7 @@ class Plan:
         self, hidden: tuple[TrueEffect, ...], errors: tuple[SensorError, ...], *, noisy: bool
     ) -> Laboratory:
         """Return two recordings of one period, early and late, one with the payload."""
-        picked = (0, min(3, self.runs - 1))
+        picked = (0, max(1, min(3, self.runs - 1)))
         runs = tuple(replace(self._runs()[k], duration=PERIOD) for k in picked)
         made = self._laboratory(runs, hidden, errors)
         return made if noisy else replace(made, sensors=Sensors(), torque_noise=())
