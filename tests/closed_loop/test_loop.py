@@ -33,7 +33,8 @@ SLIDER = """<robot name="slider"><link name="base"/>
   <joint name="slide" type="prismatic"><parent link="base"/><child link="mass"/>
     <axis xyz="1 0 0"/><limit lower="-1" upper="1" velocity="2" effort="50"/></joint></robot>"""
 PD = Controller("pd", 500.0, (800.0, 200.0), (60.0, 12.0))
-PLACES = {"joint": "@elbow", "pair": "@elbow:shoulder", "robot": ""}
+NATIVE = ("viscous_friction", "coulomb_friction", "asymmetric_friction", "joint_spring")
+PLACES = {"joint or robot": "", "joint": "@elbow", "pair": "@elbow:shoulder", "robot": ""}
 
 
 def task(mechanism: Mechanism, seed: int = 1, duration: float = 0.3, **settings: Any) -> Task:
@@ -122,7 +123,7 @@ def test_terms_are_the_force(name: str) -> None:
     (effect,) = effects_of(name + PLACES[catalogue()[name].place], robot)
     values = tuple(rng.normal(size=len(effect.parameters(robot))))
     if effect.simulated_terms(values, robot) is None:
-        assert name in ("stribeck_friction", "quadratic_drag", "torque_ripple")
+        assert name not in NATIVE
         return
     body = Mechanism(robot, (TrueEffect(effect, values),), 0.1)
     other = Mechanism(robot, (TrueEffect(effect, tuple(-2.0 * x for x in values)),), 0.2)

@@ -28,8 +28,12 @@ class PointForce(Protocol):
         """Take other values, of the same effects, and other times at which motions start."""
         ...
 
-    def __call__(self, t: float, x: np.ndarray) -> np.ndarray:
-        """Return the force (N,) at t and state (2 N,); the next call overwrites it."""
+    def __call__(self, t: float, x: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Return the force (N,) at t, state (2 N,) and memory (M,); the next call overwrites it."""
+        ...
+
+    def rate(self, t: float, x: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Return the rate of the memory (M,), per s; the next call overwrites it."""
         ...
 
 
@@ -53,6 +57,11 @@ class Bodies:
     def distinct(self) -> list[Mechanism]:
         """Each mechanism once."""
         return list({id(one): one for one in self.mechanisms}.values())
+
+    @property
+    def memory(self) -> int:
+        """Number of internal states of all, M: one mechanism after the other."""
+        return sum(one.memory for one in self.mechanisms)
 
 
 def point_force(bodies: Bodies) -> PointForce:
@@ -80,8 +89,10 @@ def _agrees(mechanism: Mechanism) -> bool:
     probed = replace(mechanism, effects=other)
     force = TracedForce(Bodies((mechanism,), (0.0,), np.arange(n)))
     force.set(Bodies((probed,), (0.0,), np.arange(n)))
-    found = np.array([-force(*instant) for instant in zip(t, np.hstack([q, v]), strict=True)])
-    expected = probed.force(t, q, v)
+    z = rng.uniform(-1.0, 1.0, (_PROBES, mechanism.memory))
+    instants = list(zip(t, np.hstack([q, v]), z, strict=True))
+    found = np.array([[*-force(*one), *force.rate(*one)] for one in instants])
+    expected = np.hstack([probed.force(t, q, v, z), probed.memory_rate(t, q, v, z)])
     return bool(np.abs(found - expected).max() <= _AGREEMENT * np.abs(expected).max())
 
 
@@ -94,10 +105,12 @@ class TracedForce:
         mechanisms, place = bodies.mechanisms, bodies.place
         n, size = mechanisms[0].robot.n, len(place)
         t, x = casadi.SX.sym("t"), casadi.SX.sym("x", 2 * size)
+        memory = casadi.SX.sym("z", bodies.memory)
         parameters = casadi.SX.sym("p", len(_parameters(bodies)))
-        left = iter(casadi.vertsplit(parameters))
+        left, states = iter(casadi.vertsplit(parameters)), iter(casadi.vertsplit(memory))
         starts = [next(left) for _ in mechanisms]
         added: list = [None] * size
+        rates: list = []
         for k, (mechanism, start) in enumerate(zip(mechanisms, starts, strict=True)):
             own = place[k * n : k * n + n]
             # One sample of a block, as the effects expect it.
@@ -106,34 +119,49 @@ class TracedForce:
             block = mechanism.block(np.array([t + start], dtype=object), q, v)
             force = [casadi.SX(0.0)] * n
             for one in mechanism.effects:
+                given: Any = [next(left) for _ in one.values]
+                seen = block
+                if one.effect.memory:
+                    z = [[next(states) for _ in range(one.effect.memory)]]
+                    seen = replace(block, memory=np.array(z, dtype=object))
+                    rates += [casadi.SX(r) for r in one.effect.simulated_rate(given, seen)[0]]
                 # A force is linear in the values: it is traced value by value.
-                for unit in np.eye(len(one.values)).tolist():
-                    value, per_unit = next(left), one.effect.simulated_force(unit, block)[0]
+                for value, unit in zip(given, np.eye(len(given)).tolist(), strict=True):
+                    per_unit = one.effect.simulated_force(unit, seen)[0]
                     force = [f + value * casadi.SX(x) for f, x in zip(force, per_unit, strict=True)]
             for i, one in zip(own, force, strict=True):
                 added[i] = -one
-        inputs, output = casadi.vertcat(t, x, parameters), casadi.vertcat(*added)
-        function: Any = casadi.Function("force", [inputs], [output])
+        inputs = casadi.vertcat(t, x, memory, parameters)
+        outputs = casadi.vertcat(*added, *rates)
+        function: Any = casadi.Function("force", [inputs], [outputs])
         # The memory that the function reads and writes is these two arrays for good; the buffer
         # must live as long as they are used.
-        self._inside, self._outside = np.zeros(inputs.numel()), np.zeros(size)
+        self._inside, outside = np.zeros(inputs.numel()), np.zeros(outputs.numel())
+        self._outside, self._rates = outside[:size], outside[size:]
         self._buffer, self._call = function.buffer()
-        views: Any = (memoryview(self._inside), memoryview(self._outside))  # type: ignore[arg-type]
+        views: Any = (memoryview(self._inside), memoryview(outside))  # type: ignore[arg-type]
         self._buffer.set_arg(0, views[0])
         self._buffer.set_res(0, views[1])
-        self._state = self._inside[1 : 1 + 2 * size]
+        end = 1 + 2 * size
+        self._state, self._memory = self._inside[1:end], self._inside[end : end + len(rates)]
         self.set(bodies)
 
     def set(self, bodies: Bodies) -> None:
         """Take other values and starts."""
-        self._inside[1 + len(self._state) :] = _parameters(bodies)
+        self._inside[1 + len(self._state) + len(self._memory) :] = _parameters(bodies)
 
-    def __call__(self, t: float, x: np.ndarray) -> np.ndarray:
+    def __call__(self, t: float, x: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Return the force."""
         self._inside[0] = t
         self._state[:] = x
+        self._memory[:] = z
         self._call()
         return self._outside
+
+    def rate(self, t: float, x: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Return the rate of the memory."""
+        self(t, x, z)
+        return self._rates
 
 
 def _parameters(bodies: Bodies) -> list[float]:
@@ -145,20 +173,30 @@ class PlainForce:
     """The force as the effects themselves evaluate it."""
 
     def __init__(self, bodies: Bodies) -> None:
-        self._added = np.zeros(len(bodies.place))
+        self._added, self._rates = np.zeros(len(bodies.place)), np.zeros(bodies.memory)
         self.set(bodies)
 
     def set(self, bodies: Bodies) -> None:
         """Take other values and starts."""
         self._groups = []
+        first = np.cumsum([0, *(one.memory for one in bodies.mechanisms)])
         for one in bodies.distinct:
             rows = np.array([k for k, other in enumerate(bodies.mechanisms) if other is one])
             own = bodies.place.reshape(-1, one.robot.n)[rows]
-            self._groups.append((own, np.array(bodies.starts)[rows], one))
+            kept = first[rows][:, None] + np.arange(one.memory)
+            self._groups.append((own, kept, np.array(bodies.starts)[rows], one))
 
-    def __call__(self, t: float, x: np.ndarray) -> np.ndarray:
+    def __call__(self, t: float, x: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Return the force."""
         size = len(self._added)
-        for own, start, mechanism in self._groups:
-            self._added[own] = -mechanism.force(start + t, x[own], x[own + size])
+        for own, kept, start, mechanism in self._groups:
+            self._added[own] = -mechanism.force(start + t, x[own], x[own + size], z[kept])
         return self._added
+
+    def rate(self, t: float, x: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Return the rate of the memory."""
+        size = len(self._added)
+        for own, kept, start, mechanism in self._groups:
+            motion = start + t, x[own], x[own + size]
+            self._rates[kept] = mechanism.memory_rate(*motion, z[kept])
+        return self._rates

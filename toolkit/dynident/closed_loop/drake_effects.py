@@ -11,17 +11,28 @@ from dynident.closed_loop.compiled import PointForce
 
 
 class ForceSystem(LeafSystem):
-    """What effects add to the generalised force on the plant."""
+    """What effects add to the generalised force on the plant; it keeps their internal states."""
 
-    def __init__(self, size: int, force: PointForce) -> None:
+    def __init__(self, size: int, force: PointForce, memory: int = 0) -> None:
         LeafSystem.__init__(self)
         self.force = force
         self.state = self.DeclareVectorInputPort("state", 2 * size)
         self.output = self.DeclareVectorOutputPort("force", size, self._calculate)
+        if memory:
+            self.DeclareContinuousState(memory)
 
     def _calculate(self, context: Any, output: Any) -> None:
         x: Any = self.state.Eval(context)
-        output.SetFromVector(self.force(context.get_time(), x))
+        z = context.get_continuous_state_vector().CopyToVector()
+        output.SetFromVector(self.force(context.get_time(), x, z))
+
+    def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
+        """Let the internal states change; Drake's name."""
+        z = context.get_continuous_state_vector().CopyToVector()
+        if len(z):
+            x: Any = self.state.Eval(context)
+            rate = self.force.rate(context.get_time(), x, z)
+            derivatives.get_mutable_vector().SetFromVector(rate)
 
 
 class InertiaSystem(LeafSystem):

@@ -218,6 +218,7 @@ def _rollout(
         saturated=motion.saturated[own].mean(axis=0),
         start=task.start,
         mechanism=task.mechanism,
+        acceleration=None if motion.a is None else motion.a[own],
     )
 
 
@@ -265,7 +266,7 @@ def _needed(
         (task, *(x[:1] for x in found)) for task, found in zip(tasks, references, strict=True)
     )
     return np.concatenate(
-        [task.mechanism.command(time + task.start, q, v, a)[0] for task, q, v, a in starts]
+        [task.mechanism.stiff_command(time + task.start, q, v, a)[0] for task, q, v, a in starts]
     )
 
 

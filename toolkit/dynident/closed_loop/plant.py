@@ -13,6 +13,12 @@ from pydrake.systems.framework import DiagramBuilder
 
 from dynident.closed_loop.compiled import Bodies, point_force
 from dynident.closed_loop.drake_effects import ForceSystem, InertiaSystem
+from dynident.closed_loop.drivetrain import (
+    DrivetrainSystem,
+    Gears,
+    Layout,
+    giving_way,
+)
 from dynident.closed_loop.layers import Layers, Terms, summed
 from dynident.closed_loop.mechanism import Mechanism
 from dynident.errors import DynidentError, SimulationError
@@ -22,6 +28,8 @@ from dynident.robot.drake import add_to_plant
 
 _FAR = 1e6
 """rad or m; no pose is beyond."""
+_SETTLING = 5
+"""Iterations for the weight of a link to hang where its spring carries it."""
 _LOST = 0.01
 """Least eigenvalue of the inertia over that along the reference, below which it is lost."""
 
@@ -33,7 +41,9 @@ def structure(mechanisms: Sequence[Mechanism]) -> Hashable:
         terms = frozenset((term.at, term.law, term.of) for term in one.terms)
         others = tuple((other.effect, len(other.values)) for other in one.others)
         said = (one.friction_width, one.carries_payload, one.number) if others else ()
-        parts.append((_kinematics(one.robot), terms, others, said))
+        gears = tuple(gear.joint for gear in one.transmissions)
+        train = gears, bool(np.any(one.loss))
+        parts.append((_kinematics(one.robot), terms, others, said, train))
     return tuple(parts), any(_is_coupled(one.inertia) for one in mechanisms)
 
 
@@ -72,6 +82,9 @@ class Plant:
     context : the diagram's, with the present parameters.
     place : (N,) where each joint stands in the plant's positions and velocities.
     inputs : (N,) where each joint stands in the plant's actuation.
+    positions, speeds : (N,) where the motion of each joint's motor stands in the diagram's state;
+        the plant's own state comes first.
+    remembers : whether there are states besides the plant's.
     gain : (N,) recorded torque per torque that acts.
     """
 
@@ -89,27 +102,54 @@ class Plant:
         self.place = np.concatenate([part.velocity_indices() for part in self._parts])
         self.inputs = np.concatenate([part.input_indices() for part in self._parts])
         self._plant, size = plant, plant.num_velocities()
-        builder.ExportInput(plant.get_actuation_input_port(), "torque")
         state = plant.get_state_output_port()
         bodies = self._bodies(mechanisms, [0.0] * len(mechanisms))
-        self._layers = Layers(builder, state, Terms.of(bodies))
+        self._compliant = giving_way(mechanisms)
+        self._train: Any = None
+        seen, terms, others = state, Terms.of(bodies), _others(bodies)
+        computed = any(one.effects for one in others.mechanisms)
+        if len(self._compliant) or any(np.any(one.loss) for one in mechanisms):
+            layout = Layout(self.place, self.inputs)
+            has_forces = computed or bool(terms.terms)
+            self._train = DrivetrainSystem(layout, self._compliant, has_forces)
+            builder.AddSystem(self._train)
+            builder.Connect(state, self._train.state)
+            builder.ExportInput(self._train.torque, "torque")
+            builder.Connect(self._train.acting, plant.get_actuation_input_port())
+            seen = self._train.seen
+        else:
+            builder.ExportInput(plant.get_actuation_input_port(), "torque")
+        self._layers = Layers(builder, seen, terms)
         outputs = self._layers.outputs
         self._forces: Any = None
-        if any(one.effects for one in _others(bodies).mechanisms):
-            self._forces = builder.AddSystem(ForceSystem(size, point_force(_others(bodies))))
-            builder.Connect(state, self._forces.state)
+        if computed:
+            force = point_force(others)
+            self._forces = builder.AddSystem(ForceSystem(size, force, others.memory))
+            builder.Connect(seen, self._forces.state)
             outputs.append(self._forces.output)
+        if self._train is not None:
+            if self._train.forces is not None:
+                builder.Connect(summed(builder, outputs, size), self._train.forces)
+            outputs = [self._train.applied]
         self._coupling: Any = None
         if any(_is_coupled(one.inertia) for one in mechanisms):
             self._coupling = builder.AddSystem(InertiaSystem(plant, bool(outputs)))
             builder.Connect(state, self._coupling.state)
-            builder.ConnectInput("torque", self._coupling.torque)
+            if self._train is None:
+                builder.ConnectInput("torque", self._coupling.torque)
+            else:
+                builder.Connect(self._train.acting, self._coupling.torque)
             if outputs:
                 builder.Connect(summed(builder, outputs, size), self._coupling.others)
             outputs.append(self._coupling.output)
         if outputs:
             generalized = plant.get_applied_generalized_force_input_port()
             builder.Connect(summed(builder, outputs, size), generalized)
+        self.positions, self.speeds = self.place.copy(), size + self.place
+        own = np.arange(len(self._compliant))
+        self.positions[self._compliant] = 2 * size + own
+        self.speeds[self._compliant] = 2 * size + len(own) + own
+        self.remembers = bool(len(own) or others.memory)
         self.diagram = builder.Build()
         self.context = self.diagram.CreateDefaultContext()
 
@@ -129,6 +169,7 @@ class Plant:
         self._mechanisms = tuple(mechanisms)
         bodies = self._bodies(mechanisms, starts)
         inertia = _diagonal_blocks([one.inertia for one in mechanisms])
+        self._set_train(mechanisms, inertia)
         self._inertia, motors = inertia, np.diag(inertia)
         self.gain = np.concatenate([one.gain for one in mechanisms])
         contexts = [self._plant.GetMyMutableContextFromRoot(self.context)]
@@ -152,6 +193,44 @@ class Plant:
         self._layers.set(self.context, Terms.of(bodies))
         if self._forces is not None:
             self._forces.force.set(_others(bodies))
+
+    def _set_train(self, mechanisms: Sequence[Mechanism], inertia: np.ndarray) -> None:
+        """Set the drivetrain; motors before a spring are its own, not the plant's."""
+        if self._train is None:
+            return
+        at = self._compliant
+        rest = inertia - np.diag(np.diag(inertia))
+        if np.any(rest[at]) or np.any(rest[:, at]):
+            what = "the inertia of a motor is coupled to a joint that gives way"
+            raise SimulationError(what, mend="leave out the coupling's ca, or the transmission")
+        inertia[at, at] = 0.0
+        n = mechanisms[0].robot.n
+        widths = np.repeat([one.friction_width for one in mechanisms], n)
+        self._train.set_loss(np.concatenate([one.loss for one in mechanisms]), widths)
+        self._train.gears = Gears([gear for one in mechanisms for gear in one.transmissions])
+
+    def start(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """Return the diagram's state where motors move so, (N,) each, and springs carry the load.
+
+        Internal states of effects are zero.
+        """
+        at, size = self._compliant, len(self.place)
+        state = np.zeros(self.context.num_continuous_states())
+        state[self.positions], state[self.speeds] = q, v
+        link = q.copy()
+        for _ in range(_SETTLING if len(at) else 0):
+            load = np.empty_like(link)
+            for k, one in enumerate(self._mechanisms):
+                own = self._columns(k)
+                motion = (x[None, own] for x in (link, v, a))
+                load[own] = one.robot.inverse_dynamics(*motion)[0]
+            link[at] = q[at] - self._train.gears.bent(load[at])
+        state[self.place], state[size + self.place] = link, v
+        return state
+
+    def accelerations(self) -> np.ndarray:
+        """Return the accelerations of the motors in the present context, (N,)."""
+        return self.diagram.EvalTimeDerivatives(self.context).CopyToVector()[self.speeds]
 
     def require_inertia(self, poses: np.ndarray) -> None:
         """Refuse robots whose joint-space inertia is not positive at one of the poses (T, N).
@@ -214,6 +293,8 @@ class Plant:
             for one in mechanism.effects
             if one in mechanism.others
             or _is_coupled(one.effect.simulated_inertia(one.values, mechanism.robot))
+            or one.effect.simulated_transmission(one.values, mechanism.robot) is not None
+            or np.any(one.effect.simulated_loss(one.values, mechanism.robot))
         ]
         return tuple(
             f"{label} is evaluated in Python, which makes the simulation slower."

@@ -58,6 +58,7 @@ class Rollout:
     saturated : (n,) share of the commands that are at the controller's limit.
     start : s, when the first sample is taken in the session.
     mechanism : what moved.
+    acceleration : (T, n) `a` where it depends on more than the motion and what acts; else None.
     """
 
     t: np.ndarray
@@ -73,6 +74,7 @@ class Rollout:
     saturated: np.ndarray
     start: float
     mechanism: Mechanism
+    acceleration: np.ndarray | None = None
 
     @cached_property
     def a(self) -> np.ndarray:
@@ -80,4 +82,6 @@ class Rollout:
 
         At a sample it is the one just after.
         """
+        if self.acceleration is not None:
+            return self.acceleration
         return self.mechanism.acceleration(self.t + self.start, self.q, self.v, self.acting)

@@ -10,7 +10,7 @@ import numpy as np
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from dynident.closed_loop.drive import Drive, ReferenceSamples
-from dynident.closed_loop.plant import Plant, scattered
+from dynident.closed_loop.plant import Plant
 from dynident.errors import SimulationError
 
 _SMALLEST_STEP = 1e-4
@@ -48,6 +48,8 @@ class Motion:
     u : command as the controller gives it.
     acting, mean : command that acts just after a sample, and in the mean until the next one.
     saturated : whether the command is at its limit.
+    a : acceleration just after a sample, where it depends on more than motion and command; None
+        elsewhere.
     """
 
     q: np.ndarray
@@ -57,6 +59,7 @@ class Motion:
     acting: np.ndarray
     mean: np.ndarray
     saturated: np.ndarray
+    a: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -111,7 +114,7 @@ class Stepper:
             If the loop diverges, oscillates, or meets an inertia that is not positive definite.
         """
         plant, rate = self._plant, self._rate
-        place, order = plant.place, np.argsort(plant.inputs)
+        place, order = plant.positions, np.argsort(plant.inputs)
         effect = (1.0 / plant.gain)[order]
         total, size = measurement.noise.shape
         resolution, noise = measurement.resolution, measurement.noise
@@ -124,7 +127,8 @@ class Stepper:
         # The object behind the input stays; asking for it is what tells Drake that it changes.
         data, torque = held.GetMutableData, held.GetMutableData().get_mutable_value()
         advance = simulator.AdvanceTo
-        states = np.empty((total, 2 * size))
+        states = np.empty((total, state.size()))
+        rates = np.empty((total, size)) if plant.remembers else None
         measured, commands = np.empty((total, size)), np.empty((total, size))
         saturated = np.zeros((total, size), dtype=bool)
         late, rest = self._late, self._rest
@@ -149,9 +153,13 @@ class Stepper:
                 if rest and k:
                     data()
                     torque.SetFromVector(commands[max(k - late - 1, 0)][order] * effect)
+                    if rates is not None:
+                        rates[k] = plant.accelerations()
                     advance(time[k] + rest / rate)
                 data()
                 torque.SetFromVector(u[order] * effect)
+                if rates is not None and not (rest and k):
+                    rates[k] = plant.accelerations()
                 advance(time[k + 1])
             except (RuntimeError, np.linalg.LinAlgError) as error:
                 raise self._diverged(time[k], state.CopyToVector(), error) from None
@@ -161,20 +169,20 @@ class Stepper:
                 progress((k + 1) / rate)
         return Motion(
             states[:, place],
-            states[:, size + place],
+            states[:, plant.speeds],
             measured,
             commands,
             *self._arrived(commands),
             saturated,
+            rates,
         )
 
     def _start(self, time: float, reference: ReferenceSamples) -> tuple[Any, Any, Any]:
         diagram, context, place = self._plant.diagram, self._plant.context, self._plant.place
         context.SetTime(time)
         held: Any = diagram.get_input_port().FixValue(context, np.zeros(len(place)))
-        context.SetContinuousState(
-            np.concatenate([scattered(reference.q[0], place), scattered(reference.v[0], place)])
-        )
+        first = (reference.q[0], reference.v[0], reference.a[0])
+        context.SetContinuousState(self._plant.start(*first))
         simulator: Any = Simulator(diagram, context)
         # Above one sample, or rounding of the time would leave a second, tiny step.
         ResetIntegratorFromFlags(simulator, "runge_kutta3", 2.0 / self._rate)
@@ -194,8 +202,7 @@ class Stepper:
 
     def _check_chatter(self, time: float, states: np.ndarray, v_ref: np.ndarray) -> None:
         """Refuse a loop whose speed swings from sample to sample by more than it follows."""
-        place = self._plant.place
-        v = states[:, len(place) + place]
+        v = states[:, self._plant.speeds]
         swing, pace = _rms(np.diff(v, 2, axis=0)), _rms(v_ref)
         # A joint that stands still swings by its encoder's noise alone.
         worst = int(np.argmax(swing / np.maximum(pace, 0.1 * pace.max() + 1e-9)))
@@ -206,7 +213,7 @@ class Stepper:
         self, time: float, x: np.ndarray, cause: Exception | None = None
     ) -> SimulationError:
         place = self._plant.place
-        speeds = x[len(place) + place]
+        speeds = x[self._plant.speeds]
         worst = int(np.argmax(np.where(np.isfinite(speeds), np.abs(speeds), np.inf)))
         task = self._joints[worst].task
         n = len(self._joints) // self._plant.count

@@ -1,0 +1,291 @@
+"""The driven two-mass response: what a link does behind a transmission that gives way.
+
+Encoders are on the motors, so the motion of a motor is known and that of its link is not. With the
+deflection d = q_motor - q_link at joint j, to first order in d, the link obeys
+
+    m d'' + C_jj d' + G_jj d + torque = load,    torque = K (d - clip(d, -gap/2, gap/2)) + D d'
+
+(D where the sides touch), with m = M_jj less the motor's inertia and C, G the derivatives of the
+inverse dynamics by speed and position. All joints feel it: the torque of joint i changes by
+-(M_ij d'' + C_ij d' + G_ij d), with m in place of M_jj at joint j.
+
+Central differences in time make of it a recursion; where the modes of contact are known it is a
+triangular band matrix, which LAPACK solves, and so are its exact derivatives by K, D, gap and m.
+"""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dynident.effects.bands import solve_band
+from dynident.effects.block import Block
+from dynident.errors import EffectError
+
+if TYPE_CHECKING:
+    from dynident.robot import Robot
+
+_POSES = 64
+_PHASE = 0.3
+"""rad that an oscillation may turn in a step: its frequency is then wrong by 0.4 %."""
+_LEAST = 0.05
+"""Of the mean inertia: no link is lighter, or unlikely estimates would ring beyond reason."""
+
+
+@dataclass(frozen=True)
+class Transmitting:
+    """Physical values of a transmission; see `dynident.effects.Transmission`.
+
+    Attributes
+    ----------
+    stiffness, damping, half_gap, rotor : N m/rad, N m s/rad, rad, kg m^2 (or N/m, N s/m, m, kg).
+    """
+
+    stiffness: float
+    damping: float
+    half_gap: float
+    rotor: float
+
+    @classmethod
+    def of(cls, inertia: float, shape: tuple[float, ...], gap: float = 0.0) -> Transmitting:
+        """Return what a resonance (Hz), a damping ratio and a share of the inertia stand for."""
+        resonance, damping, share = shape
+        link, w = (1.0 - share) * inertia, 2.0 * np.pi * resonance
+        return cls(link * w**2, 2.0 * damping * link * w, gap / 2.0, share * inertia)
+
+
+@dataclass(frozen=True, eq=False)
+class Deflection:
+    """A deflection and its derivatives, (T,) each: rad or m, per s and s^2."""
+
+    d: np.ndarray
+    rate: np.ndarray
+    bend: np.ndarray
+
+
+class DrivenLink:
+    """The link of one joint, along the motion of a recording.
+
+    Parameters
+    ----------
+    block : whole recording, with the present model's body and rotor inertias.
+    joint : column of the joint.
+
+    Attributes
+    ----------
+    inertia : kg m^2 or kg, of all that moves with the joint, in the mean over its poses.
+    a : (T,) acceleration of the motor.
+    M, C, G : (T, n) derivatives of torques by the joint's acceleration, speed and position.
+    """
+
+    def __init__(self, block: Block, joint: int) -> None:
+        robot, along = _present(block)
+        rotor = 0.0 if block.rotor is None else float(block.rotor[joint])
+        self.joint, self.a = joint, block.a[:, joint]
+        self.M, self.C, self.G = (x[:, :, joint] for x in (along.by_a, along.by_v, along.by_q))
+        self._whole = along.by_a[:, joint, joint] + rotor
+        self._load = along.torque[:, joint] + rotor * self.a
+        self.inertia = max(mean_inertia(robot, joint) + rotor, 1e-9)
+        if len(block.t) > 1:
+            self._step = float(np.mean(np.diff(block.t)))
+        else:
+            self._step = 1.0
+
+    def response(self, gear: Transmitting) -> Response:
+        """Return how the link moves behind a transmission."""
+        least = _LEAST * self.inertia
+        m = np.maximum(self._whole - gear.rotor, least)
+        moves = self._whole - gear.rotor > least
+        load = self._load - gear.rotor * self.a
+        fastest = np.sqrt(max(float((gear.stiffness + self.G[:, self.joint]).max()), 0.0) / m.min())
+        per = max(1, int(np.ceil(fastest * self._step / _PHASE)))
+        return Response(self, gear, m, moves, load, per, self._step / per)
+
+
+class Response:
+    """A deflection with its effect on the torque, and the derivatives of both.
+
+    Parameters
+    ----------
+    link, gear : what is driven, and through what.
+    m, moves, load : (T,) inertia behind the transmission, whether it depends on the motor's, and
+        the torque that the link needs where nothing gives way.
+    per, step : steps per sample, and their length in s.
+    """
+
+    def __init__(
+        self,
+        link: DrivenLink,
+        gear: Transmitting,
+        m: np.ndarray,
+        moves: np.ndarray,
+        load: np.ndarray,
+        per: int,
+        step: float,
+    ) -> None:
+        self._link, self._gear, self._m, self._moves = link, gear, m, moves
+        self._per, self._step = per, step
+        j = link.joint
+        self._fine = [self._refined(x) for x in (m, link.C[:, j], link.G[:, j], load)]
+        self._solve()
+        self.deflection = self._differences(self._d, self._per)
+        self.torque = self._torque(self.deflection)
+
+    def _refined(self, x: np.ndarray) -> np.ndarray:
+        if self._per == 1:
+            return x
+        rows = np.arange((len(x) - 1) * self._per + 1) / self._per
+        return np.interp(rows, np.arange(len(x)), x)
+
+    def _solve(self) -> None:
+        m, c, g, load = self._fine
+        gear, h = self._gear, self._step
+        touches = np.ones(len(m))
+        if gear.half_gap > 0:
+            self._d, self._side = _with_gap(m, c, g, load, gear, h)
+            touches = np.abs(self._side)
+        else:
+            self._side = np.zeros(len(m))
+        damping, stiffness = c + gear.damping * touches, g + gear.stiffness * touches
+        self._touches = touches
+        rest = g + gear.stiffness
+        # Row k + 1 holds the equation at step k; the first two are at rest.
+        ahead = m / h**2 + damping / (2.0 * h)
+        back = m / h**2 - damping / (2.0 * h)
+        band = np.zeros((3, len(m)))
+        band[0] = np.concatenate([rest[:2], ahead[1:-1]])
+        band[1, 1:-1] = stiffness[1:-1] - 2.0 * m[1:-1] / h**2
+        band[2, :-2] = back[1:-1]
+        self._band = band
+        if not gear.half_gap > 0:
+            self._d = self._banded(load)
+
+    def _banded(self, right: np.ndarray) -> np.ndarray:
+        """Solve with right sides (..,) that stand at their steps."""
+        if len(right) < 3:
+            return right / self._band[0]
+        return solve_band(self._band, np.concatenate([right[:2], right[1:-1]]))
+
+    def _differences(self, d: np.ndarray, every: int) -> Deflection:
+        """Return every so many steps' deflection, with the derivatives that the recursion means."""
+        rate, bend, h = np.zeros_like(d), np.zeros_like(d), self._step
+        rate[1:-1] = (d[2:] - d[:-2]) / (2.0 * h)
+        bend[1:-1] = (d[2:] - 2.0 * d[1:-1] + d[:-2]) / h**2
+        for x in (rate, bend):
+            if len(d) > 2:
+                x[-1] = x[-2]
+        return Deflection(*(x[::every] for x in (d, rate, bend)))
+
+    def _torque(self, moved: Deflection) -> np.ndarray:
+        """Return the change of the torque, (T, n), to first order in a deflection."""
+        link, j = self._link, self._link.joint
+        d, rate, bend = (x[:, None] for x in (moved.d, moved.rate, moved.bend))
+        changed = link.M * bend
+        changed[:, j] = self._m * moved.bend
+        return -(changed + link.C * rate + link.G * d)
+
+    def by(self, stiffness: float, damping: float, rotor: float, half_gap: float) -> np.ndarray:
+        """Return the derivative of the torque (T, n) along a change of these values."""
+        lighter = -rotor * self._moves
+        d, moved = self._d, self._differences(self._d, 1)
+        bent = d - self._side * self._gear.half_gap
+        right = -self._refined(lighter) * moved.bend - self._refined(rotor * self._link.a)
+        right -= self._touches * (stiffness * bent + damping * moved.rate)
+        right += self._gear.stiffness * self._side * half_gap
+        first = slice(0, 2)
+        side = np.where(self._touches[first] > 0, self._side[first], 0.0)
+        right[first] = (
+            self._gear.stiffness * side * half_gap
+            - stiffness * (d[first] - side * self._gear.half_gap)
+            - self._refined(rotor * self._link.a)[first]
+        )
+        change = self._torque(self._differences(self._banded(right), self._per))
+        change[:, self._link.joint] -= lighter * self.deflection.bend
+        return change
+
+
+def _with_gap(m, c, g, load, gear: Transmitting, h: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the deflection of a link in a gap, and the side that it touches: -1, 0 or 1."""
+    half, K = gear.half_gap, gear.stiffness
+    inertia = 2.0 * m / h**2 - g
+    coefficients = []
+    for damping in (c, c + gear.damping):
+        ahead = 1.0 / (m / h**2 + damping / (2.0 * h))
+        coefficients += [ahead, (m / h**2 - damping / (2.0 * h)) * ahead]
+    free, free_back, touching, touching_back = (x.tolist() for x in coefficients)
+    inertia, load = inertia.tolist(), load.tolist()
+    d, side = [0.0] * len(load), [0.0] * len(load)
+    for k in range(min(2, len(load))):
+        side[k] = 1.0 if load[k] >= 0 else -1.0
+        d[k] = (load[k] + side[k] * K * half) / (g[k] + K)
+    if len(load) > 1:
+        before, now = d[0], d[1]
+        for k in range(1, len(load) - 1):
+            pushed = load[k] + inertia[k] * now
+            if now >= half:
+                after = (pushed - K * (now - half)) * touching[k] - touching_back[k] * before
+                side[k] = 1.0
+            elif now <= -half:
+                after = (pushed - K * (now + half)) * touching[k] - touching_back[k] * before
+                side[k] = -1.0
+            else:
+                after = pushed * free[k] - free_back[k] * before
+            before, now = now, after
+            d[k + 1] = after
+    return np.array(d), np.array(side)
+
+
+# --- the rigid robot along a motion ---------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Along:
+    """The rigid robot along a motion: torque (T, n) and its derivatives (T, n, n)."""
+
+    torque: np.ndarray
+    by_q: np.ndarray
+    by_v: np.ndarray
+    by_a: np.ndarray
+
+
+_ALONG: dict[int, tuple[Robot, np.ndarray, np.ndarray, Along]] = {}
+"""By the identity of a motion's positions, for as long as these are alive."""
+_MEAN: weakref.WeakKeyDictionary[Robot, np.ndarray] = weakref.WeakKeyDictionary()
+
+
+def _present(block: Block) -> tuple[Robot, Along]:
+    """Return the present model's robot, and what it does along a motion."""
+    if block.body is None:
+        raise EffectError("needs the present model's bodies", mend="give the block a body")
+    robot, key = block.body, id(block.q)
+    kept = _ALONG.get(key)
+    if kept is not None and kept[1] is block.v and kept[2] is block.a:
+        same = kept[0] is robot or np.array_equal(kept[0].theta, robot.theta)
+        if same and kept[0].names == robot.names:
+            return robot, kept[3]
+    torque = robot.inverse_dynamics(block.q, block.v, block.a)
+    by = robot.torque_derivatives(block.q, block.v, block.a)
+    along = Along(torque, by.by_q, by.by_v, by.by_a)
+    if kept is None:
+        weakref.finalize(block.q, _ALONG.pop, key, None)
+    _ALONG[key] = (robot, block.v, block.a, along)
+    return robot, along
+
+
+def mean_inertia(robot: Robot, joint: int) -> float:
+    """Return the joint-space inertia of a joint in the mean over the poses that it can take."""
+    if robot not in _MEAN:
+        q, _, _ = robot.random_motion(0, _POSES)
+        still = np.zeros_like(q)
+        mass = robot.torque_derivatives(q, still, still).by_a
+        _MEAN[robot] = np.diagonal(mass, axis1=1, axis2=2).mean(axis=0)
+    return float(_MEAN[robot][joint])
+
+
+def stacked(columns: Iterable[np.ndarray]) -> np.ndarray:
+    """Return derivatives (T, n) each as (T, n, 1, s)."""
+    return np.stack(list(columns), axis=-1)[:, :, None, :]
