@@ -346,6 +346,14 @@ class Model:
                 without[self.slices[effect.label]] = 0.0
         return without
 
+    def points(self) -> np.ndarray:
+        """Values at which the columns of secant effects are taken, all others zero, (p,)."""
+        values = np.zeros(self.size)
+        for effect in self.effects:
+            if effect.point:
+                values[self.slices[effect.label]] = effect.point
+        return values
+
     def given_values(self) -> np.ndarray:
         """Parameter values of the robot description, effects at zero, (p,)."""
         values = np.zeros(self.size)

@@ -73,7 +73,7 @@ def fit_present(store: ColumnStore, model: Model) -> Present:
         If the columns are not finite.
     """
     n = model.robot.n
-    at = np.zeros(model.size)
+    at = model.points()
     torque_std = [
         float(np.sqrt(np.mean(np.concatenate([r.versions[0].tau[:, j] for r in store.runs]) ** 2)))
         for j in range(n)
