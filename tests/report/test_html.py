@@ -1,6 +1,8 @@
 import json
+import platform
 import re
 from dataclasses import replace
+from datetime import datetime
 from html import escape, unescape
 from html.parser import HTMLParser
 
@@ -75,7 +77,29 @@ def test_plotly_is_inlined_once_and_the_file_is_small(found, tmp_path):
 def test_seven_joints_and_long_traces_stay_small():
     many = diagnosis(tuple(f"joint{i}" for i in range(7)), samples=1500)
     again = [replace(t, recording=f"{k}-{t.recording}") for k in range(3) for t in many.traces]
-    assert len(page(replace(many, traces=tuple(again)))) < 8e6
+    assert len(page(replace(many, traces=tuple(again)))) < 6e6
+
+
+def test_it_goes_from_the_verdict_to_the_provenance(found, html):
+    headings = re.findall(r"<h2>(.*?)</h2>", html)
+    assert headings[:2] == ["What to do next", "How far the model is off"]
+    assert headings[-4:] == [
+        "The search in numbers",
+        "What this data cannot show",
+        "Parameters",
+        "Provenance",
+    ]
+    text = Elements(html).text
+    assert text.index(found.sentence) < text.index("What to do next")
+
+
+def test_a_rejected_model_has_wider_intervals_and_says_so(found):
+    joints = tuple(replace(joint, ratio_after=2.0) for joint in found.joints)
+    rejected = replace(found, verdict="unexplained", joints=joints)
+    text = Elements(page(rejected)).text
+    assert "Birge ratio" in text and "elbow 2.24" in text  # root of 1 + 2^2
+    assert "Look at the pictures of shoulder and elbow below" in text
+    assert "what is left is 2 times the noise" in text
 
 
 def test_it_says_what_the_diagnosis_says(found, html):
@@ -109,14 +133,15 @@ def test_numbers_are_those_of_the_diagnosis(found, html):
     for candidate in found.candidates:
         if candidate.status != "absorbed":
             assert f"{100 * candidate.test_gain:.2f}" in text
-    for row in found.after.parameter_table().rows:
-        assert all(cell in text for cell in row)
+    for name, value, *_, stands_for in found.after.parameter_table().rows:
+        assert all(cell in text for cell in (name, value, stands_for))
 
 
 def test_provenance(found, html):
     text = Elements(html).text
     source = found.after.sources[0]
-    for word in (source.file, source.sha256, source.filter, "arms/bench.urdf", "numpy", "drake"):
+    wanted = (source.file, source.sha256, source.filter, "arms/bench.urdf", "casadi", "drake")
+    for word in (*wanted, platform.python_version(), str(datetime.now().year)):
         assert word in text
     assert "dynident explain study.toml" in text
     assert np.__version__ in text
@@ -129,7 +154,7 @@ def test_every_plot_has_its_figure(found, html):
     wanted = [a["data-figure"] for _, a in parsed.elements if "data-figure" in a]
     wanted += [a["value"] for t, a in parsed.elements if t == "option" and "torque" in a["value"]]
     assert set(wanted) == set(figures)
-    assert len(figures) == 2 + len(found.maps) + len(found.traces)
+    assert len(figures) == 3 + len(found.maps) + len(found.traces)
 
 
 def test_hostile_names_are_text():
@@ -139,7 +164,7 @@ def test_hostile_names_are_text():
     html = page(bad, command="dynident </script><script>alert(4)</script>")
     parsed = Elements(html)
     assert {tag for tag, _ in parsed.elements}.isdisjoint({"img", "b"})
-    assert sum(tag == "script" for tag, _ in parsed.elements) == 3
+    assert sum(tag == "script" for tag, _ in parsed.elements) == 4
     assert not any(key.startswith("on") for _, a in parsed.elements for key in a)
     for name in names:
         assert name in parsed.text

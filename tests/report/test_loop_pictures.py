@@ -111,9 +111,9 @@ def test_a_page_of_its_own(found):
 def test_many_joints_stay_small():
     many = validation(tuple(f"joint{i}" for i in range(7)), runs=3, samples=600)
     html = page(many)
-    assert len(html) < 7.5e6
-    assert "Of 1 more recording there are no pictures" in html
-    assert len(figures_of(html)) == 7 * 2 * 4
+    assert len(html) < 6e6
+    assert "Of 2 more recordings there are no pictures" in html
+    assert len(figures_of(html)) == 7 * 4
 
 
 def history(rounds: int = 3, names: tuple[str, ...] = ("m$1$", "Fv@elbow")) -> Convergence:

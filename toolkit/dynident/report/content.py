@@ -145,14 +145,24 @@ def seen(one: ResidualMap) -> str:
     """What a residual map shows, in words; its own sentence where it has one."""
     if one.sentence:
         return one.sentence[0].upper() + one.sentence[1:].rstrip(".") + "."
-    known = np.isfinite(one.band)
-    if not known.any():
+    if not np.isfinite(one.band).any():
         return "No simple shape stands out."
-    count = int(np.sum(np.abs(one.before[known]) > one.band[known]))
+    beyond = _beyond(one, one.before)
+    return f"{beyond}, without a simple shape." if "points" in beyond else f"{beyond}."
+
+
+def left(one: ResidualMap) -> str:
+    """What the effects added leave of a residual map, in words; empty without a noise band."""
+    return f"{_beyond(one, one.after)}." if np.isfinite(one.band).any() else ""
+
+
+def _beyond(one: ResidualMap, mean: np.ndarray) -> str:
+    known = np.isfinite(one.band)
+    count = int(np.sum(np.abs(mean[known]) > one.band[known]))
     # The band is two standard errors: one bin in twenty lies outside by chance.
     if count <= max(1.0, 0.1 * known.sum()):
-        return "Within the noise."
-    return f"Beyond the noise at {count} of {known.sum()} points, without a simple shape."
+        return "Within the noise"
+    return f"Beyond the noise at {count} of {known.sum()} points"
 
 
 def ranked(diagnosis: Diagnosis, most: int = 10) -> tuple[Candidate, ...]:

@@ -4,27 +4,31 @@ from __future__ import annotations
 
 import hashlib
 import platform
+import re
 from dataclasses import replace
-from importlib.metadata import PackageNotFoundError, version
+from datetime import datetime
+from importlib.metadata import PackageNotFoundError, requires, version
 
 from dynident.diagnose.diagnosis import Candidate, Diagnosis, Step
 from dynident.report.content import first_set
+from dynident.report.joints import states
 from dynident.tables import Table, number, percent
 
 
 def joint_table(diagnosis: Diagnosis) -> Table:
-    """As `Diagnosis.joint_table`, with every floor both as a part of the torque and in its unit."""
+    """As `Diagnosis.joint_table`, the noise also in its unit, and in words how each joint does."""
     given = diagnosis.joint_table()
+    words = {one.joint.name: one.words for one in states(diagnosis)}
     rows = []
     for joint in diagnosis.joints:
         noise = joint.noise_rms
-        floor = noise / joint.torque_rms if noise is not None and joint.torque_rms else None
         rows.append(
             (
                 joint.name,
+                words[joint.name],
                 percent(joint.error_before),
                 *([percent(joint.error_after)] if diagnosis.steps else []),
-                percent(floor),
+                percent(joint.noise_share),
                 number(joint.ratio_before, 3),
                 *([number(joint.ratio_after, 3)] if diagnosis.steps else []),
                 f"{number(joint.torque_rms, 3)} {joint.torque_unit}",
@@ -35,6 +39,7 @@ def joint_table(diagnosis: Diagnosis) -> Table:
     rows.append(
         (
             "all joints",
+            "",
             percent(overall.before),
             *([percent(overall.after)] if diagnosis.steps else []),
             percent(overall.noise_floor),
@@ -43,6 +48,7 @@ def joint_table(diagnosis: Diagnosis) -> Table:
     )
     columns = (
         "joint",
+        "how it does",
         *(("error as given", "error after") if diagnosis.steps else ("error",)),
         "noise floor",
         *(
@@ -91,12 +97,13 @@ def _values(diagnosis: Diagnosis, step: Step) -> str:
 def candidate_table(diagnosis: Diagnosis, shown: tuple[Candidate, ...]) -> Table:
     """Candidates, those that cannot be told from the first effect marked."""
     bracketed = first_set(diagnosis)
+    added = {step.effect.label for step in diagnosis.steps}
     rows = tuple(
         (
             ("\u2503 " if c.effect.label in bracketed else "") + c.effect.title,
-            c.status.replace("_", " "),
+            "added" if c.effect.label in added else c.status.replace("_", " "),
             number(c.p_value, 2),
-            f"{100 * c.test_gain:.2f}",
+            f"{round(100 * c.test_gain, 2) + 0.0:.2f}",
             c.remark,
         )
         for c in shown
@@ -137,13 +144,26 @@ def provenance(diagnosis: Diagnosis, command: str) -> tuple[Table, Table]:
 
 
 def versions(command: str) -> Table:
-    """Versions, and the command line where there was one."""
-    versions = [("Python", platform.python_version())]
-    for package in ("dynident", "pin", "drake", "numpy", "scipy", "plotly"):
-        versions.append(("pinocchio (pin)" if package == "pin" else package, _version(package)))
-    if command:
-        versions.append(("command", command))
-    return Table("Made with", ("what", ""), tuple(versions))
+    """When and with what the page was made; the command line where there was one."""
+    made = [
+        ("written", datetime.now().astimezone().strftime("%Y-%m-%d %H:%M:%S %z")),
+        *([("command", command)] if command else []),
+        ("dynident", _version("dynident")),
+        ("Python", f"{platform.python_version()} on {platform.platform()}"),
+    ]
+    packages = (f"{package} {_version(package)}" for package in _dependencies())
+    made.append(("with", ", ".join(packages)))
+    return Table("Made", ("what", "value"), tuple(made))
+
+
+def _dependencies() -> list[str]:
+    """Packages that dynident itself asks for, without those of its extras."""
+    try:
+        wanted = requires("dynident") or []
+    except PackageNotFoundError:
+        return []
+    always = [line for line in wanted if "extra ==" not in line]
+    return sorted(re.split(r"[^\w.-]", line, maxsplit=1)[0] for line in always)
 
 
 def _version(package: str) -> str:

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import json
-import shlex
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import jinja2
-import plotly.graph_objects as go
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from dynident import files
-from dynident.diagnose.diagnosis import Diagnosis, JointResult, ResidualMap
+from dynident.diagnose.diagnosis import Diagnosis, ResidualMap
 from dynident.diagnose.loop_run import QUANTITIES
 from dynident.diagnose.validation import Unsimulated, Validation
 from dynident.report import pictures
-from dynident.report.content import after_name, ranked, seen, x_title
+from dynident.report.content import after_name, left, ranked, seen
 from dynident.report.diagnosis_tables import (
     absorbed_table,
     candidate_table,
@@ -27,13 +24,22 @@ from dynident.report.diagnosis_tables import (
     step_table,
     versions,
 )
+from dynident.report.glossary import meaning, use_of
+from dynident.report.intervals import parameter_table, widening_after, widening_before
+from dynident.report.joints import State, joint_errors, opened, states
 from dynident.report.loop_page import LoopSection, loop_section
+from dynident.report.next_steps import next_steps, summary
+from dynident.report.packing import packed
 from dynident.tables import Table, number, percent
 
-_TRACE_BYTES = 2_400_000
+_TRACE_BYTES = 600_000
 """What all torque traces together may take in the page."""
-_BYTES_PER_POINT = 54
-"""Five lines of a torque picture, two single-precision numbers each, in base 64."""
+_BYTES_PER_POINT = 32
+"""Five lines of a torque picture over one time, in single precision and base 64."""
+_HASH = 64
+"""Characters of a SHA-256."""
+_MOST_POINTS = 6600
+"""Six extremes for each pixel of a wide screen."""
 
 _KINDS = {
     "follows": "nothing_missing",
@@ -46,9 +52,19 @@ _KINDS = {
 
 @dataclass(frozen=True)
 class _JointMaps:
-    """Residual maps of one joint, each with the name of its figure."""
+    """Residual maps of one joint, each with the name of its figure.
+
+    Attributes
+    ----------
+    joint, state, words : the joint and how it does, as `JointState` has it.
+    shown : whether they are shown without asking.
+    maps : name of the figure and what it shows.
+    """
 
     joint: str
+    state: State
+    words: str
+    shown: bool
     maps: tuple[tuple[str, ResidualMap], ...]
 
 
@@ -100,8 +116,10 @@ def page(
 def _diagnosis_page(diagnosis: Diagnosis, closed: LoopSection | None, command: str) -> str:
     joint_maps = _joint_maps(diagnosis)
     names = [f"torque-{i}" for i in range(len(diagnosis.traces))]
-    points = max(16, min(3000, _TRACE_BYTES // _BYTES_PER_POINT // max(len(names), 1)))
+    points = max(16, min(_MOST_POINTS, _TRACE_BYTES // _BYTES_PER_POINT // max(len(names), 1)))
     figures = {"waterfall": pictures.waterfall(diagnosis)}
+    if len(diagnosis.joints) > 1:
+        figures["joints"] = joint_errors(diagnosis)
     if ranked(diagnosis):
         figures["ranking"] = pictures.ranking(diagnosis)
     for name, trace in zip(names, diagnosis.traces, strict=True):
@@ -111,19 +129,21 @@ def _diagnosis_page(diagnosis: Diagnosis, closed: LoopSection | None, command: s
             # The page has one legend for all of them.
             figures[name] = pictures.residual_map(diagnosis, one).update_layout(showlegend=False)
     figures |= dict(closed.figures) if closed else {}
-    given_order = {joint.name: i for i, joint in enumerate(diagnosis.joints)}
-    worst = _worst_joint(diagnosis)
-    order = sorted(
-        range(len(names)),
-        key=lambda i: (diagnosis.traces[i].joint != worst, given_order[diagnosis.traces[i].joint]),
+    place = {one.joint.name: i for i, one in enumerate(states(diagnosis))}
+    order = sorted(range(len(names)), key=lambda i: place[diagnosis.traces[i].joint])
+    known = diagnosis.noise_source != "unknown"
+    given_parameters = parameter_table(
+        diagnosis.before, widening_before(diagnosis), noise_known=known
     )
+    parts = packed(figures)
     return _template("report.html").render(
         d=diagnosis,
         closed=closed,
         robot=diagnosis.after.model.robot.name,
-        sure=diagnosis.verdict != "unexplained" and diagnosis.noise_source != "unknown",
+        sure=diagnosis.verdict != "unexplained" and known,
         added=after_name(diagnosis) if diagnosis.steps else "",
-        labels=[shlex.quote(step.effect.label) for step in diagnosis.steps],
+        summary=summary(diagnosis),
+        advice=next_steps(diagnosis),
         joints=joint_table(diagnosis),
         steps=step_table(diagnosis),
         torques=[(names[i], diagnosis.traces[i]) for i in order],
@@ -133,10 +153,12 @@ def _diagnosis_page(diagnosis: Diagnosis, closed: LoopSection | None, command: s
         weaker=candidate_table(diagnosis, ranked(diagnosis, len(diagnosis.candidates))[10:]),
         remaining=remaining_table(diagnosis),
         absorbed=absorbed_table(diagnosis),
-        parameters=diagnosis.after.tables(),
-        given_parameters=diagnosis.before.tables() if diagnosis.steps else (),
+        parameters=parameter_table(diagnosis.after, widening_after(diagnosis), noise_known=known),
+        fit_error=diagnosis.after.error_table(),
+        given_parameters=given_parameters if diagnosis.steps else None,
         provenance=provenance(diagnosis, command),
-        figures=_json(figures),
+        figures=parts.figures,
+        shared=parts.shared,
         plotly=Markup(get_plotlyjs()),
     )
 
@@ -146,6 +168,7 @@ def _validation_page(validation: Validation, command: str) -> str:
     assert closed is not None
     closed = replace(closed, sentence="")  # the head of the page has it
     errors = zip(QUANTITIES, validation.error_table().rows[-1][1:], strict=False)
+    parts = packed(dict(closed.figures))
     used = tuple((s.file, s.sha256, s.filter) for s in validation.sources)
     return _template("validation.html").render(
         closed=closed,
@@ -155,7 +178,8 @@ def _validation_page(validation: Validation, command: str) -> str:
         sentence=validation.sentence,
         errors=list(errors) if validation.runs else [],
         provenance=(Table("Files", ("file", "SHA-256", "filter"), used), versions(command)),
-        figures=_json(dict(closed.figures)),
+        figures=parts.figures,
+        shared=parts.shared,
         plotly=Markup(get_plotlyjs()),
     )
 
@@ -168,44 +192,39 @@ def _template(name: str) -> jinja2.Template:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"percent": percent, "number": number}
-    environment.globals |= {"numeric": _numeric, "seen": seen, "x_title": x_title}
+    environment.filters |= {
+        "percent": percent,
+        "number": number,
+        "capitalize_first": lambda words: words[:1].upper() + words[1:],
+    }
+    words = {"left": left, "meaning": meaning, "seen": seen, "use_of": use_of}
+    environment.globals |= {"numeric": _numeric, **words}
     return environment.get_template(name)
 
 
-def _json(figures: dict[str, go.Figure]) -> Markup:
-    # Plotly writes "<", ">" and "/" as escapes, so that no text can close the script element.
-    pairs = (f"{json.dumps(name)}:{figure.to_json()}" for name, figure in figures.items())
-    return Markup("{" + ",\n".join(pairs) + "}")
-
-
 def _numeric(table: Table) -> list[bool]:
-    """Which columns hold numbers, and are set flush right."""
+    """Which columns hold numbers, and are set flush right; a hash is none."""
     return [
         any(row[i] for row in table.rows)
-        and all(not row[i] or row[i][0] in "-+.0123456789" for row in table.rows)
+        and all(
+            not row[i] or (row[i][0] in "-+.0123456789" and len(row[i]) < _HASH)
+            for row in table.rows
+        )
         for i in range(len(table.columns))
     ]
 
 
-def _worst_joint(diagnosis: Diagnosis) -> str:
-    """The joint to show first: where something was added, or where the given model fails most."""
-    first = diagnosis.best
-
-    def badness(joint: JointResult) -> tuple[bool, float]:
-        named = first is not None and first.effect.joint == joint.name
-        ratio = joint.ratio_before
-        return named, joint.error_before if ratio is None else ratio
-
-    return max(diagnosis.joints, key=badness).name if diagnosis.joints else ""
-
-
 def _joint_maps(diagnosis: Diagnosis) -> tuple[_JointMaps, ...]:
-    worst = _worst_joint(diagnosis)
-    joints = sorted(diagnosis.joints, key=lambda joint: joint.name != worst)
+    shown = opened(diagnosis)
     numbered = [(f"map-{i}", one) for i, one in enumerate(diagnosis.maps)]
     groups = (
-        _JointMaps(joint.name, tuple(pair for pair in numbered if pair[1].joint == joint.name))
-        for joint in joints
+        _JointMaps(
+            one.joint.name,
+            one.state,
+            one.words,
+            one.joint.name in shown,
+            tuple(pair for pair in numbered if pair[1].joint == one.joint.name),
+        )
+        for one in states(diagnosis)
     )
     return tuple(group for group in groups if group.maps)

@@ -32,6 +32,11 @@ def plain(words: str) -> str:
     return escape(words).replace("$", "&#36;")
 
 
+def mark(colour: str, symbol: str) -> dict:
+    """A mark for one value; the outline has its colour, so that open and full ones match."""
+    return {"color": colour, "symbol": symbol, "size": 11, "line": {"width": 2, "color": colour}}
+
+
 def look(height: int, top: int = 10, right: int = 16) -> dict:
     """The package's look, as settings of a layout; sizes in pixels, the width is the screen's."""
     margin = {"l": 62, "r": right, "t": top, "b": 46}

@@ -13,11 +13,11 @@ from dynident.report.loop_content import loop_trace
 from dynident.report.loop_pictures import loop_quantity
 from dynident.tables import Table
 
-_BYTES = 1_600_000
+_BYTES = 450_000
 """What all pictures together may take in the page."""
-_BYTES_PER_POINT = 54
-"""Five lines, two single-precision numbers each, in base 64."""
-_MOST_PICTURED = 14
+_BYTES_PER_POINT = 32
+"""Five lines over one time, in single precision and base 64."""
+_MOST_PICTURED = 8
 """Joints times recordings that have pictures."""
 
 

@@ -26,7 +26,7 @@ from dynident.report.content import (
     x_title,
     y_title,
 )
-from dynident.report.look import FAINT, dressed, plain
+from dynident.report.look import FAINT, dressed, mark, plain
 
 
 def waterfall(diagnosis: Diagnosis) -> go.Figure:
@@ -44,7 +44,7 @@ def waterfall(diagnosis: Diagnosis) -> go.Figure:
                 "line": {"color": AFTER_COLOUR, "width": [row.kind == "added" for row in rows]},
                 "pattern": {"shape": ["/" if row.kind == "added" else "" for row in rows]},
             },
-            text=[row.text for row in rows],
+            text=[f"\u2002{row.text}" for row in rows],
             textposition="outside",
             textangle=0,
             cliponaxis=False,
@@ -104,7 +104,7 @@ def ranking(diagnosis: Diagnosis, most: int = 10) -> go.Figure:
                 y=rows,
                 mode="markers",
                 name=name,
-                marker={"size": 11, "symbol": symbol, "color": colour, "line": {"width": 2}},
+                marker=mark(colour, symbol),
                 hovertemplate="%{x:.3f} points<extra></extra>",
                 showlegend=bool(rows),
             )

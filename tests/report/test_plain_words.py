@@ -1,0 +1,150 @@
+"""What the report tells a reader in words: what to do, how each joint does, how sure values are."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import plotly.graph_objects as go
+import pytest
+
+from dynident.effects import catalogue
+from dynident.report.content import left
+from dynident.report.glossary import meaning, use_of
+from dynident.report.intervals import parameter_table, widening_after, widening_before
+from dynident.report.joints import joint_errors, opened, states
+from dynident.report.next_steps import next_steps, summary
+from dynident.report.packing import packed
+from report.fabricated import diagnosis, effect
+
+
+@pytest.fixture(scope="module")
+def found():
+    return diagnosis(samples=200)
+
+
+def rejected(found, *ratios):
+    joints = tuple(replace(j, ratio_after=r) for j, r in zip(found.joints, ratios, strict=True))
+    return replace(found, verdict="unexplained", joints=joints)
+
+
+def test_every_effect_of_the_catalogue_is_explained(found):
+    assert [
+        name for name, kind in catalogue().items() if "shows as" in meaning(kind("elbow"))
+    ] == []
+    assert all(use_of(one.against) for one in found.maps)
+
+
+def test_an_effect_of_ones_own_is_explained_by_what_it_looks_like():
+    class Own(catalogue()["viscous_friction"]):
+        name = "my_effect"
+
+    assert meaning(Own("elbow")) == f"it shows as {Own.sign_of}"
+
+
+def test_what_to_do_names_commands_and_the_experiment_that_separates(found):
+    add, separate, absorbed = next_steps(found)
+    assert add.commands == ("dynident add STUDY stribeck_friction@elbow", "dynident fit STUDY")
+    assert "asymmetric friction at elbow" in separate.what
+    for one in (found.steps[0].effect, *found.steps[0].indistinguishable):
+        assert one.advice in separate.why
+    assert "cannot show" in absorbed.what
+
+
+def test_without_noise_the_first_thing_is_a_motion_that_repeats():
+    unknown = diagnosis(("slide",), noise=False, steps=False, samples=200)
+    assert "Record a motion that repeats" in next_steps(unknown)[0].what
+    assert "not known" in summary(unknown)
+
+
+def test_where_nothing_is_missing_nothing_is_to_be_done():
+    fine = diagnosis(("slide",), steps=False, samples=200)
+    fine = replace(fine, candidates=())
+    (only,) = next_steps(fine)
+    assert only.what.startswith("Nothing is to be added")
+
+
+def test_a_joint_fails_only_where_the_verdict_says_so(found):
+    def of(one):
+        return {state.joint.name: state.state for state in states(one)}
+
+    assert of(rejected(found, 0.1, 2.0))["elbow"] == "failing"
+    # One of few samples: the verdict has tested it.
+    nothing = replace(found, verdict="nothing_missing", steps=())
+    assert set(of(nothing).values()) == {"fine"}
+    assert of(found)["elbow"] == "repaired"
+    assert opened(found) >= {"elbow"}
+
+
+def test_at_most_two_joints_are_opened():
+    many = diagnosis(tuple("abcdefg"), samples=200)
+    assert opened(rejected(many, *[1.0, 5.0, 2.0, 3.0, 0.1, 0.2, 0.3])) == {"b", "d"}
+
+
+def test_errors_of_the_joints_are_drawn_over_the_noise(found):
+    noise, given, after = joint_errors(found).data
+    assert list(given.x) == [100 * joint.error_before for joint in found.joints]
+    assert list(after.x) == [100 * joint.error_after for joint in found.joints]
+    assert list(noise.x) == [100 * joint.noise_share for joint in found.joints]
+
+
+def test_what_is_left_of_a_map_is_said(found):
+    one = found.maps[0]
+    assert left(replace(one, after=0 * one.after)) == "Within the noise."
+    assert "Beyond the noise" in left(replace(one, after=9 * one.band))
+    assert left(replace(one, band=np.full(len(one.band), np.nan))) == ""
+
+
+def half_widths(table):
+    ends = [row[2].split(" to ") for row in table.rows if row[2] != "-"]
+    return np.array([float(stop) - float(start) for start, stop in ends]) / 2
+
+
+def test_intervals_are_those_of_the_noise_where_the_model_holds(found):
+    assert widening_after(found) is None
+    half = half_widths(parameter_table(found.after, None, noise_known=True))
+    sigma = found.after.sigma[found.after.identified]
+    assert half == pytest.approx(1.96 * sigma, rel=0.1)  # as written, rounded
+
+
+def test_intervals_of_a_rejected_model_are_wider_by_the_birge_ratio(found):
+    one = rejected(found, 0.0, 3.0)
+    wider = widening_after(one)
+    assert wider is not None
+    assert wider.joints == pytest.approx({"shoulder": 1.0, "elbow": np.sqrt(10.0)})
+    assert wider.overall == pytest.approx(np.sqrt(11.0 / 2.0))
+    tables = [parameter_table(one.after, x, noise_known=True) for x in (None, wider)]
+    grown = half_widths(tables[1]) / half_widths(tables[0])
+    names = [row[0] for row in tables[0].rows if row[2] != "-"]
+    for name, ratio in zip(names, grown, strict=True):
+        place = name.partition("@")[2]
+        expected = wider.joints[place] if place else wider.overall
+        assert ratio == pytest.approx(expected, rel=0.1)
+    assert "rejected" in tables[1].notes[0] and "rejected" not in tables[0].notes[0]
+
+
+def test_the_model_as_given_is_rejected_where_something_was_added(found):
+    assert widening_before(found) is not None
+    assert widening_before(diagnosis(("slide",), steps=False, samples=200)) is None
+    assert widening_before(diagnosis(("slide",), noise=False, samples=200)) is None
+
+
+def test_shared_parts_are_written_once_and_come_back():
+    x = np.arange(200, dtype=np.float32)
+    figures = {name: go.Figure(go.Scatter(x=x, y=x**2, name="<a&b>")) for name in ("one", "two")}
+    both = packed(figures)
+    assert not set("<>&") & set(both.figures + both.shared)
+    shared = json.loads(both.shared)
+
+    def whole(part):
+        return shared[part["shared"]] if "shared" in part else part
+
+    restored = json.loads(both.figures, object_hook=whole)
+    assert restored == {name: json.loads(one.to_json()) for name, one in figures.items()}
+    alone = packed({"one": figures["one"]})
+    assert len(both.shared) == len(alone.shared)
+
+
+def test_a_step_of_the_whole_robot_leaves_its_joints_as_they_are(found):
+    step = replace(found.steps[0], effect=effect("payload"))
+    calm = tuple(replace(joint, ratio_before=0.1) for joint in found.joints)
+    assert {one.state for one in states(replace(found, steps=(step,), joints=calm))} == {"fine"}
