@@ -148,7 +148,9 @@ def score(
     moment = directions.T @ (signal[p] - back.T @ present.moments.sums()[0][:p, p])
     drop = float(part.values @ moment)
     covariance = directions @ part.covariance @ directions.T
-    penalised = drop - part.rank * np.log(present.rows) - 2.0 * np.log(grid)
+    shapes = len(effect.shape_parameters(present.model.robot))
+    price = (part.rank + shapes) * np.log(present.rows) + 2.0 * np.log(grid)
+    penalised = drop - price
     blocks = _block_scores(present, with_model, with_self, back, values) @ directions @ part.basis
     return Score(
         effect,

@@ -10,7 +10,8 @@ import numpy as np
 
 from dynident.diagnose.confidence_set import confidence_set
 from dynident.diagnose.evidence import ColumnStore
-from dynident.diagnose.present import Present
+from dynident.diagnose.noise import differences, systematic_square
+from dynident.diagnose.present import Present, residuals
 from dynident.diagnose.runs import Run
 from dynident.diagnose.scoring import Score, candidate_moments, carried, cross_validate, score
 from dynident.diagnose.shaping import refined
@@ -28,6 +29,8 @@ LEAST_SHARE = (0.006, 0.02)
 
 _CONFIDENT = 1.5  # standard errors of the held-out gain
 _MOST_BLOCKS = 0.65  # share of blocks in which the held-out residual must fall otherwise
+QUIET = "nothing is left to explain at {}"
+_QUIET = 0.15  # systematic residual over noise below which driven responses are not evaluated
 _ALIKE = 0.015  # two drops within this share of the larger are alike
 _MOST_CARRIERS = 6  # recordings up to which every choice of payload carriers is tried
 
@@ -84,7 +87,11 @@ def rank(
     only : candidates, where not the whole catalogue is meant.
     """
     model, best, tests = present.model, [], 0
+    quiet = quiet_joints(store, present)
     for effect in only or candidates(model):
+        if effect.joint in quiet and {"body", "whole"} <= effect.needs:
+            best.append(Score(effect, None, absorbed=False))
+            continue
         tell(effect.label)
         tried = list(_score_variants(store, present, effect))
         tests += len(tried)
@@ -98,8 +105,29 @@ def rank(
     best.sort(key=lambda s: -s.penalised)
     least = LEAST_SHARE[min(added, 1)]
     scores = tuple(best)
-    refusals = tuple(_refusal(s, model, tests, least) for s in scores)
+    refusals = tuple(
+        QUIET.format(s.effect.joint)
+        if s.drop == 0 and s.effect.joint in quiet and not s.absorbed
+        else _refusal(s, model, tests, least)
+        for s in scores
+    )
     return Ranking(scores, tests, refusals)
+
+
+def quiet_joints(store: ColumnStore, present: Present) -> frozenset[str]:
+    """Joints at which no residual worth a costly search is left; none where noise is unknown."""
+    if not present.noise_known:
+        return frozenset()
+    kinds = [run.kind for run in store.runs]
+    left = residuals(store, present.model, present.values)
+    found = []
+    for j, name in enumerate(present.model.robot.names):
+        pairs = [(kind, e[..., j]) for kind, e in zip(kinds, left, strict=True) if kind != "single"]
+        systematic = np.mean([systematic_square(e, kind) for kind, e in pairs])
+        noise = np.mean(np.concatenate([differences(e, kind).ravel() for kind, e in pairs]) ** 2)
+        if systematic < _QUIET**2 * noise:
+            found.append(name)
+    return frozenset(found)
 
 
 def indistinguishable(ranking: Ranking, winner: Score) -> tuple[Effect, ...]:
