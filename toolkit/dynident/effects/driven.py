@@ -90,10 +90,9 @@ class DrivenLink:
         self._whole = along.by_a[:, joint, joint] + rotor
         self._load = along.torque[:, joint] + rotor * self.a
         self.inertia = max(mean_inertia(robot, joint) + rotor, 1e-9)
-        if len(block.t) > 1:
-            self._step = float(np.mean(np.diff(block.t)))
-        else:
-            self._step = 1.0
+        if len(block.t) < 3:
+            raise EffectError("its response needs more than two samples")
+        self._step = float(np.mean(np.diff(block.t)))
 
     def response(self, gear: Transmitting) -> Response:
         """Return how the link moves behind a transmission."""
@@ -147,9 +146,9 @@ class Response:
         touches = np.ones(len(m))
         if gear.half_gap > 0:
             self._d, self._side = _with_gap(m, c, g, load, gear, h)
-            touches = np.abs(self._side)
+            touches, self._rests = np.abs(self._side), _sign(load[:2])
         else:
-            self._side = np.zeros(len(m))
+            self._side, self._rests = np.zeros(len(m)), np.zeros(2)
         damping, stiffness = c + gear.damping * touches, g + gear.stiffness * touches
         self._touches = touches
         rest = g + gear.stiffness
@@ -162,13 +161,11 @@ class Response:
         band[2, :-2] = back[1:-1]
         self._band = band
         if not gear.half_gap > 0:
-            self._d = self._banded(load)
+            self._d = self._banded(load[:2], load)
 
-    def _banded(self, right: np.ndarray) -> np.ndarray:
-        """Solve with right sides (..,) that stand at their steps."""
-        if len(right) < 3:
-            return right / self._band[0]
-        return solve_band(self._band, np.concatenate([right[:2], right[1:-1]]))
+    def _banded(self, rest: np.ndarray, right: np.ndarray) -> np.ndarray:
+        """Solve with right sides of the two steps at rest, and of the equation at every step."""
+        return solve_band(self._band, np.concatenate([rest, right[1:-1]]))
 
     def _differences(self, d: np.ndarray, every: int) -> Deflection:
         """Return every so many steps' deflection, with the derivatives that the recursion means."""
@@ -196,14 +193,10 @@ class Response:
         right = -self._refined(lighter) * moved.bend - self._refined(rotor * self._link.a)
         right -= self._touches * (stiffness * bent + damping * moved.rate)
         right += self._gear.stiffness * self._side * half_gap
-        first = slice(0, 2)
-        side = np.where(self._touches[first] > 0, self._side[first], 0.0)
-        right[first] = (
-            self._gear.stiffness * side * half_gap
-            - stiffness * (d[first] - side * self._gear.half_gap)
-            - self._refined(rotor * self._link.a)[first]
-        )
-        change = self._torque(self._differences(self._banded(right), self._per))
+        rest = self._gear.stiffness * self._rests * half_gap
+        rest -= stiffness * (d[:2] - self._rests * self._gear.half_gap)
+        rest -= self._refined(rotor * self._link.a)[:2]
+        change = self._torque(self._differences(self._banded(rest, right), self._per))
         change[:, self._link.joint] -= lighter * self.deflection.bend
         return change
 
@@ -217,26 +210,28 @@ def _with_gap(m, c, g, load, gear: Transmitting, h: float) -> tuple[np.ndarray, 
         ahead = 1.0 / (m / h**2 + damping / (2.0 * h))
         coefficients += [ahead, (m / h**2 - damping / (2.0 * h)) * ahead]
     free, free_back, touching, touching_back = (x.tolist() for x in coefficients)
-    inertia, load = inertia.tolist(), load.tolist()
+    inertia = inertia.tolist()
     d, side = [0.0] * len(load), [0.0] * len(load)
-    for k in range(min(2, len(load))):
-        side[k] = 1.0 if load[k] >= 0 else -1.0
-        d[k] = (load[k] + side[k] * K * half) / (g[k] + K)
-    if len(load) > 1:
-        before, now = d[0], d[1]
-        for k in range(1, len(load) - 1):
-            pushed = load[k] + inertia[k] * now
-            if now >= half:
-                after = (pushed - K * (now - half)) * touching[k] - touching_back[k] * before
-                side[k] = 1.0
-            elif now <= -half:
-                after = (pushed - K * (now + half)) * touching[k] - touching_back[k] * before
-                side[k] = -1.0
-            else:
-                after = pushed * free[k] - free_back[k] * before
-            before, now = now, after
-            d[k + 1] = after
+    d[0], d[1] = (load[:2] + _sign(load[:2]) * K * half) / (g[:2] + K)
+    before, now, load = d[0], d[1], load.tolist()
+    for k in range(1, len(load) - 1):
+        pushed = load[k] + inertia[k] * now
+        if now >= half:
+            after = (pushed - K * (now - half)) * touching[k] - touching_back[k] * before
+            side[k] = 1.0
+        elif now <= -half:
+            after = (pushed - K * (now + half)) * touching[k] - touching_back[k] * before
+            side[k] = -1.0
+        else:
+            after = pushed * free[k] - free_back[k] * before
+        before, now = now, after
+        d[k + 1] = after
     return np.array(d), np.array(side)
+
+
+def _sign(load: np.ndarray) -> np.ndarray:
+    """Return the side on which a link at rest leans."""
+    return np.where(load >= 0.0, 1.0, -1.0)
 
 
 # --- the rigid robot along a motion ---------------------------------------------------------------
