@@ -53,11 +53,18 @@ class _Secret:
     effects: tuple[TrueEffect, ...]
     errors: tuple[SensorError, ...]
     most: float
+    least: float
 
     def scaled(self, factor: float) -> _Secret:
         effects = tuple(_scaled(one, factor) for one in self.effects)
         errors = tuple(replace(one, size=one.size * factor) for one in self.errors)
-        return replace(self, effects=effects, errors=errors, most=self.most / factor)
+        return replace(
+            self,
+            effects=effects,
+            errors=errors,
+            most=self.most / factor,
+            least=self.least / factor,
+        )
 
 
 def unavailable(case: Case) -> str:
@@ -134,11 +141,12 @@ def _secret(plan: Plan, hidden: Hidden, rng: np.random.Generator) -> _Secret:
     )
     if hidden.effect in SENSOR_ERRORS:
         error = SensorError(hidden.effect, hidden.joint, begin.values[0])
-        return _Secret(hidden, (), (error,), begin.most)
+        return _Secret(hidden, (), (error,), begin.most, begin.least)
     kind: Callable[..., Effect] = {**catalogue(), **EFFECTS}[hidden.effect]
     place = _place(plan, hidden)
     effect = kind(place["joint"], place["source"], begin.shape).on(plan.made.robot)
-    return _Secret(hidden, (TrueEffect(effect, begin.values, hidden=True),), (), begin.most)
+    true = TrueEffect(effect, begin.values, hidden=True)
+    return _Secret(hidden, (true,), (), begin.most, begin.least)
 
 
 def _place(plan: Plan, hidden: Hidden) -> dict[str, str | None]:
@@ -184,7 +192,7 @@ def _to_target(
     ratio = left(secret)
     for _ in range(2):
         factor = float(np.clip(target / max(ratio, 1e-6), *_STEP))
-        factor = min(factor, secret.most)
+        factor = float(np.clip(factor, secret.least, secret.most))
         if 1 / _CLOSE < factor < _CLOSE:
             break
         secret = secret.scaled(factor)

@@ -23,12 +23,13 @@ class Start:
     ----------
     values : of its parameters.
     shape : of its shape parameters.
-    most : factor by which the values may be multiplied at most; physics ends there.
+    most, least : factors between which the values may be multiplied; physics ends there.
     """
 
     values: tuple[float, ...]
     shape: tuple[float, ...] = ()
     most: float = np.inf
+    least: float = 0.0
 
 
 def _log(rng: Draw, low: float, high: float) -> float:
@@ -109,7 +110,7 @@ def _elastic(at: _At) -> Start:
     compliance = 1.0 / (link * (2 * np.pi * resonance) ** 2)
     share = float(np.clip(at.rotor / (at.rotor + link), 0.02, 0.9))
     shape = (resonance, _log(at.rng, 0.02, 0.2), share)
-    return Start((compliance,), shape, (resonance / 3.0) ** 2)
+    return Start((compliance,), shape, (resonance / 3.0) ** 2, (resonance / 120.0) ** 2)
 
 
 def _gap(at: _At) -> Start:
