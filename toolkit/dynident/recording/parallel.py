@@ -18,6 +18,7 @@ from dynident.recording.filters import Filter, butterworth, zero_phase
 
 _FORGOTTEN = 1e-12
 """Share of a disturbance at a block's end that is left after the overlap."""
+_FEW = 8  # columns, of which it costs more to find the empty ones than to filter them
 _AT_ONCE = 64
 """Columns filtered at a time; bounds the temporary memory."""
 
@@ -168,7 +169,8 @@ class ParallelFilter:
         flat = x.reshape(len(x), math.prod(x.shape[1:]))
         result = np.zeros((len(rows), flat.shape[1]))
         # Many columns of a regressor are zero (a link does not load the joints beyond it).
-        used = np.flatnonzero(flat.any(axis=0))
+        few = flat.shape[1] < _FEW
+        used = np.arange(flat.shape[1]) if few else np.flatnonzero(flat.any(axis=0))
         for start in range(0, max(1, len(used)), _AT_ONCE):
             some = used[start : start + _AT_ONCE]
             y = flat[:, some]
