@@ -233,8 +233,8 @@ def _residual(
 
 
 def _moved(plan: Plan, secret: _Secret, rng: np.random.Generator) -> _Secret:
-    """Move a contact from the first recording to any, and to any of its periods."""
-    number = int(rng.integers(1, plan.runs + plan.tests + 1))
+    """Move a contact from the first training recording to any, and to any of its periods."""
+    number = int(rng.integers(1, plan.runs + 1))
     later = PAUSE * (number - 1) + PERIOD * float(rng.integers(plan.repetitions))
 
     def moved(one: TrueEffect) -> TrueEffect:

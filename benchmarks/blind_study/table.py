@@ -178,6 +178,9 @@ def _figures(judged: list[Judged]) -> Table:
         table.add_row(
             "mean size of that set", f"{size:.2f}", "", "at most 2", "yes" if size <= 2 else "NO"
         )
+    if shown:
+        more = sum(len(j.added) > 1 for j in shown)
+        table.add_row("one hidden, more than one added", f"{more}/{len(shown)}", "", "", "")
     over = [j.over_floor for j in shown if j.right and j.over_floor is not None]
     if over:
         middle, high = np.quantile(over, [0.5, 0.95])
