@@ -43,6 +43,15 @@ class Moments:
             np.concatenate([self.signal, other.signal]), np.concatenate([self.total, other.total])
         )
 
+    def clocked(self, left: np.ndarray, right: np.ndarray) -> Moments:
+        """Take plain products where a column (masks (a,) and (b,)) depends on the time.
+
+        Such a column is another one in each repetition, so that products of different repetitions
+        are not its square; and it depends on the clock and on speeds, whose noise is small.
+        """
+        plain = left[:, None] | right[None, :]
+        return Moments(np.where(plain, self.total, self.signal), self.total)
+
     def without(self, block: int) -> tuple[np.ndarray, np.ndarray]:
         """Sums over all blocks but one."""
         return (

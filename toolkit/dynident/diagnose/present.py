@@ -88,14 +88,14 @@ def fit_present(store: ColumnStore, model: Model) -> Present:
                 [model_columns(store, model, r, j, at) for j in range(n)]
                 for r in range(len(store.runs))
             ]
-        values, _ = _solve(_moments(store, _whiten(store, columns, noise, values)))
+        values, _ = _solve(_moments(store, model, _whiten(store, columns, noise, values)))
         noise = tuple(_noise(store, columns, values, j) for j in range(n))
         change = float(np.linalg.norm(values - at))
         if round >= _ROUNDS and change <= _PRESENT_TOLERANCE * np.linalg.norm(values):
             break
         at = settling.following(model, at, values)
     white = _whiten(store, columns, noise, values)
-    summed = _moments(store, white)
+    summed = _moments(store, model, white)
     values, solution = _solve(summed)
     rows = sum(
         part.shape[1] * (1 if run.kind == "perturbed" else part.shape[0])
@@ -145,14 +145,24 @@ def _whiten(store: ColumnStore, columns, noise, values) -> tuple[tuple[np.ndarra
     )
 
 
-def _moments(store: ColumnStore, white) -> Moments:
-    found = None
+def _moments(store: ColumnStore, model: Model, white) -> Moments:
+    found, timed = None, clock(model)
     for run, joints in zip(store.runs, white, strict=True):
         parts = [run.moments(w, w) for w in joints]
         here = Moments(np.sum([p.signal for p in parts], 0), np.sum([p.total for p in parts], 0))
+        if run.kind == "repeated":
+            here = here.clocked(timed, timed)
         found = here if found is None else found + here
     assert found is not None
     return found
+
+
+def clock(model: Model) -> np.ndarray:
+    """Which of a model's columns, and the torque after them, depend on the time, (p + 1,)."""
+    mask = np.zeros(model.size + 1, dtype=bool)
+    for effect in model.effects:
+        mask[model.slices[effect.label]] = effect.timed
+    return mask
 
 
 def _solve(summed: Moments) -> tuple[np.ndarray, Solution]:

@@ -10,7 +10,7 @@ from scipy import stats
 
 from dynident.diagnose.evidence import ColumnStore, joints_of
 from dynident.diagnose.moments import Moments, solve
-from dynident.diagnose.present import Present
+from dynident.diagnose.present import Present, clock
 from dynident.effects import Effect
 
 ABSORBED = 2e-3
@@ -81,6 +81,9 @@ def candidate_moments(
             Moments(np.sum([m.signal for m in part], 0), np.sum([m.total for m in part], 0))
             for part in (one, two)
         ]
+        if run.kind == "repeated":
+            own = np.full(signals[0].shape[2], variants[0].timed)
+            sums = [sums[0].clocked(clock(present.model), own), sums[1].clocked(own, own)]
         with_model = sums[0] if with_model is None else with_model + sums[0]
         with_self = sums[1] if with_self is None else with_self + sums[1]
     assert with_model is not None and with_self is not None

@@ -10,6 +10,7 @@ import numpy as np
 
 from dynident.diagnose.confidence_set import confidence_set
 from dynident.diagnose.evidence import ColumnStore
+from dynident.diagnose.moments import Kind
 from dynident.diagnose.noise import differences, systematic_square
 from dynident.diagnose.present import Present, residuals
 from dynident.diagnose.runs import Run
@@ -118,13 +119,13 @@ def quiet_joints(store: ColumnStore, present: Present) -> frozenset[str]:
     """Joints at which no residual worth a costly search is left; none where noise is unknown."""
     if not present.noise_known:
         return frozenset()
-    kinds = [run.kind for run in store.runs]
-    left = residuals(store, present.model, present.values)
+    left = zip(store.runs, residuals(store, present.model, present.values), strict=True)
+    judged: list[tuple[Kind, np.ndarray]] = [(r.kind, e) for r, e in left if r.kind != "single"]
     found = []
     for j, name in enumerate(present.model.robot.names):
-        pairs = [(kind, e[..., j]) for kind, e in zip(kinds, left, strict=True) if kind != "single"]
-        systematic = np.mean([systematic_square(e, kind) for kind, e in pairs])
-        noise = np.mean(np.concatenate([differences(e, kind).ravel() for kind, e in pairs]) ** 2)
+        systematic = np.mean([systematic_square(e[..., j], kind) for kind, e in judged])
+        each = [differences(e[..., j], kind).ravel() for kind, e in judged]
+        noise = np.mean(np.concatenate(each) ** 2)
         if systematic < _QUIET**2 * noise:
             found.append(name)
     return frozenset(found)

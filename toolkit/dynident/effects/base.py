@@ -92,6 +92,8 @@ class Effect(ABC):
     does not matter whether they are filtered or made of filtered torque, which is quicker."""
     secant: ClassVar[bool] = False
     """Whether its torque is not linear in its parameters, so that columns are taken at `point`."""
+    timed: ClassVar[bool] = False
+    """Whether its columns depend on the time in the session: they do not repeat with the motion."""
     found_by: ClassVar[Literal["residual", "repetition"]] = "residual"
     """Where it shows: in what repetitions have in common, or in what differs between them."""
     memory: ClassVar[int] = 0

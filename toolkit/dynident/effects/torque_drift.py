@@ -11,6 +11,7 @@ class TorqueDrift(JointEffect):
     """Torque in proportion to the time since the session began: rate t."""
 
     name = "torque_drift"
+    timed = True
     law = "rate t"
     sign_of = "a ramp against the time of the session, whatever the joint does"
     confounded_with = ("torque_offset", "thermal_friction")
