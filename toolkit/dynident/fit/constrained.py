@@ -67,7 +67,8 @@ class Constrained:
         prior = self.prior if isinstance(self.prior, Prior) else Prior(self.prior or model.robot)
         model = prior_model(model, prior.robot)
         free = LeastSquares(self.weighting).fit(model, dataset)
-        # Columns that depend on the predicted torque are taken where least squares settled.
+        # Columns that depend on the present model are taken where least squares settled.
+        model = free.model
         factors = factorise(rows(model, dataset, free.values))
         std = free.torque_std
         if self.weighting == "none":
