@@ -23,7 +23,7 @@ class TorqueDelay(Effect):
     place = "joint or robot"
     law = "tau(t - d) - tau(t)"
     sign_of = "a residual like the rate at which the torque changes"
-    confounded_with = ("rotor_inertia", "viscous_friction")
+    confounded_with = ("joint_elasticity", "rotor_inertia", "viscous_friction")
     shown_by = "acceleration"
     experiment = "move fast, so that the torque changes much within the delay"
     needs = frozenset({"torque", "whole"})
