@@ -16,6 +16,10 @@ from pydrake.systems.framework import LeafSystem
 
 from dynident.closed_loop.mechanism import Mechanism
 from dynident.effects import Transmission
+from dynident.errors import SimulationError
+
+_FASTEST = 1e5
+"""rad/s, or 1/s: a motor against its spring that is faster takes too many steps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +51,26 @@ class Gears:
         self.damping = np.array([one.damping for one in gears])
         self.half_gap = np.array([one.gap / 2.0 for one in gears])
         self.rotor = np.array([one.rotor for one in gears])
+        self._has_gaps = bool(np.any(self.half_gap > 0))
+
+    def require_integrable(self, joints: Sequence[str]) -> None:
+        """Refuse what is faster than an integrator can follow.
+
+        Raises
+        ------
+        SimulationError
+        """
+        fastest = np.maximum(np.sqrt(self.stiffness / self.rotor), self.damping / self.rotor)
+        for joint, rate in zip(joints, fastest, strict=True):
+            if not rate < _FASTEST:
+                what = f"the transmission is too stiff to be integrated ({rate:.2g} rad/s)"
+                mend = "choose a larger compliance, or a larger rotor inertia"
+                raise SimulationError(what, f"joint '{joint}'", mend, reason="unstable")
 
     def torque(self, bent: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """Return the transmitted torque of deflections and their rates."""
+        if not self._has_gaps:
+            return self.stiffness * bent + self.damping * rate
         half = self.half_gap
         torque = self.stiffness * (bent - np.minimum(np.maximum(bent, -half), half))
         return torque + self.damping * rate * (np.abs(bent) >= half)
@@ -78,6 +99,7 @@ class DrivetrainSystem(LeafSystem):
         LeafSystem.__init__(self)
         self._size, self._count = len(layout.place), len(compliant)
         self._at, self._drive = layout.place[compliant], layout.inputs[compliant]
+        self._motion_at = np.concatenate([self._at, self._size + self._at])
         # Of each actuator, where its joint stands among the velocities.
         self._joint_of = layout.place[np.argsort(layout.inputs)]
         self._order = np.argsort(layout.inputs)
@@ -106,9 +128,7 @@ class DrivetrainSystem(LeafSystem):
         x: Any = self.state.Eval(context)
         if self._count:
             x = np.array(x)
-            motors = self._motors(context)
-            x[self._at] = motors[: self._count]
-            x[self._size + self._at] = motors[self._count :]
+            x[self._motion_at] = self._motors(context)
         return x
 
     def _driving(self, context: Any) -> np.ndarray:
@@ -121,9 +141,8 @@ class DrivetrainSystem(LeafSystem):
 
     def _carried(self, context: Any) -> np.ndarray:
         x: Any = self.state.Eval(context)
-        motors, c = self._motors(context), self._count
-        bent, rate = motors[:c] - x[self._at], motors[c:] - x[self._size + self._at]
-        return self.gears.torque(bent, rate)
+        apart = self._motors(context) - x[self._motion_at]
+        return self.gears.torque(apart[: self._count], apart[self._count :])
 
     def _see(self, context: Any, output: Any) -> None:
         output.SetFromVector(self._motion(context))

@@ -208,6 +208,8 @@ class Plant:
         widths = np.repeat([one.friction_width for one in mechanisms], n)
         self._train.set_loss(np.concatenate([one.loss for one in mechanisms]), widths)
         self._train.gears = Gears([gear for one in mechanisms for gear in one.transmissions])
+        names = [one.robot.names[gear.joint] for one in mechanisms for gear in one.transmissions]
+        self._train.gears.require_integrable(names)
 
     def start(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return the diagram's state where motors move so, (N,) each, and springs carry the load.

@@ -1,0 +1,160 @@
+"""Driven responses and Dahl's state: what they say of a motion is what the closed loop shows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import butter, filtfilt
+from tests.synthetic import arm, smooth_motion
+
+from dynident.closed_loop import ClosedLoop, Controller, Fourier, Mechanism, Task, TrueEffect
+from dynident.effects import Block, Effect, effects_of
+from dynident.effects.backlash import Backlash
+from dynident.effects.driven import mean_inertia
+
+ROBOT = arm()
+ROTORS = (0.1, 0.07)
+KNOWN = {"viscous_friction": (1.2, 0.5), "coulomb_friction": (1.5, 0.6), "rotor_inertia": ROTORS}
+PD = Controller("pd", 1000.0, (1500.0, 600.0), (80.0, 30.0), derivative_cutoff_hz=80.0)
+RATE = 1000.0
+
+
+def known() -> list[TrueEffect]:
+    return [
+        one
+        for name, values in KNOWN.items()
+        for joint, value in zip(ROBOT.names, values, strict=True)
+        for one in TrueEffect.of(f"{name}@{joint}", ROBOT, [value])
+    ]
+
+
+def share(joint: str) -> float:
+    j = ROBOT.names.index(joint)
+    return ROTORS[j] / (ROTORS[j] + mean_inertia(ROBOT, j))
+
+
+def compliance(joint: str, resonance: float) -> float:
+    inertia = mean_inertia(ROBOT, ROBOT.names.index(joint))
+    return 1.0 / (inertia * (2.0 * np.pi * resonance) ** 2)
+
+
+def explained(effect: Effect, value: float) -> np.ndarray:
+    """What the column at the truth leaves of the effect in a simulated command, per joint.
+
+    Below 30 Hz: a command is held from sample to sample, and its mean is known to a sample.
+    """
+    hidden = TrueEffect(effect, (value,))
+    trajectory = Fourier.random(ROBOT, 4.0, 5, amplitude=[1.0, 1.2], speed=[2.5, 3.0])
+    task = Task(Mechanism.of(ROBOT, [*known(), hidden]), trajectory, 2.0)
+    (found,) = ClosedLoop(accuracy=1e-4).simulate([task], PD, lead_in=0.5)
+    a = np.gradient(found.v, found.t, axis=0)
+    rest = found.torque - Mechanism.of(ROBOT, known()).command(found.t, found.q, found.v, a)
+    block = Block(found.t, found.q, found.v, a, ROBOT.names, body=ROBOT, rotor=np.array(ROTORS))
+    model = effect.at([value]).columns(block)[:, :, 0] * value
+    b, a = butter(3, 30.0, fs=RATE)
+    # The first motion rings from a start that is not known.
+    kept = slice(700, -150)
+    rest, model = (filtfilt(b, a, x, axis=0)[kept] for x in (rest, model))
+    acting = [ROBOT.names.index(str(effect.joint))]
+    acting = acting if effect.name == "presliding" else [0, 1]
+    return ((rest - model).std(axis=0) / rest.std(axis=0))[acting]
+
+
+@pytest.mark.parametrize(
+    ("joint", "resonance", "damping"), [("elbow", 8.0, 0.1), ("shoulder", 16.0, 0.2)]
+)
+def test_elasticity_is_what_the_loop_shows(joint: str, resonance: float, damping: float) -> None:
+    (effect,) = effects_of(f"joint_elasticity@{joint}", ROBOT)
+    effect = effect.shaped(resonance, damping, share(joint))
+    assert (explained(effect, compliance(joint, resonance)) < 0.03).all()
+
+
+@pytest.mark.parametrize(("joint", "gap"), [("elbow", 6e-3), ("shoulder", 1e-2)])
+def test_backlash_is_what_the_loop_shows(joint: str, gap: float) -> None:
+    (effect,) = effects_of(f"backlash@{joint}", ROBOT)
+    assert (explained(effect.shaped(30.0, 0.15, share(joint)), gap) < 0.05).all()
+
+
+def test_presliding_is_what_the_loop_shows() -> None:
+    (effect,) = effects_of("presliding@elbow", ROBOT)
+    assert (explained(effect.shaped(5e-3), 0.4) < 0.005).all()
+
+
+def block(seed: int, rate: float = 500.0) -> Block:
+    t, q, v, a = smooth_motion(2, seed, rate, 1.0, 2.0)
+    return Block(t, q, v, a, ROBOT.names, body=ROBOT, rotor=np.array(ROTORS))
+
+
+@pytest.mark.parametrize("label", ["joint_elasticity@shoulder", "backlash@elbow"])
+def test_sensitivities_are_exact_while_no_contact_changes(label: str) -> None:
+    (effect,) = effects_of(label, ROBOT)
+    if isinstance(effect, Backlash):
+        effect = effect.at([1e-4])
+    effect, samples = effect.shaped(12.0, 0.2, 0.3), block(1)
+    found = effect.sensitivities(samples)
+    assert found is not None
+    for k in range(3):
+        ends = []
+        for step in (1e-6, -1e-6):
+            shape = list(effect.shape)
+            shape[k] *= np.exp(step)
+            ends.append(effect.shaped(*shape).columns(samples))
+        expected = (ends[0] - ends[1]) / 2e-6
+        limit = 1e-5 * np.abs(expected).max()
+        np.testing.assert_allclose(found[..., k], expected, atol=limit)
+
+
+def test_derivative_by_the_gap_is_exact() -> None:
+    (effect,) = effects_of("backlash@elbow", ROBOT)
+    assert isinstance(effect, Backlash)
+    gap, samples = 1e-3, block(2)
+    ends = [
+        effect.at([gap * (1.0 + step)]).columns(samples) * gap * (1.0 + step)
+        for step in (1e-6, -1e-6)
+    ]
+    expected = (ends[0] - ends[1]) / (2e-6 * gap)
+    found = effect.at([gap]).by_gap(samples)
+    np.testing.assert_allclose(found, expected, atol=1e-4 * np.abs(expected).max())
+
+
+def test_a_response_does_not_depend_on_the_rate_of_the_samples() -> None:
+    (effect,) = effects_of("joint_elasticity@elbow", ROBOT)
+    effect = effect.shaped(40.0, 0.1, 0.3)
+    coarse, fine = (effect.columns(block(3, rate)) for rate in (250.0, 2000.0))
+    late = slice(100, -2)  # when the start has rung down
+    error = coarse[late] - fine[::8][late]
+    assert error.std() < 0.02 * fine[::8][late].std()
+
+
+def test_screened_shapes_share_the_dynamics_of_a_joint() -> None:
+    from dynident.effects import driven
+
+    (effect,) = effects_of("joint_elasticity@elbow", ROBOT)
+    samples = block(4)
+    variants = list(effect.variants(ROBOT))
+    assert 5 <= len(variants) <= 20
+    variants[0].columns(samples)
+    robot = samples.body
+    assert robot is not None
+    samples = replace(samples, body=robot.with_theta(robot.theta))  # the same, made again
+    kept = driven._ALONG[id(samples.q)][3]
+    for one in variants:
+        assert np.isfinite(one.columns(samples)).all()
+    assert driven._ALONG[id(samples.q)][3] is kept
+
+
+def test_dahls_state_is_the_sign_of_a_long_motion_and_a_spring_at_a_reversal() -> None:
+    (effect,) = effects_of("presliding@elbow", ROBOT)
+    effect = effect.shaped(1e-2)
+    t = np.linspace(0.0, 1.0, 2001)
+    q = np.zeros((2001, 2))
+    q[:, 1] = np.where(t < 0.5, t, 1.0 - t)
+    v = np.zeros((2001, 2))
+    v[:, 1] = np.where(t < 0.5, 1.0, -1.0)
+    z = effect.columns(Block(t, q, v, 0 * q, ROBOT.names))[:, 1, 0] + np.sign(v[:, 1])
+    assert np.abs(z[:1000] - 1.0).max() < 1e-12
+    back = np.abs(q[:, 1] - 0.5)
+    expected = -1.0 + 2.0 * np.exp(-back / 1e-2)
+    np.testing.assert_allclose(z[1001:], expected[1001:], atol=1e-9)
