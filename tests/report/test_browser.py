@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -77,108 +77,131 @@ def seven_joints(tmp_path_factory) -> Path:
     return report(found, tmp_path_factory.mktemp("seven") / "report.html")
 
 
-@contextmanager
-def opened(browser, path: Path, width: int) -> Iterator:
-    """A page that has loaded; nothing may have complained or left the machine by the end."""
+@dataclass
+class Visit:
+    """A page that was opened once, with what it has complained of and asked for."""
+
+    page: Any
+    width: int
+    address: str
+    complaints: list[str] = field(default_factory=list)
+    requests: list[str] = field(default_factory=list)
+
+    def assert_quiet(self) -> None:
+        """Nothing was complained of, and nothing left the machine."""
+        assert self.complaints == []
+        assert set(self.requests) == {self.address}
+
+
+@pytest.fixture(scope="module")
+def visit(browser) -> Callable[[Path, int], Visit]:
+    visits: dict[tuple[Path, int], Visit] = {}
+
+    def at(path: Path, width: int) -> Visit:
+        if (path, width) not in visits:
+            visits[path, width] = _visited(browser, path, width)
+        return visits[path, width]
+
+    return at
+
+
+def _visited(browser, path: Path, width: int) -> Visit:
     phone = width == PHONE
     context = browser.new_context(
         viewport={"width": width, "height": 844}, has_touch=phone, is_mobile=phone
     )
-    complaints, requests = [], []
-    page = context.new_page()
-    page.on("console", lambda message: complaints.append(message.text))
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.on("request", lambda request: requests.append(request.url))
-    page.goto(path.as_uri())
-    page.wait_for_function('document.querySelectorAll(".js-plotly-plot").length > 2')
-    yield page
-    context.close()
-    assert complaints == []
-    assert [url for url in requests if url != path.as_uri()] == []
+    found = Visit(context.new_page(), width, path.as_uri())
+    found.page.on("console", lambda message: found.complaints.append(message.text))
+    found.page.on("pageerror", lambda error: found.complaints.append(str(error)))
+    found.page.on("request", lambda request: found.requests.append(request.url))
+    found.page.set_default_timeout(120_000)
+    found.page.goto(found.address)
+    found.page.wait_for_function("document.querySelectorAll('.js-plotly-plot').length > 2")
+    return found
 
 
-def assert_readable(page, width: int) -> None:
+def assert_readable(one: Visit) -> None:
     """Every picture in sight is drawn, no text is tiny, nothing sticks out to the side."""
-    pictures = page.evaluate(_DRAWN)
-    assert pictures and all(one["height"] > 60 for one in pictures)
-    assert [one["name"] for one in pictures if not one["shapes"]] == []
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
-    assert page.evaluate(_SMALL_TEXT, SMALLEST_TEXT) == []
+    pictures = one.page.evaluate(_DRAWN)
+    assert pictures and all(picture["height"] > 60 for picture in pictures)
+    assert [picture["name"] for picture in pictures if not picture["shapes"]] == []
+    assert one.page.evaluate("document.documentElement.scrollWidth") <= one.width
+    assert one.page.evaluate(_SMALL_TEXT, SMALLEST_TEXT) == []
+    one.assert_quiet()
 
 
 @pytest.mark.parametrize("width", [PHONE, DESK])
 @pytest.mark.parametrize("which", ["two_joints", "seven_joints"])
-def test_it_is_readable(which, width, browser, request):
-    with opened(browser, request.getfixturevalue(which), width) as page:
-        assert_readable(page, width)
-        sentence = page.locator(".sentence").bounding_box()
-        assert sentence["y"] + sentence["height"] < 844  # the verdict is seen without scrolling
-        first = page.locator("main h2").first
-        assert first.inner_text() == "What to do next"
+def test_it_is_readable(which, width, visit, request):
+    one = visit(request.getfixturevalue(which), width)
+    assert_readable(one)
+    sentence = one.page.locator(".sentence").bounding_box()
+    assert sentence["y"] + sentence["height"] < 844  # the verdict is seen without scrolling
+    assert one.page.locator("main h2").first.inner_text() == "What to do next"
 
 
-def test_zoom(browser, two_joints):
-    with opened(browser, two_joints, DESK) as page:
-        plot = page.locator("#torque .nsewdrag").first
-        plot.scroll_into_view_if_needed()
-        box = plot.bounding_box()
-        whole = page.evaluate(_RANGE)
-        height = box["y"] + box["height"] / 2
-        page.mouse.move(box["x"] + 0.4 * box["width"], height)
-        page.mouse.down()
-        page.mouse.move(box["x"] + 0.5 * box["width"], height, steps=4)
-        page.mouse.move(box["x"] + 0.6 * box["width"], height + 2, steps=4)
-        page.mouse.up()
-        page.wait_for_function(f"{_RANGE}[1] - {_RANGE}[0] < {0.3 * (whole[1] - whole[0])}")
-        near = page.evaluate(_RANGE)
-        assert whole[0] < near[0] < near[1] < whole[1]
-        page.mouse.dblclick(box["x"] + 0.5 * box["width"], height)
-        page.wait_for_function(f"Math.abs({_RANGE}[0] - {whole[0]}) < 1e-6")
+def test_zoom(visit, two_joints):
+    one = visit(two_joints, DESK)
+    page = one.page
+    plot = page.locator("#torque .nsewdrag").first
+    plot.scroll_into_view_if_needed()
+    box = plot.bounding_box()
+    whole = page.evaluate(_RANGE)
+    height = box["y"] + box["height"] / 2
+    page.mouse.move(box["x"] + 0.4 * box["width"], height)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.5 * box["width"], height, steps=4)
+    page.mouse.move(box["x"] + 0.6 * box["width"], height + 2, steps=4)
+    page.mouse.up()
+    page.wait_for_function(f"{_RANGE}[1] - {_RANGE}[0] < {0.3 * (whole[1] - whole[0])}")
+    near = page.evaluate(_RANGE)
+    assert whole[0] < near[0] < near[1] < whole[1]
+    page.mouse.dblclick(box["x"] + 0.5 * box["width"], height)
+    page.wait_for_function(f"Math.abs({_RANGE}[0] - {whole[0]}) < 1e-6")
+    one.assert_quiet()
 
 
-def test_a_finger_scrolls_until_the_glass_is_chosen(browser, two_joints):
+def test_a_finger_scrolls_until_the_glass_is_chosen(visit, two_joints):
     mode = 'document.getElementById("torque")._fullLayout.dragmode'
-    with opened(browser, two_joints, PHONE) as page:
-        assert page.evaluate(mode) is False
-        page.locator('#torque [data-val="zoom"]').tap()
-        assert page.evaluate(mode) == "zoom"
+    one = visit(two_joints, PHONE)
+    assert one.page.evaluate(mode) is False
+    one.page.locator('#torque [data-val="zoom"]').tap()
+    assert one.page.evaluate(mode) == "zoom"
+    one.assert_quiet()
 
 
-def test_only_the_joints_that_fail_are_unfolded(browser, seven_joints):
+def test_only_the_joints_that_fail_are_unfolded(visit, seven_joints):
     shown = (
-        "() => [...document.querySelectorAll('details.joint[open] summary')].map(n => n.innerText)"
+        "[...document.querySelectorAll('details.joint[open] summary strong')].map(n => n.innerText)"
     )
-    with opened(browser, seven_joints, DESK) as page:
-        assert [line.split(":")[0] for line in page.evaluate(shown)] == ["joint7"]
-        folded = page.locator("details.joint").nth(1)
-        assert folded.locator(".js-plotly-plot").count() == 0
-        folded.locator("summary").click()
-        folded.locator(".js-plotly-plot").nth(5).wait_for()
-        page.locator("#final-only").check()
-        assert_readable(page, DESK)
+    one = visit(seven_joints, DESK)
+    assert one.page.evaluate(shown) == ["joint7"]
+    folded = one.page.locator("details.joint").nth(1)
+    assert folded.locator(".js-plotly-plot").count() == 0
+    folded.locator("summary").click()
+    folded.locator(".js-plotly-plot").nth(5).wait_for()
+    one.page.locator("#final-only").check()
+    assert_readable(one)
 
 
-def test_what_is_chosen_is_drawn(browser, two_joints):
-    title = 'document.getElementById("torque")._fullData[0].y[7]'
+def test_what_is_chosen_is_drawn(visit, two_joints):
+    torque = 'document.getElementById("torque")._fullData[0].y[7]'
     loop = 'document.querySelector("[data-quantity=torque]")._fullData[0].y[7]'
-    with opened(browser, two_joints, DESK) as page:
-        before = page.evaluate(f"[{title}, {loop}]")
-        page.locator("[data-chooses=torque]").select_option(index=1)
-        page.locator("[data-chooses=loop]").select_option(index=1)
-        after = page.evaluate(f"[{title}, {loop}]")
-        assert all(a != b for a, b in zip(before, after, strict=True))
+    one = visit(two_joints, DESK)
+    before = one.page.evaluate(f"[{torque}, {loop}]")
+    one.page.locator("[data-chooses=torque]").select_option(index=1)
+    one.page.locator("[data-chooses=loop]").select_option(index=1)
+    after = one.page.evaluate(f"[{torque}, {loop}]")
+    assert all(a != b for a, b in zip(before, after, strict=True))
+    one.assert_quiet()
 
 
-def test_the_page_of_a_validation(browser, tmp_path):
-    path = report(validation(), tmp_path / "loop.html")
-    for width in (PHONE, DESK):
-        with opened(browser, path, width) as page:
-            assert_readable(page, width)
+def test_the_page_of_a_validation(visit, tmp_path):
+    assert_readable(visit(report(validation(), tmp_path / "loop.html"), PHONE))
 
 
-def test_hostile_names_stay_names(browser, tmp_path):
+def test_hostile_names_stay_names(visit, tmp_path):
     names = ("a", "$x$ </script><img src=x onerror=alert(2)>")
-    path = report(diagnosis(names, samples=300), tmp_path / "report.html")
-    with opened(browser, path, DESK) as page:
-        assert_readable(page, DESK)
-        assert page.locator("img").count() == 0
+    one = visit(report(diagnosis(names, samples=300), tmp_path / "report.html"), DESK)
+    assert_readable(one)
+    assert one.page.locator("img").count() == 0

@@ -1,3 +1,4 @@
+import hashlib
 import json
 import platform
 import re
@@ -146,6 +147,13 @@ def test_provenance(found, html):
     assert "dynident explain study.toml" in text
     assert np.__version__ in text
     assert "dynident explain" not in Elements(page(found)).text
+
+
+def test_the_study_is_named_with_its_hash(found, tmp_path):
+    study = tmp_path / "study.toml"
+    study.write_text('robot = "arm.urdf"')
+    text = Elements(page(found, study=study)).text
+    assert hashlib.sha256(study.read_bytes()).hexdigest() in text
 
 
 def test_every_plot_has_its_figure(found, html):

@@ -8,6 +8,7 @@ import plotly.graph_objects as go
 import pytest
 
 from dynident.effects import catalogue
+from dynident.effects.viscous_friction import ViscousFriction
 from dynident.report.content import left
 from dynident.report.glossary import meaning, use_of
 from dynident.report.intervals import parameter_table, widening_after, widening_before
@@ -35,7 +36,7 @@ def test_every_effect_of_the_catalogue_is_explained(found):
 
 
 def test_an_effect_of_ones_own_is_explained_by_what_it_looks_like():
-    class Own(catalogue()["viscous_friction"]):
+    class Own(ViscousFriction):
         name = "my_effect"
 
     assert meaning(Own("elbow")) == f"it shows as {Own.sign_of}"
@@ -81,10 +82,10 @@ def test_at_most_two_joints_are_opened():
 
 
 def test_errors_of_the_joints_are_drawn_over_the_noise(found):
-    noise, given, after = joint_errors(found).data
-    assert list(given.x) == [100 * joint.error_before for joint in found.joints]
-    assert list(after.x) == [100 * joint.error_after for joint in found.joints]
-    assert list(noise.x) == [100 * joint.noise_share for joint in found.joints]
+    noise, given, after = (np.asarray(one["x"]) for one in joint_errors(found).to_dict()["data"])
+    assert list(given) == [100 * joint.error_before for joint in found.joints]
+    assert list(after) == [100 * joint.error_after for joint in found.joints]
+    assert list(noise) == [100 * joint.noise_share for joint in found.joints]
 
 
 def test_what_is_left_of_a_map_is_said(found):
@@ -139,7 +140,7 @@ def test_shared_parts_are_written_once_and_come_back():
         return shared[part["shared"]] if "shared" in part else part
 
     restored = json.loads(both.figures, object_hook=whole)
-    assert restored == {name: json.loads(one.to_json()) for name, one in figures.items()}
+    assert restored == {name: json.loads(str(one.to_json())) for name, one in figures.items()}
     alone = packed({"one": figures["one"]})
     assert len(both.shared) == len(alone.shared)
 

@@ -84,7 +84,7 @@ def write_report(study: Study, diagnosis: Diagnosis, to: Path | None) -> None:
     with progress("simulating"):
         recordings = study.test if len(study.test) else study.train
         loop = loop_of(Judged.of(diagnosis.after), recordings, study.controller)
-    write(diagnosis, to=to, loop=loop, command=command_line())
+    write(diagnosis, to=to, loop=loop, command=command_line(), study=study.path)
     click.echo(f"report: {to}", err=True)
 
 

@@ -8,6 +8,7 @@ import re
 from dataclasses import replace
 from datetime import datetime
 from importlib.metadata import PackageNotFoundError, requires, version
+from pathlib import Path
 
 from dynident.diagnose.diagnosis import Candidate, Diagnosis, Step
 from dynident.report.content import first_set
@@ -25,7 +26,6 @@ def joint_table(diagnosis: Diagnosis) -> Table:
         rows.append(
             (
                 joint.name,
-                words[joint.name],
                 percent(joint.error_before),
                 *([percent(joint.error_after)] if diagnosis.steps else []),
                 percent(joint.noise_share),
@@ -33,22 +33,21 @@ def joint_table(diagnosis: Diagnosis) -> Table:
                 *([number(joint.ratio_after, 3)] if diagnosis.steps else []),
                 f"{number(joint.torque_rms, 3)} {joint.torque_unit}",
                 "-" if noise is None else f"{number(noise, 3)} {joint.torque_unit}",
+                words[joint.name],
             )
         )
     overall = diagnosis.test_error
     rows.append(
         (
             "all joints",
-            "",
             percent(overall.before),
             *([percent(overall.after)] if diagnosis.steps else []),
             percent(overall.noise_floor),
-            *([""] * (4 if diagnosis.steps else 3)),
+            *([""] * (5 if diagnosis.steps else 4)),
         )
     )
     columns = (
         "joint",
-        "how it does",
         *(("error as given", "error after") if diagnosis.steps else ("error",)),
         "noise floor",
         *(
@@ -57,6 +56,7 @@ def joint_table(diagnosis: Diagnosis) -> Table:
         ),
         "torque rms",
         "noise rms",
+        "how it does",
     )
     return Table(given.title, columns, tuple(rows), given.notes)
 
@@ -129,10 +129,13 @@ def absorbed_table(diagnosis: Diagnosis) -> Table:
     return Table("Absorbed effects", ("effect", "what would show it"), rows)
 
 
-def provenance(diagnosis: Diagnosis, command: str) -> tuple[Table, Table]:
+def provenance(diagnosis: Diagnosis, command: str, study: Path | None) -> tuple[Table, Table]:
     """Files and versions that a diagnosis rests on."""
     description = diagnosis.after.model.robot.description
     rows = []
+    if study is not None and study.is_file():
+        digest = hashlib.sha256(study.read_bytes()).hexdigest()
+        rows.append((str(study), "study", digest, ""))
     if description is not None:
         digest = hashlib.sha256(description.text.encode()).hexdigest()
         rows.append((description.path, "robot description", digest, ""))

@@ -74,6 +74,7 @@ def report(
     *,
     loop: Validation | Unsimulated | None = None,
     command: str = "",
+    study: str | Path | None = None,
 ) -> Path:
     """Write a diagnosis, or a validation in closed loop, as one self-contained HTML file.
 
@@ -88,6 +89,8 @@ def report(
         the reason why there is none.
     command : str, optional
         The command line that led to it, for the provenance.
+    study : str or Path, optional
+        The study file, for the provenance.
 
     Returns
     -------
@@ -98,7 +101,7 @@ def report(
     FileError
         If the folder is missing or may not be written; an old file is then untouched.
     """
-    return files.write_text(to, page(found, loop=loop, command=command))
+    return files.write_text(to, page(found, loop=loop, command=command, study=study))
 
 
 def page(
@@ -106,14 +109,18 @@ def page(
     *,
     loop: Validation | Unsimulated | None = None,
     command: str = "",
+    study: str | Path | None = None,
 ) -> str:
     """Return the report as a string of HTML; see `report`."""
     if isinstance(found, Validation):
         return _validation_page(found, command)
-    return _diagnosis_page(found, loop_section(loop), command)
+    tables = provenance(found, command, None if study is None else Path(study))
+    return _diagnosis_page(found, loop_section(loop), tables)
 
 
-def _diagnosis_page(diagnosis: Diagnosis, closed: LoopSection | None, command: str) -> str:
+def _diagnosis_page(
+    diagnosis: Diagnosis, closed: LoopSection | None, made: tuple[Table, ...]
+) -> str:
     joint_maps = _joint_maps(diagnosis)
     names = [f"torque-{i}" for i in range(len(diagnosis.traces))]
     points = max(16, min(_MOST_POINTS, _TRACE_BYTES // _BYTES_PER_POINT // max(len(names), 1)))
@@ -156,7 +163,7 @@ def _diagnosis_page(diagnosis: Diagnosis, closed: LoopSection | None, command: s
         parameters=parameter_table(diagnosis.after, widening_after(diagnosis), noise_known=known),
         fit_error=diagnosis.after.error_table(),
         given_parameters=given_parameters if diagnosis.steps else None,
-        provenance=provenance(diagnosis, command),
+        provenance=made,
         figures=parts.figures,
         shared=parts.shared,
         plotly=Markup(get_plotlyjs()),

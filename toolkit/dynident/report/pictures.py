@@ -63,7 +63,9 @@ def waterfall(diagnosis: Diagnosis) -> go.Figure:
         place = {"x": 0, "xanchor": "left"}
     else:
         head = f"noise floor {100 * floor:.2f} %"
-        place = {"x": 100 * floor, "xanchor": "left", "xshift": 4}
+        # Where there is room beside the line.
+        side, shift = ("right", -4) if 2 * floor > diagnosis.test_error.before else ("left", 4)
+        place = {"x": 100 * floor, "xanchor": side, "xshift": shift}
         figure.add_vrect(
             x0=0, x1=100 * floor, fillcolor=FAINT, line_width=0, layer="below"
         ).add_vline(x=100 * floor, line={"color": GREY, "width": 2, "dash": "dash"})
@@ -133,12 +135,9 @@ def ranking(diagnosis: Diagnosis, most: int = 10) -> go.Figure:
 
 def residual_map(diagnosis: Diagnosis, one: ResidualMap) -> go.Figure:
     """Mean residual against one quantity, before and after, with the noise band."""
-    layout = {
-        "xaxis": {"title": {"text": x_title(one)}},
-        "yaxis": {"title": {"text": y_title(one)}, **_map_zero(one)},
-        "dragmode": False,
-    }
-    return dressed(go.Figure(_map_traces(diagnosis, one), layout), 310, top=30)
+    y = {"title": {"text": y_title(one)}, **_map_zero(one)}
+    layout = {"xaxis": {"title": {"text": x_title(one)}}, "yaxis": y, "dragmode": False}
+    return dressed(go.Figure(_map_traces(diagnosis, one), layout), 300, top=22)
 
 
 def residual_maps(diagnosis: Diagnosis, joint: str) -> go.Figure:
