@@ -9,7 +9,7 @@ searched by matched filters: Gaussian bumps of many widths at all times.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import minimize
@@ -153,7 +153,11 @@ def without(run: Run, bumps: Sequence[Bump]) -> Run:
         reach = min(_REACH * bump.width, float(t[0, -1] - t[0, 0]) / 4)
         kept &= ~np.any(np.abs(t - bump.time) < reach, axis=0)
     before = np.concatenate([[0], np.cumsum(kept)])
-    return replace(run, index=run.index[:, kept], edges=np.unique(before[run.edges]))
+    left_out = ~run.kept
+    left_out[run.index[:, ~kept].ravel()] = True
+    return replace(
+        run, index=run.index[:, kept], edges=np.unique(before[run.edges]), left_out=left_out
+    )
 
 
 # --- one search ---------------------------------------------------------------------------------
@@ -225,22 +229,63 @@ def _best(data: Sequence[Repeated]) -> Bump | None:
     by_joint = {one.joint: [s for s in data if s.joint == one.joint] for one in data}
     found, positions = [], 0
     for series in by_joint.values():
-        prepared, degrees = _prepare(series), None
-        for width in WIDTHS:
-            tried = _tried(prepared, width)
-            if tried is None:
-                continue
-            # Single samples, of which there are most, show how heavy the tails are.
-            degrees = degrees or _degrees(tried.z[tried.witnesses(width)])
-            positions += len(tried.z)
-            best = int(np.argmax(tried.z))
-            one = prepared[tried.series[best]]
-            rows = width / one.of.step
-            found.append((_chance(tried.z[best], degrees, rows), one, tried.rows[best], rows))
+        places = _places(_prepare(series, [np.zeros(s.t.shape[1], dtype=bool) for s in series]))
+        if not places:
+            continue
+        # Once more, by noise measured without what stands out most.
+        peak = min(places)
+        places = _places(_prepare(series, [_about(peak, k, s) for k, s in enumerate(series)]))
+        found += places
+        positions += sum(place.tried for place in places)
     if not found:
         return None
-    chance, prepared, row, width = min(found, key=lambda one: one[0])
-    return _refined(prepared, float(row), width, min(1.0, chance * positions))
+    best = min(found)
+    return _refined(best, min(1.0, best.chance * positions))
+
+
+@dataclass(frozen=True, order=True)
+class _Place:
+    """The place at which a bump of one width stands out most.
+
+    Attributes
+    ----------
+    chance : probability of its like there under noise alone.
+    series : whose it is, among those of its joint.
+    row, width : in rows.
+    tried : number of places of that width.
+    of : the series.
+    """
+
+    chance: float
+    series: int
+    row: float
+    width: float
+    tried: int
+    of: _Prepared = field(compare=False)
+
+
+def _places(prepared: Sequence[_Prepared]) -> list[_Place]:
+    """The best place of each width, for the series of one joint."""
+    found, degrees = [], 0.0
+    for width in WIDTHS:
+        tried = _tried(prepared, width)
+        if tried is None:
+            continue
+        # Single samples, of which there are most, show how heavy the tails are.
+        degrees = degrees or _degrees(tried.z[tried.witnesses(width)])
+        best = int(np.argmax(tried.z))
+        k = int(tried.series[best])
+        rows = width / prepared[k].of.step
+        chance = _chance(float(tried.z[best]), degrees, rows)
+        found.append(_Place(chance, k, float(tried.rows[best]), rows, len(tried.z), prepared[k]))
+    return found
+
+
+def _about(peak: _Place, k: int, one: Repeated) -> np.ndarray:
+    """Instants (S,) of a series about a peak, in whichever repetition it is."""
+    instants = one.t.shape[1]
+    away = np.abs(np.arange(instants) - peak.row % instants)
+    return (k == peak.series) & (away < min(3 * peak.width, instants / 8))
 
 
 @dataclass(frozen=True, eq=False)
@@ -319,8 +364,9 @@ def _chance(z: float, degrees: float, width: float) -> float:
     return 2 * float(student.sf(z / (student.ppf(0.75, wide) / _QUARTER) ** -1, wide))
 
 
-def _refined(one: _Prepared, row: float, width: float, p_value: float) -> Bump:
+def _refined(place: _Place, p_value: float) -> Bump:
     """The bump with its best time and width, in the repetition where it is."""
+    one, row, width = place.of, place.row, place.width
     least, most = WIDTHS[0] / one.of.step, _SHARE * one.of.residual.shape[1]
 
     def misfit(x: np.ndarray) -> float:
@@ -364,19 +410,29 @@ def _cleared(one: Repeated, bump: Bump) -> Repeated:
 # --- the noise ----------------------------------------------------------------------------------
 
 
-def _prepare(series: Sequence[Repeated]) -> list[_Prepared]:
-    """Differences of all series of one joint, with the noise that they have in common."""
-    changes = [_changes(one) for one in series]
+def _prepare(series: Sequence[Repeated], left_out: Sequence[np.ndarray]) -> list[_Prepared]:
+    """Differences of all series of one joint, with the noise that they have in common.
+
+    `left_out` are the instants (S,) of each series that are no witnesses of the noise.
+    """
+    kept = [~np.tile(out, len(s.t)) for s, out in zip(series, left_out, strict=True)]
+    changes = [_changes(s, ~out) for s, out in zip(series, left_out, strict=True)]
     still = [np.ones(len(change)) for change in changes]
     # Noise follows the speed itself, or, once filtered, the least speed near by.
     for measure in (np.abs, _slowness):
         speeds = [measure(one.speed).ravel() for one in series]
-        sizes = [np.abs(c * i) for c, i in zip(changes, still, strict=True)]
-        at, scales = _scales(np.concatenate(sizes), np.concatenate(speeds))
+        sizes = [np.abs(c * i)[k] for c, i, k in zip(changes, still, kept, strict=True)]
+        witnesses = [s[k] for s, k in zip(speeds, kept, strict=True)]
+        at, scales = _scales(np.concatenate(sizes), np.concatenate(witnesses))
         still = [i / np.interp(s, at, scales) for i, s in zip(still, speeds, strict=True)]
-    clipped = [np.clip(c * i, -_CLIP, _CLIP) for c, i in zip(changes, still, strict=True)]
+    stretches = []
+    for change, own, keep in zip(changes, still, kept, strict=True):
+        clipped = np.clip(change * own, -_CLIP, _CLIP)
+        borders = np.flatnonzero(np.diff(keep)) + 1
+        parts = zip(np.split(clipped, borders), np.split(keep, borders), strict=True)
+        stretches += [part for part, inside in parts if inside[0] and len(part) > 2 * ORDER]
     # The scale is in `still` already: of this model only the colour is used.
-    noise = measure_noise(clipped, [np.zeros(len(c)) for c in clipped])
+    noise = measure_noise(stretches, [np.zeros(len(part)) for part in stretches])
     colour = noise.colour / noise.std
     return [
         _Prepared(one, change, own, colour)
@@ -384,24 +440,28 @@ def _prepare(series: Sequence[Repeated]) -> list[_Prepared]:
     ]
 
 
-def _changes(one: Repeated) -> np.ndarray:
+def _changes(one: Repeated, kept: np.ndarray) -> np.ndarray:
     """What each repetition does not share with the others' mean, (P S,).
 
-    Less a level and friction of its own, fitted so that bursts have little say.
+    Less a level and friction of its own, fitted to the instants `kept` (S,) so that bursts have
+    little say.
     """
     count = len(one.residual)
     others = (one.residual.sum(axis=0) - one.residual) / (count - 1)
     found = one.residual - others
     for change, v in zip(found, one.speed, strict=True):
         columns = np.column_stack([np.ones_like(v), v, np.tanh(v / FRICTION_WIDTH)])
-        weight = np.ones_like(v)
-        rest = change
-        for _ in range(6):
+        weight, rest = kept.astype(float), change
+        for step in range(10):
             root = np.sqrt(weight)
             x = np.linalg.lstsq(columns * root[:, None], change * root, rcond=1e-8)[0]
             rest = change - columns @ x
-            limit = 1.345 * 1.4826 * float(np.median(np.abs(rest)))
-            weight = np.minimum(1.0, limit / np.maximum(np.abs(rest), 1e-300)) if limit else weight
+            usual = 1.4826 * float(np.median(np.abs(rest[kept])))
+            size = np.abs(rest) / max(usual, 1e-300)
+            # Huber's weights find the bulk; Tukey's then forget what is far from it.
+            huber = np.minimum(1.0, 1.345 / np.maximum(size, 1e-9))
+            tukey = np.maximum(1.0 - (size / 4.685) ** 2, 0.0) ** 2
+            weight = kept * (huber if step < 4 else tukey)
         change[:] = rest
     return found.ravel()
 

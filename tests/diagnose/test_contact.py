@@ -1,0 +1,127 @@
+"""Contacts: found where they are, and nowhere in noise of any colour."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from dynident.diagnose.contact import WIDTHS, Bump, Repeated, _prepare, _scanned, bumps_in, without
+from dynident.diagnose.runs import Run
+
+STEP = 0.02
+INSTANTS = 250
+
+
+def motion(rng: np.random.Generator) -> np.ndarray:
+    """Speed over one period, (S,) rad/s."""
+    phase = 2 * np.pi * np.arange(1, 5)[:, None] * np.arange(INSTANTS) / INSTANTS
+    return rng.normal(size=4) @ np.sin(phase) + rng.normal(size=4) @ np.cos(phase)
+
+
+def noise(rng: np.random.Generator, kind: str, speed: np.ndarray) -> np.ndarray:
+    """Noise (P, S) of standard deviation one at speed."""
+    if "heavy" in kind:
+        x = rng.standard_t(5, speed.size + 200)
+    else:
+        x = rng.standard_normal(speed.size + 200)
+    if "coloured" in kind:
+        x = lfilter([1.0], [1.0, -rng.uniform(0.5, 0.9)], x)
+    x = (x[200:] / x[200:].std()).reshape(speed.shape)
+    if "slow" in kind:
+        x = x * (1 + rng.uniform(1, 5) * np.exp(-np.abs(speed) / rng.uniform(0.05, 0.3)))
+    return x
+
+
+def data(seed: int, kind: str = "", repetitions: int = 4) -> list[Repeated]:
+    """Two joints in two recordings: what a model lacks, and noise."""
+    rng, found = np.random.default_rng(seed), []
+    for run in range(2):
+        t = 50.0 * run + STEP * np.arange(repetitions * INSTANTS).reshape(repetitions, -1)
+        for joint in ("shoulder", "elbow"):
+            speed = np.tile(motion(rng), (repetitions, 1))
+            lacking = 3.0 * np.sign(speed) + 2.0 * np.sin(2 * np.pi * t / (STEP * INSTANTS))
+            residual = lacking + noise(rng, kind, speed)
+            found.append(Repeated(run, run + 1, joint, t, residual, speed))
+    return found
+
+
+def pushed(series: list[Repeated], k: int, p: int, time: float, width: float, height: float):
+    one = series[k]
+    bump = np.zeros_like(one.residual)
+    bump[p] = height * np.exp(-(((one.t[p] - time) / width) ** 2) / 2)
+    return [replace(s, residual=s.residual + bump) if s is one else s for s in series]
+
+
+@pytest.mark.parametrize("kind", ["", "coloured", "slow"])
+@pytest.mark.parametrize("seed", range(3))
+def test_one_burst_is_found_where_it_is_and_nowhere_else(kind: str, seed: int) -> None:
+    time = 50.0 + STEP * INSTANTS * 2 + 1.7
+    (bump,) = bumps_in(pushed(data(seed, kind), 3, 2, time, 0.2, 5.0))
+    assert (bump.run, bump.number, bump.repetition, bump.joint) == (1, 2, 2, "elbow")
+    assert bump.time == pytest.approx(time, abs=0.2)
+    assert 0.1 < bump.width < 0.4
+    assert bump.amplitude == pytest.approx(5.0, rel=0.5)
+    assert bump.p_value < 1e-4
+
+
+@pytest.mark.parametrize("p", [0, 1])
+@pytest.mark.parametrize("height", [8.0, -8.0])
+def test_of_two_repetitions_it_is_the_one_with_the_larger_residual(p: int, height: float) -> None:
+    time = STEP * INSTANTS * p + 2.5
+    quiet = [
+        replace(s, residual=noise(np.random.default_rng(k), "", s.speed))
+        for k, s in enumerate(data(5, repetitions=2))
+    ]
+    (bump,) = bumps_in(pushed(quiet, 0, p, time, 0.15, height))
+    assert (bump.repetition, bump.joint) == (p, "shoulder")
+    assert bump.time == pytest.approx(time, abs=0.1)
+    assert np.sign(bump.amplitude) == np.sign(height)
+
+
+def test_bursts_come_in_the_order_of_their_significance() -> None:
+    series = pushed(data(1), 0, 1, STEP * INSTANTS + 2.0, 0.2, 6.0)
+    found = bumps_in(pushed(series, 3, 0, 53.0, 0.2, -12.0))
+    assert [(b.run, b.joint) for b in found] == [(1, "elbow"), (0, "shoulder")]
+    assert found[0].p_value <= found[1].p_value
+
+
+@pytest.mark.parametrize("kind", ["", "coloured", "slow", "coloured slow", "heavy"])
+def test_noise_is_no_contact(kind: str) -> None:
+    assert [seed for seed in range(6) if bumps_in(data(100 + seed, kind))] == []
+
+
+def test_friction_that_falls_is_no_contact() -> None:
+    warming = [
+        replace(s, residual=s.residual + 8.0 * np.exp(-s.t / 10.0) * np.sign(s.speed))
+        for s in data(7)
+    ]
+    assert bumps_in(warming) == ()
+
+
+def test_the_scan_is_the_fit_at_every_row() -> None:
+    series = [s for s in data(2, "coloured slow") if s.joint == "elbow"]
+    prepared = _prepare(series, [np.zeros(INSTANTS, dtype=bool)] * len(series))[0]
+    rows = np.arange(100.0, 600.0)
+    for width in (WIDTHS[0] / STEP, WIDTHS[4] / STEP):
+        exact = prepared.match(prepared.change, rows, width)[0]
+        np.testing.assert_allclose(_scanned(prepared, width)[100:600], exact, atol=0.01)
+
+
+def test_instants_of_a_bump_are_left_out_of_all_repetitions() -> None:
+    t = STEP * np.arange(1000)
+    recording: Any = SimpleNamespace(start=100.0)
+    version: Any = SimpleNamespace(t=t, recording=recording)
+    run = Run("repeated", (version,), np.arange(1000).reshape(4, 250), np.array([0, 125, 250]))
+    bump = Bump(0, 1, 2, "elbow", 100.0 + 11.0, 0.1, 5.0, 1e-9)
+    short = without(run, [bump])
+    assert without(run, []) is run
+    # One second into the period, less and plus four widths.
+    gone = set(range(250)) - set(short.index[0])
+    assert min(gone) == pytest.approx(30, abs=1) and max(gone) == pytest.approx(70, abs=1)
+    np.testing.assert_array_equal(short.index[1] - short.index[0], 250)
+    np.testing.assert_array_equal(short.edges, [0, 125 - len(gone), 250 - len(gone)])
