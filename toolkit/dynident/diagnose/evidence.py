@@ -34,12 +34,30 @@ class ColumnStore:
     _now: Hashable = None
     _present: dict[Hashable, Signals] = field(default_factory=dict)
     _blocks: dict[Hashable, Block] = field(default_factory=dict)
+    _simulation: ColumnStore | None = None
+
+    @property
+    def simulation(self) -> ColumnStore | None:
+        """Evidence of the simulated motion alone, which is all that candidates need of it."""
+        if any(run.columns_from == "recording" for run in self.runs):
+            return None
+        runs = tuple(
+            replace(run, versions=run.versions[-1:], columns_from="recording") for run in self.runs
+        )
+        if self._simulation is None:
+            self._simulation = ColumnStore(self.model, runs)
+        self._simulation.runs = runs  # who carries the payload may have been found out
+        return self._simulation
 
     def prepare(self, effects: Iterable[Effect]) -> None:
         """Compute the rigid body's columns and those of many effects in one pass.
 
         Effects that depend on the present model, or need the whole recording, are left for `of`.
         """
+        if self.simulation is not None:
+            effects = list(effects)
+            self.simulation.prepare([e for e in effects if e not in self.model])
+            effects = [e for e in effects if e in self.model]
         later = {"torque", "body", "whole"}
         wanted = [e for e in effects if e not in self._known and not e.needs & later]
         base = self.model.base.independent
@@ -69,17 +87,20 @@ class ColumnStore:
         self._known.pop(effect, None)
         for run in range(len(self.runs)):
             self._present.pop((effect, run), None)
+        if self._simulation is not None:
+            self._simulation.forget(effect)
 
     def renew(self, runs: tuple[Run, ...]) -> None:
         """Take runs whose last versions, the simulated motions, are new."""
-        fresh = ColumnStore(self.model, tuple(replace(r, versions=r.versions[-1:]) for r in runs))
-        fresh.prepare(self._known)
+        wanted = list(self._simulation._known) if self._simulation else []
+        self.runs, self._simulation, self._now = runs, None, None
+        fresh = self.simulation
+        assert fresh is not None
+        fresh.prepare(dict.fromkeys([*wanted, *self._known]))
         for r in range(len(runs)):
             self._rigid[r][-1] = fresh.rigid(r)[0]
             for effect, columns in self._known.items():
                 columns[r][-1] = fresh.of(effect, r, self.model, None)[0]
-        self._now = None
-        self.runs = runs
 
     def rigid(self, run: int) -> Signals:
         """Columns of the base parameters, (T, n, b) for each version."""
@@ -88,8 +109,11 @@ class ColumnStore:
     def of(self, effect: Effect, run: int, model: Model, values: np.ndarray | None) -> Signals:
         """Columns of an effect at the joints where it acts, (T, J, k) for each version.
 
-        `model` and its parameters are those whose torque and bodies some columns depend on.
+        `model` and its parameters are those whose torque and bodies some columns depend on. Of a
+        candidate for it along simulated motion, the columns of that motion only.
         """
+        if self.simulation is not None and effect not in model:
+            return self.simulation.of(effect, run, model, values)
         if effect.linear_in_torque:
             rows = zip(self.runs[run].versions, self._filtered(run, model, values), strict=True)
             return [acting(effect, replace(self._rows(v), torque=torque)) for v, torque in rows]
