@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -53,7 +54,7 @@ def explained(effect: Effect, value: float) -> np.ndarray:
     rest = found.torque - Mechanism.of(ROBOT, known()).command(found.t, found.q, found.v, a)
     block = Block(found.t, found.q, found.v, a, ROBOT.names, body=ROBOT, rotor=np.array(ROTORS))
     model = effect.at([value]).columns(block)[:, :, 0] * value
-    b, a = butter(3, 30.0, fs=RATE)
+    b, a = cast(Any, butter(3, 30.0, fs=RATE))
     # The first motion rings from a start that is not known.
     kept = slice(700, -150)
     rest, model = (filtfilt(b, a, x, axis=0)[kept] for x in (rest, model))

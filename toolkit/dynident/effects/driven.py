@@ -129,16 +129,24 @@ class Response:
         self._link, self._gear, self._m, self._moves = link, gear, m, moves
         self._per, self._step = per, step
         j = link.joint
-        self._fine = [self._refined(x) for x in (m, link.C[:, j], link.G[:, j], load)]
+        smooth = (self._smooth(x) for x in (link.C[:, j], link.G[:, j], load))
+        self._fine = [self._linear(m), *smooth]
         self._solve()
         self.deflection = self._differences(self._d, self._per)
         self.torque = self._torque(self.deflection)
 
-    def _refined(self, x: np.ndarray) -> np.ndarray:
-        if self._per == 1:
-            return x
-        rows = np.arange((len(x) - 1) * self._per + 1) / self._per
-        return np.interp(rows, np.arange(len(x)), x)
+    def _steps(self, samples: int) -> np.ndarray:
+        return np.arange((samples - 1) * self._per + 1) / self._per
+
+    def _linear(self, x: np.ndarray) -> np.ndarray:
+        """Return samples at the steps: an inertia that stays above its least."""
+        return x if self._per == 1 else np.interp(self._steps(len(x)), np.arange(len(x)), x)
+
+    def _smooth(self, x: np.ndarray) -> np.ndarray:
+        """Return samples at the steps without kinks, which a second derivative would show."""
+        from scipy.interpolate import CubicSpline
+
+        return x if self._per == 1 else CubicSpline(np.arange(len(x)), x)(self._steps(len(x)))
 
     def _solve(self) -> None:
         m, c, g, load = self._fine
@@ -190,12 +198,13 @@ class Response:
         lighter = -rotor * self._moves
         d, moved = self._d, self._differences(self._d, 1)
         bent = d - self._side * self._gear.half_gap
-        right = -self._refined(lighter) * moved.bend - self._refined(rotor * self._link.a)
+        lost = self._smooth(rotor * self._link.a)
+        right = -self._linear(lighter) * moved.bend - lost
         right -= self._touches * (stiffness * bent + damping * moved.rate)
         right += self._gear.stiffness * self._side * half_gap
         rest = self._gear.stiffness * self._rests * half_gap
         rest -= stiffness * (d[:2] - self._rests * self._gear.half_gap)
-        rest -= self._refined(rotor * self._link.a)[:2]
+        rest -= lost[:2]
         change = self._torque(self._differences(self._banded(rest, right), self._per))
         change[:, self._link.joint] -= lighter * self.deflection.bend
         return change
