@@ -2,63 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from dynident.effects import FRICTION_WIDTH, Block, Effect, Term, Transmission, effects_of
+from dynident.closed_loop.true_effect import TrueEffect, ordered
+from dynident.effects import FRICTION_WIDTH, Block, Term, Transmission
 from dynident.errors import EffectError, SimulationError
 from dynident.model import Model
 from dynident.robot import Robot
-from dynident.settings import nearest
-
-
-@dataclass(frozen=True)
-class TrueEffect:
-    """An effect that a simulated robot really has.
-
-    Attributes
-    ----------
-    effect : with its place and shape.
-    values : of its parameters, in their order.
-    hidden : whether the user of the recordings is to find it: it is left out of the study.
-    """
-
-    effect: Effect
-    values: tuple[float, ...]
-    hidden: bool = False
-
-    @classmethod
-    def of(
-        cls,
-        label: str,
-        robot: Robot,
-        values: Mapping[str, float] | Sequence[float],
-        shape: Mapping[str, float] | Sequence[float] = (),
-        *,
-        hidden: bool = False,
-    ) -> tuple[TrueEffect, ...]:
-        """Return the effects of a label: `name@joint` one, `name` one per place.
-
-        Parameters
-        ----------
-        label : as in a study file.
-        robot : on which they sit.
-        values, shape : by name (parameters left out are 0, shape parameters at their default) or
-            all in order.
-        hidden : see the class.
-
-        Raises
-        ------
-        EffectError
-            If the label, a name or a number of values does not fit, or a value is out of bounds.
-        """
-        return tuple(
-            cls(effect, _ordered(effect, robot, values), hidden)
-            for effect in (_shaped(one, robot, shape) for one in effects_of(label, robot))
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +59,7 @@ class Mechanism:
                 raise EffectError("is there twice", effect.label, "name it once")
             if "payload" in effect.needs and not carries_payload:
                 continue
-            values = _ordered(effect, robot, one.values)
+            values = ordered(effect, robot, one.values)
             acting.append(TrueEffect(effect, values, one.hidden))
             robot = effect.simulated_robot(values, robot)
         made = cls(robot, tuple(acting), friction_width, carries_payload)
@@ -357,34 +311,3 @@ class Mechanism:
             acting = acting / (1.0 + self.loss * self._sign(v) * np.sign(acting))
         load = acting - self.robot.inverse_dynamics(q, v, still) - self.force(t, q, v)
         return np.linalg.solve(inertia, load[:, :, None])[:, :, 0]
-
-
-def _ordered(effect: Effect, robot: Robot, values) -> tuple[float, ...]:
-    parameters = effect.parameters(robot)
-    if isinstance(values, Mapping):
-        names = tuple(parameter.name for parameter in parameters)
-        for name in values:
-            if name not in names:
-                mend = nearest(name, names, "parameters")
-                raise EffectError(f"no parameter '{name}'", effect.label, mend)
-        values = [values.get(name, 0.0) for name in names]
-    if len(values) != len(parameters):
-        names = ", ".join(parameter.name for parameter in parameters)
-        raise EffectError(f"{len(values)} values", effect.label, f"give {names}")
-    for value, parameter in zip(values, parameters, strict=True):
-        if not (np.isfinite(value) and parameter.lower <= value <= parameter.upper):
-            limits = f"between {parameter.lower:g} and {parameter.upper:g} {parameter.unit}"
-            mend = f"choose it {limits}"
-            raise EffectError(f"{parameter.name} = {value:g}", effect.label, mend)
-    return tuple(float(value) for value in values)
-
-
-def _shaped(effect: Effect, robot: Robot, shape) -> Effect:
-    if isinstance(shape, Mapping):
-        names = tuple(one.name for one in effect.shape_parameters(robot))
-        for name in shape:
-            if name not in names:
-                mend = nearest(name, names, "shape parameters")
-                raise EffectError(f"no shape parameter '{name}'", effect.label, mend)
-        shape = [shape.get(name, own) for name, own in zip(names, effect.shape, strict=True)]
-    return effect.shaped(*shape).on(robot) if len(shape) else effect
