@@ -1,4 +1,4 @@
-"""Temperatures: of the joints that have a sensor, in files, on new clocks, in parts."""
+"""Temperatures and numbers: of joints with a sensor, in files, on new clocks, in parts."""
 
 import warnings
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dynident.errors import DynidentWarning, RecordingError
-from dynident.recording import SUFFIXES, Column, read, uniform, write
+from dynident.recording import SUFFIXES, Column, Dataset, numbered, read, uniform, write
 
 NAN = float("nan")
 
@@ -72,3 +72,10 @@ def test_numbers_are_whole(arm, number):
     assert arm.number == 0 and arm.replace(number=3).number == 3
     with pytest.raises(RecordingError, match="number = "):
         arm.replace(number=number)
+
+
+def test_recordings_without_numbers_are_numbered_through_all_datasets(arm):
+    train, test = numbered(Dataset((arm, arm)), Dataset((arm.replace(number=1),)))
+    assert [r.number for r in (*train.recordings, *test.recordings)] == [1, 2, 3]
+    known = Dataset((arm.replace(number=4), arm.replace(number=2)))
+    assert numbered(known, test)[0] is known

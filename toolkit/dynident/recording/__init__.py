@@ -9,7 +9,7 @@ torque through one low-pass and decimation, in blocks if asked; both follow a `F
 """
 
 from dynident.recording.columns import Column
-from dynident.recording.dataset import Dataset, Noise
+from dynident.recording.dataset import Dataset, Noise, numbered
 from dynident.recording.filters import (
     Filter,
     Motion,
@@ -52,6 +52,7 @@ __all__ = [
     "lowpass",
     "mismatch",
     "moving",
+    "numbered",
     "periods",
     "read",
     "require_motion",

@@ -59,3 +59,22 @@ class Dataset:
     def __add__(self, other: Dataset) -> Dataset:
         """Recordings of both, with this one's filter and noise."""
         return Dataset(self.recordings + other.recordings, self.filter, self.noise)
+
+
+def numbered(*datasets: Dataset) -> tuple[Dataset, ...]:
+    """Return datasets whose recordings can be told apart by their numbers.
+
+    Recordings of a study are numbered as in its file and come back as they are. Where numbers are
+    missing (0) or repeated, all are numbered anew from 1, through all datasets.
+    """
+    numbers = [one.number for dataset in datasets for one in dataset.recordings]
+    if 0 not in numbers and len(set(numbers)) == len(numbers):
+        return datasets
+    found, last = [], 0
+    for dataset in datasets:
+        recordings = tuple(
+            one.replace(number=last + k) for k, one in enumerate(dataset.recordings, start=1)
+        )
+        last += len(recordings)
+        found.append(Dataset(recordings, dataset.filter, dataset.noise))
+    return tuple(found)
