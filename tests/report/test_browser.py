@@ -54,6 +54,7 @@ def browser(tmp_path_factory) -> Iterator:
     with playwright.sync_playwright() as driver:
         found = driver.chromium.launch(
             executable_path=BROWSER,
+            timeout=120_000,
             args=["--no-sandbox", "--disable-gpu"],
             env={**os.environ, "HOME": str(home)},
         )

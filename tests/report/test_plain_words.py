@@ -89,8 +89,9 @@ def test_errors_of_the_joints_are_drawn_over_the_noise(found):
 
 
 def test_what_is_left_of_a_map_is_said(found):
-    one = found.maps[0]
+    one = next(one for one in found.maps if one.sentence)
     assert left(replace(one, after=0 * one.after)) == "Within the noise."
+    assert left(replace(one, sentence="", before=0 * one.before, after=0 * one.after)) == ""
     assert "Beyond the noise" in left(replace(one, after=9 * one.band))
     assert left(replace(one, band=np.full(len(one.band), np.nan))) == ""
 

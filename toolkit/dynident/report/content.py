@@ -152,8 +152,12 @@ def seen(one: ResidualMap) -> str:
 
 
 def left(one: ResidualMap) -> str:
-    """What the effects added leave of a residual map, in words; empty without a noise band."""
-    return f"{_beyond(one, one.after)}." if np.isfinite(one.band).any() else ""
+    """What the effects added leave of a residual map, in words.
+
+    Empty without a noise band, and where there was nothing before either.
+    """
+    words = f"{_beyond(one, one.after)}."
+    return words if np.isfinite(one.band).any() and words != seen(one) else ""
 
 
 def _beyond(one: ResidualMap, mean: np.ndarray) -> str:

@@ -61,7 +61,7 @@ def _state(diagnosis: Diagnosis, joint: JointResult) -> JointState:
         words = f"what is left is {number(after, 2)} times the noise"
         return JointState(joint, "failing", words, (2, after))
     if diagnosis.steps and (named or before > BEYOND):
-        words = f"as given {number(before, 2)} times the noise is missing, now only noise is left"
+        words = f"from {number(before, 2)} times the noise down to it"
         return JointState(joint, "repaired", words, (1, before))
     # Where the verdict is that nothing is missing, a large ratio is one of few samples.
     return JointState(joint, "fine", "nothing is left but noise", (0, before))

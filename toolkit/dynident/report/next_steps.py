@@ -101,7 +101,10 @@ def _either(effects: tuple[Effect, ...]) -> str:
 
 
 def _experiments(step: Step) -> str:
-    """Each experiment once, with what it shows."""
+    """The experiment that tells them apart; else each effect's own, once, with what it shows."""
+    advice = getattr(step, "advice", "")
+    if advice:
+        return f"{advice[0].upper()}{advice[1:].rstrip('.')}."
     shows: dict[str, list[str]] = {}
     for effect in (step.effect, *step.indistinguishable):
         shows.setdefault(effect.advice, []).append(effect.title)
