@@ -202,3 +202,31 @@ def test_what_runs_in_python_is_said() -> None:
     loop, soft = ClosedLoop(), elastic(arm(), 10.0, 0.1, "elbow", 0.05)
     loop.simulate([Task(soft, Fourier.random(arm(), 2.0, 3), 0.01)], PD, lead_in=0.0)
     assert [note for note in loop.notes if "joint_elasticity@elbow" in note]
+
+
+def test_an_acceleration_just_after_a_sample_is_the_diagrams_own() -> None:
+    from dynident.closed_loop.plant import Plant
+
+    robot, rng = arm(), np.random.default_rng(3)
+    effects = [
+        *elastic(robot, 10.0, 0.1, "elbow", 0.05).effects,
+        *TrueEffect.of("presliding@shoulder", robot, [0.5]),
+        *TrueEffect.of("coulomb_friction", robot, [0.5]),
+        *TrueEffect.of("load_friction@elbow", robot, [0.1]),
+    ]
+    made = Mechanism.of(robot, effects)
+    plant = Plant([made, made])
+    plant.set([made, made], [0.0, 0.0])
+    state, u = rng.normal(size=plant.context.num_continuous_states()), rng.normal(size=4)
+    state[-2:] = 0.3, -0.7
+    plant.context.SetContinuousState(state)
+    plant.diagram.get_input_port().FixValue(plant.context, u[np.argsort(plant.inputs)])
+    rates = plant.diagram.EvalTimeDerivatives(plant.context).CopyToVector()[plant.speeds]
+    past = plant.past(state[None])
+    for k in range(2):
+        own, kept = slice(2 * k, 2 * k + 2), slice(k, k + 1)
+        motion = (state[None, plant.positions[own]], state[None, plant.speeds[own]])
+        found = made.acceleration(
+            np.zeros(1), *motion, u[None, own], past.of(slice(0, 1), own, kept)
+        )
+        np.testing.assert_allclose(found[0], rates[own], rtol=1e-9)

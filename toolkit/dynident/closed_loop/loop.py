@@ -171,8 +171,8 @@ class ClosedLoop:
         measurement = Measurement(noise, np.tile(resolution, len(tasks)))
         motion = stepper.run(time, reference, drive, measurement, tell)
         return [
-            _rollout(motion, reference, slice(before, before + length), k, task, rate, resolution)
-            for k, (task, length) in enumerate(zip(tasks, kept, strict=True))
+            _rollout(motion, reference, slice(before, before + length), k, tasks, rate, resolution)
+            for k, length in enumerate(kept)
         ]
 
     def _plant(self, tasks: Sequence[Task]) -> Plant:
@@ -195,9 +195,18 @@ class ClosedLoop:
 
 
 def _rollout(
-    motion: Motion, reference, rows: slice, k: int, task: Task, rate: float, resolution: np.ndarray
+    motion: Motion,
+    reference,
+    rows: slice,
+    k: int,
+    tasks: Sequence[Task],
+    rate: float,
+    resolution: np.ndarray,
 ) -> Rollout:
+    task = tasks[k]
     n = task.mechanism.robot.n
+    first_state = sum(one.mechanism.memory for one in tasks[:k])
+    memory = slice(first_state, first_state + task.mechanism.memory)
     columns = slice(k * n, k * n + n)
     own = (rows, columns)
     first = rows.start
@@ -218,7 +227,7 @@ def _rollout(
         saturated=motion.saturated[own].mean(axis=0),
         start=task.start,
         mechanism=task.mechanism,
-        acceleration=None if motion.a is None else motion.a[own],
+        past=None if motion.past is None else motion.past.of(rows, columns, memory),
     )
 
 

@@ -16,6 +16,25 @@ from dynident.robot import Robot
 
 
 @dataclass(frozen=True, eq=False)
+class Past:
+    """What accelerations depend on besides the motors' motion: left by what went before.
+
+    Attributes
+    ----------
+    q, v : (T, n) of the links, rad or m, and per s.
+    memory : (T, m) internal states of the effects.
+    """
+
+    q: np.ndarray
+    v: np.ndarray
+    memory: np.ndarray
+
+    def of(self, rows: slice, joints: slice, memory: slice) -> Past:
+        """Return that of one mechanism among others."""
+        return Past(self.q[rows, joints], self.v[rows, joints], self.memory[rows, memory])
+
+
+@dataclass(frozen=True, eq=False)
 class Mechanism:
     """A robot and its true effects, ready to compute torques.
 
@@ -292,22 +311,42 @@ class Mechanism:
                 )
 
     def acceleration(
-        self, t: np.ndarray, q: np.ndarray, v: np.ndarray, u: np.ndarray
+        self,
+        t: np.ndarray,
+        q: np.ndarray,
+        v: np.ndarray,
+        u: np.ndarray,
+        past: Past | None = None,
     ) -> np.ndarray:
-        """Return the acceleration that a recorded torque gives, (T, n); inverse of `command`.
+        """Return the acceleration of the motors under a recorded torque, (T, n).
+
+        The inverse of `command`; where that needs it, with the past.
 
         Raises
         ------
         SimulationError
             See `command`.
         """
-        self._require_no_past()
+        if past is None:
+            self._require_no_past()
+            past = Past(q, v, np.zeros((len(q), self.memory)))
         still, unit = np.zeros_like(q), np.eye(self.robot.n)
-        weight = self.robot.inverse_dynamics(q, still, still)
-        mass = [self.robot.inverse_dynamics(q, still, still + e) - weight for e in unit]
+        weight = self.robot.inverse_dynamics(past.q, still, still)
+        mass = [self.robot.inverse_dynamics(past.q, still, still + e) - weight for e in unit]
         inertia = np.stack(mass, axis=2) + self.inertia
         acting = u / self.gain
         if np.any(self.loss):
             acting = acting / (1.0 + self.loss * self._sign(v) * np.sign(acting))
-        load = acting - self.robot.inverse_dynamics(q, v, still) - self.force(t, q, v)
-        return np.linalg.solve(inertia, load[:, :, None])[:, :, 0]
+        load = acting - self.force(t, q, v, past.memory)
+        motors = {}
+        for gear in self.transmissions:
+            j = gear.joint
+            carried = gear.torque(q[:, j] - past.q[:, j], v[:, j] - past.v[:, j])
+            motors[j] = (load[:, j] - carried) / gear.rotor
+            load[:, j] = carried
+            inertia[:, j, j] -= self.inertia[j, j]  # the motor is not the link's
+        load = load - self.robot.inverse_dynamics(past.q, past.v, still)
+        a = np.linalg.solve(inertia, load[:, :, None])[:, :, 0]
+        for j, own in motors.items():
+            a[:, j] = own
+        return a

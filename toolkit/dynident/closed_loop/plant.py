@@ -20,7 +20,7 @@ from dynident.closed_loop.drivetrain import (
     giving_way,
 )
 from dynident.closed_loop.layers import Layers, Terms, summed
-from dynident.closed_loop.mechanism import Mechanism
+from dynident.closed_loop.mechanism import Mechanism, Past
 from dynident.errors import DynidentError, SimulationError
 from dynident.inertia import to_drake
 from dynident.robot import Robot
@@ -230,9 +230,11 @@ class Plant:
         state[self.place], state[size + self.place] = link, v
         return state
 
-    def accelerations(self) -> np.ndarray:
-        """Return the accelerations of the motors in the present context, (N,)."""
-        return self.diagram.EvalTimeDerivatives(self.context).CopyToVector()[self.speeds]
+    def past(self, states: np.ndarray) -> Past:
+        """Return what is not the motors' motion of the diagram's states (T, .)."""
+        size = len(self.place)
+        memory = states[:, 2 * size + 2 * len(self._compliant) :]
+        return Past(states[:, self.place], states[:, size + self.place], memory)
 
     def require_inertia(self, poses: np.ndarray) -> None:
         """Refuse robots whose joint-space inertia is not positive at one of the poses (T, N).

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from dynident.closed_loop.mechanism import Mechanism
+from dynident.closed_loop.mechanism import Mechanism, Past
 from dynident.closed_loop.references import Reference
 from dynident.robot import Robot
 
@@ -58,7 +58,7 @@ class Rollout:
     saturated : (n,) share of the commands that are at the controller's limit.
     start : s, when the first sample is taken in the session.
     mechanism : what moved.
-    acceleration : (T, n) `a` where it depends on more than the motion and what acts; else None.
+    past : what `a` depends on besides the motion and what acts; None where that is nothing.
     """
 
     t: np.ndarray
@@ -74,7 +74,7 @@ class Rollout:
     saturated: np.ndarray
     start: float
     mechanism: Mechanism
-    acceleration: np.ndarray | None = None
+    past: Past | None = None
 
     @cached_property
     def a(self) -> np.ndarray:
@@ -82,6 +82,5 @@ class Rollout:
 
         At a sample it is the one just after.
         """
-        if self.acceleration is not None:
-            return self.acceleration
-        return self.mechanism.acceleration(self.t + self.start, self.q, self.v, self.acting)
+        t = self.t + self.start
+        return self.mechanism.acceleration(t, self.q, self.v, self.acting, self.past)

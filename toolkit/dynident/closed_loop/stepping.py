@@ -10,6 +10,7 @@ import numpy as np
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from dynident.closed_loop.drive import Drive, ReferenceSamples
+from dynident.closed_loop.mechanism import Past
 from dynident.closed_loop.plant import Plant
 from dynident.errors import SimulationError
 
@@ -48,8 +49,7 @@ class Motion:
     u : command as the controller gives it.
     acting, mean : command that acts just after a sample, and in the mean until the next one.
     saturated : whether the command is at its limit.
-    a : acceleration just after a sample, where it depends on more than motion and command; None
-        elsewhere.
+    past : what else the accelerations depend on; None where that is nothing.
     """
 
     q: np.ndarray
@@ -59,7 +59,7 @@ class Motion:
     acting: np.ndarray
     mean: np.ndarray
     saturated: np.ndarray
-    a: np.ndarray | None = None
+    past: Past | None = None
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,6 @@ class Stepper:
         data, torque = held.GetMutableData, held.GetMutableData().get_mutable_value()
         advance = simulator.AdvanceTo
         states = np.empty((total, state.size()))
-        rates = np.empty((total, size)) if plant.remembers else None
         measured, commands = np.empty((total, size)), np.empty((total, size))
         saturated = np.zeros((total, size), dtype=bool)
         late, rest = self._late, self._rest
@@ -153,13 +152,9 @@ class Stepper:
                 if rest and k:
                     data()
                     torque.SetFromVector(commands[max(k - late - 1, 0)][order] * effect)
-                    if rates is not None:
-                        rates[k] = plant.accelerations()
                     advance(time[k] + rest / rate)
                 data()
                 torque.SetFromVector(u[order] * effect)
-                if rates is not None and not (rest and k):
-                    rates[k] = plant.accelerations()
                 advance(time[k + 1])
             except (RuntimeError, np.linalg.LinAlgError) as error:
                 raise self._diverged(time[k], state.CopyToVector(), error) from None
@@ -174,7 +169,7 @@ class Stepper:
             commands,
             *self._arrived(commands),
             saturated,
-            rates,
+            plant.past(states) if plant.remembers else None,
         )
 
     def _start(self, time: float, reference: ReferenceSamples) -> tuple[Any, Any, Any]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 
 @dataclass(frozen=True)
 class Transmission:
@@ -27,3 +29,9 @@ class Transmission:
     damping: float
     gap: float
     rotor: float
+
+    def torque(self, bent: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        """Return the transmitted torque of deflections (T,) and their rates."""
+        half = self.gap / 2.0
+        touching = np.abs(bent) >= half
+        return self.stiffness * (bent - np.clip(bent, -half, half)) + self.damping * rate * touching
