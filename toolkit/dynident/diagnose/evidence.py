@@ -123,6 +123,16 @@ class ColumnStore:
             self._known[effect] = [[self._plain(effect, v) for v in r.versions] for r in self.runs]
         return self._known[effect][run]
 
+    def clock(self, effect: Effect, run: int) -> np.ndarray:
+        """The factor of an effect's columns that depends on the time, folded, (P, S)."""
+        version, recording = self.runs[run].versions[0], self.runs[run].recording
+        block = replace(self._rows(version), t=version.t + recording.start)
+        if recording.temperature is not None:
+            columns = recording.temperature.T
+            at = [np.interp(version.t, recording.t, column) for column in columns]
+            block = replace(block, temperature=np.stack(at, axis=1))
+        return effect.clock(block)[self.runs[run].index]
+
     def _plain(self, effect: Effect, version: Sampled) -> np.ndarray:
         if "whole" in effect.needs:
             block = replace(version.block(self.model, rigid=False), carries_payload=True)

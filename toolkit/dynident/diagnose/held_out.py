@@ -92,17 +92,9 @@ def on_recordings(store: ColumnStore, present: Present | Estimate) -> HeldOut:
         first = run.versions[0]
         joints = [model_columns(store, present.model, r, j, present.values) for j in range(n)]
         residual = np.stack([c[0] @ combination for c in joints], axis=-1)
-        runs.append(
-            HeldOutRun(
-                run.recording.name,
-                first.t,
-                first.q,
-                first.v,
-                first.a,
-                first.tau,
-                first.tau - residual,
-            )
-        )
+        kept, predicted = run.kept, first.tau - residual
+        signals = (first.t, first.q, first.v, first.a, first.tau, predicted)
+        runs.append(HeldOutRun(run.recording.name, *(x[kept] for x in signals)))
         folded.append(np.stack([run.fold([v @ combination for v in c]) for c in joints], axis=-1))
         doubt.append(np.array([_doubt(c[0], present) for c in joints]))
     return _judged(store, tuple(runs), folded, doubt)

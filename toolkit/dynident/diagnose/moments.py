@@ -43,14 +43,9 @@ class Moments:
             np.concatenate([self.signal, other.signal]), np.concatenate([self.total, other.total])
         )
 
-    def clocked(self, left: np.ndarray, right: np.ndarray) -> Moments:
-        """Take plain products where a column (masks (a,) and (b,)) depends on the time.
-
-        Such a column is another one in each repetition, so that products of different repetitions
-        are not its square; and it depends on the clock and on speeds, whose noise is small.
-        """
-        plain = left[:, None] | right[None, :]
-        return Moments(np.where(plain, self.total, self.signal), self.total)
+    def where(self, chosen: np.ndarray, other: np.ndarray) -> Moments:
+        """Take other signal moments (B, a, b) where a mask (a, b) says so."""
+        return Moments(np.where(chosen, other, self.signal), self.total)
 
     def without(self, block: int) -> tuple[np.ndarray, np.ndarray]:
         """Sums over all blocks but one."""
@@ -94,6 +89,49 @@ def moments(left: np.ndarray, right: np.ndarray, edges: np.ndarray, kind: Kind) 
                 signal.append(plain)
         total.append(plain)
     return Moments(np.array(signal), np.array(total))
+
+
+def clocked(left: Clocked, right: Clocked, edges: np.ndarray) -> np.ndarray:
+    """Signal moments of columns of which some depend on the time, (B, a, b).
+
+    Such a column is another one in each repetition, and products of repetitions are not its
+    square. Its instrument is the motion of the next repetition at the time of this one.
+    """
+    found = []
+    for start, stop in pairwise(edges):
+        one, two = left.columns[:, start:stop], right.columns[:, start:stop]
+        for_one, for_two = left.instruments[:, start:stop], right.instruments[:, start:stop]
+        there = np.einsum("psa,psb->ab", one, for_two, optimize=True)
+        back = np.einsum("psa,psb->ab", for_one, two, optimize=True)
+        # The torque has no instrument: what it holds of the time is its own.
+        weight = np.where(left.is_torque, 0.0, 0.5)[:, None]
+        weight = np.where(right.is_torque[None, :] & ~left.is_torque[:, None], 1.0, weight)
+        found.append((1.0 - weight) * there + weight * back)
+    return np.array(found)
+
+
+@dataclass(frozen=True)
+class Clocked:
+    """Columns of a recording that repeats, with what the time of the session does to them.
+
+    Attributes
+    ----------
+    columns : (P, S, k)
+    clock : (P, S, k) factor of each that depends on the time; 1 where none does.
+    is_torque : (k,) mask.
+    """
+
+    columns: np.ndarray
+    clock: np.ndarray
+    is_torque: np.ndarray
+
+    @property
+    def instruments(self) -> np.ndarray:
+        """Columns of the next repetition's motion at this one's time, (P, S, k)."""
+        after = np.roll(self.clock, -1, axis=0)
+        sound = np.abs(after) > 1e-12 * np.abs(self.clock).max(axis=(0, 1))
+        ratio = np.where(sound, self.clock / np.where(sound, after, 1.0), 1.0)
+        return np.roll(self.columns, -1, axis=0) * ratio
 
 
 @dataclass(frozen=True)

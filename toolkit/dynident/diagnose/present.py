@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynident.diagnose.evidence import ColumnStore, joints_of
-from dynident.diagnose.moments import Moments, Solution, solve
+from dynident.diagnose.moments import Clocked, Moments, Solution, clocked, solve
 from dynident.diagnose.noise import (
     NoiseModel,
     differences,
@@ -146,18 +146,29 @@ def _whiten(store: ColumnStore, columns, noise, values) -> tuple[tuple[np.ndarra
 
 
 def _moments(store: ColumnStore, model: Model, white) -> Moments:
-    found, timed = None, clock(model)
-    for run, joints in zip(store.runs, white, strict=True):
+    found, timed = None, timed_columns(model)
+    for r, (run, joints) in enumerate(zip(store.runs, white, strict=True)):
         parts = [run.moments(w, w) for w in joints]
         here = Moments(np.sum([p.signal for p in parts], 0), np.sum([p.total for p in parts], 0))
-        if run.kind == "repeated":
-            here = here.clocked(timed, timed)
+        if run.kind == "repeated" and timed.any():
+            own = [with_clock(store, model, r, w) for w in joints]
+            other = np.sum([clocked(one, one, run.edges) for one in own], axis=0)
+            here = here.where(timed[:, None] | timed[None, :], other)
         found = here if found is None else found + here
     assert found is not None
     return found
 
 
-def clock(model: Model) -> np.ndarray:
+def with_clock(store: ColumnStore, model: Model, run: int, white: np.ndarray) -> Clocked:
+    """Whitened columns of a model and the torque, (P, S, p + 1), with what time does to them."""
+    clock = np.ones_like(white)
+    for effect in model.effects:
+        if effect.timed:
+            clock[:, :, model.slices[effect.label]] = store.clock(effect, run)[:, :, None]
+    return Clocked(white, clock, np.arange(white.shape[2]) == model.size)
+
+
+def timed_columns(model: Model) -> np.ndarray:
     """Which of a model's columns, and the torque after them, depend on the time, (p + 1,)."""
     mask = np.zeros(model.size + 1, dtype=bool)
     for effect in model.effects:

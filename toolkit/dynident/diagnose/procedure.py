@@ -10,6 +10,7 @@ import numpy as np
 from dynident.closed_loop import Controller
 from dynident.diagnose.blunting import blunted
 from dynident.diagnose.diagnosis import Diagnosis
+from dynident.diagnose.disturbances import left_out
 from dynident.diagnose.evidence import ColumnStore
 from dynident.diagnose.held_out import on_recordings
 from dynident.diagnose.present import Present, fit_present
@@ -73,6 +74,12 @@ def diagnose(
     everything = [v for effect in candidates(given) for v in effect.variants(given.robot)]
     store.prepare([*given.effects, *everything])
     start = blunted(store, _shaped(store, given))
+    tell("looking for contacts")
+    if held is not None:
+        held.prepare(start.model.effects)
+    disturbances = left_out(store, held, start)
+    if disturbances:
+        start = blunted(store, _shaped(store, given))
     rounds = [rank(store, start, 0, tell)]
     present, found = start, []
     while len(found) < most and not _resolved(store, present):
@@ -90,7 +97,9 @@ def diagnose(
     kept = _without_superfluous(store, present, found, tell)
     if len(kept.found) < len(found):
         rounds.append(rank(store, kept.final, len(kept.found), tell))
-    search = Search(store, start, kept.final, tuple(kept.found), tuple(rounds), loop.notes)
+    search = Search(
+        store, start, kept.final, tuple(kept.found), tuple(rounds), disturbances, loop.notes
+    )
     return told(search, train, test, held)
 
 

@@ -51,6 +51,7 @@ class Run:
         versions but for the simulated one and every row of `index` is the same.
     edges : (B + 1,) blocks of instants.
     columns_from : whose motion the columns of the regression are taken along.
+    left_out : (T,) rows that are not to be judged, a contact in them; None for none.
     """
 
     kind: Kind
@@ -58,6 +59,13 @@ class Run:
     index: np.ndarray
     edges: np.ndarray
     columns_from: Literal["recording", "simulation"] = "recording"
+    left_out: np.ndarray | None = None
+
+    @property
+    def kept(self) -> np.ndarray:
+        """Rows of the recording that are judged, (T,) mask."""
+        whole = np.ones(len(self.versions[0].t), dtype=bool)
+        return whole if self.left_out is None else ~self.left_out
 
     @property
     def recording(self) -> Recording:

@@ -9,8 +9,8 @@ import numpy as np
 from scipy import stats
 
 from dynident.diagnose.evidence import ColumnStore, joints_of
-from dynident.diagnose.moments import Moments, solve
-from dynident.diagnose.present import Present, clock
+from dynident.diagnose.moments import Clocked, Moments, clocked, solve
+from dynident.diagnose.present import Present, timed_columns, with_clock
 from dynident.effects import Effect
 
 ABSORBED = 2e-3
@@ -66,6 +66,8 @@ def candidate_moments(
     (B, p + 1, k) and (B, k, k) for each variant
     """
     joints = joints_of(variants[0], present.model)
+    timed = timed_columns(present.model)
+    mixed = variants[0].timed or timed.any()
     with_model, with_self = None, None
     width = 0
     for r, run in enumerate(store.runs):
@@ -75,15 +77,20 @@ def candidate_moments(
         one, two = [], []
         for position, joint in enumerate(joints):
             white = run.whitened([s[:, position] for s in signals], joint, present.noise[joint])
-            one.append(run.moments(present.white[r][joint], white))
+            known = present.white[r][joint]
+            one.append(run.moments(known, white))
             two.append(run.moments(white, white))
+            if run.kind == "repeated" and mixed:
+                new = Clocked(white, _clock(store, variants, r), np.zeros(white.shape[2], bool))
+                old = with_clock(store, present.model, r, known)
+                chosen = timed[:, None] | np.full(white.shape[2], variants[0].timed)
+                one[-1] = one[-1].where(chosen, clocked(old, new, run.edges))
+                if variants[0].timed:
+                    two[-1] = two[-1].where(np.array(True), clocked(new, new, run.edges))
         sums = [
             Moments(np.sum([m.signal for m in part], 0), np.sum([m.total for m in part], 0))
             for part in (one, two)
         ]
-        if run.kind == "repeated":
-            own = np.full(signals[0].shape[2], variants[0].timed)
-            sums = [sums[0].clocked(clock(present.model), own), sums[1].clocked(own, own)]
         with_model = sums[0] if with_model is None else with_model + sums[0]
         with_self = sums[1] if with_self is None else with_self + sums[1]
     assert with_model is not None and with_self is not None
@@ -92,6 +99,15 @@ def candidate_moments(
         (_columns(with_model, slice(i, i + width)), _block(with_self, slice(i, i + width)))
         for i in starts
     ]
+
+
+def _clock(store: ColumnStore, variants: Sequence[Effect], run: int) -> np.ndarray:
+    """What the time of the session does to the columns of effects, (P, S, k) over all of them."""
+    factors = []
+    for effect in variants:
+        count = len(effect.parameters(store.model.robot))
+        factors += [store.clock(effect, run)] * count
+    return np.stack(factors, axis=2)
 
 
 def _columns(part: Moments, columns: slice) -> Moments:

@@ -18,6 +18,7 @@ from dynident.diagnose.diagnosis import (
     Trace,
     Verdict,
 )
+from dynident.diagnose.disturbances import Disturbance, contact_candidates
 from dynident.diagnose.evidence import ColumnStore
 from dynident.diagnose.held_out import HeldOut, on_blocks, on_recordings, with_noise_of
 from dynident.diagnose.maps import residual_maps
@@ -66,7 +67,10 @@ class Found:
 class Search:
     """What a search did: the evidence, the fits, the effects added, the ranking of each round.
 
-    `notes` are on its instruments, where they come from a simulation or could not.
+    Attributes
+    ----------
+    disturbances : contacts, left out of the evidence.
+    notes : on its instruments, where they come from a simulation or could not.
     """
 
     store: ColumnStore
@@ -74,6 +78,7 @@ class Search:
     final: Present
     found: tuple[Found, ...]
     rounds: tuple[Ranking, ...]
+    disturbances: tuple[Disturbance, ...] = ()
     notes: tuple[str, ...] = ()
 
 
@@ -118,15 +123,19 @@ def told(
         )
         for one, stage, old, new in zip(found, stages[1:], judged[:-1], judged[1:], strict=True)
     )
+    contacts = tuple(one.step(given) for one in search.disturbances)
+    first_error = contacts[0].test_error_before if contacts else before.error
+    steps = (*contacts, *steps)
     source = _noise_source(store, held)
     verdict = _verdict(before, after, steps, rounds[-1])
+    pushed = contact_candidates(given, store, search.disturbances)
     return Diagnosis(
         verdict,
         source,
         _joint_results(given, before, after),
-        TestError(before.error, after.error, after.floor),
+        TestError(first_error, after.error, after.floor),
         steps,
-        _candidates(rounds[0], before.error, start),
+        _merged(_candidates(rounds[0], before.error, start), pushed),
         _candidates(rounds[-1], after.error, stages[-1]),
         _estimate(store, start, train),
         _estimate(store, stages[-1], train),
@@ -135,6 +144,12 @@ def told(
         (*_notes(store, held, stages[-1], source), *search.notes),
         sources_of(test) if test is not None else (),
     )
+
+
+def _merged(found: tuple[Candidate, ...], pushed: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
+    """Contacts that were found first, those that were not after everything else."""
+    first = tuple(one for one in pushed if one.status == "material")
+    return (*first, *found, *(one for one in pushed if one.status != "material"))
 
 
 def _verdict(before: HeldOut, after: HeldOut, steps, last: Ranking) -> Verdict:

@@ -197,6 +197,10 @@ class Effect(ABC):
     def columns(self, block: Block) -> np.ndarray:
         """Torque per unit of each linear parameter, (T, n, k) in N m or N."""
 
+    def clock(self, block: Block) -> np.ndarray:
+        """The factor of its columns that depends on the time of the session, (T,)."""
+        return np.ones(len(block.t))
+
     def sensitivities(self, block: Block) -> np.ndarray | None:
         """Derivatives of the columns by the logarithm of each of s shape parameters.
 

@@ -50,7 +50,7 @@ class ThermalFriction(JointEffect):
 
     def at_joint(self, block: Block) -> np.ndarray:
         v = block.v[:, [block.index(self.joint)]]
-        return self._factor(block)[:, None] * np.hstack([v, block.sign(v)])
+        return self.clock(block)[:, None] * np.hstack([v, block.sign(v)])
 
     def sensitivities(self, block: Block) -> np.ndarray:
         columns = self.columns(block)
@@ -63,8 +63,7 @@ class ThermalFriction(JointEffect):
         """Return the temperature of the session's times t (T,) that this law takes, in C."""
         return COOL + SPAN * np.exp(-t / self.shape[0])
 
-    def _factor(self, block: Block) -> np.ndarray:
-        """Return h, (T,)."""
+    def clock(self, block: Block) -> np.ndarray:
         recorded = self._temperature(block)
         if recorded is None:
             return np.exp(-block.t / self.shape[0])

@@ -23,3 +23,6 @@ class TorqueDrift(JointEffect):
 
     def at_joint(self, block: Block) -> np.ndarray:
         return block.t[:, None]
+
+    def clock(self, block: Block) -> np.ndarray:
+        return block.t
