@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from dynident.diagnose.contact import WIDTHS, Bump, Repeated, _prepare, _scanned, bumps_in, without
+from dynident.diagnose.changes import Repeated, changes_of, scanned
+from dynident.diagnose.contact import WIDTHS, Bump, bumps_in, without
 from dynident.diagnose.runs import Run
 
 STEP = 0.02
@@ -30,7 +31,7 @@ def noise(rng: np.random.Generator, kind: str, speed: np.ndarray) -> np.ndarray:
     else:
         x = rng.standard_normal(speed.size + 200)
     if "coloured" in kind:
-        x = lfilter([1.0], [1.0, -rng.uniform(0.5, 0.9)], x)
+        x = np.asarray(lfilter([1.0], [1.0, -rng.uniform(0.5, 0.9)], x))
     x = (x[200:] / x[200:].std()).reshape(speed.shape)
     if "slow" in kind:
         x = x * (1 + rng.uniform(1, 5) * np.exp(-np.abs(speed) / rng.uniform(0.05, 0.3)))
@@ -105,11 +106,11 @@ def test_friction_that_falls_is_no_contact() -> None:
 
 def test_the_scan_is_the_fit_at_every_row() -> None:
     series = [s for s in data(2, "coloured slow") if s.joint == "elbow"]
-    prepared = _prepare(series, [np.zeros(INSTANTS, dtype=bool)] * len(series))[0]
+    prepared = changes_of(series, [np.zeros(INSTANTS, dtype=bool)] * len(series))[0]
     rows = np.arange(100.0, 600.0)
     for width in (WIDTHS[0] / STEP, WIDTHS[4] / STEP):
         exact = prepared.match(prepared.change, rows, width)[0]
-        np.testing.assert_allclose(_scanned(prepared, width)[100:600], exact, atol=0.01)
+        np.testing.assert_allclose(scanned(prepared, width)[100:600], exact, atol=0.01)
 
 
 def test_instants_of_a_bump_are_left_out_of_all_repetitions() -> None:

@@ -32,4 +32,4 @@ def chance_of(z: float, degrees: float, width: float) -> float:
     """
     more = max(degrees - 4.0, 0.5) * max(1.0, width / 2)
     wide = max(degrees, 4.0 + more) if width > 2 else degrees
-    return 2 * float(student.sf(z / (student.ppf(0.75, wide) / QUARTER) ** -1, wide))
+    return 2 * float(student.sf(z * student.ppf(0.75, wide) / QUARTER, wide))
