@@ -47,7 +47,8 @@ class Backlash(Effect):
     @property
     def gap(self) -> float:
         """The gap at which the column is taken."""
-        return max(self.point[0], _GAPS[0] / 100.0) if self.point else _GAPS[1]
+        given = self.point[0] if self.point else 0.0
+        return max(given, _GAPS[0] / 100.0) if given > 0 else _GAPS[1]
 
     def columns(self, block: Block) -> np.ndarray:
         _, response = self._response(block)
