@@ -66,6 +66,7 @@ class Step:
     test_error_before, test_error_after : relative torque error on the test recordings.
     indistinguishable : effects that this data cannot tell from it.
     p_value : as in `Candidate`.
+    advice : the experiment that would tell it from those; empty where there are none.
     """
 
     effect: Effect
@@ -74,6 +75,7 @@ class Step:
     test_error_after: float
     indistinguishable: tuple[Effect, ...]
     p_value: float
+    advice: str = ""
 
 
 @dataclass(frozen=True)

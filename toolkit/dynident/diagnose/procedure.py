@@ -24,7 +24,8 @@ from dynident.diagnose.search import (
 )
 from dynident.diagnose.shaping import best_shape, reshaped
 from dynident.diagnose.simulated import motion_of_loop
-from dynident.diagnose.telling import RESOLUTION, Found, Search, told
+from dynident.diagnose.telling import Found, Search, told
+from dynident.diagnose.verdict import RESOLUTION
 from dynident.effects import Effect
 from dynident.fit.estimate import Estimate
 from dynident.model import Model

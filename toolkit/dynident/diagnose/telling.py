@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dynident.diagnose.blunting import blunting_notes
 from dynident.diagnose.diagnosis import (
     Candidate,
     Diagnosis,
@@ -16,27 +15,23 @@ from dynident.diagnose.diagnosis import (
     Step,
     TestError,
     Trace,
-    Verdict,
 )
 from dynident.diagnose.disturbances import Disturbance, contact_candidates
 from dynident.diagnose.evidence import ColumnStore
+from dynident.diagnose.experiments import Adviser
 from dynident.diagnose.held_out import HeldOut, on_blocks, on_recordings, with_noise_of
 from dynident.diagnose.maps import residual_maps
 from dynident.diagnose.present import Present, fit_present, residuals
 from dynident.diagnose.runs import flagged_run
 from dynident.diagnose.scoring import Score
 from dynident.diagnose.search import Ranking
+from dynident.diagnose.verdict import noise_source, notes_on, verdict_of
 from dynident.effects import Effect
 from dynident.fit.estimate import Estimate
 from dynident.fit.least_squares import sources_of
 from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.robot import base_parameters
-
-WITHIN_NOISE = 0.3
-"""Systematic residual over noise that must be surpassed, with 99 % confidence, before anything is
-said to be missing."""
-
 
 _RANK_TOLERANCE = 1e-6  # of what comes from squares, in which half of the digits are gone
 
@@ -45,13 +40,6 @@ _METHODS: dict[NoiseSource, str] = {
     "given": "least squares corrected for the stated noise, noise whitened",
     "unknown": "least squares, weighted per joint",
 }
-
-RESOLUTION = 1e-4
-"""Share of a joint's torque below which a residual is that of differentiation and filters."""
-
-MOST_EXPLAINED = 0.8
-"""Share of the systematic square that the effects added must take away for the residual to count
-as explained although a part smaller than the noise is left of it."""
 
 
 @dataclass(frozen=True)
@@ -125,9 +113,9 @@ def told(
     )
     contacts = tuple(one.step(given) for one in search.disturbances)
     first_error = contacts[0].test_error_before if contacts else before.error
-    steps = (*contacts, *steps)
-    source = _noise_source(store, held)
-    verdict = _verdict(before, after, steps, rounds[-1])
+    steps = (*contacts, *_advised(steps, Adviser.of(store, stages[-1])))
+    source = noise_source(store, held)
+    verdict = verdict_of(before, after, steps, rounds[-1])
     pushed = contact_candidates(given, store, search.disturbances)
     return Diagnosis(
         verdict,
@@ -135,14 +123,37 @@ def told(
         _joint_results(given, before, after),
         TestError(first_error, after.error, after.floor),
         steps,
-        _merged(_candidates(rounds[0], before.error, start), pushed),
+        _revealed(_merged(_candidates(rounds[0], before.error, start), pushed), store, start),
         _candidates(rounds[-1], after.error, stages[-1]),
         _estimate(store, start, train),
         _estimate(store, stages[-1], train),
         residual_maps(given, before, after),
         _traces(given, before, after),
-        (*_notes(store, held, stages[-1], source), *search.notes),
+        (*notes_on(store, held, stages[-1], source), *search.notes),
         sources_of(test) if test is not None else (),
+    )
+
+
+def _advised(steps: tuple[Step, ...], adviser: Adviser) -> tuple[Step, ...]:
+    """Say which experiment would tell an effect from those that cannot be told from it."""
+    return tuple(
+        replace(one, advice=adviser.separating((one.effect, *one.indistinguishable), one.values))
+        if one.indistinguishable
+        else one
+        for one in steps
+    )
+
+
+def _revealed(
+    candidates: tuple[Candidate, ...], store: ColumnStore, present: Present
+) -> tuple[Candidate, ...]:
+    """Say which experiment would show what is absorbed."""
+    if not any(one.status == "absorbed" for one in candidates):
+        return candidates
+    adviser = Adviser.of(store, present)
+    return tuple(
+        replace(one, remark=adviser.revealing(one.effect)) if one.status == "absorbed" else one
+        for one in candidates
     )
 
 
@@ -150,35 +161,6 @@ def _merged(found: tuple[Candidate, ...], pushed: tuple[Candidate, ...]) -> tupl
     """Contacts that were found first, those that were not after everything else."""
     first = tuple(one for one in pushed if one.status == "material")
     return (*first, *found, *(one for one in pushed if one.status != "material"))
-
-
-def _verdict(before: HeldOut, after: HeldOut, steps, last: Ranking) -> Verdict:
-    if after.least_ratio is None or after.ratio is None or before.ratio is None:
-        if last.material:
-            return "unexplained"
-        return "explained" if steps else "nothing_missing"
-    if within_noise(after):
-        return "explained" if steps else "nothing_missing"
-    explained = 1.0 - float(np.sum(after.ratio**2) / np.sum(before.ratio**2))
-    if steps and explained >= MOST_EXPLAINED and float(after.ratio.max()) <= 1.0:
-        return "explained"
-    return "unexplained"
-
-
-def within_noise(judged: HeldOut) -> bool:
-    """Whether nothing remains at any joint but noise, and what no processing can resolve."""
-    assert judged.least_ratio is not None and judged.noise_std is not None
-    systematic = judged.least_ratio * judged.noise_std
-    matters = systematic > RESOLUTION * judged.torque_rms
-    return not np.any(matters & (judged.least_ratio > WITHIN_NOISE))
-
-
-def _noise_source(store: ColumnStore, held: ColumnStore | None) -> NoiseSource:
-    """Where the noise floor that is reported comes from."""
-    kinds = {run.kind for run in (*store.runs, *(held.runs if held else ()))}
-    if "repeated" in kinds:
-        return "replicates"
-    return "given" if "perturbed" in kinds else "unknown"
 
 
 def _joint_results(given: Model, before: HeldOut, after: HeldOut) -> tuple[JointResult, ...]:
@@ -254,7 +236,7 @@ def _method(store: ColumnStore) -> str:
     """How the model was fitted, in words."""
     if store.runs[0].columns_from == "simulation":
         return "instrumental variables from the simulated closed loop"
-    return _METHODS[_noise_source(store, None)]
+    return _METHODS[noise_source(store, None)]
 
 
 def _traces(given: Model, before: HeldOut, after: HeldOut) -> tuple[Trace, ...]:
@@ -291,31 +273,3 @@ def _decide_payload(held: ColumnStore, present: Present) -> None:
         run if said else flagged_run(run, with_load < without)
         for run, said, without, with_load in zip(held.runs, stated, *sums, strict=True)
     )
-
-
-def _notes(store, held, present: Present, source: NoiseSource) -> tuple[str, ...]:
-    notes = []
-    if held is None:
-        notes.append("No test recordings: errors are those of held-out blocks of time.")
-    elif source != "unknown" and all(run.kind == "single" for run in held.runs):
-        notes.append("The test recordings do not repeat: the noise is that of the training ones.")
-    if source == "given":
-        notes.append("The noise is the study's word, not measured: record a repeated motion.")
-    simulated = store.runs[0].columns_from == "simulation"
-    if _noise_source(store, None) == "unknown" and simulated:
-        notes.append(
-            "Nothing repeats in the training recordings and no noise is stated: the instruments "
-            "are simulated, and there is no noise floor."
-        )
-    elif _noise_source(store, None) == "unknown":
-        floor = ", and no noise floor" if source == "unknown" else ""
-        notes.append(
-            "Nothing repeats in the training recordings and no noise is stated: plain least "
-            f"squares, whose columns carry noise{floor}. Small effects may be false; record a "
-            "repeated motion."
-        )
-    if any("payload" in effect.needs for effect in present.model.effects):
-        carriers = [r.recording.name for r in store.runs if r.recording.payload]
-        carriers += [r.recording.name for r in (held.runs if held else ()) if r.recording.payload]
-        notes.append(f"Payload carried in: {', '.join(carriers)}.")
-    return (*notes, *blunting_notes(present))

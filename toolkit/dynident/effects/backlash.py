@@ -36,7 +36,7 @@ class Backlash(Effect):
         return (Parameter("gap", motion_unit(robot, self.joint), 0.0),)
 
     def shape_parameters(self, robot):
-        sides = ShapeParameter("resonance", "Hz", (20.0, 50.0), RESONANCE.lower, RESONANCE.upper)
+        sides = ShapeParameter("resonance", "Hz", (30.0,), RESONANCE.lower, RESONANCE.upper)
         return (sides, DAMPING, ROTOR_SHARE)
 
     def variants(self, robot) -> Iterator[Backlash]:

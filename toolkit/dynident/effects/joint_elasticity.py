@@ -15,10 +15,10 @@ from dynident.effects.base import (
 from dynident.effects.driven import DrivenLink, Response, Transmitting, mean_inertia, stacked
 from dynident.effects.transmission import Transmission
 
-RESONANCE = ShapeParameter("resonance", "Hz", (5.0, 10.0, 20.0, 40.0, 80.0), 2.0, 200.0)
+RESONANCE = ShapeParameter("resonance", "Hz", (5.0, 12.0, 30.0, 80.0), 2.0, 200.0)
 """Of the link against the locked motor, at the mean of its inertia."""
 DAMPING = ShapeParameter("damping", "1", (0.1,), 0.002, 2.0)
-ROTOR_SHARE = ShapeParameter("rotor_share", "1", (0.1, 0.5), 0.005, 0.95)
+ROTOR_SHARE = ShapeParameter("rotor_share", "1", (0.3,), 0.005, 0.95)
 """Share of the motor in the inertia that moves with the joint."""
 
 
