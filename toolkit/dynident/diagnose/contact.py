@@ -27,7 +27,7 @@ The noise is measured with the place that stands out most left out, and tails ar
 values of healthy data come out up to a hundred times too small. Those of pushes that matter are
 smaller by many powers of ten.
 """
-WIDTHS = tuple(float(w) for w in np.geomspace(0.02, 0.6, 9))
+WIDTHS = tuple(float(w) for w in np.geomspace(0.025, 0.6, 6))
 """s, of the bumps that are searched."""
 
 _MOST = 8  # bumps in one diagnosis: beyond that it is no contact but noise of another kind
@@ -141,11 +141,14 @@ def _best(data: Sequence[Repeated]) -> Bump | None:
         places = _places(changes_of(series, [np.zeros(s.t.shape[1], dtype=bool) for s in series]))
         if not places:
             continue
-        # Once more, by noise measured without what stands out most.
         peak = min(places)
+        positions += sum(place.tried for place in places)
+        if peak.chance * positions > 1.0:
+            found.append(peak)
+            continue
+        # Once more, by noise measured without what stands out most.
         places = _places(changes_of(series, [_about(peak, k, s) for k, s in enumerate(series)]))
         found += places
-        positions += sum(place.tried for place in places)
     if not found:
         return None
     best = min(found)
