@@ -58,12 +58,32 @@ class Changes:
     change : (P S,) what each repetition does not share with the others.
     still : (P S,) one over the noise's local standard deviation.
     colour : (ORDER + 1,) whitening filter.
+    kept : (S,) instants to which the slow changes were fitted.
     """
 
     of: Repeated
     change: np.ndarray
     still: np.ndarray
     colour: np.ndarray
+    kept: np.ndarray
+
+    def certainty(self, row: float, width: float) -> float:
+        """Share of a bump's z value that is left for not knowing the slow changes exactly.
+
+        Parameters
+        ----------
+        row, width : of the bump, in rows.
+        """
+        instants = len(self.kept)
+        p = int(row // instants)
+        own = slice(p * instants, (p + 1) * instants)
+        bump = np.exp(-(((np.arange(own.start, own.stop) - row) / width) ** 2) / 2)
+        columns = np.column_stack([bump, *_slow(self.of.speed[p]).T]) * self.still[own, None]
+        white = np.asarray(lfilter(self.colour, [1.0], columns, axis=0))
+        bump, slow = white[:, 0], white[:, 1:]
+        along = slow.T @ bump
+        unknown = along @ np.linalg.pinv(slow[self.kept].T @ slow[self.kept], 1e-10) @ along
+        return float(1.0 / np.sqrt(1.0 + unknown / max(float(bump @ bump), 1e-300)))
 
     def match(self, signal: np.ndarray, rows: np.ndarray, width: float) -> np.ndarray:
         """Fit bumps of a width (in rows) at rows (M,), any real numbers, to a signal (P S,).
@@ -120,9 +140,9 @@ def changes_of(series: Sequence[Repeated], left_out: Sequence[np.ndarray]) -> li
     # Noise follows the speed itself, or, once filtered, the least speed near by.
     for measure in (np.abs, _slowness):
         speeds = [measure(one.speed).ravel() for one in series]
-        sizes = [np.abs(c * i)[k] for c, i, k in zip(changes, still, kept, strict=True)]
-        witnesses = [s[k] for s, k in zip(speeds, kept, strict=True)]
-        at, scales = _scales(np.concatenate(sizes), np.concatenate(witnesses))
+        sizes = [np.abs(c * i) for c, i in zip(changes, still, strict=True)]
+        # All rows: those left out may be the only ones that turn round, say.
+        at, scales = _scales(np.concatenate(sizes), np.concatenate(speeds))
         still = [i / np.interp(s, at, scales) for i, s in zip(still, speeds, strict=True)]
     stretches = []
     for change, own, keep in zip(changes, still, kept, strict=True):
@@ -134,8 +154,8 @@ def changes_of(series: Sequence[Repeated], left_out: Sequence[np.ndarray]) -> li
     noise = measure_noise(stretches, [np.zeros(len(part)) for part in stretches])
     colour = noise.colour / noise.std
     return [
-        Changes(one, change, own, colour)
-        for one, change, own in zip(series, changes, still, strict=True)
+        Changes(one, change, own, colour, ~out)
+        for one, change, own, out in zip(series, changes, still, left_out, strict=True)
     ]
 
 
@@ -149,7 +169,7 @@ def _changes(one: Repeated, kept: np.ndarray) -> np.ndarray:
     others = (one.residual.sum(axis=0) - one.residual) / (count - 1)
     found = one.residual - others
     for change, v in zip(found, one.speed, strict=True):
-        columns = np.column_stack([np.ones_like(v), v, np.tanh(v / FRICTION_WIDTH)])
+        columns = _slow(v)
         weight, rest = kept.astype(float), change
         for step in range(10):
             root = np.sqrt(weight)
@@ -163,6 +183,11 @@ def _changes(one: Repeated, kept: np.ndarray) -> np.ndarray:
             weight = kept * (huber if step < 4 else tukey)
         change[:] = rest
     return found.ravel()
+
+
+def _slow(speed: np.ndarray) -> np.ndarray:
+    """Columns of what may change from repetition to repetition: a level and friction, (S, 3)."""
+    return np.column_stack([np.ones_like(speed), speed, np.tanh(speed / FRICTION_WIDTH)])
 
 
 def _slowness(speed: np.ndarray) -> np.ndarray:

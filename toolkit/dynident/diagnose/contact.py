@@ -188,8 +188,10 @@ def _places(prepared: Sequence[Changes]) -> list[_Place]:
         best = int(np.argmax(tried.z))
         k = int(tried.series[best])
         rows = width / prepared[k].of.step
-        chance = chance_of(float(tried.z[best]), degrees, rows)
-        found.append(_Place(chance, k, float(tried.rows[best]), rows, len(tried.z), prepared[k]))
+        row = float(tried.rows[best])
+        z = float(tried.z[best]) * prepared[k].certainty(row, rows)
+        chance = chance_of(z, degrees, rows)
+        found.append(_Place(chance, k, row, rows, len(tried.z), prepared[k]))
     return found
 
 
