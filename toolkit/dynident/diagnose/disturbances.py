@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from dynident.diagnose.contact import Bump, find_contacts, without
 from dynident.diagnose.diagnosis import Candidate, Step
 from dynident.diagnose.evidence import ColumnStore
 from dynident.diagnose.held_out import on_recordings
 from dynident.diagnose.present import Present
+from dynident.diagnose.runs import Run
 from dynident.effects import Effect, catalogue
 from dynident.model import Model
 
@@ -35,31 +37,103 @@ class Disturbance:
         )
 
 
-def left_out(
-    store: ColumnStore, held: ColumnStore | None, present: Present
-) -> tuple[Disturbance, ...]:
-    """Find contacts in the recordings, and leave their instants out of both stores.
+@dataclass(frozen=True)
+class Contacts:
+    """The contacts in the recordings of a diagnosis.
 
-    One disturbance a joint is told, the clearest; all are left out.
-
-    Parameters
+    Attributes
     ----------
-    store, held : training and test recordings; their runs are replaced.
-    present : the model as it fits the training recordings.
+    store, held : training and test recordings; `held` is None where there are none.
+    whole, whole_held : their runs with nothing left out.
+    bumps, bumps_held : what was found in them.
     """
-    found: list[Disturbance] = []
-    judged = held if held is not None else store
-    for one in (store, held) if held is not None else (store,):
-        for bump in find_contacts(one, present):
-            before = on_recordings(judged, present).error
-            here = one.runs[bump.run]
-            one.runs = (*one.runs[: bump.run], without(here, [bump]), *one.runs[bump.run + 1 :])
-            after = on_recordings(judged, present).error
-            found.append(Disturbance(bump, before, after))
-    clearest: dict[str, Disturbance] = {}
-    for one in sorted(found, key=lambda d: d.bump.p_value):
-        clearest.setdefault(one.bump.joint, one)
-    return tuple(clearest.values())
+
+    store: ColumnStore
+    held: ColumnStore | None
+    whole: tuple[Run, ...]
+    whole_held: tuple[Run, ...]
+    bumps: tuple[Bump, ...]
+    bumps_held: tuple[Bump, ...]
+
+    @classmethod
+    def leave_out(cls, store: ColumnStore, held: ColumnStore | None, present: Present) -> Contacts:
+        """Find contacts in the recordings and leave their instants out of both stores.
+
+        Parameters
+        ----------
+        store, held : their runs are replaced.
+        present : the model as it fits the training recordings.
+        """
+        whole, whole_held = store.runs, held.runs if held is not None else ()
+        bumps = find_contacts(store, present)
+        bumps_held = find_contacts(held, present) if held is not None else ()
+        found = cls(store, held, whole, whole_held, bumps, bumps_held)
+        found._leave(bumps, bumps_held)
+        return found
+
+    def confirmed(self, present: Present) -> Contacts:
+        """Keep the contacts that a better model still shows, and leave only these out.
+
+        What a poor model lacks is not quite the same in every repetition, as motions are not, and
+        may look like a contact.
+        """
+        if not (self.bumps or self.bumps_held):
+            return self
+        self._leave((), ())
+        again = find_contacts(self.store, present) if self.bumps else ()
+        again_held = ()
+        if self.held is not None and self.bumps_held:
+            again_held = find_contacts(self.held, present)
+        bumps, bumps_held = _common(again, self.bumps), _common(again_held, self.bumps_held)
+        self._leave(bumps, bumps_held)
+        return replace(self, bumps=bumps, bumps_held=bumps_held)
+
+    def told(self, present: Present) -> tuple[Disturbance, ...]:
+        """One disturbance a joint, the clearest, with the error before and after it is left out."""
+        judged = self.held or self.store
+        clearest: dict[str, Bump] = {}
+        for bump in sorted((*self.bumps, *self.bumps_held), key=lambda one: one.p_value):
+            clearest.setdefault(bump.joint, bump)
+        if not clearest:
+            return ()
+        self._leave((), ())
+        before = on_recordings(judged, present).error
+        self._leave(self.bumps, self.bumps_held)
+        after = on_recordings(judged, present).error
+        told = []
+        for bump in clearest.values():
+            told.append(Disturbance(bump, before, after))
+            before = after
+        return tuple(told)
+
+    def _leave(self, bumps: Sequence[Bump], bumps_held: Sequence[Bump]) -> None:
+        self.store.runs = _masked(self.store.runs, self.whole, bumps)
+        if self.held is not None:
+            self.held.runs = _masked(self.held.runs, self.whole_held, bumps_held)
+
+
+def _masked(
+    runs: tuple[Run, ...], whole: tuple[Run, ...], bumps: Sequence[Bump]
+) -> tuple[Run, ...]:
+    """Runs as they are now, with these bumps and no others left out."""
+    found = []
+    for r, (run, original) in enumerate(zip(runs, whole, strict=True)):
+        again = replace(run, index=original.index, edges=original.edges, left_out=None)
+        found.append(without(again, [bump for bump in bumps if bump.run == r]))
+    return tuple(found)
+
+
+def _common(bumps: Sequence[Bump], others: Sequence[Bump]) -> tuple[Bump, ...]:
+    """Bumps that are among others too, at about the same time."""
+    return tuple(
+        one
+        for one in bumps
+        if any(
+            (one.run, one.joint, one.repetition) == (two.run, two.joint, two.repetition)
+            and abs(one.time - two.time) <= 2.0 * (one.width + two.width)
+            for two in others
+        )
+    )
 
 
 def contact_candidates(

@@ -34,6 +34,7 @@ class ColumnStore:
     _now: Hashable = None
     _present: dict[Hashable, Signals] = field(default_factory=dict)
     _blocks: dict[Hashable, Block] = field(default_factory=dict)
+    _screened: dict[Hashable, Signals] = field(default_factory=dict)
     _simulation: ColumnStore | None = None
 
     @property
@@ -94,6 +95,7 @@ class ColumnStore:
         """Take runs whose last versions, the simulated motions, are new."""
         wanted = list(self._simulation._known) if self._simulation else []
         self.runs, self._simulation, self._now = runs, None, None
+        self.look_again()
         fresh = self.simulation
         assert fresh is not None
         fresh.prepare(dict.fromkeys([*wanted, *self._known]))
@@ -122,6 +124,22 @@ class ColumnStore:
         if effect not in self._known:
             self._known[effect] = [[self._plain(effect, v) for v in r.versions] for r in self.runs]
         return self._known[effect][run]
+
+    def screening(self, effect: Effect, run: int, model: Model, values: np.ndarray) -> Signals:
+        """As `of`, but as the first model of this diagnosis had them; for a first look only.
+
+        Columns that depend on the predicted torque or on the bodies cost an inverse dynamics of
+        the whole recording, and change little as effects are added.
+        """
+        if effect.linear_in_torque or not effect.needs & {"torque", "body"}:
+            return self.of(effect, run, model, values)
+        if (effect, run) not in self._screened:
+            self._screened[effect, run] = self.of(effect, run, model, values)
+        return self._screened[effect, run]
+
+    def look_again(self) -> None:
+        """Let `screening` evaluate everything anew: the model has become another one."""
+        self._screened.clear()
 
     def clock(self, effect: Effect, run: int) -> np.ndarray:
         """The factor of an effect's columns that depends on the time, folded, (P, S)."""

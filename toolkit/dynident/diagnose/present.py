@@ -21,7 +21,7 @@ from dynident.model import Model
 
 _ROUNDS = 3  # fit, measure the noise, fit again: the noise model settles at once
 _PRESENT_ROUNDS = 30  # at most, until columns that depend on the model's values settle as well
-_PRESENT_TOLERANCE = 1e-6
+_PRESENT_TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True)

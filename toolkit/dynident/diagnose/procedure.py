@@ -10,7 +10,7 @@ import numpy as np
 from dynident.closed_loop import Controller
 from dynident.diagnose.blunting import blunted
 from dynident.diagnose.diagnosis import Diagnosis
-from dynident.diagnose.disturbances import left_out
+from dynident.diagnose.disturbances import Contacts
 from dynident.diagnose.evidence import ColumnStore
 from dynident.diagnose.held_out import on_recordings
 from dynident.diagnose.present import Present, fit_present
@@ -35,6 +35,7 @@ from dynident.threads import single_threaded
 MOST_EFFECTS = 8
 """Effects that are added at most."""
 
+_ANOTHER = 0.1  # of the torque that must be explained for a model to be another one
 _FIRST_SHARE = 0.75  # of an effect's drop that a simpler one in it explains, to be named first
 
 
@@ -78,8 +79,8 @@ def diagnose(
     tell("looking for contacts")
     if held is not None:
         held.prepare(start.model.effects)
-    disturbances = left_out(store, held, start)
-    if disturbances:
+    contacts = Contacts.leave_out(store, held, start)
+    if contacts.bumps:
         start = blunted(store, _shaped(store, given))
     rounds = [rank(store, start, 0, tell)]
     present, found = start, []
@@ -91,6 +92,8 @@ def diagnose(
         found.append(chosen)
         _carry(store, chosen.score)
         present = blunted(store, _refitted(store, present.model + chosen.score.effect))
+        if _has_changed(store, start, present):
+            store.look_again()
         if loop.renew(store, present):
             present = blunted(store, _refitted(store, present.model))
         rounds.append(rank(store, present, len(found), tell))
@@ -98,10 +101,21 @@ def diagnose(
     kept = _without_superfluous(store, present, found, tell)
     if len(kept.found) < len(found):
         rounds.append(rank(store, kept.final, len(kept.found), tell))
+    sure = contacts.confirmed(kept.final)
+    if sure.bumps != contacts.bumps:
+        start = fit_present(store, start.model)
+        kept = replace(kept, final=fit_present(store, kept.final.model))
+    disturbances = sure.told(start)
     search = Search(
         store, start, kept.final, tuple(kept.found), tuple(rounds), disturbances, loop.notes
     )
     return told(search, train, test, held)
+
+
+def _has_changed(store: ColumnStore, start: Present, present: Present) -> bool:
+    """Whether effects have changed the predicted torque enough to look at candidates again."""
+    before, now = (on_recordings(store, one) for one in (start, present))
+    return now.error < before.error - _ANOTHER
 
 
 def _resolved(store: ColumnStore, present: Present) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,10 +11,16 @@ from scipy import stats
 from dynident.diagnose.evidence import ColumnStore, joints_of
 from dynident.diagnose.moments import Clocked, Moments, clocked, solve
 from dynident.diagnose.present import Present, timed_columns, with_clock
+from dynident.diagnose.runs import Signals
 from dynident.effects import Effect
+from dynident.model import Model
 
 ABSORBED = 2e-3
 """Share of an effect's columns (in norm) left beside the model, below which it is absorbed."""
+
+
+Columns = Callable[[Effect, int, Model, np.ndarray], Signals]
+"""Columns of an effect in a run, for a model and its values, as `ColumnStore.of`."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +57,10 @@ class Score:
 
 
 def candidate_moments(
-    store: ColumnStore, present: Present, variants: Sequence[Effect]
+    store: ColumnStore,
+    present: Present,
+    variants: Sequence[Effect],
+    columns_of: Columns | None = None,
 ) -> list[tuple[Moments, Moments]]:
     """Moments of columns with the model's and the torque, and with themselves.
 
@@ -60,18 +69,20 @@ def candidate_moments(
     Parameters
     ----------
     variants : one effect at one place, with any number of shapes.
+    columns_of : where columns come from; `ColumnStore.of` by default.
 
     Returns
     -------
     (B, p + 1, k) and (B, k, k) for each variant
     """
     joints = joints_of(variants[0], present.model)
+    look = columns_of or store.of
     timed = timed_columns(present.model)
     mixed = variants[0].timed or timed.any()
     with_model, with_self = None, None
     width = 0
     for r, run in enumerate(store.runs):
-        each = [store.of(effect, r, present.model, present.values) for effect in variants]
+        each = [look(effect, r, present.model, present.values) for effect in variants]
         width = each[0][0].shape[2]
         signals = [np.concatenate(shapes, axis=2) for shapes in zip(*each, strict=True)]
         one, two = [], []

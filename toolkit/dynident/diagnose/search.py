@@ -30,6 +30,7 @@ LEAST_SHARE = (0.006, 0.02)
 
 _CONFIDENT = 1.5  # standard errors of the held-out gain
 _MOST_BLOCKS = 0.65  # share of blocks in which the held-out residual must fall otherwise
+_HOPELESS = 0.2  # corrected p value above which no better shape makes an effect significant
 QUIET = "nothing is left to explain at {}"
 _QUIET = 0.15  # systematic residual over noise below which driven responses are not evaluated
 _ALIKE = 0.015  # two drops within this share of the larger are alike
@@ -101,6 +102,8 @@ def rank(
     for i in range(min(CONTENDERS, len(best))):
         if best[i].absorbed:
             break
+        if best[i].p_value * tests > _HOPELESS:
+            continue
         tell(f"{best[i].effect.label}, cross-validated")
         best[i] = _confirm(store, present, best[i])
     best.sort(key=lambda s: -s.penalised)
@@ -181,7 +184,7 @@ def _score_variants(store: ColumnStore, present: Present, effect: Effect) -> Ite
             yield one if not _impossible(one, present.model) else replace(one, penalised=-np.inf)
         return
     shapes = list(effect.variants(present.model.robot))
-    found = candidate_moments(store, present, shapes)
+    found = candidate_moments(store, present, shapes, store.screening)
     for shaped, parts in zip(shapes, found, strict=True):
         yield score(present, shaped, *parts, grid=len(shapes))
 
