@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import lfilter
 
 from dynident.diagnose.changes import Repeated, changes_of, scanned
-from dynident.diagnose.contact import WIDTHS, Bump, bumps_in, without
+from dynident.diagnose.contact import LEVEL, WIDTHS, Bump, bumps_in, without
 from dynident.diagnose.runs import Run
 
 STEP = 0.02
@@ -62,12 +62,14 @@ def pushed(series: list[Repeated], k: int, p: int, time: float, width: float, he
 @pytest.mark.parametrize("seed", range(3))
 def test_one_burst_is_found_where_it_is_and_nowhere_else(kind: str, seed: int) -> None:
     time = 50.0 + STEP * INSTANTS * 2 + 1.7
-    (bump,) = bumps_in(pushed(data(seed, kind), 3, 2, time, 0.2, 5.0))
+    # Slow noise of the same size hides more.
+    height = 9.0 if kind == "coloured" else 5.0
+    (bump,) = bumps_in(pushed(data(seed, kind), 3, 2, time, 0.2, height))
     assert (bump.run, bump.number, bump.repetition, bump.joint) == (1, 2, 2, "elbow")
     assert bump.time == pytest.approx(time, abs=0.2)
     assert 0.1 < bump.width < 0.4
-    assert bump.amplitude == pytest.approx(5.0, rel=0.5)
-    assert bump.p_value < 1e-4
+    assert bump.amplitude == pytest.approx(height, rel=0.5)
+    assert bump.p_value < LEVEL
 
 
 @pytest.mark.parametrize("p", [0, 1])

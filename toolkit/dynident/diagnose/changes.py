@@ -68,7 +68,10 @@ class Changes:
     kept: np.ndarray
 
     def certainty(self, row: float, width: float) -> float:
-        """Share of a bump's z value that is left for not knowing the slow changes exactly.
+        """Share of a bump's z value that is left for two doubts.
+
+        The slow changes are not known exactly. And one sample that is far out is no bump: what is
+        left of z without the sample that speaks for it most.
 
         Parameters
         ----------
@@ -78,12 +81,19 @@ class Changes:
         p = int(row // instants)
         own = slice(p * instants, (p + 1) * instants)
         bump = np.exp(-(((np.arange(own.start, own.stop) - row) / width) ** 2) / 2)
-        columns = np.column_stack([bump, *_slow(self.of.speed[p]).T]) * self.still[own, None]
+        columns = np.column_stack([self.change[own], bump, *_slow(self.of.speed[p]).T])
+        columns = columns * self.still[own, None]
         white = np.asarray(lfilter(self.colour, [1.0], columns, axis=0))
-        bump, slow = white[:, 0], white[:, 1:]
+        change, bump, slow = white[:, 0], white[:, 1], white[:, 2:]
+        power = max(float(bump @ bump), 1e-300)
         along = slow.T @ bump
         unknown = along @ np.linalg.pinv(slow[self.kept].T @ slow[self.kept], 1e-10) @ along
-        return float(1.0 / np.sqrt(1.0 + unknown / max(float(bump @ bump), 1e-300)))
+        parts = bump * change
+        total = float(parts.sum())
+        largest = int(np.argmax(parts * np.sign(total)))
+        rest = max(power - float(bump[largest] ** 2), 1e-300)
+        alone = (total - float(parts[largest])) / total * np.sqrt(power / rest) if total else 1.0
+        return float(np.clip(alone, 0.0, 1.0) / np.sqrt(1.0 + unknown / power))
 
     def match(self, signal: np.ndarray, rows: np.ndarray, width: float) -> np.ndarray:
         """Fit bumps of a width (in rows) at rows (M,), any real numbers, to a signal (P S,).

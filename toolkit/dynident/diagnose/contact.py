@@ -23,14 +23,14 @@ from dynident.diagnose.tails import QUARTER, chance_of, degrees_of_freedom
 LEVEL = 1e-6
 """p value below which a bump is a contact.
 
-The noise is measured with the place that stands out most left out, and tails are extrapolated: p
-values of healthy data come out up to a hundred times too small. Those of pushes that matter are
-smaller by many powers of ten.
+The noise is measured without the place that stands out most: p values of healthy data come out too
+small, up to a hundred times. Those of pushes that matter are smaller by many powers of ten.
 """
 WIDTHS = tuple(float(w) for w in np.geomspace(0.025, 0.6, 6))
 """s, of the bumps that are searched."""
 
 _MOST = 8  # bumps in one diagnosis: beyond that it is no contact but noise of another kind
+_WORTH_A_LOOK = 2e-3  # probability at the one place that stands out most
 _SHARE = 1 / 12  # of a repetition, the widest bump: it must not be most of what is compared
 _STRIDE = 0.25  # of a width, from one position to the next
 _PEAKS = 5  # positions, with what surrounds them, that are no witnesses of the noise
@@ -143,7 +143,8 @@ def _best(data: Sequence[Repeated]) -> Bump | None:
             continue
         peak = min(places)
         positions += sum(place.tried for place in places)
-        if peak.chance * positions > 1.0:
+        # A burst hides behind itself at first: in the slow changes and in the noise's scale.
+        if peak.chance > _WORTH_A_LOOK:
             found.append(peak)
             continue
         # Once more, by noise measured without what stands out most.
