@@ -35,6 +35,7 @@ class ColumnStore:
     _present: dict[Hashable, Signals] = field(default_factory=dict)
     _blocks: dict[Hashable, Block] = field(default_factory=dict)
     _screened: dict[Hashable, Signals] = field(default_factory=dict)
+    _full: dict[Hashable, np.ndarray] = field(default_factory=dict)
     _simulation: ColumnStore | None = None
 
     @property
@@ -95,6 +96,7 @@ class ColumnStore:
         """Take runs whose last versions, the simulated motions, are new."""
         wanted = list(self._simulation._known) if self._simulation else []
         self.runs, self._simulation, self._now = runs, None, None
+        self._full.clear()
         self.look_again()
         fresh = self.simulation
         assert fresh is not None
@@ -193,10 +195,41 @@ class ColumnStore:
             return self._blocks[key]
         block = model.ready(effect, sampled.block(model, rigid=False), values)
         if "torque" in effect.needs:
-            block = replace(block, torque=model.torque_without_loads(block, values))
+            block = replace(block, torque=self._torque(effect, run, version, block, model, values))
         if sampled.motion.samples <= _SHARED:
             self._blocks[key] = block
         return block
+
+    def _torque(
+        self,
+        effect: Effect,
+        run: int,
+        version: int,
+        block: Block,
+        model: Model,
+        values: np.ndarray,
+    ) -> np.ndarray:
+        """Predicted torque at the full rate, (T, n), but for effects that depend on it.
+
+        A fit whose own columns depend on it asks again and again: then the rigid body's columns are
+        kept, of which the torque is a product.
+        """
+        changes_bodies = any("body" in e.needs for e in model.effects)
+        if effect not in model or changes_bodies or len(block.t) > _SHARED:
+            return model.torque_without_loads(block, values)
+        base, tip = list(model.base.independent), 10 * (model.robot.tip % model.robot.n)
+        if (run, version) not in self._full:
+            whole = model.robot.regressor(block.q, block.v, block.a)
+            self._full[run, version] = whole[:, :, [*base, *range(tip, tip + 10)]]
+        rigid = self._full[run, version]
+        torque = rigid[:, :, : len(base)] @ values[: len(base)]
+        for one in model.effects:
+            own = values[model.slices[one.label]]
+            if "payload" in one.needs:
+                torque = torque + rigid[:, :, len(base) :] @ own * float(block.carries_payload)
+            elif "torque" not in one.needs:
+                torque = torque + one.columns(block) @ own
+        return torque
 
     def _rows(self, version: Sampled) -> Block:
         return self.model.block(version.t, version.q, version.v, version.a, rigid=False)
