@@ -20,6 +20,7 @@ REACH = 4.0
 
 _QUANTILES = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0)  # of speeds: noise is worst at rest
 _FEWEST = 40  # samples that show a scale
+_WHITE = 0.3  # of the noise's size, white: where filters leave nothing, nothing is to be found
 _CLIP = 3.0  # standard deviations beyond which a sample tells nothing of the noise
 
 
@@ -161,8 +162,10 @@ def changes_of(series: Sequence[Repeated], left_out: Sequence[np.ndarray]) -> li
         parts = zip(np.split(clipped, borders), np.split(keep, borders), strict=True)
         stretches += [part for part, inside in parts if inside[0] and len(part) > 2 * ORDER]
     # The scale is in `still` already: of this model only the colour is used.
-    noise = measure_noise(stretches, [np.zeros(len(part)) for part in stretches])
-    colour = noise.colour / noise.std
+    size = float(np.sqrt(np.mean(np.concatenate(stretches) ** 2)))
+    no_speed = [np.zeros(len(part)) for part in stretches]
+    noise = measure_noise(stretches, no_speed, _WHITE * size)
+    colour = noise.colour / (noise.std * noise.scales[0])
     return [
         Changes(one, change, own, colour, ~out)
         for one, change, own, out in zip(series, changes, still, left_out, strict=True)
