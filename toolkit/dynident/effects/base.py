@@ -82,7 +82,7 @@ class Effect(ABC):
     contains: ClassVar[tuple[str, ...]] = ()
     """Simpler effects whose columns are among this one's."""
     stands_in_for: ClassVar[tuple[str, ...]] = ()
-    """Those of `contains` whose column may belong to either: they are named first where they do
+    """Simpler effects whose columns it has, or may seem to have: they are named first where they do
     most of the work."""
     needs: ClassVar[frozenset[str]] = frozenset()
     """What `Block` must carry: "rigid", "torque", "body"; "whole" where it must be the whole

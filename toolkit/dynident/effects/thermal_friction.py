@@ -31,6 +31,8 @@ class ThermalFriction(JointEffect):
 
     name = "thermal_friction"
     timed = True
+    # Where the session is short beside T nothing warms up, and these two are what it looks like.
+    stands_in_for = ("viscous_friction", "coulomb_friction")
     law = "h (Fvt v + Fct sign(v)), h = exp(-t/T) or (temperature - 25 C)/10 K"
     sign_of = "slopes and steps against velocity that change in the course of the session"
     confounded_with = ("viscous_friction", "coulomb_friction", "torque_drift")
