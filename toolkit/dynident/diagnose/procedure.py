@@ -29,12 +29,14 @@ from dynident.diagnose.verdict import RESOLUTION
 from dynident.effects import Effect
 from dynident.fit.estimate import Estimate
 from dynident.model import Model
-from dynident.recording import Dataset
+from dynident.recording import Dataset, numbered
 from dynident.threads import single_threaded
 
 MOST_EFFECTS = 8
 """Effects that are added at most."""
 
+_REFITS = 4  # of shapes whose columns depend on the bodies
+_GAINED = 0.02  # share of the systematic square that another refit must take away
 _ANOTHER = 0.1  # of the torque that must be explained for a model to be another one
 _FIRST_SHARE = 0.75  # of an effect's drop that a simpler one in it explains, to be named first
 
@@ -68,6 +70,8 @@ def diagnose(
         If a recording is too short, or does not repeat with its period.
     """
     given = model.model if isinstance(model, Estimate) else model
+    train, *others = numbered(train, *([] if test is None else [test]))
+    test = others[0] if others else None
     tell("reading the motion")
     loop = motion_of_loop(given, train, controller, tell)
     store = ColumnStore(given, loop.runs or gather(train))
@@ -175,15 +179,26 @@ def _shaped(store: ColumnStore, model: Model) -> Present:
 
 
 def _refitted(store: ColumnStore, model: Model) -> Present:
-    """Fit a model, each shape parameter refined with the others as they are."""
+    """Fit a model, each shape parameter refined with the others as they are.
+
+    Responses that depend on the bodies are refined again with the bodies that come out, which were
+    others while the effect was missing, until nothing is gained.
+    """
     present = fit_present(store, model)
-    shaped = [e for e in model.effects if e.shape_parameters(model.robot)]
-    if len(shaped) < 2:
-        return present
-    for effect in shaped:
-        others = fit_present(store, present.model - effect)
-        better = reshaped(store, others, effect)
-        present = fit_present(store, present.model.with_shapes((better,)))
+    shaped = [e.label for e in model.effects if e.shape_parameters(model.robot)]
+    driven = [e.label for e in model.effects if {"body", "whole"} <= e.needs]
+    for again in range(_REFITS if driven else 1):
+        labels = shaped if again == 0 and len(shaped) > 1 else driven
+        before = present
+        for label in labels:
+            effect = next(e for e in present.model.effects if e.label == label)
+            others = fit_present(store, present.model - effect)
+            better = reshaped(store, others, present, effect).effect
+            trial = fit_present(store, present.model.with_shapes((better,)))
+            if trial.error_signal < present.error_signal:
+                present = trial
+        if before.error_signal - present.error_signal < _GAINED * before.error_signal:
+            break
     return present
 
 

@@ -16,7 +16,7 @@ from dynident.diagnose.present import Present, residuals
 from dynident.diagnose.runs import Run
 from dynident.diagnose.scoring import Score, candidate_moments, carried, cross_validate, score
 from dynident.diagnose.shaping import refined
-from dynident.effects import Effect, catalogue
+from dynident.effects import Block, Effect, catalogue
 from dynident.model import Model
 
 CONTENDERS = 6
@@ -183,10 +183,18 @@ def _score_variants(store: ColumnStore, present: Present, effect: Effect) -> Ite
             # A load has mass: of two complementary choices only one can be meant.
             yield one if not _impossible(one, present.model) else replace(one, penalised=-np.inf)
         return
-    shapes = list(effect.variants(present.model.robot))
+    seen = _seen(present, effect)
+    shapes = [variant.suited(seen) for variant in effect.variants(present.model.robot)]
     found = candidate_moments(store, present, shapes, store.screening)
     for shaped, parts in zip(shapes, found, strict=True):
         yield score(present, shaped, *parts, grid=len(shapes))
+
+
+def _seen(present: Present, effect: Effect) -> Block:
+    """One sample with what an effect needs of the present model."""
+    still = np.zeros((1, present.model.robot.n))
+    block = present.model.block(np.zeros(1), still, still, still, rigid=False)
+    return present.model.ready(effect, block, present.values)
 
 
 def _confirm(store: ColumnStore, present: Present, one: Score) -> Score:

@@ -12,8 +12,10 @@ from scipy.optimize import fminbound, minimize
 from dynident.diagnose.evidence import ColumnStore
 from dynident.diagnose.moments import Moments
 from dynident.diagnose.present import Present
-from dynident.diagnose.scoring import Score, candidate_moments, carried, score
+from dynident.diagnose.runs import Signals
+from dynident.diagnose.scoring import Columns, Score, candidate_moments, carried, score
 from dynident.effects import Block, Effect, Parameter
+from dynident.model import Model
 
 _SECANTS = 3  # times that columns are taken at the values just found
 _SETTLED = 0.02  # relative change of values at which secants count as settled
@@ -53,31 +55,58 @@ class Tangent(Effect):
         return np.concatenate([plain, turned], axis=2)
 
 
-def score_at(store: ColumnStore, present: Present, effect: Effect, like: Score, grid: int) -> Score:
+@dataclass(frozen=True)
+class Beside:
+    """Columns of an effect, for a model that has it, to be judged beside the model without it.
+
+    What depends on the bodies or on the predicted torque is that of the model with the effect: the
+    parameters that were fitted without it have taken on a part of it.
+    """
+
+    store: ColumnStore
+    whole: Present
+
+    def columns(self, effect: Effect, run: int, model: Model, values: np.ndarray) -> Signals:
+        """As `ColumnStore.of`."""
+        return self.store.of(effect, run, self.whole.model, self.whole.values)
+
+
+def score_at(
+    store: ColumnStore,
+    present: Present,
+    effect: Effect,
+    like: Score,
+    grid: int,
+    columns_of: Columns | None = None,
+) -> Score:
     """Score an effect with other columns; carriers of a payload as in `like`."""
-    (parts,) = candidate_moments(store, present, [effect])
+    (parts,) = candidate_moments(store, present, [effect], columns_of)
     if like.carriers is not None:
         parts = tuple(carried(part, store, like.carriers) for part in parts)
     return score(present, effect, *parts, grid=grid, carriers=like.carriers)
 
 
-def refined(store: ColumnStore, present: Present, one: Score) -> Score:
+def refined(
+    store: ColumnStore, present: Present, one: Score, columns_of: Columns | None = None
+) -> Score:
     """Return a score at the shape parameters and secants that fit best."""
     if not one.drop > 0:
         return one
     if one.effect.secant:
-        one = _at_its_values(store, present, one)
+        one = _at_its_values(store, present, one, columns_of)
     if not one.effect.shape_parameters(present.model.robot):
         return one
     has_slopes = type(one.effect).sensitivities is not Effect.sensitivities
     search = _by_gradient if has_slopes else _by_trial
-    better = search(store, present, one)
+    better = search(store, present, one, columns_of)
     if better.drop <= one.drop:
         return one
-    return _at_its_values(store, present, better) if one.effect.secant else better
+    return _at_its_values(store, present, better, columns_of) if one.effect.secant else better
 
 
-def _at_its_values(store: ColumnStore, present: Present, one: Score) -> Score:
+def _at_its_values(
+    store: ColumnStore, present: Present, one: Score, columns_of: Columns | None
+) -> Score:
     """Take secants through the values found, until they settle."""
     for _ in range(_SECANTS):
         if not one.values or not np.any(one.values):
@@ -87,7 +116,7 @@ def _at_its_values(store: ColumnStore, present: Present, one: Score) -> Score:
         change = np.linalg.norm(np.subtract(effect.point, old))
         if change <= _SETTLED * np.linalg.norm(effect.point):
             break
-        better = score_at(store, present, effect, one, _grid(one.effect, present))
+        better = score_at(store, present, effect, one, _grid(effect, present), columns_of)
         store.forget(effect)
         if not better.drop > 0.5 * one.drop:
             break  # the secant has left the range in which the law is what it is
@@ -104,7 +133,9 @@ def _grid(effect: Effect, present: Present) -> int:
     return sum(1 for _ in effect.variants(present.model.robot))
 
 
-def _by_gradient(store: ColumnStore, present: Present, one: Score) -> Score:
+def _by_gradient(
+    store: ColumnStore, present: Present, one: Score, columns_of: Columns | None
+) -> Score:
     """Minimise the residual over the shapes with exact derivatives, linear parameters solved for.
 
     At the best linear parameters the derivative of the residual by a shape is the partial one
@@ -119,7 +150,7 @@ def _by_gradient(store: ColumnStore, present: Present, one: Score) -> Score:
         nonlocal best
         trial = effect.shaped(*np.clip(np.exp(logarithm), *_limits(shapes)))
         tangent = Tangent.to(trial)
-        ((with_model, with_self),) = candidate_moments(store, present, [tangent])
+        ((with_model, with_self),) = candidate_moments(store, present, [tangent], columns_of)
         store.forget(tangent)
         plain = slice(0, k)
         found = score(
@@ -166,13 +197,15 @@ def _slope(
     return -2.0 * moment.reshape(-1, k) @ values
 
 
-def _by_trial(store: ColumnStore, present: Present, one: Score) -> Score:
+def _by_trial(
+    store: ColumnStore, present: Present, one: Score, columns_of: Columns | None
+) -> Score:
     shapes = one.effect.shape_parameters(present.model.robot)
     grid = _grid(one.effect, present)
 
     def at(shape: np.ndarray) -> Score:
         effect = one.effect.shaped(*np.exp(np.atleast_1d(shape)))
-        result = score_at(store, present, effect, one, grid)
+        result = score_at(store, present, effect, one, grid, columns_of)
         store.forget(effect)
         return result
 
@@ -191,11 +224,18 @@ def _minimum(loss: Callable[[np.ndarray], float], shapes, start) -> np.ndarray:
     return minimize(loss, np.log(start), bounds=bounds, method="Nelder-Mead").x
 
 
-def reshaped(store: ColumnStore, present: Present, effect: Effect) -> Effect:
-    """Return an effect at the shape that fits best near its own; `present` is without it."""
+def reshaped(store: ColumnStore, others: Present, whole: Present, effect: Effect) -> Score:
+    """Return an effect's score at the shape that fits best near its own.
+
+    Parameters
+    ----------
+    others, whole : the model without the effect, and with it.
+    effect : as it is in the model.
+    """
+    beside = Beside(store, whole).columns
     blank = Score(effect, None, absorbed=False)
-    now = score_at(store, present, effect, blank, _grid(effect, present))
-    return refined(store, present, now).effect
+    now = score_at(store, others, effect, blank, _grid(effect, others), beside)
+    return refined(store, others, now, beside)
 
 
 def best_shape(store: ColumnStore, present: Present, effect: Effect) -> Effect:

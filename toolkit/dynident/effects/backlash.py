@@ -8,11 +8,18 @@ from itertools import product
 import numpy as np
 
 from dynident.effects.base import Block, Effect, Parameter, ShapeParameter, motion_unit
-from dynident.effects.driven import DrivenLink, Response, Transmitting, mean_inertia, stacked
+from dynident.effects.driven import (
+    DrivenLink,
+    Response,
+    Transmitting,
+    mean_inertia,
+    share_of_rotor,
+    stacked,
+)
 from dynident.effects.joint_elasticity import DAMPING, RESONANCE, ROTOR_SHARE
 from dynident.effects.transmission import Transmission
 
-_GAPS = (0.002, 0.005, 0.015)
+_GAPS = (0.0015, 0.003, 0.006, 0.012)
 """rad (a tenth of it in m): gaps that are screened."""
 
 
@@ -36,7 +43,7 @@ class Backlash(Effect):
         return (Parameter("gap", motion_unit(robot, self.joint), 0.0),)
 
     def shape_parameters(self, robot):
-        sides = ShapeParameter("resonance", "Hz", (30.0,), RESONANCE.lower, RESONANCE.upper)
+        sides = ShapeParameter("resonance", "Hz", (15.0, 30.0), RESONANCE.lower, RESONANCE.upper)
         return (sides, DAMPING, ROTOR_SHARE)
 
     def variants(self, robot) -> Iterator[Backlash]:
@@ -49,6 +56,10 @@ class Backlash(Effect):
         """The gap at which the column is taken."""
         given = self.point[0] if self.point else 0.0
         return max(given, _GAPS[0] / 100.0) if given > 0 else _GAPS[1]
+
+    def suited(self, block: Block) -> Backlash:
+        share = share_of_rotor(block, block.index(self.joint))
+        return self if share is None else self.shaped(*self.shape[:2], share)
 
     def columns(self, block: Block) -> np.ndarray:
         _, response = self._response(block)

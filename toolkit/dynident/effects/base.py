@@ -167,6 +167,10 @@ class Effect(ABC):
         for shape in product(*(one.grid for one in self.shape_parameters(robot))):
             yield self.shaped(*shape)
 
+    def suited(self, block: Block) -> Self:
+        """Return the effect with those shapes that the present model in a block suggests."""
+        return self
+
     def at(self, values: Sequence[float]) -> Self:
         """Return the effect with its columns taken at other values; itself where it is linear."""
         return replace(self, point=tuple(float(x) for x in values)) if self.secant else self

@@ -290,6 +290,15 @@ def mean_inertia(robot: Robot, joint: int) -> float:
     return float(_MEAN[robot][joint])
 
 
+def share_of_rotor(block: Block, joint: int) -> float | None:
+    """Return the motor's share of a joint's inertia in the present model; None if unknown."""
+    if block.body is None or block.rotor is None or not block.rotor[joint] > 0:
+        return None
+    rotor = float(block.rotor[joint])
+    link = mean_inertia(block.body, joint)
+    return float(np.clip(rotor / (rotor + link), 0.02, 0.9)) if link > 0 else None
+
+
 def stacked(columns: Iterable[np.ndarray]) -> np.ndarray:
     """Return derivatives (T, n) each as (T, n, 1, s)."""
     return np.stack(list(columns), axis=-1)[:, :, None, :]

@@ -12,7 +12,14 @@ from dynident.effects.base import (
     force_unit,
     motion_unit,
 )
-from dynident.effects.driven import DrivenLink, Response, Transmitting, mean_inertia, stacked
+from dynident.effects.driven import (
+    DrivenLink,
+    Response,
+    Transmitting,
+    mean_inertia,
+    share_of_rotor,
+    stacked,
+)
 from dynident.effects.transmission import Transmission
 
 RESONANCE = ShapeParameter("resonance", "Hz", (5.0, 12.0, 30.0, 80.0), 2.0, 200.0)
@@ -45,6 +52,10 @@ class JointElasticity(Effect):
 
     def shape_parameters(self, robot):
         return (RESONANCE, DAMPING, ROTOR_SHARE)
+
+    def suited(self, block: Block) -> JointElasticity:
+        share = share_of_rotor(block, block.index(self.joint))
+        return self if share is None else self.shaped(*self.shape[:2], share)
 
     def columns(self, block: Block) -> np.ndarray:
         gear, response = self._response(block)
