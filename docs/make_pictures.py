@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from shutil import which
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -28,6 +30,7 @@ def main() -> None:
     residual(left, diagnosis)
     waterfall(right, diagnosis)
     figure.savefig(HERE / "hidden_effect.png", dpi=150, facecolor="white")
+    report_page(diagnosis)
     impossible_links()
     noisy_positions()
 
@@ -76,6 +79,24 @@ def noisy_positions() -> None:
     for axes in (left, right):
         axes.spines[["top", "right"]].set_visible(False)
     figure.savefig(HERE / "noisy_positions.png", dpi=150, facecolor="white")
+
+
+def report_page(diagnosis: di.Diagnosis) -> None:
+    """The top of the report as a browser shows it; left as it is where there is no chromium."""
+    browser = which("chromium")
+    if browser is None:
+        print("no chromium: report.png is not drawn again")
+        return
+    from playwright.sync_api import sync_playwright
+
+    with TemporaryDirectory() as folder, sync_playwright() as play:
+        page = di.report(diagnosis, to=Path(folder) / "report.html")
+        chromium = play.chromium.launch(executable_path=browser, args=["--no-sandbox"])
+        tab = chromium.new_page(viewport={"width": 1000, "height": 1000})
+        tab.goto(page.as_uri())
+        tab.wait_for_timeout(2000)  # until plotly has drawn
+        tab.screenshot(path=HERE / "report.png")
+        chromium.close()
 
 
 def impossible_links() -> None:
