@@ -283,7 +283,8 @@ class Model:
             values = self.given_values() if values is None else values
             carries = block.carries_payload
             body = self.present_robot(values, effect, carries_payload=carries)
-            block = replace(block, body=body, rotor=self.rotor(values))
+            empty = self.present_robot(values, effect) if carries else body
+            block = replace(block, body=body, empty=empty, rotor=self.rotor(values))
         if "rigid" in effect.needs and block.rigid is None:
             block = replace(block, rigid=self.robot.regressor(block.q, block.v, block.a))
         return block

@@ -38,6 +38,7 @@ class Block:
     torque : (T, n) N m or N, torque that the present model predicts; None where none needs it.
     body : the robot with the inertias of the present model, and with its payload where that is on
         board; None where no effect in use needs it.
+    empty : the same robot without its payload, with `body`.
     rotor : (n,) kg m^2 or kg, motor inertia that the present model adds to the bodies'; with
         `body`.
     number : of the recording in its study, from 1; 0 where that does not matter.
@@ -56,6 +57,7 @@ class Block:
     rigid: np.ndarray | None = None
     torque: np.ndarray | None = None
     body: Robot | None = None
+    empty: Robot | None = None
     rotor: np.ndarray | None = None
     number: int = 0
     temperature: np.ndarray | None = None

@@ -89,7 +89,8 @@ class DrivenLink:
         self.M, self.C, self.G = (x[:, :, joint] for x in (along.by_a, along.by_v, along.by_q))
         self._whole = along.by_a[:, joint, joint] + rotor
         self._load = along.torque[:, joint] + rotor * self.a
-        self.inertia = max(mean_inertia(robot, joint) + rotor, 1e-9)
+        # What is stiff stays as stiff when a payload is taken up.
+        self.inertia = max(mean_inertia(block.empty or robot, joint) + rotor, 1e-9)
         if len(block.t) < 3:
             raise EffectError("its response needs more than two samples")
         self._step = float(np.mean(np.diff(block.t)))
@@ -295,7 +296,7 @@ def share_of_rotor(block: Block, joint: int) -> float | None:
     if block.body is None or block.rotor is None or not block.rotor[joint] > 0:
         return None
     rotor = float(block.rotor[joint])
-    link = mean_inertia(block.body, joint)
+    link = mean_inertia(block.empty or block.body, joint)
     return float(np.clip(rotor / (rotor + link), 0.02, 0.9)) if link > 0 else None
 
 
