@@ -31,7 +31,7 @@ LEAST_SHARE = (0.006, 0.02)
 _CONFIDENT = 1.5  # standard errors of the held-out gain
 _MOST_BLOCKS = 0.65  # share of blocks in which the held-out residual must fall otherwise
 _HOPELESS = 0.2  # corrected p value above which no better shape makes an effect significant
-QUIET = "nothing is left to explain at {}"
+_NOISY = "plain least squares takes it for the noise in accelerations: record a repeated motion"
 _QUIET = 0.15  # systematic residual over noise below which driven responses are not evaluated
 _ALIKE = 0.015  # two drops within this share of the larger are alike
 _MOST_CARRIERS = 6  # recordings up to which every choice of payload carriers is tried
@@ -90,8 +90,10 @@ def rank(
     """
     model, best, tests = present.model, [], 0
     quiet = quiet_joints(store, present)
+    noisy = all(run.kind == "single" and run.columns_from == "recording" for run in store.runs)
     for effect in only or candidates(model):
-        if effect.joint in quiet and {"body", "whole"} <= effect.needs:
+        driven = {"body", "whole"} <= effect.needs
+        if driven and (noisy or effect.joint in quiet):
             best.append(Score(effect, None, absorbed=False))
             continue
         tell(effect.label)
@@ -109,13 +111,15 @@ def rank(
     best.sort(key=lambda s: -s.penalised)
     least = LEAST_SHARE[min(added, 1)]
     scores = tuple(best)
-    refusals = tuple(
-        QUIET.format(s.effect.joint)
-        if s.drop == 0 and s.effect.joint in quiet and not s.absorbed
-        else _refusal(s, model, tests, least)
-        for s in scores
-    )
+    refusals = tuple(_unseen(s, noisy) or _refusal(s, store, model, tests, least) for s in scores)
     return Ranking(scores, tests, refusals)
+
+
+def _unseen(one: Score, noisy: bool) -> str:
+    """Why a driven response was not evaluated; empty where it was."""
+    if one.drop != 0 or one.absorbed or not {"body", "whole"} <= one.effect.needs:
+        return ""
+    return _NOISY if noisy else f"nothing is left to explain at {one.effect.joint}"
 
 
 def quiet_joints(store: ColumnStore, present: Present) -> frozenset[str]:
@@ -206,7 +210,7 @@ def _confirm(store: ColumnStore, present: Present, one: Score) -> Score:
     return replace(one, losses=with_effect, gains=without - with_effect)
 
 
-def _refusal(one: Score, model: Model, tests: int, least: float) -> str:
+def _refusal(one: Score, store: ColumnStore, model: Model, tests: int, least: float) -> str:
     """Why an effect is not material; empty where it is."""
     if one.absorbed:
         return one.effect.advice
@@ -221,6 +225,9 @@ def _refusal(one: Score, model: Model, tests: int, least: float) -> str:
         return "explains less than its parameters cost"
     if one.share < least:
         return f"explains only {100 * one.share:.2g} % of the squared residual"
+    unresolved = one.effect.unresolved(one.values, _step(store))
+    if unresolved:
+        return unresolved
     if one.gains is None:
         return "other effects explain more"
     spread = one.gains.std(ddof=1) * np.sqrt(len(one.gains))
@@ -228,6 +235,11 @@ def _refusal(one: Score, model: Model, tests: int, least: float) -> str:
     if not (one.gains.sum() > 0 and (confident or np.mean(one.gains > 0) >= _MOST_BLOCKS)):
         return "does not help on held-out blocks"
     return ""
+
+
+def _step(store: ColumnStore) -> float:
+    """The longest time between two samples, s."""
+    return max(1.0 / run.recording.rate_hz for run in store.runs)
 
 
 def _impossible(one: Score, model: Model) -> str:

@@ -167,6 +167,10 @@ class Effect(ABC):
         for shape in product(*(one.grid for one in self.shape_parameters(robot))):
             yield self.shaped(*shape)
 
+    def unresolved(self, values: Sequence[float], step: float) -> str:
+        """Why such values say nothing at a time of `step` s between samples; empty if they do."""
+        return ""
+
     def suited(self, block: Block) -> Self:
         """Return the effect with those shapes that the present model in a block suggests."""
         return self

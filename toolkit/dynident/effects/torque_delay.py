@@ -11,6 +11,9 @@ from dynident.errors import EffectError
 _NEXT_TO_NOTHING = 1e-7
 """Delay in s below which a difference has fewer digits than the derivative in the middle of it."""
 
+_SAMPLING = 0.6
+"""Of a sample: a delay that a torque which is held, or is not, amounts to."""
+
 
 class TorqueDelay(Effect):
     """The torque recorded at t is the one that acted at t - d: of one joint, or of all alike.
@@ -69,3 +72,8 @@ class TorqueDelay(Effect):
 def _within(t: np.ndarray, delay: float) -> np.ndarray:
     """Instants earlier by a delay, those beyond the recording at its ends."""
     return np.clip(t - delay, t[0], t[-1])
+
+    def unresolved(self, values, step):
+        if not abs(values[0]) < _SAMPLING * step:
+            return ""
+        return "less than a sample: a matter of when the torque was sampled (held_command)"
