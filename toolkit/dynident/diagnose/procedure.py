@@ -33,7 +33,7 @@ from dynident.recording import Dataset, numbered
 from dynident.threads import single_threaded
 
 MOST_EFFECTS = 8
-"""Effects that are added at most."""
+"""Effects that are added at most; two for each joint where there are more joints."""
 
 _REFITS = 4  # of shapes whose columns depend on the bodies
 _GAINED = 0.02  # share of the systematic square that another refit must take away
@@ -48,7 +48,7 @@ def diagnose(
     test: Dataset | None = None,
     *,
     controller: Controller | None = None,
-    most: int = MOST_EFFECTS,
+    most: int | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> Diagnosis:
     """Find where a model fails and which physical effects it lacks.
@@ -61,7 +61,7 @@ def diagnose(
     test : recordings to judge by; without any, blocks of the training recordings are held out.
     controller : of the closed loop behind the recordings; where nothing repeats, the simulated
         loop gives the instruments.
-    most : effects that are added at most.
+    most : effects that are added at most; see `MOST_EFFECTS`.
     tell : told what is being done, for a progress display.
 
     Raises
@@ -70,6 +70,7 @@ def diagnose(
         If a recording is too short, or does not repeat with its period.
     """
     given = model.model if isinstance(model, Estimate) else model
+    most = max(MOST_EFFECTS, 2 * given.robot.n) if most is None else most
     train, *others = numbered(train, *([] if test is None else [test]))
     test = others[0] if others else None
     tell("reading the motion")
@@ -144,7 +145,16 @@ def _choose(ranking: Ranking) -> Found | None:
     if simpler:
         # The column that they share is the same whoever it belongs to: both are named.
         return Found(simpler[0], ranking.corrected(simpler[0]), (best.effect,))
-    return Found(best, ranking.corrected(best), indistinguishable(ranking, best))
+    alike = indistinguishable(ranking, best)
+    among = [s for s in material if s is best or s.effect in alike]
+    chosen = min(among, key=_size)  # the first of the simplest: they stand in order
+    others = tuple(s.effect for s in among if s is not chosen)
+    return Found(chosen, ranking.corrected(chosen), others)
+
+
+def _size(one: Score) -> int:
+    """Number of parameters that an effect brings: of what is alike, the simplest is added."""
+    return len(one.values) + len(one.effect.shape)
 
 
 def _alternatives_only(one: Found, following: Ranking) -> Found:
