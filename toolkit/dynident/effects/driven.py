@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 _POSES = 64
 _PHASE = 0.3
 """rad that an oscillation may turn in a step: its frequency is then wrong by 0.4 %."""
+_RUNAWAY = 1e3
+"""rad or m, per unit of what drives it."""
 _LEAST = 0.05
 """Of the mean inertia: no link is lighter, or unlikely estimates would ring beyond reason."""
 
@@ -154,7 +156,8 @@ class Response:
         gear, h = self._gear, self._step
         touches = np.ones(len(m))
         if gear.half_gap > 0:
-            self._d, self._side = _with_gap(m, c, g, load, gear, h)
+            d, self._side = _with_gap(m, c, g, load, gear, h)
+            self._d = _bounded(d)
             touches, self._rests = np.abs(self._side), _sign(load[:2])
         else:
             self._side, self._rests = np.zeros(len(m)), np.zeros(2)
@@ -174,7 +177,7 @@ class Response:
 
     def _banded(self, rest: np.ndarray, right: np.ndarray) -> np.ndarray:
         """Solve with right sides of the two steps at rest, and of the equation at every step."""
-        return solve_band(self._band, np.concatenate([rest, right[1:-1]]))
+        return _bounded(solve_band(self._band, np.concatenate([rest, right[1:-1]])))
 
     def _differences(self, d: np.ndarray, every: int) -> Deflection:
         """Return every so many steps' deflection, with the derivatives that the recursion means."""
@@ -213,7 +216,8 @@ class Response:
 
 def _with_gap(m, c, g, load, gear: Transmitting, h: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the deflection of a link in a gap, and the side that it touches: -1, 0 or 1."""
-    half, K = gear.half_gap, gear.stiffness
+    # Plain numbers, in which the loop is several times as fast.
+    half, K = float(gear.half_gap), float(gear.stiffness)
     inertia = 2.0 * m / h**2 - g
     coefficients = []
     for damping in (c, c + gear.damping):
@@ -222,7 +226,7 @@ def _with_gap(m, c, g, load, gear: Transmitting, h: float) -> tuple[np.ndarray, 
     free, free_back, touching, touching_back = (x.tolist() for x in coefficients)
     inertia = inertia.tolist()
     d, side = [0.0] * len(load), [0.0] * len(load)
-    d[0], d[1] = (load[:2] + _sign(load[:2]) * K * half) / (g[:2] + K)
+    d[:2] = ((load[:2] + _sign(load[:2]) * K * half) / (g[:2] + K)).tolist()
     before, now, load = d[0], d[1], load.tolist()
     for k in range(1, len(load) - 1):
         pushed = load[k] + inertia[k] * now
@@ -237,6 +241,14 @@ def _with_gap(m, c, g, load, gear: Transmitting, h: float) -> tuple[np.ndarray, 
         before, now = now, after
         d[k + 1] = after
     return np.array(d), np.array(side)
+
+
+def _bounded(d: np.ndarray) -> np.ndarray:
+    """Return a deflection (T,); zero throughout where it has run away.
+
+    A link of an unlikely estimate may fall instead of ring: such a transmission explains nothing.
+    """
+    return d if np.all(np.abs(d) < _RUNAWAY) else np.zeros_like(d)
 
 
 def _sign(load: np.ndarray) -> np.ndarray:
