@@ -29,7 +29,9 @@ def is_place(said: dict[str, Any]) -> bool:
     """Whether effect, joint and source are those of an effect of the catalogue."""
     effect = catalogue()[said["effect"]]
     joint, source = said["joint"], said["source"]
-    wanted = {"robot": 0, "joint": 1, "pair": 2}[effect.place]
+    wanted = {"robot": 0, "joint": 1, "pair": 2, "joint or robot": int(joint is not None)}[
+        effect.place
+    ]
     assert (joint in JOINTS) if wanted else joint is None
     assert (source in JOINTS - {joint}) if wanted == 2 else source is None
     return True
