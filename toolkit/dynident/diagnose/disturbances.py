@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from dynident.diagnose.contact import Bump, find_contacts, without
 from dynident.diagnose.diagnosis import Candidate, Step
 from dynident.diagnose.evidence import ColumnStore
 from dynident.diagnose.held_out import on_recordings
 from dynident.diagnose.present import Present
 from dynident.diagnose.runs import Run
+from dynident.diagnose.verdict import RESOLUTION
 from dynident.effects import Effect, catalogue
 from dynident.model import Model
-
-_LEAST = 1e-3  # of the torque (rms): a smaller burst is no contact
 
 
 @dataclass(frozen=True)
@@ -69,8 +66,10 @@ class Contacts:
         present : the model as it fits the training recordings.
         """
         whole, whole_held = store.runs, held.runs if held is not None else ()
-        bumps = _resolved(store, find_contacts(store, present))
-        bumps_held = _resolved(held, find_contacts(held, present)) if held is not None else ()
+        bumps = _resolved(store, present, find_contacts(store, present))
+        bumps_held = (
+            _resolved(held, present, find_contacts(held, present)) if held is not None else ()
+        )
         found = cls(store, held, whole, whole_held, bumps, bumps_held)
         found._leave(bumps, bumps_held)
         return found
@@ -127,15 +126,14 @@ def _masked(
     return tuple(found)
 
 
-def _resolved(store: ColumnStore, bumps: Sequence[Bump]) -> tuple[Bump, ...]:
-    """Bumps that are more than what differentiation and filters leave of a joint's torque."""
-    found = []
-    for bump in bumps:
-        run = store.runs[bump.run]
-        tau = run.versions[0].tau[:, run.recording.joints.index(bump.joint)]
-        if abs(bump.amplitude) > _LEAST * float(np.sqrt(np.mean(tau**2))):
-            found.append(bump)
-    return tuple(found)
+def _resolved(store: ColumnStore, present: Present, bumps: Sequence[Bump]) -> tuple[Bump, ...]:
+    """Bumps at joints whose residual is more than what differentiation and filters leave."""
+    if not bumps:
+        return ()
+    judged = on_recordings(store, present)
+    names = present.model.robot.names
+    matters = judged.residual_rms > RESOLUTION * judged.torque_rms
+    return tuple(bump for bump in bumps if matters[names.index(bump.joint)])
 
 
 def _common(bumps: Sequence[Bump], others: Sequence[Bump]) -> tuple[Bump, ...]:

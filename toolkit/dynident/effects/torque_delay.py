@@ -62,6 +62,11 @@ class TorqueDelay(Effect):
     def simulated_terms(self, values, robot):
         return ()
 
+    def unresolved(self, values, step):
+        if not abs(values[0]) < _SAMPLING * step:
+            return ""
+        return "less than a sample: a matter of when the torque was sampled (held_command)"
+
     def simulated_delay(self, values, robot):
         at = slice(None) if self.joint is None else robot.names.index(str(self.joint))
         delay = np.zeros(robot.n)
@@ -72,8 +77,3 @@ class TorqueDelay(Effect):
 def _within(t: np.ndarray, delay: float) -> np.ndarray:
     """Instants earlier by a delay, those beyond the recording at its ends."""
     return np.clip(t - delay, t[0], t[-1])
-
-    def unresolved(self, values, step):
-        if not abs(values[0]) < _SAMPLING * step:
-            return ""
-        return "less than a sample: a matter of when the torque was sampled (held_command)"
