@@ -39,7 +39,36 @@ _NEAR = 1e-6  # relative stationarity, violation and complementarity of a soluti
 _FAR = 1e-2  # relative stationarity where the objective merely became flat, on its way to infinity
 
 
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Raise what Ctrl-C raises once the work has ended: CasADi ends each call, and swallows the rest.
+
+    That holds for its solvers and for a plain evaluation, which then returns None.
+    """
+    handler = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(handler):
+        yield
+        return
+    caught: list[BaseException] = []
+
+    def note(number: int, frame: Any) -> None:
+        try:
+            handler(number, frame)
+        except BaseException as exception:
+            caught.append(exception)
+            raise
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if caught:
+            raise caught[0]
+
+
 @single_threaded
+@_interruptible()
 def solve(
     program: Program,
     starts: Sequence[Mapping[str, ArrayLike]] | None,
@@ -174,31 +203,6 @@ def _rank(attempt: Attempt) -> tuple[bool, bool, float]:
     """Solutions first, then what comes near the constraints, then the lowest objective."""
     objective = attempt.objective if np.isfinite(attempt.objective) else np.inf
     return (not attempt.status.ok, not attempt.violation <= _NEAR, objective)
-
-
-@contextmanager
-def _interruptible() -> Iterator[None]:
-    """Raise what Ctrl-C raises once the solver has ended: CasADi ends it, and swallows the rest."""
-    handler = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(handler):
-        yield
-        return
-    caught: list[BaseException] = []
-
-    def note(number: int, frame: Any) -> None:
-        try:
-            handler(number, frame)
-        except BaseException as exception:
-            caught.append(exception)
-            raise
-
-    signal.signal(signal.SIGINT, note)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, handler)
-        if caught:
-            raise caught[0]
 
 
 def _largest(values: np.ndarray) -> float:
