@@ -22,9 +22,10 @@ from pathlib import Path
 import numpy as np
 from joblib import Parallel, delayed
 
+from blind_study.foreign import PositionDependentViscosity
 from dynident.closed_loop import Controller, Experiment, Fourier, Run, Sensors, TrueEffect
 from dynident.diagnose import diagnose
-from dynident.effects import JointEffect, Parameter, catalogue
+from dynident.effects import catalogue
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
 from dynident.robot import Robot
@@ -64,28 +65,12 @@ UNIT: dict[str, tuple[tuple[float, ...], tuple[tuple[float, float], ...]]] = {
 }
 """Values of each effect at strength one, up to a factor, and ranges of its shape parameters."""
 
-FOREIGN = "position_dependent_viscosity"
+FOREIGN = PositionDependentViscosity.name
 """The effect that is in no catalogue."""
 
 CONTROLLER = Controller("pd", 1000.0, (1500.0, 600.0), (80.0, 30.0), derivative_cutoff_hz=80.0)
 SENSORS = Sensors(position_std=2e-5, torque_std=0.1)
 PERIOD, DURATION, RUNS, TESTS = 8.0, 16.0, 4, 2
-
-
-class PositionDependentViscosity(JointEffect):
-    """A viscosity that varies with position, as an unevenly filled gearbox has it."""
-
-    name = FOREIGN
-    law = "c v sin(3 q)"
-    sign_of = "a slope against velocity that changes with position"
-    experiment = "move {joint} at the same speeds in several places"
-
-    def parameters(self, robot):
-        return (Parameter("c", "N m s/rad"),)
-
-    def at_joint(self, block):
-        j = block.index(self.joint)
-        return block.v[:, [j]] * np.sin(3.0 * block.q[:, [j]])
 
 
 @dataclass(frozen=True)

@@ -153,7 +153,7 @@ def test_commands_are_the_torque_of_the_recorded_motion(name: str) -> None:
     assert np.abs(without - torque).max() > 0.02 * scale.min(), "the effect is not to be seen"
 
 
-@pytest.mark.parametrize("name", [n for n, kind in catalogue().items() if not kind.memory])
+@pytest.mark.parametrize("name", catalogue())
 def test_compiled_force_is_the_effects_force(name: str) -> None:
     """Also at values other than those it was compiled for."""
     robot = arm()
@@ -171,19 +171,17 @@ def test_compiled_force_is_the_effects_force(name: str) -> None:
     assert isinstance(force, TracedForce)
     then = bodies(-2.0, 3.0)
     rng = np.random.default_rng(1)
+    kept = one.effect.memory
     for law in (force, plainly):
         law.set(then)
         for t in range(20):
-            x = rng.normal(size=8)
-            expected = [
-                -body.force(np.array([t + start]), x[place[own]][None], x[place[own] + 4][None])[0]
-                for body, start, own in zip(
-                    then.mechanisms, starts, (slice(0, 2), slice(2, 4)), strict=True
-                )
-            ]
-            np.testing.assert_allclose(
-                law(t, x, np.zeros(0))[place], np.concatenate(expected), rtol=1e-9, atol=1e-12
-            )
+            x, z = rng.normal(size=8), rng.uniform(-1.0, 1.0, 2 * kept)
+            for k, (body, start) in enumerate(zip(then.mechanisms, starts, strict=True)):
+                own, rows = place[2 * k : 2 * k + 2], slice(k * kept, (k + 1) * kept)
+                instant = (np.array([t + start]), x[own][None], x[own + 4][None], z[rows][None])
+                found, rate = law(t, x, z)[own], law.rate(t, x, z)[rows]
+                np.testing.assert_allclose(found, -body.force(*instant)[0], rtol=1e-9, atol=1e-12)
+                np.testing.assert_allclose(rate, body.memory_rate(*instant)[0], rtol=1e-9)
 
 
 def test_effects_that_do_not_run_on_symbols_are_simulated_all_the_same(monkeypatch) -> None:

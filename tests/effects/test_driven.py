@@ -107,19 +107,6 @@ def test_sensitivities_are_exact_while_no_contact_changes(label: str) -> None:
         np.testing.assert_allclose(found[..., k], expected, atol=limit)
 
 
-def test_derivative_by_the_gap_is_exact() -> None:
-    (effect,) = effects_of("backlash@elbow", ROBOT)
-    assert isinstance(effect, Backlash)
-    gap, samples = 1e-3, block(2)
-    ends = [
-        effect.at([gap * (1.0 + step)]).columns(samples) * gap * (1.0 + step)
-        for step in (1e-6, -1e-6)
-    ]
-    expected = (ends[0] - ends[1]) / (2e-6 * gap)
-    found = effect.at([gap]).by_gap(samples)
-    np.testing.assert_allclose(found, expected, atol=1e-4 * np.abs(expected).max())
-
-
 def test_a_response_does_not_depend_on_the_rate_of_the_samples() -> None:
     (effect,) = effects_of("joint_elasticity@elbow", ROBOT)
     effect = effect.shaped(40.0, 0.1, 0.3)
@@ -135,7 +122,7 @@ def test_screened_shapes_share_the_dynamics_of_a_joint() -> None:
     (effect,) = effects_of("joint_elasticity@elbow", ROBOT)
     samples = block(4)
     variants = list(effect.variants(ROBOT))
-    assert 3 <= len(variants) <= 20
+    assert 5 <= len(variants) <= 20
     variants[0].columns(samples)
     robot = samples.body
     assert robot is not None

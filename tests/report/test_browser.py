@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from playwright.sync_api import sync_playwright
 
 from dynident.report import report
 from report.fabricated import diagnosis
 from report.fabricated_loop import validation
-
-playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 
 BROWSER = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
@@ -51,7 +50,7 @@ _RANGE = 'document.getElementById("torque")._fullLayout.xaxis.range'
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory) -> Iterator:
     home = tmp_path_factory.mktemp("home")
-    with playwright.sync_playwright() as driver:
+    with sync_playwright() as driver:
         found = driver.chromium.launch(
             executable_path=BROWSER,
             timeout=120_000,

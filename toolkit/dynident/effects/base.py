@@ -260,6 +260,16 @@ class Effect(ABC):
         return np.zeros(robot.n)
 
 
+class Forceless(Effect):
+    """An effect that is simulated by a change of the plant, not by a force on it."""
+
+    def simulated_force(self, values: Sequence[float], block: Block) -> np.ndarray:
+        return np.zeros(block.q.shape)
+
+    def simulated_terms(self, values: Sequence[float], robot: Robot) -> tuple[Term, ...]:
+        return ()
+
+
 class JointEffect(Effect):
     """An effect whose torque acts at one joint only."""
 

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from dynident.effects.base import Block, Effect, Parameter
+from dynident.effects.base import Block, Forceless, Parameter
 from dynident.robot.rotations import from_axis_angle
 
 _NEXT_TO_NOTHING = 1e-4  # rad: below it the series of the sinc is exact to rounding
 
 
-class BaseTilt(Effect):
+class BaseTilt(Forceless):
     """The base is turned by a rotation vector (rx, ry, 0) in the world's axes; gravity stays.
 
     Turning it about the vertical changes nothing. In the base's own axes it is gravity that turns,
@@ -50,12 +50,6 @@ class BaseTilt(Effect):
             # What a robot at rest takes is linear in gravity.
             columns[:, :, k] = body.with_gravity(change).inverse_dynamics(block.q, still, still)
         return columns
-
-    def simulated_force(self, values, block):
-        return np.zeros_like(block.q)
-
-    def simulated_terms(self, values, robot):
-        return ()
 
     def simulated_robot(self, values, robot):
         turn = _rotation(values)

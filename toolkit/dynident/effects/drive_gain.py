@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynident.effects.base import Block, JointEffect, Parameter
+from dynident.effects.base import Block, Forceless, JointEffect, Parameter
 from dynident.errors import EffectError
 
 
-class DriveGain(JointEffect):
+class DriveGain(Forceless, JointEffect):
     """Recorded torque = (1 + e) times the torque that acts.
 
     The column is the torque which the model predicts, never the measured one: the measured torque
@@ -31,12 +31,6 @@ class DriveGain(JointEffect):
         if block.torque is None:
             raise EffectError("needs the predicted torque in the block", self.label)
         return block.torque[:, [block.index(self.joint)]]
-
-    def simulated_force(self, values, block):
-        return np.zeros_like(block.q)
-
-    def simulated_terms(self, values, robot):
-        return ()
 
     def simulated_gain(self, values, robot):
         gain = np.ones(robot.n)

@@ -197,7 +197,7 @@ class Response:
         changed[:, j] = self._m * moved.bend
         return -(changed + link.C * rate + link.G * d)
 
-    def by(self, stiffness: float, damping: float, rotor: float, half_gap: float) -> np.ndarray:
+    def by(self, stiffness: float, damping: float, rotor: float) -> np.ndarray:
         """Return the derivative of the torque (T, n) along a change of these values."""
         lighter = -rotor * self._moves
         d, moved = self._d, self._differences(self._d, 1)
@@ -205,9 +205,7 @@ class Response:
         lost = self._smooth(rotor * self._link.a)
         right = -self._linear(lighter) * moved.bend - lost
         right -= self._touches * (stiffness * bent + damping * moved.rate)
-        right += self._gear.stiffness * self._side * half_gap
-        rest = self._gear.stiffness * self._rests * half_gap
-        rest -= stiffness * (d[:2] - self._rests * self._gear.half_gap)
+        rest = -stiffness * (d[:2] - self._rests * self._gear.half_gap)
         rest -= lost[:2]
         change = self._torque(self._differences(self._banded(rest, right), self._per))
         change[:, self._link.joint] -= lighter * self.deflection.bend

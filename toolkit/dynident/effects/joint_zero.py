@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dynident.effects.base import Block, Effect, Parameter, motion_unit
+from dynident.effects.base import Block, Forceless, Parameter, motion_unit
 from dynident.robot.rotations import from_axis_angle
 
 _NEXT_TO_NOTHING = 1e-5
@@ -14,7 +14,7 @@ _NEXT_TO_NOTHING = 1e-5
 of it."""
 
 
-class JointZero(Effect):
+class JointZero(Forceless):
     """The joint stands at q + offset where q is recorded; torques of all joints change."""
 
     name = "joint_zero"
@@ -47,12 +47,6 @@ class JointZero(Effect):
         rise = body.inverse_dynamics(moved, block.v, block.a)
         rise -= body.inverse_dynamics(block.q, block.v, block.a)
         return rise[:, :, None] / offset
-
-    def simulated_force(self, values, block):
-        return np.zeros_like(block.q)
-
-    def simulated_terms(self, values, robot):
-        return ()
 
     def simulated_robot(self, values, robot):
         index = robot.names.index(str(self.joint))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynident.effects.base import Block, JointEffect, Parameter
+from dynident.effects.base import Block, Forceless, JointEffect, Parameter
 from dynident.errors import EffectError
 
 
-class LoadFriction(JointEffect):
+class LoadFriction(Forceless, JointEffect):
     """Dry friction in proportion to the torque that is transmitted: mu abs(tau) tanh(v/w).
 
     The column is made of the torque which the model predicts, never of the measured one, whose
@@ -32,12 +32,6 @@ class LoadFriction(JointEffect):
             raise EffectError("needs the predicted torque in the block", self.label)
         j = [block.index(self.joint)]
         return np.abs(block.torque[:, j]) * block.sign(block.v[:, j])
-
-    def simulated_force(self, values, block):
-        return np.zeros_like(block.q)
-
-    def simulated_terms(self, values, robot):
-        return ()
 
     def simulated_loss(self, values, robot):
         loss = np.zeros(robot.n)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynident.effects.base import Block, Effect, Parameter
+from dynident.effects.base import Block, Forceless, Parameter
 from dynident.errors import EffectError
 from dynident.inertia import PARAMETERS, UNITS
 
 _NAMES = ("mass", *PARAMETERS[1:])
 
 
-class Payload(Effect):
+class Payload(Forceless):
     """Inertial parameters added to the last link while the payload is carried.
 
     Mass and first moment (mx, my, mz), and the second moments that any real load brings with
@@ -41,12 +41,6 @@ class Payload(Effect):
             raise EffectError("needs the rigid-body regressor in the block", self.label)
         tip = block.tip % len(block.names)
         return block.rigid[:, :, 10 * tip : 10 * tip + 10] * float(block.carries_payload)
-
-    def simulated_force(self, values, block):
-        return np.zeros_like(block.q)
-
-    def simulated_terms(self, values, robot):
-        return ()
 
     def simulated_robot(self, values, robot):
         theta = np.array(robot.theta, dtype=float).reshape(robot.n, 10)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynident.effects.base import Block, JointEffect, Parameter, motion_unit
+from dynident.effects.base import Block, Forceless, JointEffect, Parameter, motion_unit
 
 
-class RotorInertia(JointEffect):
+class RotorInertia(Forceless, JointEffect):
     """Torque proportional to the joint's own acceleration: Ia a."""
 
     name = "rotor_inertia"
@@ -25,12 +25,6 @@ class RotorInertia(JointEffect):
 
     def at_joint(self, block: Block) -> np.ndarray:
         return block.a[:, [block.index(self.joint)]]
-
-    def simulated_force(self, values, block):
-        return np.zeros_like(block.q)
-
-    def simulated_terms(self, values, robot):
-        return ()
 
     def simulated_inertia(self, values, robot):
         inertia = np.zeros((robot.n, robot.n))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from dynident.effects.base import Block, Effect, Parameter
+from dynident.effects.base import Block, Forceless, Parameter
 from dynident.errors import EffectError
 
 _NEXT_TO_NOTHING = 1e-7
@@ -15,7 +15,7 @@ _SAMPLING = 0.6
 """Of a sample: a delay that a torque which is held, or is not, amounts to."""
 
 
-class TorqueDelay(Effect):
+class TorqueDelay(Forceless):
     """The torque recorded at t is the one that acted at t - d: of one joint, or of all alike.
 
     The column is made of the torque which the model predicts, by a cubic spline through its samples
@@ -55,12 +55,6 @@ class TorqueDelay(Effect):
         else:
             columns[:, at, 0] = (curve(_within(block.t, d)) - torque) / d
         return columns
-
-    def simulated_force(self, values, block):
-        return np.zeros_like(block.q)
-
-    def simulated_terms(self, values, robot):
-        return ()
 
     def unresolved(self, values, step):
         if not abs(values[0]) < _SAMPLING * step:

@@ -41,7 +41,7 @@ _FAR = 1e-2  # relative stationarity where the objective merely became flat, on 
 
 @contextmanager
 def _interruptible() -> Iterator[None]:
-    """Raise what Ctrl-C raises once the work has ended: CasADi ends each call, and swallows the rest.
+    """Raise what Ctrl-C raises once the work has ended: CasADi ends a call, and swallows the rest.
 
     That holds for its solvers and for a plain evaluation, which then returns None.
     """
