@@ -12,8 +12,8 @@ from tests.synthetic import arm, smooth_motion
 
 from dynident.closed_loop import ClosedLoop, Controller, Fourier, Mechanism, Task, TrueEffect
 from dynident.effects import Block, Effect, effects_of
+from dynident.effects.along import mean_inertia
 from dynident.effects.backlash import Backlash
-from dynident.effects.driven import mean_inertia
 
 ROBOT = arm()
 ROTORS = (0.1, 0.07)
@@ -117,7 +117,7 @@ def test_a_response_does_not_depend_on_the_rate_of_the_samples() -> None:
 
 
 def test_screened_shapes_share_the_dynamics_of_a_joint() -> None:
-    from dynident.effects import driven
+    from dynident.effects import along
 
     (effect,) = effects_of("joint_elasticity@elbow", ROBOT)
     samples = block(4)
@@ -127,10 +127,10 @@ def test_screened_shapes_share_the_dynamics_of_a_joint() -> None:
     robot = samples.body
     assert robot is not None
     samples = replace(samples, body=robot.with_theta(robot.theta))  # the same, made again
-    kept = driven._ALONG[id(samples.q)][3]
+    kept = along._ALONG[id(samples.q)][3]
     for one in variants:
         assert np.isfinite(one.columns(samples)).all()
-    assert driven._ALONG[id(samples.q)][3] is kept
+    assert along._ALONG[id(samples.q)][3] is kept
 
 
 def test_dahls_state_is_the_sign_of_a_long_motion_and_a_spring_at_a_reversal() -> None:

@@ -13,10 +13,11 @@ from dynident.diagnose.diagnosis import Diagnosis
 from dynident.diagnose.disturbances import Contacts
 from dynident.diagnose.evidence import ColumnStore
 from dynident.diagnose.held_out import on_recordings
-from dynident.diagnose.present import Present, fit_present
+from dynident.diagnose.present import Present, fit_present, residuals
 from dynident.diagnose.runs import flagged_run, gather
 from dynident.diagnose.scoring import Score
 from dynident.diagnose.search import (
+    ALIKE,
     Ranking,
     candidates,
     indistinguishable,
@@ -38,7 +39,9 @@ MOST_EFFECTS = 8
 _REFITS = 4  # of shapes whose columns depend on the bodies
 _GAINED = 0.02  # share of the systematic square that another refit must take away
 _ANOTHER = 0.1  # of the torque that must be explained for a model to be another one
-_FIRST_SHARE = 0.75  # of an effect's drop that a simpler one in it explains, to be named first
+_FIRST_SHARE = 0.75  # of the largest drop that a simpler effect must reach, to be named first
+_NEARLY = 0.85  # of the largest drop, from which a rival that is not linear is fitted to compare
+_LEAST_FALL = 0.015  # of a joint's squared noise that an effect must take off the held-out residual
 
 
 @single_threaded
@@ -90,7 +93,7 @@ def diagnose(
     rounds = [rank(store, start, 0, tell)]
     present, found = start, []
     while len(found) < most and not _resolved(store, present):
-        chosen = _choose(rounds[-1])
+        chosen = _choose(store, present, rounds[-1])
         if chosen is None:
             break
         tell(f"adding {chosen.score.effect.label}")
@@ -103,7 +106,9 @@ def diagnose(
             present = blunted(store, _refitted(store, present.model))
         rounds.append(rank(store, present, len(found), tell))
         found[-1] = _alternatives_only(chosen, rounds[-1])
-    kept = _without_superfluous(store, present, found, tell)
+    if held is not None:
+        _decide_payload(held, present)
+    kept = _without_superfluous(store, held, present, found, tell)
     if len(kept.found) < len(found):
         rounds.append(rank(store, kept.final, len(kept.found), tell))
     sure = contacts.confirmed(kept.final)
@@ -129,7 +134,7 @@ def _resolved(store: ColumnStore, present: Present) -> bool:
     return bool(np.all(judged.residual_rms <= RESOLUTION * judged.torque_rms))
 
 
-def _choose(ranking: Ranking) -> Found | None:
+def _choose(store: ColumnStore, present: Present, ranking: Ranking) -> Found | None:
     """The best material effect; or the simpler one in it, where that does most of the work."""
     material = ranking.material
     if not material:
@@ -145,11 +150,38 @@ def _choose(ranking: Ranking) -> Found | None:
     if simpler:
         # The column that they share is the same whoever it belongs to: both are named.
         return Found(simpler[0], ranking.corrected(simpler[0]), (best.effect,))
-    alike = indistinguishable(ranking, best)
+    alike = {*indistinguishable(ranking, best), *_alike_once_fitted(store, present, ranking)}
     among = [s for s in material if s is best or s.effect in alike]
-    chosen = min(among, key=_size)  # the first of the simplest: they stand in order
+    as_good = [s for s in among if s.drop >= _FIRST_SHARE * best.drop]
+    chosen = min(as_good, key=_size)  # the first of the simplest: they stand in order
     others = tuple(s.effect for s in among if s is not chosen)
     return Found(chosen, ranking.corrected(chosen), others)
+
+
+def _alike_once_fitted(
+    store: ColumnStore, present: Present, ranking: Ranking
+) -> tuple[Effect, ...]:
+    """Rivals of the best effect that explain the same once each is fitted together with the model.
+
+    Before, columns that are not linear in their values are those of a first guess.
+    """
+    best, *others = ranking.material
+    rivals = [
+        s
+        for s in others
+        if s.effect.secant
+        and "whole" not in s.effect.needs
+        and s.losses is not None
+        and s.drop >= _NEARLY * best.drop
+    ]
+    if not (best.effect.secant and "whole" not in best.effect.needs and rivals):
+        return ()
+
+    def explained(effect: Effect) -> float:
+        return present.error_signal - fit_present(store, present.model + effect).error_signal
+
+    most = explained(best.effect)
+    return tuple(s.effect for s in rivals if explained(s.effect) >= (1.0 - ALIKE) * most)
 
 
 def _size(one: Score) -> int:
@@ -221,23 +253,57 @@ class _Kept:
 
 
 def _without_superfluous(
-    store: ColumnStore, present: Present, found: list[Found], tell: Callable[[str], None]
+    store: ColumnStore,
+    held: ColumnStore | None,
+    present: Present,
+    found: list[Found],
+    tell: Callable[[str], None],
 ) -> _Kept:
-    """Drop every added effect that the others have made superfluous."""
+    """Drop every added effect that the others have made superfluous, or that helps nowhere else."""
     kept = list(found)
     for one in found:
-        if len(kept) < 2 or _belongs(one.score.effect, kept):
+        if _belongs(one.score.effect, kept):
             continue
         effect = next(e for e in present.model.effects if e.label == one.score.effect.label)
         rest = fit_present(store, present.model - effect)
         tell(f"doing without {effect.label}")
-        if not rank(store, rest, len(kept) - 1, only=(effect,)).material:
+        needed = len(kept) == 1 or rank(store, rest, len(kept) - 1, only=(effect,)).material
+        if not needed or not _helps(held, rest, present):
             kept.remove(one)
             present = rest
     return _Kept(present, kept)
+
+
+def _helps(held: ColumnStore | None, without: Present, present: Present) -> bool:
+    """Whether an effect lowers the residual of the test recordings at any joint."""
+    if held is None:
+        return True  # its gain was cross-validated
+    before, after = (on_recordings(held, one) for one in (without, present))
+    scale = after.residual_rms if after.noise_std is None else after.noise_std
+    fall = before.residual_rms**2 - after.residual_rms**2
+    return bool(np.any(fall > _LEAST_FALL * scale**2))
 
 
 def _belongs(effect: Effect, found: list[Found]) -> bool:
     """Whether an effect is part of another one: without it the other would bring it back."""
     others = (one.score.effect for one in found)
     return any(effect.name in o.contains and effect.joint == o.joint for o in others)
+
+
+def _decide_payload(held: ColumnStore, present: Present) -> None:
+    """Decide which test recordings carry a payload of known inertia, where the study is silent."""
+    if not any("payload" in effect.needs for effect in present.model.effects):
+        return
+    stated = [run.recording.payload is not None for run in held.runs]
+    sums = []
+    for carries in (False, True):
+        held.runs = tuple(
+            run if said else flagged_run(run, carries)
+            for run, said in zip(held.runs, stated, strict=True)
+        )
+        misfits = residuals(held, present.model, present.values)
+        sums.append([float(np.sum(e**2)) for e in misfits])
+    held.runs = tuple(
+        run if said else flagged_run(run, with_load < without)
+        for run, said, without, with_load in zip(held.runs, stated, *sums, strict=True)
+    )

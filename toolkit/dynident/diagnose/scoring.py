@@ -55,6 +55,16 @@ class Score:
     losses: np.ndarray | None = None
     gains: np.ndarray | None = None
 
+    @property
+    def settled_drop(self) -> float:
+        """The drop if its value is the one at which its column was taken.
+
+        A column that is not linear in the value says nothing of another value.
+        """
+        if len(self.values) != 1 or len(self.effect.point) != 1 or self.values[0] == 0:
+            return self.drop
+        return self.drop * (1.0 - (1.0 - self.effect.point[0] / self.values[0]) ** 2)
+
 
 def candidate_moments(
     store: ColumnStore,
@@ -194,6 +204,22 @@ def score(
         values=tuple(float(v) for v in values),
         sigma=tuple(float(s) for s in np.sqrt(np.clip(np.diag(covariance), 0.0, None))),
     )
+
+
+def impossible(one: Score, model: Model) -> str:
+    """What is physically impossible in a score's values; empty where nothing is.
+
+    Of several values some may leave their bounds by their uncertainty. A single one that is out of
+    them says that at its bound, where there is no effect, the data are explained better.
+    """
+    if one.absorbed:
+        return ""
+    parameters = one.effect.parameters(model.robot)
+    for parameter, value, sigma in zip(parameters, one.values, one.sigma, strict=False):
+        slack = 3.0 * sigma if len(one.values) > 1 else 0.0
+        if value < parameter.lower - slack or value > parameter.upper + slack:
+            return f"would need {parameter.name} = {value:.3g} {parameter.unit}"
+    return ""
 
 
 def cross_validate(

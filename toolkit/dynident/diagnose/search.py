@@ -14,7 +14,14 @@ from dynident.diagnose.moments import Kind
 from dynident.diagnose.noise import differences, systematic_square
 from dynident.diagnose.present import Present, residuals
 from dynident.diagnose.runs import Run
-from dynident.diagnose.scoring import Score, candidate_moments, carried, cross_validate, score
+from dynident.diagnose.scoring import (
+    Score,
+    candidate_moments,
+    carried,
+    cross_validate,
+    impossible,
+    score,
+)
 from dynident.diagnose.shaping import refined
 from dynident.effects import Block, Effect, catalogue
 from dynident.model import Model
@@ -33,7 +40,7 @@ _MOST_BLOCKS = 0.65  # share of blocks in which the held-out residual must fall 
 _HOPELESS = 0.2  # corrected p value above which no better shape makes an effect significant
 _NOISY = "plain least squares takes it for the noise in accelerations: record a repeated motion"
 _QUIET = 0.15  # systematic residual over noise below which driven responses are not evaluated
-_ALIKE = 0.015  # two drops within this share of the larger are alike
+ALIKE = 0.015  # two drops within this share of the larger are alike
 _MOST_CARRIERS = 6  # recordings up to which every choice of payload carriers is tried
 
 
@@ -104,7 +111,7 @@ def rank(
     for i in range(min(CONTENDERS, len(best))):
         if best[i].absorbed:
             break
-        if best[i].p_value * tests > _HOPELESS:
+        if best[i].p_value * tests > _HOPELESS or best[i].penalised == -np.inf:
             continue
         tell(f"{best[i].effect.label}, cross-validated")
         best[i] = _confirm(store, present, best[i])
@@ -161,7 +168,7 @@ def indistinguishable(ranking: Ranking, winner: Score) -> tuple[Effect, ...]:
     return tuple(
         other.effect
         for k, other in enumerate(rivals, 1)
-        if k in kept or abs(winner.drop - other.drop) <= _ALIKE * winner.drop
+        if k in kept or abs(winner.drop - other.drop) <= ALIKE * winner.drop
     )
 
 
@@ -185,13 +192,23 @@ def _score_variants(store: ColumnStore, present: Present, effect: Effect) -> Ite
             parts = (carried(part, store, choice) for part in whole)
             one = score(present, effect, *parts, grid=len(choices), carriers=choice)
             # A load has mass: of two complementary choices only one can be meant.
-            yield one if not _impossible(one, present.model) else replace(one, penalised=-np.inf)
+            yield _possible(one, present.model)
         return
     seen = _seen(present, effect)
     shapes = [variant.suited(seen) for variant in effect.variants(present.model.robot)]
     found = candidate_moments(store, present, shapes, store.screening)
     for shaped, parts in zip(shapes, found, strict=True):
-        yield score(present, shaped, *parts, grid=len(shapes))
+        yield _possible(score(present, shaped, *parts, grid=len(shapes)), present.model)
+
+
+def _possible(one: Score, model: Model) -> Score:
+    """Return a score that counts for nothing where its values are impossible.
+
+    Columns taken at a value count as far as that is the value found.
+    """
+    if impossible(one, model):
+        return replace(one, penalised=-np.inf)
+    return replace(one, penalised=one.penalised - (one.drop - one.settled_drop))
 
 
 def _seen(present: Present, effect: Effect) -> Block:
@@ -214,9 +231,8 @@ def _refusal(one: Score, store: ColumnStore, model: Model, tests: int, least: fl
     """Why an effect is not material; empty where it is."""
     if one.absorbed:
         return one.effect.advice
-    impossible = _impossible(one, model)
-    if impossible:
-        return impossible
+    if beyond := impossible(one, model):
+        return beyond
     if one.rank == 0:
         return "its columns are noise in this data"
     if min(1.0, one.p_value * tests) >= LEVEL:
@@ -240,14 +256,3 @@ def _refusal(one: Score, store: ColumnStore, model: Model, tests: int, least: fl
 def _step(store: ColumnStore) -> float:
     """The longest time between two samples, s."""
     return max(1.0 / run.recording.rate_hz for run in store.runs)
-
-
-def _impossible(one: Score, model: Model) -> str:
-    """What is physically impossible in a score's values, beyond their uncertainty."""
-    if one.absorbed or not one.values:
-        return ""
-    parameters = one.effect.parameters(model.robot)
-    for parameter, value, sigma in zip(parameters, one.values, one.sigma, strict=True):
-        if value < parameter.lower - 3 * sigma or value > parameter.upper + 3 * sigma:
-            return f"would need {parameter.name} = {value:.3g} {parameter.unit}"
-    return ""

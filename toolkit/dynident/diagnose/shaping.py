@@ -7,19 +7,28 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from scipy.optimize import fminbound, minimize
+from scipy.optimize import fminbound, minimize, minimize_scalar
 
 from dynident.diagnose.evidence import ColumnStore
 from dynident.diagnose.moments import Moments
 from dynident.diagnose.present import Present
 from dynident.diagnose.runs import Signals
-from dynident.diagnose.scoring import Columns, Score, candidate_moments, carried, score
+from dynident.diagnose.scoring import (
+    Columns,
+    Score,
+    candidate_moments,
+    carried,
+    impossible,
+    score,
+)
 from dynident.effects import Block, Effect, Parameter
 from dynident.model import Model
 
 _SECANTS = 3  # times that columns are taken at the values just found
 _SETTLED = 0.02  # relative change of values at which secants count as settled
 _EVALUATIONS = 25  # of a gradient search, at most
+_VALUES_TRIED = 10  # of a column that is taken at a value
+_VALUE_RANGE = 0.5  # of the logarithm of that value, to each side
 _PRECISION = 1e-3  # of the logarithm of a shape parameter
 
 
@@ -92,16 +101,16 @@ def refined(
     """Return a score at the shape parameters and secants that fit best."""
     if not one.drop > 0:
         return one
-    if one.effect.secant:
-        one = _at_its_values(store, present, one, columns_of)
     if not one.effect.shape_parameters(present.model.robot):
-        return one
+        return _at_its_values(store, present, one, columns_of) if one.effect.secant else one
+    if one.effect.point:
+        one = _at_best_value(store, present, one, columns_of)
     has_slopes = type(one.effect).sensitivities is not Effect.sensitivities
     search = _by_gradient if has_slopes else _by_trial
     better = search(store, present, one, columns_of)
-    if better.drop <= one.drop:
+    if better.settled_drop <= one.settled_drop:
         return one
-    return _at_its_values(store, present, better, columns_of) if one.effect.secant else better
+    return _at_best_value(store, present, better, columns_of) if one.effect.point else better
 
 
 def _at_its_values(
@@ -122,6 +131,30 @@ def _at_its_values(
             break  # the secant has left the range in which the law is what it is
         one = better
     return one
+
+
+def _at_best_value(
+    store: ColumnStore, present: Present, one: Score, columns_of: Columns | None
+) -> Score:
+    """Seek the value at which the column that is taken there fits best.
+
+    Columns that change with the value as those of bursts do cannot be iterated on.
+    """
+    best = one
+
+    def loss(logarithm: float) -> float:
+        nonlocal best
+        effect = one.effect.at([float(np.exp(logarithm))])
+        found = score_at(store, present, effect, one, _grid(effect, present), columns_of)
+        store.forget(effect)
+        if found.settled_drop > best.settled_drop and not impossible(found, present.model):
+            best = found
+        return -found.settled_drop
+
+    (start,) = np.log(one.effect.point)
+    span = (start - _VALUE_RANGE, start + _VALUE_RANGE)
+    minimize_scalar(loss, bounds=span, method="bounded", options={"maxiter": _VALUES_TRIED})
+    return best
 
 
 def _within_bounds(one: Score, present: Present) -> list[float]:
@@ -160,7 +193,7 @@ def _by_gradient(
             Moments(with_self.signal[:, plain, plain], with_self.total[:, plain, plain]),
             grid=grid,
         )
-        if found.drop > best.drop:
+        if found.settled_drop > best.settled_drop and not impossible(found, present.model):
             best = found
         values = np.array(found.values or (0.0,) * k)
         slope = _slope(present, with_model.sums()[0], with_self.sums()[0], values)

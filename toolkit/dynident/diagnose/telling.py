@@ -21,8 +21,7 @@ from dynident.diagnose.evidence import ColumnStore
 from dynident.diagnose.experiments import Adviser
 from dynident.diagnose.held_out import HeldOut, on_blocks, on_recordings, with_noise_of
 from dynident.diagnose.maps import residual_maps
-from dynident.diagnose.present import Present, fit_present, residuals
-from dynident.diagnose.runs import flagged_run
+from dynident.diagnose.present import Present, fit_present
 from dynident.diagnose.scoring import Score
 from dynident.diagnose.search import Ranking
 from dynident.diagnose.verdict import noise_source, notes_on, verdict_of
@@ -90,9 +89,6 @@ def told(
         stages.append(fit_present(store, wider.with_shapes(present.model.effects)))
     if found:
         stages[-1] = present  # with its dry friction blunted where that was called for later
-    if held is not None:
-        held.prepare(present.model.effects)
-        _decide_payload(held, stages[-1])
     judged = [
         with_noise_of(on_recordings(held, s), on_recordings(store, s))
         if held
@@ -253,23 +249,4 @@ def _traces(given: Model, before: HeldOut, after: HeldOut) -> tuple[Trace, ...]:
         )
         for old, new in zip(before.runs, after.runs, strict=True)
         for j, (name, unit) in enumerate(zip(robot.names, robot.torque_units, strict=True))
-    )
-
-
-def _decide_payload(held: ColumnStore, present: Present) -> None:
-    """Decide which test recordings carry a payload of known inertia, where the study is silent."""
-    if not any("payload" in effect.needs for effect in present.model.effects):
-        return
-    stated = [run.recording.payload is not None for run in held.runs]
-    sums = []
-    for carries in (False, True):
-        held.runs = tuple(
-            run if said else flagged_run(run, carries)
-            for run, said in zip(held.runs, stated, strict=True)
-        )
-        misfits = residuals(held, present.model, present.values)
-        sums.append([float(np.sum(e**2)) for e in misfits])
-    held.runs = tuple(
-        run if said else flagged_run(run, with_load < without)
-        for run, said, without, with_load in zip(held.runs, stated, *sums, strict=True)
     )

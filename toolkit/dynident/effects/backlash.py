@@ -7,8 +7,8 @@ from itertools import product
 
 import numpy as np
 
+from dynident.effects.along import mean_inertia
 from dynident.effects.base import Parameter, ShapeParameter, motion_unit
-from dynident.effects.driven import mean_inertia
 from dynident.effects.flexible import DAMPING, RESONANCE, ROTOR_SHARE, FlexibleJoint
 
 _GAPS = (0.0015, 0.003, 0.006, 0.012)

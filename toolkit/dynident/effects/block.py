@@ -41,6 +41,7 @@ class Block:
     empty : the same robot without its payload, with `body`.
     rotor : (n,) kg m^2 or kg, motor inertia that the present model adds to the bodies'; with
         `body`.
+    period : s after which the motion repeats; None where it does not, or for a part of a recording.
     number : of the recording in its study, from 1; 0 where that does not matter.
     temperature : (T, n) degrees Celsius of the motors, NaN where it is not recorded; or None.
     memory : (T, m) internal state of the one effect that is simulated; None otherwise.
@@ -59,6 +60,7 @@ class Block:
     body: Robot | None = None
     empty: Robot | None = None
     rotor: np.ndarray | None = None
+    period: float | None = None
     number: int = 0
     temperature: np.ndarray | None = None
     memory: np.ndarray | None = None

@@ -15,25 +15,22 @@ triangular band matrix, which LAPACK solves, and so are its exact derivatives by
 
 from __future__ import annotations
 
-import weakref
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dynident.effects.along import along_motion, mean_inertia
 from dynident.effects.bands import solve_band
 from dynident.effects.block import Block
 from dynident.errors import EffectError
 
-if TYPE_CHECKING:
-    from dynident.robot import Robot
-
-_POSES = 64
 _PHASE = 0.3
 """rad that an oscillation may turn in a step: its frequency is then wrong by 0.4 %."""
 _RUNAWAY = 1e3
 """rad or m, per unit of what drives it."""
+_RUNG_DOWN = np.log(100.0)
+"""Decades of a start that a run-up takes away, as a logarithm."""
 _LEAST = 0.05
 """Of the mean inertia: no link is lighter, or unlikely estimates would ring beyond reason."""
 
@@ -85,7 +82,7 @@ class DrivenLink:
     """
 
     def __init__(self, block: Block, joint: int) -> None:
-        robot, along = _present(block)
+        robot, along = along_motion(block)
         rotor = 0.0 if block.rotor is None else float(block.rotor[joint])
         self.joint, self.a = joint, block.a[:, joint]
         self.M, self.C, self.G = (x[:, :, joint] for x in (along.by_a, along.by_v, along.by_q))
@@ -96,6 +93,7 @@ class DrivenLink:
         if len(block.t) < 3:
             raise EffectError("its response needs more than two samples")
         self._step = float(np.mean(np.diff(block.t)))
+        self._period = 0 if block.period is None else round(block.period / self._step)
 
     def response(self, gear: Transmitting) -> Response:
         """Return how the link moves behind a transmission."""
@@ -107,6 +105,17 @@ class DrivenLink:
         per = max(1, int(np.ceil(fastest * self._step / _PHASE)))
         return Response(self, gear, m, moves, load, per, self._step / per)
 
+    def run_up(self, gear: Transmitting) -> np.ndarray:
+        """Return rows of the motion that came before the first, as it repeats itself.
+
+        As many as the ringing takes that a start at rest gives rise to; none where nothing repeats.
+        """
+        decay = gear.damping / (2.0 * (self.inertia - gear.rotor))  # per s
+        if not (self._period and decay > 0):
+            return np.zeros(0, dtype=int)
+        wanted = min(int(np.ceil(_RUNG_DOWN / (decay * self._step))), 2 * self._period)
+        return np.arange(-wanted, 0) % self._period
+
 
 class Response:
     """A deflection with its effect on the torque, and the derivatives of both.
@@ -116,7 +125,7 @@ class Response:
     link, gear : what is driven, and through what.
     m, moves, load : (T,) inertia behind the transmission, whether it depends on the motor's, and
         the torque that the link needs where nothing gives way.
-    per, step : steps per sample, and their length in s.
+    per, step : steps per sample, and their length in s; see also `DrivenLink.run_up`.
     """
 
     def __init__(
@@ -131,11 +140,13 @@ class Response:
     ) -> None:
         self._link, self._gear, self._m, self._moves = link, gear, m, moves
         self._per, self._step = per, step
+        before = link.run_up(gear)
+        self._rows, self._first = np.concatenate([before, np.arange(len(m))]), len(before)
         j = link.joint
         smooth = (self._smooth(x) for x in (link.C[:, j], link.G[:, j], load))
         self._fine = [self._linear(m), *smooth]
         self._solve()
-        self.deflection = self._differences(self._d, self._per)
+        self.deflection = self._samples(self._differences(self._d))
         self.torque = self._torque(self.deflection)
 
     def _steps(self, samples: int) -> np.ndarray:
@@ -143,12 +154,14 @@ class Response:
 
     def _linear(self, x: np.ndarray) -> np.ndarray:
         """Return samples at the steps: an inertia that stays above its least."""
+        x = x[self._rows]
         return x if self._per == 1 else np.interp(self._steps(len(x)), np.arange(len(x)), x)
 
     def _smooth(self, x: np.ndarray) -> np.ndarray:
         """Return samples at the steps without kinks, which a second derivative would show."""
         from scipy.interpolate import CubicSpline
 
+        x = x[self._rows]
         return x if self._per == 1 else CubicSpline(np.arange(len(x)), x)(self._steps(len(x)))
 
     def _solve(self) -> None:
@@ -179,15 +192,20 @@ class Response:
         """Solve with right sides of the two steps at rest, and of the equation at every step."""
         return _bounded(solve_band(self._band, np.concatenate([rest, right[1:-1]])))
 
-    def _differences(self, d: np.ndarray, every: int) -> Deflection:
-        """Return every so many steps' deflection, with the derivatives that the recursion means."""
+    def _differences(self, d: np.ndarray) -> Deflection:
+        """Return the deflection of every step, with the derivatives that the recursion means."""
         rate, bend, h = np.zeros_like(d), np.zeros_like(d), self._step
         rate[1:-1] = (d[2:] - d[:-2]) / (2.0 * h)
         bend[1:-1] = (d[2:] - 2.0 * d[1:-1] + d[:-2]) / h**2
         for x in (rate, bend):
             if len(d) > 2:
                 x[-1] = x[-2]
-        return Deflection(*(x[::every] for x in (d, rate, bend)))
+        return Deflection(d, rate, bend)
+
+    def _samples(self, moved: Deflection) -> Deflection:
+        """Return a deflection at the samples of the motion, from that at all steps."""
+        steps = slice(self._first * self._per, None, self._per)
+        return Deflection(*(x[steps] for x in (moved.d, moved.rate, moved.bend)))
 
     def _torque(self, moved: Deflection) -> np.ndarray:
         """Return the change of the torque, (T, n), to first order in a deflection."""
@@ -200,14 +218,14 @@ class Response:
     def by(self, stiffness: float, damping: float, rotor: float) -> np.ndarray:
         """Return the derivative of the torque (T, n) along a change of these values."""
         lighter = -rotor * self._moves
-        d, moved = self._d, self._differences(self._d, 1)
+        d, moved = self._d, self._differences(self._d)
         bent = d - self._side * self._gear.half_gap
         lost = self._smooth(rotor * self._link.a)
         right = -self._linear(lighter) * moved.bend - lost
         right -= self._touches * (stiffness * bent + damping * moved.rate)
         rest = -stiffness * (d[:2] - self._rests * self._gear.half_gap)
         rest -= lost[:2]
-        change = self._torque(self._differences(self._banded(rest, right), self._per))
+        change = self._torque(self._samples(self._differences(self._banded(rest, right))))
         change[:, self._link.joint] -= lighter * self.deflection.bend
         return change
 
@@ -252,62 +270,6 @@ def _bounded(d: np.ndarray) -> np.ndarray:
 def _sign(load: np.ndarray) -> np.ndarray:
     """Return the side on which a link at rest leans."""
     return np.where(load >= 0.0, 1.0, -1.0)
-
-
-# --- the rigid robot along a motion ---------------------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class Along:
-    """The rigid robot along a motion: torque (T, n) and its derivatives (T, n, n)."""
-
-    torque: np.ndarray
-    by_q: np.ndarray
-    by_v: np.ndarray
-    by_a: np.ndarray
-
-
-_ALONG: dict[int, tuple[Robot, np.ndarray, np.ndarray, Along]] = {}
-"""By the identity of a motion's positions, for as long as these are alive."""
-_MEAN: weakref.WeakKeyDictionary[Robot, np.ndarray] = weakref.WeakKeyDictionary()
-
-
-def _present(block: Block) -> tuple[Robot, Along]:
-    """Return the present model's robot, and what it does along a motion."""
-    if block.body is None:
-        raise EffectError("needs the present model's bodies", mend="give the block a body")
-    robot, key = block.body, id(block.q)
-    kept = _ALONG.get(key)
-    if kept is not None and kept[1] is block.v and kept[2] is block.a:
-        same = kept[0] is robot or np.array_equal(kept[0].theta, robot.theta)
-        if same and kept[0].names == robot.names:
-            return robot, kept[3]
-    torque = robot.inverse_dynamics(block.q, block.v, block.a)
-    by = robot.torque_derivatives(block.q, block.v, block.a)
-    along = Along(torque, by.by_q, by.by_v, by.by_a)
-    if kept is None:
-        weakref.finalize(block.q, _ALONG.pop, key, None)
-    _ALONG[key] = (robot, block.v, block.a, along)
-    return robot, along
-
-
-def mean_inertia(robot: Robot, joint: int) -> float:
-    """Return the joint-space inertia of a joint in the mean over the poses that it can take."""
-    if robot not in _MEAN:
-        q, _, _ = robot.random_motion(0, _POSES)
-        still = np.zeros_like(q)
-        mass = robot.torque_derivatives(q, still, still).by_a
-        _MEAN[robot] = np.diagonal(mass, axis1=1, axis2=2).mean(axis=0)
-    return float(_MEAN[robot][joint])
-
-
-def share_of_rotor(block: Block, joint: int) -> float | None:
-    """Return the motor's share of a joint's inertia in the present model; None if unknown."""
-    if block.body is None or block.rotor is None or not block.rotor[joint] > 0:
-        return None
-    rotor = float(block.rotor[joint])
-    link = mean_inertia(block.empty or block.body, joint)
-    return float(np.clip(rotor / (rotor + link), 0.02, 0.9)) if link > 0 else None
 
 
 def stacked(columns: Iterable[np.ndarray]) -> np.ndarray:

@@ -6,15 +6,9 @@ from abc import abstractmethod
 
 import numpy as np
 
+from dynident.effects.along import mean_inertia, share_of_rotor
 from dynident.effects.base import Block, Forceless, ShapeParameter
-from dynident.effects.driven import (
-    DrivenLink,
-    Response,
-    Transmitting,
-    mean_inertia,
-    share_of_rotor,
-    stacked,
-)
+from dynident.effects.driven import DrivenLink, Response, Transmitting, stacked
 from dynident.effects.transmission import Transmission
 from dynident.robot import Robot
 

@@ -126,7 +126,7 @@ class Sampled:
         temperature = getattr(recording, "temperature", None)
         if temperature is not None:
             temperature = temperature[motion.first : motion.first + motion.samples][raw]
-        return model.block(
+        block = model.block(
             motion.t[raw] + recording.start,
             motion.q[raw],
             motion.v[raw],
@@ -136,6 +136,7 @@ class Sampled:
             number=getattr(recording, "number", 0),
             temperature=temperature,
         )
+        return replace(block, period=recording.period) if raw == slice(None) else block
 
     def _plans(self, size: int) -> Iterator[FilterBlock]:
         """Blocks whose rows lie in the recording's window."""
