@@ -47,6 +47,8 @@ class HeldOut:
     least_ratio : (n,) what that ratio is at least, with 99 % confidence, the uncertainty of the
         parameters accounted for; None likewise.
     inflation : (n,) variance of a mean of consecutive noise over that of white noise.
+    rounding : (n,) mean square of the residual that encoders' steps leave; None where that was not
+        looked at.
     """
 
     runs: tuple[HeldOutRun, ...]
@@ -54,6 +56,7 @@ class HeldOut:
     ratio: np.ndarray | None
     least_ratio: np.ndarray | None
     inflation: np.ndarray
+    rounding: np.ndarray | None = None
 
     @property
     def torque_rms(self) -> np.ndarray:

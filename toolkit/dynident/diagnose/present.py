@@ -64,8 +64,12 @@ class Present:
         return float(combination @ self.moments.sums()[1] @ combination)
 
 
-def fit_present(store: ColumnStore, model: Model) -> Present:
+def fit_present(store: ColumnStore, model: Model, near: Present | None = None) -> Present:
     """Fit a model to the runs of a store.
+
+    Parameters
+    ----------
+    near : the fit of a like model, from which columns that depend on the values start.
 
     Raises
     ------
@@ -73,12 +77,12 @@ def fit_present(store: ColumnStore, model: Model) -> Present:
         If the columns are not finite.
     """
     n = model.robot.n
-    at = model.points()
+    at = _held(model, _beginning(model, near))
     torque_std = [
         float(np.sqrt(np.mean(np.concatenate([r.versions[0].tau[:, j] for r in store.runs]) ** 2)))
         for j in range(n)
     ]
-    noise = tuple(flat_noise(std or 1.0) for std in torque_std)
+    noise = tuple(flat_noise(std or 1.0) for std in torque_std) if near is None else near.noise
     known = any(run.kind != "single" for run in store.runs)
     columns, values, settling = [], at, Settling()
     for round in range(_PRESENT_ROUNDS if model.needs_values else _ROUNDS):
@@ -89,14 +93,16 @@ def fit_present(store: ColumnStore, model: Model) -> Present:
                 for r in range(len(store.runs))
             ]
         values, _ = _solve(_moments(store, model, _whiten(store, columns, noise, values)))
-        if round == 0:
+        if round == 0 and near is None:
             # Along a robot without bodies their columns are rounding errors, and any value fits.
             values = _waiting(model, at, values)
         noise = tuple(_noise(store, columns, values, j) for j in range(n))
-        change = float(np.linalg.norm(values - at))
-        if round >= _ROUNDS and change <= _PRESENT_TOLERANCE * np.linalg.norm(values):
+        change = float(np.linalg.norm(_held(model, values) - at))
+        if round >= _ROUNDS - (near is not None) and change <= _PRESENT_TOLERANCE * np.linalg.norm(
+            values
+        ):
             break
-        at = settling.following(model, at, values)
+        at = _held(model, settling.following(model, at, values))
     white = _whiten(store, columns, noise, values)
     summed = _moments(store, model, white)
     values, solution = _solve(summed)
@@ -105,8 +111,30 @@ def fit_present(store: ColumnStore, model: Model) -> Present:
         for run, joints in zip(store.runs, white, strict=True)
         for part in joints
     )
-    model = model.at(values)
+    model = model.at(_held(model, values))
     return Present(model, values, solution.covariance, solution, noise, known, white, summed, rows)
+
+
+def _beginning(model: Model, near: Present | None) -> np.ndarray:
+    """Values at which columns that depend on them are taken first, (p,)."""
+    if near is None:
+        return model.points()
+    known = dict(zip(near.model.names, near.values, strict=True))
+    return np.array(
+        [known.get(name, x) for name, x in zip(model.names, model.points(), strict=True)]
+    )
+
+
+def _held(model: Model, values: np.ndarray) -> np.ndarray:
+    """Values, but where a column is that of a whole response at a value: that value.
+
+    Another gap is another motion of the link: it is sought as shapes are, not iterated on.
+    """
+    held = np.array(values)
+    for effect in model.effects:
+        if effect.point and {"body", "whole"} <= effect.needs:
+            held[model.slices[effect.label]] = effect.point
+    return held
 
 
 def _waiting(model: Model, at: np.ndarray, found: np.ndarray) -> np.ndarray:

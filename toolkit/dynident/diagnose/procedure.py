@@ -41,6 +41,7 @@ _GAINED = 0.02  # share of the systematic square that another refit must take aw
 _ANOTHER = 0.1  # of the torque that must be explained for a model to be another one
 _FIRST_SHARE = 0.75  # of the largest drop that a simpler effect must reach, to be named first
 _NEARLY = 0.85  # of the largest drop, from which a rival that is not linear is fitted to compare
+_LEAST_KEPT = 0.1  # of the drop that an effect promises, that is left when all is fitted with it
 _LEAST_FALL = 0.015  # of a joint's squared noise that an effect must take off the held-out residual
 
 
@@ -97,13 +98,16 @@ def diagnose(
         if chosen is None:
             break
         tell(f"adding {chosen.score.effect.label}")
-        found.append(chosen)
         _carry(store, chosen.score)
-        present = blunted(store, _refitted(store, present.model + chosen.score.effect))
+        wider = blunted(store, _refitted(store, present.model + chosen.score.effect, present))
+        if present.error_signal - wider.error_signal < _LEAST_KEPT * chosen.score.drop:
+            break  # what it explains beside the model it does not explain in it
+        found.append(chosen)
+        present = wider
         if _has_changed(store, start, present):
             store.look_again()
         if loop.renew(store, present):
-            present = blunted(store, _refitted(store, present.model))
+            present = blunted(store, _refitted(store, present.model, present))
         rounds.append(rank(store, present, len(found), tell))
         found[-1] = _alternatives_only(chosen, rounds[-1])
     if held is not None:
@@ -113,8 +117,8 @@ def diagnose(
         rounds.append(rank(store, kept.final, len(kept.found), tell))
     sure = contacts.confirmed(kept.final)
     if sure.bumps != contacts.bumps:
-        start = fit_present(store, start.model)
-        kept = replace(kept, final=fit_present(store, kept.final.model))
+        start = fit_present(store, start.model, start)
+        kept = replace(kept, final=fit_present(store, kept.final.model, kept.final))
     disturbances = sure.told(start)
     search = Search(
         store, start, kept.final, tuple(kept.found), tuple(rounds), disturbances, loop.notes
@@ -178,7 +182,9 @@ def _alike_once_fitted(
         return ()
 
     def explained(effect: Effect) -> float:
-        return present.error_signal - fit_present(store, present.model + effect).error_signal
+        return (
+            present.error_signal - fit_present(store, present.model + effect, present).error_signal
+        )
 
     most = explained(best.effect)
     return tuple(s.effect for s in rivals if explained(s.effect) >= (1.0 - ALIKE) * most)
@@ -214,19 +220,19 @@ def _shaped(store: ColumnStore, model: Model) -> Present:
     present = fit_present(store, model)
     for effect in present.model.effects:
         if effect.shape_parameters(model.robot):
-            others = fit_present(store, present.model - effect)
+            others = fit_present(store, present.model - effect, present)
             better = best_shape(store, others, effect)
-            present = fit_present(store, present.model.with_shapes((better,)))
-    return _refitted(store, present.model)
+            present = fit_present(store, present.model.with_shapes((better,)), present)
+    return _refitted(store, present.model, present)
 
 
-def _refitted(store: ColumnStore, model: Model) -> Present:
+def _refitted(store: ColumnStore, model: Model, near: Present | None = None) -> Present:
     """Fit a model, each shape parameter refined with the others as they are.
 
     Responses that depend on the bodies are refined again with the bodies that come out, which were
     others while the effect was missing, until nothing is gained.
     """
-    present = fit_present(store, model)
+    present = fit_present(store, model, near)
     shaped = [e.label for e in model.effects if e.shape_parameters(model.robot)]
     driven = [e.label for e in model.effects if {"body", "whole"} <= e.needs]
     for again in range(_REFITS if driven else 1):
@@ -234,9 +240,9 @@ def _refitted(store: ColumnStore, model: Model) -> Present:
         before = present
         for label in labels:
             effect = next(e for e in present.model.effects if e.label == label)
-            others = fit_present(store, present.model - effect)
+            others = fit_present(store, present.model - effect, present)
             better = reshaped(store, others, present, effect).effect
-            trial = fit_present(store, present.model.with_shapes((better,)))
+            trial = fit_present(store, present.model.with_shapes((better,)), present)
             if trial.error_signal < present.error_signal:
                 present = trial
         if before.error_signal - present.error_signal < _GAINED * before.error_signal:
@@ -265,7 +271,7 @@ def _without_superfluous(
         if _belongs(one.score.effect, kept):
             continue
         effect = next(e for e in present.model.effects if e.label == one.score.effect.label)
-        rest = fit_present(store, present.model - effect)
+        rest = fit_present(store, present.model - effect, present)
         tell(f"doing without {effect.label}")
         needed = len(kept) == 1 or rank(store, rest, len(kept) - 1, only=(effect,)).material
         if not needed or not _helps(held, rest, present):
@@ -275,13 +281,21 @@ def _without_superfluous(
 
 
 def _helps(held: ColumnStore | None, without: Present, present: Present) -> bool:
-    """Whether an effect lowers the residual of the test recordings at any joint."""
+    """Whether an effect lowers the residual of the test recordings at any joint.
+
+    The whole of it, or what of it repeats: columns that carry noise may take the latter away and
+    add to the former.
+    """
     if held is None:
         return True  # its gain was cross-validated
     before, after = (on_recordings(held, one) for one in (without, present))
-    scale = after.residual_rms if after.noise_std is None else after.noise_std
-    fall = before.residual_rms**2 - after.residual_rms**2
-    return bool(np.any(fall > _LEAST_FALL * scale**2))
+    falls = [before.residual_rms**2 - after.residual_rms**2]
+    scale = after.residual_rms
+    if after.noise_std is not None and after.ratio is not None:
+        assert before.noise_std is not None and before.ratio is not None
+        scale = before.noise_std
+        falls.append((before.ratio * before.noise_std) ** 2 - (after.ratio * after.noise_std) ** 2)
+    return any(bool(np.any(fall > _LEAST_FALL * scale**2)) for fall in falls)
 
 
 def _belongs(effect: Effect, found: list[Found]) -> bool:

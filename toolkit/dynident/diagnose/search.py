@@ -202,13 +202,8 @@ def _score_variants(store: ColumnStore, present: Present, effect: Effect) -> Ite
 
 
 def _possible(one: Score, model: Model) -> Score:
-    """Return a score that counts for nothing where its values are impossible.
-
-    Columns taken at a value count as far as that is the value found.
-    """
-    if impossible(one, model):
-        return replace(one, penalised=-np.inf)
-    return replace(one, penalised=one.penalised - (one.drop - one.settled_drop))
+    """Return a score that counts for nothing where its values are impossible."""
+    return replace(one, penalised=-np.inf) if impossible(one, model) else one
 
 
 def _seen(present: Present, effect: Effect) -> Block:
@@ -224,7 +219,9 @@ def _confirm(store: ColumnStore, present: Present, one: Score) -> Score:
     if one.carriers is not None:
         parts = tuple(carried(part, store, one.carriers) for part in parts)
     without, with_effect = cross_validate(present, *parts)
-    return replace(one, losses=with_effect, gains=without - with_effect)
+    # Columns taken at a value count as far as that is the value found.
+    settled = one.penalised - (one.drop - one.settled_drop)
+    return replace(one, penalised=settled, losses=with_effect, gains=without - with_effect)
 
 
 def _refusal(one: Score, store: ColumnStore, model: Model, tests: int, least: float) -> str:

@@ -27,6 +27,7 @@ from dynident.model import Model
 _SECANTS = 3  # times that columns are taken at the values just found
 _SETTLED = 0.02  # relative change of values at which secants count as settled
 _EVALUATIONS = 25  # of a gradient search, at most
+_FURTHEST = 1.7  # factor by which a gradient search changes a shape, at most
 _VALUES_TRIED = 10  # of a column that is taken at a value
 _VALUE_RANGE = 0.5  # of the logarithm of that value, to each side
 _PRECISION = 1e-3  # of the logarithm of a shape parameter
@@ -103,14 +104,16 @@ def refined(
         return one
     if not one.effect.shape_parameters(present.model.robot):
         return _at_its_values(store, present, one, columns_of) if one.effect.secant else one
-    if one.effect.point:
-        one = _at_best_value(store, present, one, columns_of)
     has_slopes = type(one.effect).sensitivities is not Effect.sensitivities
     search = _by_gradient if has_slopes else _by_trial
-    better = search(store, present, one, columns_of)
-    if better.settled_drop <= one.settled_drop:
-        return one
-    return _at_best_value(store, present, better, columns_of) if one.effect.point else better
+    if one.effect.point:
+        one = _at_best_value(store, present, one, columns_of)
+    one = _better(one, search(store, present, one, columns_of))
+    return _at_best_value(store, present, one, columns_of) if one.effect.point else one
+
+
+def _better(one: Score, other: Score) -> Score:
+    return other if other.settled_drop > one.settled_drop else one
 
 
 def _at_its_values(
@@ -199,7 +202,11 @@ def _by_gradient(
         slope = _slope(present, with_model.sums()[0], with_self.sums()[0], values)
         return -found.drop / one.drop, slope / one.drop
 
-    bounds = [(np.log(s.lower), np.log(s.upper)) for s in shapes]
+    # Not further than to the next shapes of the grid: beyond, other peaks lead astray.
+    bounds = [
+        tuple(np.log(np.clip([x / _FURTHEST, x * _FURTHEST], s.lower, s.upper)))
+        for s, x in zip(shapes, effect.shape, strict=True)
+    ]
     options = {"maxfun": _EVALUATIONS, "ftol": 1e-5}
     minimize(
         loss, np.log(effect.shape), jac=True, bounds=bounds, method="L-BFGS-B", options=options

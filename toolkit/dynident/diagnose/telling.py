@@ -17,6 +17,7 @@ from dynident.diagnose.diagnosis import (
     Trace,
 )
 from dynident.diagnose.disturbances import Disturbance, contact_candidates
+from dynident.diagnose.encoders import rounding_notes, with_rounding
 from dynident.diagnose.evidence import ColumnStore
 from dynident.diagnose.experiments import Adviser
 from dynident.diagnose.held_out import HeldOut, on_blocks, on_recordings, with_noise_of
@@ -84,18 +85,21 @@ def told(
     found, rounds, given = search.found, search.rounds, search.start.model
     by_label = {e.label: e for e in present.model.effects}
     stages = [start]
-    for one in found:
+    for one in found[:-1]:
         wider = stages[-1].model + by_label[one.score.effect.label]
-        stages.append(fit_present(store, wider.with_shapes(present.model.effects)))
+        stages.append(fit_present(store, wider.with_shapes(present.model.effects), stages[-1]))
     if found:
-        stages[-1] = present  # with its dry friction blunted where that was called for later
+        # With its dry friction blunted where that was called for later.
+        stages.append(present)
     judged = [
         with_noise_of(on_recordings(held, s), on_recordings(store, s))
         if held
         else on_blocks(store, s)
         for s in stages
     ]
-    before, after = judged[0], judged[-1]
+    rounded = test if test is not None and held is not None else train
+    before = with_rounding(judged[0], start, rounded)
+    after = with_rounding(judged[-1], stages[-1], rounded) if found else before
     steps = tuple(
         Step(
             by_label[one.score.effect.label],
@@ -125,7 +129,11 @@ def told(
         _estimate(store, stages[-1], train),
         residual_maps(given, before, after),
         _traces(given, before, after),
-        (*notes_on(store, held, stages[-1], source), *search.notes),
+        (
+            *notes_on(store, held, stages[-1], source),
+            *rounding_notes(after, given.robot.names),
+            *search.notes,
+        ),
         sources_of(test) if test is not None else (),
     )
 

@@ -38,11 +38,14 @@ def verdict_of(before: HeldOut, after: HeldOut, steps, last: Ranking) -> Verdict
 
 
 def within_noise(judged: HeldOut) -> bool:
-    """Whether nothing remains at any joint but noise, and what no processing can resolve."""
+    """Whether nothing remains at any joint but noise, and what nothing can resolve."""
     assert judged.least_ratio is not None and judged.noise_std is not None
-    systematic = judged.least_ratio * judged.noise_std
+    power = (judged.least_ratio * judged.noise_std) ** 2
+    if judged.rounding is not None:
+        power = power - judged.rounding
+    systematic = np.sqrt(np.clip(power, 0.0, None))
     matters = systematic > RESOLUTION * judged.torque_rms
-    return not np.any(matters & (judged.least_ratio > WITHIN_NOISE))
+    return not np.any(matters & (systematic > WITHIN_NOISE * judged.noise_std))
 
 
 def noise_source(store: ColumnStore, held: ColumnStore | None) -> NoiseSource:

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from dynident.robot import Robot
 
 _POSES = 64
+_RATE = 200.0
+"""Hz at which the derivatives of the torque are evaluated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,13 +44,28 @@ def along_motion(block: Block) -> tuple[Robot, Along]:
         same = kept[0] is robot or np.array_equal(kept[0].theta, robot.theta)
         if same and kept[0].names == robot.names:
             return robot, kept[3]
-    torque = robot.inverse_dynamics(block.q, block.v, block.a)
-    by = robot.torque_derivatives(block.q, block.v, block.a)
-    along = Along(torque, by.by_q, by.by_v, by.by_a)
+    along = Along(robot.inverse_dynamics(block.q, block.v, block.a), *_derivatives(robot, block))
     if kept is None:
         weakref.finalize(block.q, _ALONG.pop, key, None)
     _ALONG[key] = (robot, block.v, block.a, along)
     return robot, along
+
+
+def _derivatives(robot: Robot, block: Block) -> tuple[np.ndarray, ...]:
+    """Derivatives of the torque by q, v and a, (T, n, n) each.
+
+    They cost most of all, and change as slowly as the motion: splines give them between samples.
+    """
+    step = float(np.mean(np.diff(block.t)))
+    every = max(1, min(int(1.0 / (_RATE * step)), len(block.t) // 4))
+    rows = np.unique(np.append(np.arange(0, len(block.t), every), len(block.t) - 1))
+    by = robot.torque_derivatives(block.q[rows], block.v[rows], block.a[rows])
+    if every == 1:
+        return by.by_q, by.by_v, by.by_a
+    from scipy.interpolate import make_interp_spline
+
+    at = np.arange(len(block.t))
+    return tuple(make_interp_spline(rows, x, k=3)(at) for x in (by.by_q, by.by_v, by.by_a))
 
 
 def mean_inertia(robot: Robot, joint: int) -> float:

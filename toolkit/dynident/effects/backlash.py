@@ -11,7 +11,7 @@ from dynident.effects.along import mean_inertia
 from dynident.effects.base import Parameter, ShapeParameter, motion_unit
 from dynident.effects.flexible import DAMPING, RESONANCE, ROTOR_SHARE, FlexibleJoint
 
-_GAPS = (0.0015, 0.003, 0.006, 0.012)
+_GAPS = (0.0015, 0.004, 0.01, 0.025)
 """rad (a tenth of it in m): gaps that are screened."""
 
 

@@ -12,7 +12,8 @@ from dynident.effects.driven import DrivenLink, Response, Transmitting, stacked
 from dynident.effects.transmission import Transmission
 from dynident.robot import Robot
 
-RESONANCE = ShapeParameter("resonance", "Hz", (5.0, 10.0, 20.0, 40.0, 80.0), 2.0, 200.0)
+_SCREENED = (3.0, 4.0, 5.4, 7.3, 9.8, 13.2, 18.0, 25.0, 40.0, 80.0)  # Hz: a peak is narrow
+RESONANCE = ShapeParameter("resonance", "Hz", _SCREENED, 2.0, 200.0)
 """Of the link against the locked motor, at the mean of its inertia."""
 DAMPING = ShapeParameter("damping", "1", (0.1,), 0.002, 2.0)
 ROTOR_SHARE = ShapeParameter("rotor_share", "1", (0.3,), 0.005, 0.95)

@@ -28,6 +28,7 @@ from dynident.recording.parallel import FilterBlock, ParallelFilter, choose_fact
 from dynident.recording.periods import Periods, mismatch, periods, require_repetition
 from dynident.recording.read import SUFFIXES, read
 from dynident.recording.recording import SIGNALS, Provenance, Recording
+from dynident.recording.resolution import resolution
 from dynident.recording.uniform import uniform
 from dynident.recording.write import write
 
@@ -58,6 +59,7 @@ __all__ = [
     "require_motion",
     "require_repetition",
     "require_torque",
+    "resolution",
     "uniform",
     "warn_of_missing_torque",
     "within",
