@@ -100,8 +100,8 @@ def diagnose(
         tell(f"adding {chosen.score.effect.label}")
         _carry(store, chosen.score)
         wider = blunted(store, _refitted(store, present.model + chosen.score.effect, present))
-        if present.error_signal - wider.error_signal < _LEAST_KEPT * chosen.score.drop:
-            break  # what it explains beside the model it does not explain in it
+        if _breaks_its_promise(present, wider, chosen.score):
+            break
         found.append(chosen)
         present = wider
         if _has_changed(store, start, present):
@@ -188,6 +188,16 @@ def _alike_once_fitted(
 
     most = explained(best.effect)
     return tuple(s.effect for s in rivals if explained(s.effect) >= (1.0 - ALIKE) * most)
+
+
+def _breaks_its_promise(present: Present, wider: Present, one: Score) -> bool:
+    """Whether a driven response does not explain in a model what it explained beside it.
+
+    With it the bodies change, and with them the response, which may not follow.
+    """
+    if not ({"body", "whole"} <= one.effect.needs and present.noise_known):
+        return False
+    return present.error_signal - wider.error_signal < _LEAST_KEPT * one.drop
 
 
 def _size(one: Score) -> int:
