@@ -29,11 +29,17 @@ def with_rounding(judged: HeldOut, present: Present, dataset: Dataset) -> HeldOu
     return replace(judged, rounding=rounding_power(present, dataset))
 
 
+def nothing_but_rounding(judged: HeldOut, present: Present, dataset: Dataset) -> bool:
+    """Whether a residual beyond the noise is no more than encoders' steps leave."""
+    rounded = with_rounding(judged, present, dataset)
+    return rounded.rounding is not None and within_noise(rounded)
+
+
 def rounding_power(present: Present, dataset: Dataset) -> np.ndarray:
     """Mean square of the torque error that repeats because positions are rounded, (n,).
 
-    The filtered motion is rounded again, with two draws of the noise that the recording has: what
-    both do to the prediction is what repeats.
+    The filtered motion is rounded again, on a lattice that is moved, with two draws of the noise
+    that the recording has: what both do to the prediction is what repeats.
 
     Parameters
     ----------
@@ -64,10 +70,12 @@ def _again(recording: Recording, dataset: Dataset, steps: np.ndarray) -> list[Re
     power = np.mean((recording.q[rows] - motion.q) ** 2, axis=0) - steps**2 / 12.0
     std = np.sqrt(np.clip(power, 0.0, None))
     rng, safe = np.random.default_rng(0), np.where(steps > 0, steps, 1.0)
+    # Another place of the lattice: what the filter left of the first rounding is in `smooth`.
+    shift = steps * rng.uniform(0.0, 1.0, len(steps))
     found = [recording.replace(q=smooth)]
     for _ in range(_DRAWS):
-        noisy = smooth + std * rng.standard_normal(smooth.shape)
-        rounded = np.where(steps > 0, np.round(noisy / safe) * safe, smooth)
+        noisy = smooth + shift + std * rng.standard_normal(smooth.shape)
+        rounded = np.where(steps > 0, np.round(noisy / safe) * safe - shift, smooth)
         found.append(recording.replace(q=rounded))
     return found
 

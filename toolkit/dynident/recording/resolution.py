@@ -6,8 +6,6 @@ import numpy as np
 
 _WHOLE = 0.05
 """Steps by which a position may miss a whole number of them."""
-_REPEATED = 0.9
-"""Share of samples that may be different from each other, on a lattice that is worth the name."""
 
 
 def resolution(q: np.ndarray) -> np.ndarray:
@@ -28,7 +26,7 @@ def _step(x: np.ndarray) -> float:
     seen = np.unique(x)
     gaps = np.diff(seen)
     gaps = gaps[gaps > 1e-9 * max(float(np.ptp(seen)), 1e-300)]
-    if len(gaps) == 0 or len(seen) > _REPEATED * len(x):
+    if len(gaps) == 0:
         return 0.0
     # The smallest gap is rounded as numbers are; the mean over all gaps is not.
     steps = np.round(gaps / gaps.min())

@@ -1,0 +1,70 @@
+"""What the steps of an encoder leave is neither noise nor missing physics."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dynident import diagnose as find
+from dynident.diagnose.encoders import rounding_power
+from dynident.diagnose.evidence import ColumnStore
+from dynident.diagnose.held_out import on_recordings
+from dynident.diagnose.present import fit_present
+from dynident.diagnose.runs import gather
+from dynident.model import Model
+from dynident.recording import Dataset, Recording
+from synthetic import arm, synthetic, true_values
+
+VALUES = {"Fv__shoulder": 1.2, "Fv__elbow": 0.5}
+STEP = 2e-4
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    return Model(arm()) + "viscous_friction"
+
+
+def recordings(model: Model, step: float, torque_std: float, count: int) -> tuple[Recording, ...]:
+    truth = true_values(model, **VALUES)
+    smooth = (
+        synthetic(model, truth, k, rate_hz=250.0, torque_std=torque_std) for k in range(count)
+    )
+    return tuple(one.replace(q=np.round(one.q / step) * step) if step else one for one in smooth)
+
+
+def test_rounding_power_is_what_rounding_leaves(model: Model) -> None:
+    runs = Dataset(recordings(model, STEP, 1e-3, 3))
+    store = ColumnStore(model, gather(runs))
+    store.prepare(model.effects)
+    present = fit_present(store, model)
+    judged = on_recordings(store, present)
+    assert judged.ratio is not None and judged.noise_std is not None
+    left = judged.ratio * judged.noise_std
+    assert (left > 3.0 * judged.noise_std).all(), "rounding is not to be seen"
+    predicted = np.sqrt(rounding_power(present, runs))
+    np.testing.assert_allclose(predicted, left, rtol=0.3)
+
+
+def test_there_is_none_without_steps(model: Model) -> None:
+    runs = Dataset(recordings(model, 0.0, 1e-3, 1))
+    store = ColumnStore(model, gather(runs))
+    store.prepare(model.effects)
+    np.testing.assert_array_equal(rounding_power(fit_present(store, model), runs), np.zeros(2))
+
+
+def test_a_healthy_robot_with_a_coarse_encoder_lacks_nothing(model: Model) -> None:
+    runs = recordings(model, STEP, 0.1, 4)
+    found = find(model, Dataset(runs[:3]), Dataset(runs[3:]))
+    assert (found.verdict, found.steps) == ("nothing_missing", ())
+    assert any("steps of the encoder at shoulder" in note for note in found.notes)
+    # The same residual without steps that explain it would be missing physics.
+    moved = tuple(off_the_lattice(one) for one in runs)
+    assert find(model, Dataset(moved[:3]), Dataset(moved[3:])).verdict != "nothing_missing"
+
+
+def off_the_lattice(recording: Recording) -> Recording:
+    """The same positions moved off their lattice by far less than a step."""
+    rng = np.random.default_rng(3)
+    return replace(recording, q=recording.q + 1e-7 * rng.standard_normal(recording.q.shape))
