@@ -45,7 +45,8 @@ class Judged:
     size : of that set.
     added : number of effects added.
     verdict : of the answer.
-    over_floor : held-out error after, over the noise floor; None without one.
+    before_over_floor, over_floor : held-out error before and after, over the noise floor; None
+        without one.
     both : of two, whether each is in the set of some step.
     absorbed : whether the truth is listed as absorbed.
     cpu_s : of `explain`.
@@ -66,6 +67,7 @@ class Judged:
     size: int
     added: tuple[Place, ...]
     verdict: str
+    before_over_floor: float | None
     over_floor: float | None
     both: bool
     absorbed: bool
@@ -93,7 +95,7 @@ def judge(truth: dict[str, Any], said: dict[str, Any]) -> Judged:
         "steps": [],
         "candidates": [],
         "verdict": "no answer",
-        "test_error": {"after": None, "noise_floor": None},
+        "test_error": {"before": None, "after": None, "noise_floor": None},
     }
     steps = answer["steps"]
     sets = [[_place(s), *(_place(o) for o in s["indistinguishable"])] for s in steps]
@@ -106,7 +108,7 @@ def judge(truth: dict[str, Any], said: dict[str, Any]) -> Judged:
         return any(same(place, one, truth["joints"], planar=planar) for one in among)
 
     floor = answer["test_error"]["noise_floor"]
-    after = answer["test_error"]["after"]
+    before, after = answer["test_error"]["before"], answer["test_error"]["after"]
     ratios = [one["ratio"] for one in truth["hidden"]]
     return Judged(
         said["name"],
@@ -124,6 +126,7 @@ def judge(truth: dict[str, Any], said: dict[str, Any]) -> Judged:
         size=len(first),
         added=tuple(one[0] for one in sets),
         verdict=answer["verdict"],
+        before_over_floor=before / floor if floor and before is not None else None,
         over_floor=after / floor if floor and after is not None else None,
         both=bool(hidden) and all(any(found(one, each) for each in sets) for one in hidden),
         absorbed=any(one in absorbed for one in hidden),

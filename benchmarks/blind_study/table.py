@@ -14,8 +14,10 @@ from rich.console import Console
 from rich.table import Table
 from scipy import stats
 
+from blind_study import record
 from blind_study.judge import Judged, judge
 from blind_study.robots import MANY, TWO
+from dynident.diagnose.track_record import LARGE, track_record
 
 LEAST = 0.7
 """Ratio below which an effect need not be found."""
@@ -62,6 +64,7 @@ def show(folder: Path) -> None:
     console.print(_figures(judged))
     console.print(_effects(judged))
     console.print(_times(judged))
+    console.print(_records(judged))
     console.print(_failures(judged))
 
 
@@ -230,6 +233,31 @@ def _times(judged: list[Judged]) -> Table:
             table.add_row(
                 what, str(len(times)), f"{np.median(times):.1f}", f"{max(times):.1f}", str(demanded)
             )
+    return table
+
+
+def _records(judged: list[Judged]) -> Table:
+    """How often answers of each kind were right, beside what the tool says of them."""
+    table = _table(
+        "Answers by kind, and how many were right",
+        "answer",
+        "error without it",
+        "right here",
+        "95 % interval",
+        "what the tool says",
+    )
+    for (said, size), (right, cases) in record.counts(judged).items():
+        over = LARGE + 0.1 if size == "large" else 1.0
+        verdict = "unexplained" if said in ("in_part", "none_of_these") else said
+        told = track_record(verdict, named=said in ("in_part", "explained"), over_floor=over)
+        interval = stats.binomtest(right, cases).proportion_ci(method="wilson")
+        table.add_row(
+            said.replace("_", " "),
+            f"{'at least' if size == 'large' else 'below'} {LARGE:g} times the floor",
+            f"{right}/{cases}",
+            f"{interval.low:.3f} .. {interval.high:.3f}",
+            f"{told.right}/{told.cases}" if told else "nothing",
+        )
     return table
 
 

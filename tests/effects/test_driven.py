@@ -11,7 +11,7 @@ from scipy.signal import butter, filtfilt
 from tests.synthetic import arm, smooth_motion
 
 from dynident.closed_loop import ClosedLoop, Controller, Fourier, Mechanism, Task, TrueEffect
-from dynident.effects import Block, Effect, effects_of
+from dynident.effects import Block, Effect, along, effects_of
 from dynident.effects.along import mean_inertia
 from dynident.effects.backlash import Backlash
 
@@ -116,9 +116,34 @@ def test_a_response_does_not_depend_on_the_rate_of_the_samples() -> None:
     assert error.std() < 0.02 * fine[::8][late].std()
 
 
-def test_screened_shapes_share_the_dynamics_of_a_joint() -> None:
-    from dynident.effects import along
+@pytest.mark.parametrize("label", ["joint_elasticity@elbow", "backlash@elbow"])
+def test_a_motion_that_repeats_has_no_start_to_ring_from(label: str) -> None:
+    (effect,) = effects_of(label, ROBOT)
+    effect = effect.shaped(8.0, 0.05, 0.3)
+    t, q, v, a = smooth_motion(2, 5, 500.0, 8.0, 2.0)
+    alone = Block(t, q, v, a, ROBOT.names, body=ROBOT, rotor=np.array(ROTORS))
+    first, third = slice(0, 1000), slice(2000, 3000)
+    rings, steady = (effect.columns(one)[..., 0] for one in (alone, replace(alone, period=2.0)))
+    assert unlike(rings[first], rings[third]) > 0.1
+    assert unlike(steady[first], steady[third]) < 0.05
+    assert unlike(rings[third], steady[third]) < 0.05
 
+
+def unlike(x: np.ndarray, y: np.ndarray) -> float:
+    """Difference of two signals, relative to the latter (root mean squares)."""
+    return float(np.linalg.norm(x - y) / np.linalg.norm(y))
+
+
+def test_derivatives_between_samples_are_those_at_them() -> None:
+    """Splines give them at a high rate; at a low one every sample has its own."""
+    samples = block(3, 2000.0)
+    _, fine = along.along_motion(samples)
+    exact = ROBOT.torque_derivatives(samples.q, samples.v, samples.a)
+    for found, expected in ((fine.by_q, exact.by_q), (fine.by_v, exact.by_v)):
+        np.testing.assert_allclose(found, expected, atol=1e-5 * np.abs(expected).max())
+
+
+def test_screened_shapes_share_the_dynamics_of_a_joint() -> None:
     (effect,) = effects_of("joint_elasticity@elbow", ROBOT)
     samples = block(4)
     variants = list(effect.variants(ROBOT))

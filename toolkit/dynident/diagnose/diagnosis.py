@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from dynident.diagnose.track_record import TrackRecord, track_record
 from dynident.effects import Effect
 from dynident.fit.estimate import Estimate, Source
 from dynident.tables import Table, number, percent, print_tables
@@ -216,6 +217,23 @@ class Diagnosis:
             )
         return _VERDICTS[self.verdict].format(effects=effects)
 
+    @property
+    def track_record(self) -> TrackRecord | None:
+        """How often answers like this one were right; None where the noise was not measured."""
+        floor = self.test_error.noise_floor
+        if self.noise_source != "replicates" or not floor:
+            return None
+        over = self.test_error.before / floor
+        return track_record(self.verdict, named=bool(self.steps), over_floor=over)
+
+    @property
+    def confidence(self) -> str:
+        """The same in plain words; empty where nothing can be said."""
+        return str(self.track_record or "")
+
+    def _confidence_lines(self) -> tuple[str, ...]:
+        return (self.confidence,) if self.confidence else ()
+
     def _named(self, step: Step) -> str:
         """A step with everything that the data cannot tell it from: never one alone."""
         added = {one.effect.label for one in self.steps}
@@ -259,7 +277,7 @@ class Diagnosis:
                 "after": self.test_error.after,
                 "noise_floor": self.test_error.noise_floor,
             },
-            "notes": list(self.notes),
+            "notes": [*self._confidence_lines(), *self.notes],
         }
 
     def tables(self) -> tuple[Table | str, ...]:
@@ -270,6 +288,7 @@ class Diagnosis:
             self.candidate_table(),
             self.step_table(),
             self.sentence,
+            *self._confidence_lines(),
             *self.notes,
         )
 
