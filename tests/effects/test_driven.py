@@ -116,10 +116,19 @@ def test_a_response_does_not_depend_on_the_rate_of_the_samples() -> None:
     assert error.std() < 0.02 * fine[::8][late].std()
 
 
-@pytest.mark.parametrize("label", ["joint_elasticity@elbow", "backlash@elbow"])
-def test_a_motion_that_repeats_has_no_start_to_ring_from(label: str) -> None:
+@pytest.mark.parametrize(
+    ("label", "shape"),
+    [
+        ("joint_elasticity@elbow", (8.0, 0.05, 0.3)),
+        ("backlash@elbow", (8.0, 0.05, 0.3)),
+        ("presliding@elbow", (0.3,)),
+    ],
+)
+def test_a_motion_that_repeats_has_no_start_to_settle_from(
+    label: str, shape: tuple[float, ...]
+) -> None:
     (effect,) = effects_of(label, ROBOT)
-    effect = effect.shaped(8.0, 0.05, 0.3)
+    effect = effect.shaped(*shape)
     t, q, v, a = smooth_motion(2, 5, 500.0, 8.0, 2.0)
     alone = Block(t, q, v, a, ROBOT.names, body=ROBOT, rotor=np.array(ROTORS))
     first, third = slice(0, 1000), slice(2000, 3000)

@@ -18,6 +18,8 @@ from dynident.model import Model
 ABSORBED = 2e-3
 """Share of an effect's columns (in norm) left beside the model, below which it is absorbed."""
 
+_UNSEEN = 1e-3
+"""Part of the noise below which a column is not seen."""
 
 Columns = Callable[[Effect, int, Model, np.ndarray], Signals]
 """Columns of an effect in a run, for a model and its values, as `ColumnStore.of`."""
@@ -165,11 +167,12 @@ def score(
     cross = back.T @ total[:p]
     left_total = own_total - cross - cross.T + back.T @ model_total @ back
     scale = np.sqrt(np.clip(np.diag(own_signal), 0.0, None))
-    if not np.any(scale > 0):
+    seen = _seen(effect, present, scale)
+    if not np.any(seen):
         return Score(effect, carriers, absorbed=True)
-    scale = np.where(scale > 0, scale, 1.0)
+    scale = np.where(seen, scale, 1.0)
     # Directions of the columns, by what is left of them beside the model.
-    size, directions = np.linalg.eigh(own_signal / np.outer(scale, scale))
+    size, directions = np.linalg.eigh(own_signal * np.outer(seen, seen) / np.outer(scale, scale))
     keep = size > 1e-9 * size[-1]
     white = directions[:, keep] / np.sqrt(size[keep]) / scale[:, None]
     left, turn = np.linalg.eigh(white.T @ left_signal @ white)
@@ -204,6 +207,13 @@ def score(
         values=tuple(float(v) for v in values),
         sigma=tuple(float(s) for s in np.sqrt(np.clip(np.diag(covariance), 0.0, None))),
     )
+
+
+def _seen(effect: Effect, present: Present, scale: np.ndarray) -> np.ndarray:
+    """Which columns, of these norms, could be told from rounding errors at any possible value."""
+    bounds = [(p.lower, p.upper) for p in effect.parameters(present.model.robot)]
+    reach = np.array([max(abs(low), abs(high)) for low, high in bounds])
+    return scale * reach > _UNSEEN * np.sqrt(present.rows)
 
 
 def impossible(one: Score, model: Model) -> str:

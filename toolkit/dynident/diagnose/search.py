@@ -85,6 +85,7 @@ def rank(
     added: int,
     tell: Callable[[str], None] = lambda _: None,
     only: tuple[Effect, ...] = (),
+    least: float | None = None,
 ) -> Ranking:
     """Score every candidate on a model.
 
@@ -94,6 +95,7 @@ def rank(
     added : number of effects added so far; later ones must explain more.
     tell : told what is being done, for a progress display.
     only : candidates, where not the whole catalogue is meant.
+    least : share of the squared residual that they must explain; None for `LEAST_SHARE`.
     """
     model, best, tests = present.model, [], 0
     quiet = quiet_joints(store, present)
@@ -108,7 +110,7 @@ def rank(
         tests += len(tried)
         best.append(max(tried, key=lambda s: s.penalised))
     best.sort(key=lambda s: -s.penalised)
-    for i in range(min(CONTENDERS, len(best))):
+    for i in range(len(only) or min(CONTENDERS, len(best))):
         if best[i].absorbed:
             break
         if best[i].p_value * tests > _HOPELESS or best[i].penalised == -np.inf:
@@ -116,7 +118,7 @@ def rank(
         tell(f"{best[i].effect.label}, cross-validated")
         best[i] = _confirm(store, present, best[i])
     best.sort(key=lambda s: -s.penalised)
-    least = LEAST_SHARE[min(added, 1)]
+    least = LEAST_SHARE[min(added, 1)] if least is None else least
     scores = tuple(best)
     refusals = tuple(_unseen(s, noisy) or _refusal(s, store, model, tests, least) for s in scores)
     return Ranking(scores, tests, refusals)

@@ -55,14 +55,21 @@ class Presliding(JointEffect):
         return full
 
     def _state(self, block: Block, j: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return z (T,), and its derivative by the logarithm of the distance."""
-        step = np.diff(block.q[:, j])
+        """Return z (T,), and its derivative by the logarithm of the distance.
+
+        Where the motion repeats, a period of it is run through before.
+        """
+        q = block.q[:, j]
+        before = 0
+        if block.period is not None:
+            before = min(round(block.period / float(np.mean(np.diff(block.t)))), len(q) - 1)
+        step = np.diff(np.concatenate([q[:before] - q[before] + q[0], q]))
         way, sign = np.abs(step) / self.shape[0], np.sign(step)
         kept = np.exp(-way)
         start = block.sign(block.v[:1, j])
         z = _recursion(kept, np.concatenate([start, sign * -np.expm1(-way)]))
         change = np.concatenate([[0.0], (z[:-1] - sign) * kept * way])
-        return z, _recursion(kept, change)
+        return z[before:], _recursion(kept, change)[before:]
 
     def simulated_rate(self, values, block):
         v = block.v[:, [block.index(self.joint)]]
