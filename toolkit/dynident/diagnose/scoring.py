@@ -213,7 +213,7 @@ def _seen(effect: Effect, present: Present, scale: np.ndarray) -> np.ndarray:
     """Which columns, of these norms, could be told from rounding errors at any possible value."""
     bounds = [(p.lower, p.upper) for p in effect.parameters(present.model.robot)]
     reach = np.array([max(abs(low), abs(high)) for low, high in bounds])
-    return scale * reach > _UNSEEN * np.sqrt(present.rows)
+    return scale > _UNSEEN * np.sqrt(present.rows) / reach
 
 
 def impossible(one: Score, model: Model) -> str:
