@@ -6,7 +6,7 @@ version of every run.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -139,6 +139,30 @@ class ColumnStore:
             self._screened[effect, run] = self.of(effect, run, model, values)
         return self._screened[effect, run]
 
+    def together(
+        self, variants: Sequence[Effect], run: int, model: Model, values: np.ndarray
+    ) -> None:
+        """Evaluate the response of one effect with several shapes at once, for `of` to find."""
+        first = variants[0]
+        if len(variants) < 2 or first in model or not {"body", "whole"} <= first.needs:
+            return
+        if self.simulation is not None:
+            self.simulation.together(variants, run, model, values)
+            return
+        self._look_at(model, values)
+        new = [
+            v for v in variants if (v, run) not in self._present and (v, run) not in self._screened
+        ]
+        if not new:
+            return
+        versions = self.runs[run].versions
+        found: list[Signals] = [[] for _ in new]
+        for i, version in enumerate(versions):
+            block = self._block(first, run, i, model, values)
+            for signals, columns in zip(found, first.family(new, block), strict=True):
+                signals.append(version.filtered(columns))
+        self._present.update({(v, run): signals for v, signals in zip(new, found, strict=True)})
+
     def look_again(self) -> None:
         """Let `screening` evaluate everything anew: the model has become another one."""
         self._screened.clear()
@@ -168,12 +192,7 @@ class ColumnStore:
     ) -> Signals:
         """Columns that depend on the present model; kept until another is the present one."""
         values = np.zeros(model.size) if values is None else values
-        carries = tuple(bool(one.recording.payload) for one in self.runs)
-        now = (model.effects, values.tobytes(), carries)
-        if now != self._now:
-            self._now = now
-            self._present.clear()
-            self._blocks.clear()
+        self._look_at(model, values)
         if (effect, run) not in self._present:
             count = len(self.runs[run].versions)
             blocks = [self._block(effect, run, i, model, values) for i in range(count)]
@@ -182,6 +201,15 @@ class ColumnStore:
                 for version, block in zip(self.runs[run].versions, blocks, strict=True)
             ]
         return self._present[effect, run]
+
+    def _look_at(self, model: Model, values: np.ndarray) -> None:
+        """Forget what depends on another present model."""
+        carries = tuple(bool(one.recording.payload) for one in self.runs)
+        now = (model.effects, values.tobytes(), carries)
+        if now != self._now:
+            self._now = now
+            self._present.clear()
+            self._blocks.clear()
 
     def _block(
         self, effect: Effect, run: int, version: int, model: Model, values: np.ndarray

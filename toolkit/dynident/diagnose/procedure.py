@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,9 +20,10 @@ from dynident.diagnose.present import Present, fit_present
 from dynident.diagnose.pruning import without_superfluous
 from dynident.diagnose.refitting import refitted, shaped
 from dynident.diagnose.runs import gather
-from dynident.diagnose.search import candidates, rank
-from dynident.diagnose.simulated import motion_of_loop
-from dynident.diagnose.telling import Search, told
+from dynident.diagnose.search import Ranking, candidates, rank
+from dynident.diagnose.second_look import second_look
+from dynident.diagnose.simulated import SimulatedMotion, motion_of_loop
+from dynident.diagnose.telling import Found, Search, told
 from dynident.diagnose.verdict import RESOLUTION
 from dynident.fit.estimate import Estimate
 from dynident.model import Model
@@ -81,25 +82,15 @@ def diagnose(
     contacts = Contacts.leave_out(store, held, start)
     if contacts.bumps:
         start = blunted(store, shaped(store, given))
-    rounds = [rank(store, start, 0, tell)]
-    present, found = start, []
-    while len(found) < most and not _resolved(store, present, train):
-        chosen = choose(store, present, rounds[-1])
-        if chosen is None:
-            break
-        tell(f"adding {chosen.score.effect.label}")
-        carry(store, chosen.score)
-        wider = blunted(store, refitted(store, present.model + chosen.score.effect, present))
-        if breaks_its_promise(present, wider, chosen.score):
-            break
-        found.append(chosen)
-        present = wider
-        if _has_changed(store, start, present):
-            store.look_again()
-        if loop.renew(store, present):
-            present = blunted(store, refitted(store, present.model, present))
-        rounds.append(rank(store, present, len(found), tell))
-        found[-1] = alternatives_only(chosen, rounds[-1])
+    search_on = _Growth(store, loop, train, start, most, tell)
+    first = rank(store, start, 0, tell)
+    grown = search_on.grown(first)
+    again = second_look(store, start, grown.present, first, tell)
+    if again is not None:
+        other = search_on.grown(again)
+        if other.present.error_signal < grown.present.error_signal:
+            grown = other
+    present, found, rounds = grown.present, grown.found, grown.rounds
     if held is not None:
         decide_payload(held, present)
     kept = without_superfluous(store, held, present, found, tell)
@@ -114,6 +105,51 @@ def diagnose(
         store, start, kept.final, tuple(kept.found), tuple(rounds), disturbances, loop.notes
     )
     return told(search, train, test, held)
+
+
+@dataclass(frozen=True)
+class _Grown:
+    """A model with the effects that were added, and the ranking of each round."""
+
+    present: Present
+    found: list[Found]
+    rounds: list[Ranking]
+
+
+@dataclass(frozen=True)
+class _Growth:
+    """What the addition of effects works on; see `diagnose`."""
+
+    store: ColumnStore
+    loop: SimulatedMotion
+    train: Dataset
+    start: Present
+    most: int
+    tell: Callable[[str], None]
+
+    def grown(self, first: Ranking) -> _Grown:
+        """Add the best effect and ask again, until nothing is material any more."""
+        store, present = self.store, self.start
+        found: list[Found] = []
+        rounds = [first]
+        while len(found) < self.most and not _resolved(store, present, self.train):
+            chosen = choose(store, present, rounds[-1])
+            if chosen is None:
+                break
+            self.tell(f"adding {chosen.score.effect.label}")
+            carry(store, chosen.score)
+            wider = blunted(store, refitted(store, present.model + chosen.score.effect, present))
+            if breaks_its_promise(present, wider, chosen.score):
+                break
+            found.append(chosen)
+            present = wider
+            if _has_changed(store, self.start, present):
+                store.look_again()
+            if self.loop.renew(store, present):
+                present = blunted(store, refitted(store, present.model, present))
+            rounds.append(rank(store, present, len(found), self.tell))
+            found[-1] = alternatives_only(chosen, rounds[-1])
+        return _Grown(present, found, rounds)
 
 
 def _has_changed(store: ColumnStore, start: Present, present: Present) -> bool:

@@ -215,6 +215,12 @@ def _seen(present: Present, effect: Effect) -> Block:
     return present.model.ready(effect, block, present.values)
 
 
+def judged(store: ColumnStore, present: Present, one: Score, tests: int) -> tuple[Score, str]:
+    """Return a score refined and cross-validated, and why it is not material; empty if it is."""
+    one = _confirm(store, present, one)
+    return one, _refusal(one, store, present.model, tests, LEAST_SHARE[0])
+
+
 def _confirm(store: ColumnStore, present: Present, one: Score) -> Score:
     one = refined(store, present, one)
     (parts,) = candidate_moments(store, present, [one.effect])

@@ -8,11 +8,15 @@ from itertools import product
 import numpy as np
 
 from dynident.effects.along import mean_inertia
-from dynident.effects.base import Parameter, ShapeParameter, motion_unit
+from dynident.effects.base import Block, Parameter, ShapeParameter, motion_unit
+from dynident.effects.driven import DrivenLink
 from dynident.effects.flexible import DAMPING, RESONANCE, ROTOR_SHARE, FlexibleJoint
+from dynident.effects.gaps import Transmitting
 
 _GAPS = (0.0015, 0.004, 0.01, 0.025)
 """rad (a tenth of it in m): gaps that are screened."""
+_DENSE = ((18.0, 28.0, 42.0), (0.13, 0.21, 0.32, 0.46), tuple(np.geomspace(8e-4, 6e-2, 13)))
+"""Hz, 1 and rad: shapes and gaps of a second look."""
 
 
 class Backlash(FlexibleJoint):
@@ -42,11 +46,22 @@ class Backlash(FlexibleJoint):
         for one, gap in product(super().variants(robot), _GAPS):
             yield one.at([scale * gap])
 
+    def dense_variants(self, robot) -> Iterator[Backlash]:
+        scale = 0.1 if motion_unit(robot, self.joint) == "m" else 1.0
+        for resonance, share, gap in product(*_DENSE):
+            yield self.shaped(resonance, DAMPING.grid[0], share).at([scale * gap])
+
     @property
     def gap(self) -> float:
         """The gap at which the column is taken."""
         given = self.point[0] if self.point else 0.0
         return max(given, _GAPS[0] / 100.0) if given > 0 else _GAPS[1]
+
+    def family(self, variants, block: Block) -> list[np.ndarray]:
+        link = DrivenLink(block, block.index(self.joint))
+        gears = [Transmitting.of(link.inertia, one.shape, one.gap) for one in variants]
+        found = zip(variants, link.responses(gears), strict=True)
+        return [(one.per_unit(0.0) * response.torque)[:, :, None] for one, response in found]
 
     def per_unit(self, stiffness):
         return 1.0 / self.gap

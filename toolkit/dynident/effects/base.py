@@ -167,6 +167,10 @@ class Effect(ABC):
         for shape in product(*(one.grid for one in self.shape_parameters(robot))):
             yield self.shaped(*shape)
 
+    def dense_variants(self, robot: Robot) -> Iterator[Self]:
+        """With many more shapes, where a few may miss the true one; none by default."""
+        yield from ()
+
     def unresolved(self, values: Sequence[float], step: float) -> str:
         """Why such values say nothing at a time of `step` s between samples; empty if they do."""
         return ""
@@ -204,6 +208,10 @@ class Effect(ABC):
     @abstractmethod
     def columns(self, block: Block) -> np.ndarray:
         """Torque per unit of each linear parameter, (T, n, k) in N m or N."""
+
+    def family(self, variants: Sequence[Effect], block: Block) -> list[np.ndarray]:
+        """Columns of this effect with several shapes: for less, where they have much in common."""
+        return [one.columns(block) for one in variants]
 
     def clock(self, block: Block) -> np.ndarray:
         """The factor of its columns that depends on the time of the session, (T,)."""

@@ -15,14 +15,16 @@ triangular band matrix, which LAPACK solves, and so are its exact derivatives by
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from dynident.effects.along import along_motion, mean_inertia
 from dynident.effects.bands import solve_band
 from dynident.effects.block import Block
+from dynident.effects.gaps import Transmitting, through_gaps
 from dynident.errors import EffectError
 
 _PHASE = 0.3
@@ -33,28 +35,6 @@ _RUNG_DOWN = np.log(100.0)
 """Decades of a start that a run-up takes away, as a logarithm."""
 _LEAST = 0.05
 """Of the mean inertia: no link is lighter, or unlikely estimates would ring beyond reason."""
-
-
-@dataclass(frozen=True)
-class Transmitting:
-    """Physical values of a transmission; see `dynident.effects.Transmission`.
-
-    Attributes
-    ----------
-    stiffness, damping, half_gap, rotor : N m/rad, N m s/rad, rad, kg m^2 (or N/m, N s/m, m, kg).
-    """
-
-    stiffness: float
-    damping: float
-    half_gap: float
-    rotor: float
-
-    @classmethod
-    def of(cls, inertia: float, shape: tuple[float, ...], gap: float = 0.0) -> Transmitting:
-        """Return what a resonance (Hz), a damping ratio and a share of the inertia stand for."""
-        resonance, damping, share = shape
-        link, w = (1.0 - share) * inertia, 2.0 * np.pi * resonance
-        return cls(link * w**2, 2.0 * damping * link * w, gap / 2.0, share * inertia)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +57,8 @@ class DrivenLink:
     Attributes
     ----------
     inertia : kg m^2 or kg, of all that moves with the joint, in the mean over its poses.
-    a : (T,) acceleration of the motor.
+    a, whole, load : (T,) acceleration of the motor, and inertia and torque of all that moves.
+    step, period : s between samples; samples after which the motion repeats, 0 where it does not.
     M, C, G : (T, n) derivatives of torques by the joint's acceleration, speed and position.
     """
 
@@ -86,24 +67,41 @@ class DrivenLink:
         rotor = 0.0 if block.rotor is None else float(block.rotor[joint])
         self.joint, self.a = joint, block.a[:, joint]
         self.M, self.C, self.G = (x[:, :, joint] for x in (along.by_a, along.by_v, along.by_q))
-        self._whole = along.by_a[:, joint, joint] + rotor
-        self._load = along.torque[:, joint] + rotor * self.a
+        self.whole = along.by_a[:, joint, joint] + rotor
+        self.load = along.torque[:, joint] + rotor * self.a
         # What is stiff stays as stiff when a payload is taken up.
         self.inertia = max(mean_inertia(block.empty or robot, joint) + rotor, 1e-9)
         if len(block.t) < 3:
             raise EffectError("its response needs more than two samples")
-        self._step = float(np.mean(np.diff(block.t)))
-        self._period = 0 if block.period is None else round(block.period / self._step)
+        self.step = float(np.mean(np.diff(block.t)))
+        self.period = 0 if block.period is None else round(block.period / self.step)
 
     def response(self, gear: Transmitting) -> Response:
         """Return how the link moves behind a transmission."""
-        least = _LEAST * self.inertia
-        m = np.maximum(self._whole - gear.rotor, least)
-        moves = self._whole - gear.rotor > least
-        load = self._load - gear.rotor * self.a
-        fastest = np.sqrt(max(float((gear.stiffness + self.G[:, self.joint]).max()), 0.0) / m.min())
-        per = max(1, int(np.ceil(fastest * self._step / _PHASE)))
-        return Response(self, gear, m, moves, load, per, self._step / per)
+        return self.responses([gear])[0]
+
+    def responses(self, gears: Sequence[Transmitting]) -> list[Response]:
+        """Return how the link moves behind each of several transmissions, in the same steps."""
+        per = max(map(self._steps_per_sample, gears))
+        before = max((self.run_up(gear) for gear in gears), key=len)
+        fine = Fine.of(self, per, before)
+        made = [Response(self, fine, gear) for gear in gears]
+        gaps = [one for one in made if one.gear.half_gap > 0]
+        if gaps:
+            m, load = (np.stack([getattr(g, x) for g in gaps], axis=1) for x in ("m", "load"))
+            walked = through_gaps(m, fine.c, fine.g, load, [g.gear for g in gaps], fine.step)
+            for one, d, side in zip(gaps, *(x.T for x in walked), strict=True):
+                one.walked = d, side
+        return made
+
+    def behind(self, gear: Transmitting) -> np.ndarray:
+        """Return the inertia behind a transmission, (T,): no less than a part of the mean."""
+        return np.maximum(self.whole - gear.rotor, _LEAST * self.inertia)
+
+    def _steps_per_sample(self, gear: Transmitting) -> int:
+        stiffest = max(float((gear.stiffness + self.G[:, self.joint]).max()), 0.0)
+        fastest = np.sqrt(stiffest / self.behind(gear).min())
+        return max(1, int(np.ceil(fastest * self.step / _PHASE)))
 
     def run_up(self, gear: Transmitting) -> np.ndarray:
         """Return rows of the motion that came before the first, as it repeats itself.
@@ -111,10 +109,48 @@ class DrivenLink:
         As many as the ringing takes that a start at rest gives rise to; none where nothing repeats.
         """
         decay = gear.damping / (2.0 * (self.inertia - gear.rotor))  # per s
-        if not (self._period and decay > 0):
+        if not (self.period and decay > 0):
             return np.zeros(0, dtype=int)
-        wanted = min(int(np.ceil(_RUNG_DOWN / (decay * self._step))), 2 * self._period)
-        return np.arange(-wanted, 0) % self._period
+        wanted = min(int(np.ceil(_RUNG_DOWN / (decay * self.step))), 2 * self.period)
+        return np.arange(-wanted, 0) % self.period
+
+
+@dataclass(frozen=True, eq=False)
+class Fine:
+    """A link's motion in the steps of a recursion, (S,) each, a run-up before it.
+
+    Attributes
+    ----------
+    rows, first : (R,) samples that are run through, and where those of the motion begin in them.
+    per, step : steps per sample, and their length in s.
+    whole, c, g, load, a : inertia of all that moves, damping and stiffness without a transmission,
+        torque where nothing gives way, and acceleration of the motor.
+    """
+
+    rows: np.ndarray
+    first: int
+    per: int
+    step: float
+    whole: np.ndarray
+    c: np.ndarray
+    g: np.ndarray
+    load: np.ndarray
+    a: np.ndarray
+
+    @classmethod
+    def of(cls, link: DrivenLink, per: int, before: np.ndarray) -> Fine:
+        """Return a link's motion in `per` steps per sample, rows `before` run through first."""
+        rows, j = np.concatenate([before, np.arange(len(link.a))]), link.joint
+        steps = np.arange((len(rows) - 1) * per + 1) / per
+        samples = np.stack([link.C[:, j], link.G[:, j], link.load, link.a], axis=1)[rows]
+        whole = link.whole[rows]
+        if per > 1:
+            from scipy.interpolate import CubicSpline
+
+            # Without kinks, which a second derivative would show; but an inertia stays positive.
+            samples = CubicSpline(np.arange(len(rows)), samples)(steps)
+            whole = np.interp(steps, np.arange(len(rows)), whole)
+        return cls(rows, len(before), per, link.step / per, whole, *samples.T)
 
 
 class Response:
@@ -122,71 +158,60 @@ class Response:
 
     Parameters
     ----------
-    link, gear : what is driven, and through what.
-    m, moves, load : (T,) inertia behind the transmission, whether it depends on the motor's, and
-        the torque that the link needs where nothing gives way.
-    per, step : steps per sample, and their length in s; see also `DrivenLink.run_up`.
+    link, fine, gear : what is driven, in which steps, and through what.
+
+    Attributes
+    ----------
+    m, load : (S,) inertia behind the transmission, and the torque that the link needs where nothing
+        gives way.
+    walked : deflection and side (S,) of a link in a gap, found step by step; None without a gap.
     """
 
-    def __init__(
-        self,
-        link: DrivenLink,
-        gear: Transmitting,
-        m: np.ndarray,
-        moves: np.ndarray,
-        load: np.ndarray,
-        per: int,
-        step: float,
-    ) -> None:
-        self._link, self._gear, self._m, self._moves = link, gear, m, moves
-        self._per, self._step = per, step
-        before = link.run_up(gear)
-        self._rows, self._first = np.concatenate([before, np.arange(len(m))]), len(before)
-        j = link.joint
-        smooth = (self._smooth(x) for x in (link.C[:, j], link.G[:, j], load))
-        self._fine = [self._linear(m), *smooth]
-        self._solve()
-        self.deflection = self._samples(self._differences(self._d))
-        self.torque = self._torque(self.deflection)
+    def __init__(self, link: DrivenLink, fine: Fine, gear: Transmitting) -> None:
+        self.gear, self._link, self._fine = gear, link, fine
+        least = _LEAST * link.inertia
+        self.m = np.maximum(fine.whole - gear.rotor, least)
+        self._moves = fine.whole - gear.rotor > least
+        self.load = fine.load - gear.rotor * fine.a
+        self.walked: tuple[np.ndarray, np.ndarray] | None = None
 
-    def _steps(self, samples: int) -> np.ndarray:
-        return np.arange((samples - 1) * self._per + 1) / self._per
+    @cached_property
+    def torque(self) -> np.ndarray:
+        """The change of the torque of every joint, (T, n)."""
+        return self._torque(self._samples(self._differences(self._d)))
 
-    def _linear(self, x: np.ndarray) -> np.ndarray:
-        """Return samples at the steps: an inertia that stays above its least."""
-        x = x[self._rows]
-        return x if self._per == 1 else np.interp(self._steps(len(x)), np.arange(len(x)), x)
+    @cached_property
+    def _side(self) -> np.ndarray:
+        return np.zeros(len(self.m)) if self.walked is None else self.walked[1]
 
-    def _smooth(self, x: np.ndarray) -> np.ndarray:
-        """Return samples at the steps without kinks, which a second derivative would show."""
-        from scipy.interpolate import CubicSpline
+    @cached_property
+    def _touches(self) -> np.ndarray:
+        return np.ones(len(self.m)) if self.walked is None else np.abs(self._side)
 
-        x = x[self._rows]
-        return x if self._per == 1 else CubicSpline(np.arange(len(x)), x)(self._steps(len(x)))
+    @cached_property
+    def _rests(self) -> np.ndarray:
+        return np.zeros(2) if self.walked is None else _sign(self.load[:2])
 
-    def _solve(self) -> None:
-        m, c, g, load = self._fine
-        gear, h = self._gear, self._step
-        touches = np.ones(len(m))
-        if gear.half_gap > 0:
-            d, self._side = _with_gap(m, c, g, load, gear, h)
-            self._d = _bounded(d)
-            touches, self._rests = np.abs(self._side), _sign(load[:2])
-        else:
-            self._side, self._rests = np.zeros(len(m)), np.zeros(2)
-        damping, stiffness = c + gear.damping * touches, g + gear.stiffness * touches
-        self._touches = touches
-        rest = g + gear.stiffness
-        # Row k + 1 holds the equation at step k; the first two are at rest.
+    @cached_property
+    def _d(self) -> np.ndarray:
+        if self.walked is not None:
+            return _bounded(self.walked[0])
+        return self._banded(self.load[:2], self.load)
+
+    @cached_property
+    def _band(self) -> np.ndarray:
+        """Row k + 1 holds the equation at step k; the first two are at rest."""
+        m, h, gear = self.m, self._fine.step, self.gear
+        damping = self._fine.c + gear.damping * self._touches
+        stiffness = self._fine.g + gear.stiffness * self._touches
+        rest = self._fine.g + gear.stiffness
         ahead = m / h**2 + damping / (2.0 * h)
         back = m / h**2 - damping / (2.0 * h)
         band = np.zeros((3, len(m)))
         band[0] = np.concatenate([rest[:2], ahead[1:-1]])
         band[1, 1:-1] = stiffness[1:-1] - 2.0 * m[1:-1] / h**2
         band[2, :-2] = back[1:-1]
-        self._band = band
-        if not gear.half_gap > 0:
-            self._d = self._banded(load[:2], load)
+        return band
 
     def _banded(self, rest: np.ndarray, right: np.ndarray) -> np.ndarray:
         """Solve with right sides of the two steps at rest, and of the equation at every step."""
@@ -194,7 +219,7 @@ class Response:
 
     def _differences(self, d: np.ndarray) -> Deflection:
         """Return the deflection of every step, with the derivatives that the recursion means."""
-        rate, bend, h = np.zeros_like(d), np.zeros_like(d), self._step
+        rate, bend, h = np.zeros_like(d), np.zeros_like(d), self._fine.step
         rate[1:-1] = (d[2:] - d[:-2]) / (2.0 * h)
         bend[1:-1] = (d[2:] - 2.0 * d[1:-1] + d[:-2]) / h**2
         for x in (rate, bend):
@@ -204,7 +229,7 @@ class Response:
 
     def _samples(self, moved: Deflection) -> Deflection:
         """Return a deflection at the samples of the motion, from that at all steps."""
-        steps = slice(self._first * self._per, None, self._per)
+        steps = slice(self._fine.first * self._fine.per, None, self._fine.per)
         return Deflection(*(x[steps] for x in (moved.d, moved.rate, moved.bend)))
 
     def _torque(self, moved: Deflection) -> np.ndarray:
@@ -212,51 +237,23 @@ class Response:
         link, j = self._link, self._link.joint
         d, rate, bend = (x[:, None] for x in (moved.d, moved.rate, moved.bend))
         changed = link.M * bend
-        changed[:, j] = self._m * moved.bend
+        changed[:, j] = link.behind(self.gear) * moved.bend
         return -(changed + link.C * rate + link.G * d)
 
     def by(self, stiffness: float, damping: float, rotor: float) -> np.ndarray:
         """Return the derivative of the torque (T, n) along a change of these values."""
         lighter = -rotor * self._moves
         d, moved = self._d, self._differences(self._d)
-        bent = d - self._side * self._gear.half_gap
-        lost = self._smooth(rotor * self._link.a)
-        right = -self._linear(lighter) * moved.bend - lost
+        bent = d - self._side * self.gear.half_gap
+        lost = rotor * self._fine.a
+        right = -lighter * moved.bend - lost
         right -= self._touches * (stiffness * bent + damping * moved.rate)
-        rest = -stiffness * (d[:2] - self._rests * self._gear.half_gap)
+        rest = -stiffness * (d[:2] - self._rests * self.gear.half_gap)
         rest -= lost[:2]
         change = self._torque(self._samples(self._differences(self._banded(rest, right))))
-        change[:, self._link.joint] -= lighter * self.deflection.bend
+        at = self._samples(Deflection(lighter, lighter, moved.bend))
+        change[:, self._link.joint] -= at.d * at.bend
         return change
-
-
-def _with_gap(m, c, g, load, gear: Transmitting, h: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the deflection of a link in a gap, and the side that it touches: -1, 0 or 1."""
-    # Plain numbers, in which the loop is several times as fast.
-    half, K = float(gear.half_gap), float(gear.stiffness)
-    inertia = 2.0 * m / h**2 - g
-    coefficients = []
-    for damping in (c, c + gear.damping):
-        ahead = 1.0 / (m / h**2 + damping / (2.0 * h))
-        coefficients += [ahead, (m / h**2 - damping / (2.0 * h)) * ahead]
-    free, free_back, touching, touching_back = (x.tolist() for x in coefficients)
-    inertia = inertia.tolist()
-    d, side = [0.0] * len(load), [0.0] * len(load)
-    d[:2] = ((load[:2] + _sign(load[:2]) * K * half) / (g[:2] + K)).tolist()
-    before, now, load = d[0], d[1], load.tolist()
-    for k in range(1, len(load) - 1):
-        pushed = load[k] + inertia[k] * now
-        if now >= half:
-            after = (pushed - K * (now - half)) * touching[k] - touching_back[k] * before
-            side[k] = 1.0
-        elif now <= -half:
-            after = (pushed - K * (now + half)) * touching[k] - touching_back[k] * before
-            side[k] = -1.0
-        else:
-            after = pushed * free[k] - free_back[k] * before
-        before, now = now, after
-        d[k + 1] = after
-    return np.array(d), np.array(side)
 
 
 def _bounded(d: np.ndarray) -> np.ndarray:
