@@ -25,7 +25,7 @@ def test_answers_are_of_four_kinds_and_two_sizes(verdict: str, named: bool, said
 def test_a_record_states_its_counts_and_their_interval(monkeypatch) -> None:
     monkeypatch.setattr(module, "_COUNTS", {("explained", "large"): (45, 50)})
     found = track_record("explained", named=True, over_floor=2.0)
-    assert found == TrackRecord("explained", 45, 50)
+    assert found is not None and found == TrackRecord("explained", 45, 50)
     # Wilson's interval of 45 in 50, from his formula with z = 1.96.
     assert found.interval == pytest.approx((0.7864, 0.9565), abs=1e-4)
     assert "Of 50 answers" in str(found) and "45 were right" in str(found)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import product
 
 import numpy as np
@@ -57,7 +57,7 @@ class Backlash(FlexibleJoint):
         given = self.point[0] if self.point else 0.0
         return max(given, _GAPS[0] / 100.0) if given > 0 else _GAPS[1]
 
-    def family(self, variants, block: Block) -> list[np.ndarray]:
+    def family(self, variants: Sequence[Backlash], block: Block) -> list[np.ndarray]:
         link = DrivenLink(block, block.index(self.joint))
         gears = [Transmitting.of(link.inertia, one.shape, one.gap) for one in variants]
         found = zip(variants, link.responses(gears), strict=True)

@@ -16,7 +16,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -209,8 +209,8 @@ class Effect(ABC):
     def columns(self, block: Block) -> np.ndarray:
         """Torque per unit of each linear parameter, (T, n, k) in N m or N."""
 
-    def family(self, variants: Sequence[Effect], block: Block) -> list[np.ndarray]:
-        """Columns of this effect with several shapes: for less, where they have much in common."""
+    def family(self, variants: Sequence[Any], block: Block) -> list[np.ndarray]:
+        """Columns of `variants`, this effect with several shapes: for less where that can be."""
         return [one.columns(block) for one in variants]
 
     def clock(self, block: Block) -> np.ndarray:

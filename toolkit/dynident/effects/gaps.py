@@ -63,9 +63,15 @@ def through_gaps(
     lean = np.where(load[:2] >= 0.0, 1.0, -1.0)
     d[:2] = (load[:2] + lean * K * half) / (g[:2, None] + K)
     if len(gears) == 1:
-        columns = (load, inertia, free, free_back, touching, touching_back)
-        found = _walk(d[:2, 0].tolist(), *(x[:, 0].tolist() for x in columns), half[0], K[0])
-        return found[0][:, None], found[1][:, None]
+        walked, touched = _walk(
+            d[:2, 0].tolist(),
+            [x[:, 0].tolist() for x in (load, inertia)],
+            [x[:, 0].tolist() for x in (free, free_back)],
+            [x[:, 0].tolist() for x in (touching, touching_back)],
+            float(half[0]),
+            float(K[0]),
+        )
+        return walked[:, None], touched[:, None]
     _walk_together(d, load, inertia, (free, free_back), (touching, touching_back), half, K)
     beyond = d[1:-1] - np.clip(d[1:-1], -half, half)
     side[1:-1] = np.sign(beyond)
@@ -106,29 +112,26 @@ def _walk_together(
 
 def _walk(
     start: list[float],
-    load: list[float],
-    inertia: list[float],
-    free: list[float],
-    free_back: list[float],
-    touching: list[float],
-    touching_back: list[float],
+    driven: list[list[float]],
+    free: list[list[float]],
+    touching: list[list[float]],
     half: float,
     K: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """As `through_gaps`, of one gap: in plain numbers, which are faster than arrays of one."""
-    half, K = float(half), float(K)
+    """As `_walk_together`, of one gap: in plain numbers, which are faster than arrays of one."""
+    load, inertia = driven
     d, side = [*start, *[0.0] * (len(load) - 2)], [0.0] * len(load)
     before, now = start
     for k in range(1, len(load) - 1):
         pushed = load[k] + inertia[k] * now
         if now >= half:
-            after = (pushed - K * (now - half)) * touching[k] - touching_back[k] * before
+            after = (pushed - K * (now - half)) * touching[0][k] - touching[1][k] * before
             side[k] = 1.0
         elif now <= -half:
-            after = (pushed - K * (now + half)) * touching[k] - touching_back[k] * before
+            after = (pushed - K * (now + half)) * touching[0][k] - touching[1][k] * before
             side[k] = -1.0
         else:
-            after = pushed * free[k] - free_back[k] * before
+            after = pushed * free[0][k] - free[1][k] * before
         before, now = now, after
         d[k + 1] = after
     return np.array(d), np.array(side)
