@@ -5,6 +5,7 @@ import pytest
 
 from dynident.closed_loop import Mechanism, TrueEffect
 from dynident.effects import Block, effects_of
+from dynident.effects.thermal_friction import ThermalFriction
 from dynident.robot import Robot
 
 SLIDER = """<robot name="axis"><link name="rail"/><link name="bob"><inertial>
@@ -39,6 +40,7 @@ def test_friction_falls_to_a_share_of_e_in_one_time_constant() -> None:
 
 def test_a_recorded_temperature_takes_the_place_of_time() -> None:
     one, other = effect("thermal_friction@hinge", 50.0), effect("thermal_friction@hinge", 90.0)
+    assert isinstance(one, ThermalFriction)
     recorded = block(temperature=one.temperature(T)[:, None])
     np.testing.assert_allclose(other.columns(recorded), one.columns(block()), atol=1e-12)
     assert not np.any(other.sensitivities(recorded))
@@ -62,6 +64,7 @@ def test_a_contact_is_in_one_recording_only() -> None:
 def test_sensitivities_are_the_derivatives_by_the_logarithms(label, shape) -> None:
     one, step = effect(label, *shape), 1e-6
     exact = one.sensitivities(block(number=3))
+    assert exact is not None
     for k in range(len(shape)):
         ends = []
         for sign in (1, -1):

@@ -30,8 +30,9 @@ def test_files_keep_what_is_recorded_and_nothing_else(warm, tmp_path, suffix):
 def test_columns_can_have_other_names(warm, tmp_path):
     path = tmp_path / "run.npz"
     t = np.arange(9) * 1e-3
-    np.savez(path, **{"t": t, "q.a": t, "tau.a": t, "motor": 300.0 + t})
+    np.savez(path, **{"t": t, "q.a": t, "tau.a": t, "motor": 300.0 + t})  # pyright: ignore
     recording = read(path, ["a"], {"temperature.a": Column("motor", 0.1)})
+    assert recording.temperature is not None
     np.testing.assert_allclose(recording.temperature[:, 0], 30.0 + 0.1 * t)
     with pytest.raises(RecordingError, match=r"no column 'oil' \(for temperature.a"):
         read(path, ["a"], {"temperature.a": "oil"})
@@ -39,11 +40,14 @@ def test_columns_can_have_other_names(warm, tmp_path):
 
 def test_cut_select_and_other_clocks_keep_it(warm):
     assert warm.cut(1.0, 2.0).temperature.shape == (250, 2)
-    np.testing.assert_array_equal(warm.select(["elbow"]).temperature[:, 0], warm.temperature[:, 1])
+    elbow = warm.select(["elbow"]).temperature
+    assert elbow is not None
+    np.testing.assert_array_equal(elbow[:, 0], warm.temperature[:, 1])
     assert warm.select(["shoulder"]).temperature is None
     t = warm.t + 4e-4 * np.sin(40.0 * warm.t)
     with pytest.warns(DynidentWarning, match="jittered"):
         even = uniform(warm.replace(t=t))
+    assert even.temperature is not None
     assert np.isnan(even.temperature[:, 0]).all()
     np.testing.assert_allclose(even.temperature[:, 1], 60 - 35 * np.exp(-even.t / 2), atol=0.02)
 
