@@ -30,3 +30,13 @@ def test_several_gaps_at_once_are_each_gap_alone() -> None:
     inner = slice(1, -1)
     np.testing.assert_array_equal(side[inner] != 0, np.abs(d[inner]) > half)
     assert (np.abs(side).mean(axis=0) > 0.05).all() and (np.abs(side).mean(axis=0) < 1.0).all()
+
+
+def test_a_link_that_runs_away_does_so_quietly() -> None:
+    """Hanging upside down on a spring too weak to hold it, with hardly any inertia."""
+    gears = [Transmitting.of(1e-6, (15.0, 0.1, 0.3), gap) for gap in (1e-3, 1e-2)]
+    still = np.zeros(STEPS)
+    m, load = np.full((STEPS, 2), 1e-6), np.ones((STEPS, 2))
+    d, side = through_gaps(m, still, still - 5.0, load, gears, STEP)
+    assert not np.isfinite(d).all(axis=0).any()
+    assert np.isin(side, (-1.0, 0.0, 1.0)).all()

@@ -50,7 +50,7 @@ def through_gaps(
 
     Returns
     -------
-    d, side : (S, V) each
+    d, side : (S, V) each; d is not finite where a link has run away
     """
     half = np.array([one.half_gap for one in gears])
     K, D = np.array([one.stiffness for one in gears]), np.array([one.damping for one in gears])
@@ -72,10 +72,12 @@ def through_gaps(
             float(K[0]),
         )
         return walked[:, None], touched[:, None]
-    _walk_together(d, load, inertia, (free, free_back), (touching, touching_back), half, K)
-    beyond = d[1:-1] - np.clip(d[1:-1], -half, half)
-    side[1:-1] = np.sign(beyond)
-    return d, side
+    # A link that its load outgrows falls beyond all numbers: the caller sees that it is not finite.
+    with np.errstate(over="ignore", invalid="ignore"):
+        _walk_together(d, load, inertia, (free, free_back), (touching, touching_back), half, K)
+        beyond = d[1:-1] - np.clip(d[1:-1], -half, half)
+        side[1:-1] = np.sign(beyond)
+    return d, np.nan_to_num(side)
 
 
 def _walk_together(
