@@ -60,9 +60,7 @@ def _alike_once_fitted(
         return ()
 
     def explained(effect: Effect) -> float:
-        return (
-            present.error_signal - fit_present(store, present.model + effect, present).error_signal
-        )
+        return present.misfit - fit_present(store, present.model + effect, present).misfit
 
     most = explained(best.effect)
     return tuple(s.effect for s in rivals if explained(s.effect) >= (1.0 - ALIKE) * most)
@@ -75,7 +73,8 @@ def breaks_its_promise(present: Present, wider: Present, one: Score) -> bool:
     """
     if not ({"body", "whole"} <= one.effect.needs and present.noise_known):
         return False
-    return present.error_signal - wider.error_signal < _LEAST_KEPT * one.drop
+    promised = one.drop / present.error_signal
+    return present.misfit - wider.misfit < _LEAST_KEPT * promised * present.misfit
 
 
 def _size(one: Score) -> int:

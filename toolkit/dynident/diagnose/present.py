@@ -39,6 +39,9 @@ class Present:
     white : per run and joint, whitened columns and torque, (P, S, p + 1).
     moments : (B, p + 1, p + 1) of columns and torque, over all joints.
     rows : number of whitened rows, over all repetitions and joints; noisy copies do not count.
+    misfit : systematic square of the residual over the variance of the noise (of the torque, where
+        the noise is unknown), summed over joints. By it fits are compared: what is whitened depends
+        on the metric, which is another one when less is missing.
     """
 
     model: Model
@@ -50,10 +53,11 @@ class Present:
     white: tuple[tuple[np.ndarray, ...], ...]
     moments: Moments
     rows: int
+    misfit: float
 
     @property
     def error_signal(self) -> float:
-        """Squared systematic residual, whitened: what no noise explains."""
+        """Squared systematic residual, whitened: what no noise explains, in this metric."""
         combination = np.append(-self.values, 1.0)
         return float(combination @ self.moments.sums()[0] @ combination)
 
@@ -96,7 +100,7 @@ def fit_present(store: ColumnStore, model: Model, near: Present | None = None) -
         if round == 0 and near is None:
             # Along a robot without bodies their columns are rounding errors, and any value fits.
             values = _waiting(model, at, values)
-        noise = tuple(_noise(store, columns, values, j) for j in range(n))
+        noise = tuple(_Left.of(store, columns, values, j).noise for j in range(n))
         change = float(np.linalg.norm(_held(model, values) - at))
         if round >= _ROUNDS - (near is not None) and change <= _PRESENT_TOLERANCE * np.linalg.norm(
             values
@@ -111,8 +115,14 @@ def fit_present(store: ColumnStore, model: Model, near: Present | None = None) -
         for run, joints in zip(store.runs, white, strict=True)
         for part in joints
     )
+    scale = [one.std for one in noise] if known else torque_std
+    left = [_Left.of(store, columns, values, j).square for j in range(n)]
+    misfit = sum(x / s**2 for x, s in zip(left, scale, strict=True) if s > 0)
     model = model.at(_held(model, values))
-    return Present(model, values, solution.covariance, solution, noise, known, white, summed, rows)
+    covariance = solution.covariance
+    return Present(
+        model, values, covariance, solution, noise, known, white, summed, rows, float(misfit)
+    )
 
 
 def _beginning(model: Model, near: Present | None) -> np.ndarray:
@@ -222,20 +232,48 @@ def _solve(summed: Moments) -> tuple[np.ndarray, Solution]:
     return solution.values, solution
 
 
-def _noise(store: ColumnStore, columns, values: np.ndarray, joint: int) -> NoiseModel:
-    combination = np.append(-values, 1.0)
-    stretches, speeds, plain, systematic = [], [], [], []
-    for run, joints in zip(store.runs, columns, strict=True):
-        residual = run.fold([c @ combination for c in joints[joint]])
-        if run.kind == "single":
-            plain.append(residual[0])
-            continue
-        systematic.append(systematic_square(residual, run.kind))
-        speed = run.versions[0].v[:, joint][run.index]
-        for stretch, v in zip(differences(residual, run.kind), speed, strict=False):
-            stretches.append(stretch)
-            speeds.append(v)
-    if stretches:
-        misfit = float(np.sqrt(max(np.mean(systematic), 0.0)))
-        return measure_noise(stretches, speeds, misfit)
-    return flat_noise(float(np.sqrt(np.mean(np.concatenate(plain) ** 2))) or 1.0)
+@dataclass(frozen=True)
+class _Left:
+    """What a fit leaves at one joint.
+
+    Attributes
+    ----------
+    stretches, speeds : of noise in the order of time, and the joint's velocity in them.
+    plain : residuals of which nothing tells the noise.
+    """
+
+    stretches: list[np.ndarray]
+    speeds: list[np.ndarray]
+    plain: list[np.ndarray]
+    systematic: list[float]
+
+    @classmethod
+    def of(cls, store: ColumnStore, columns, values: np.ndarray, joint: int) -> _Left:
+        combination = np.append(-values, 1.0)
+        left = cls([], [], [], [])
+        for run, joints in zip(store.runs, columns, strict=True):
+            residual = run.fold([c @ combination for c in joints[joint]])
+            if run.kind == "single":
+                left.plain.append(residual[0])
+                continue
+            left.systematic.append(systematic_square(residual, run.kind))
+            speed = run.versions[0].v[:, joint][run.index]
+            for stretch, v in zip(differences(residual, run.kind), speed, strict=False):
+                left.stretches.append(stretch)
+                left.speeds.append(v)
+        return left
+
+    @property
+    def square(self) -> float:
+        """Mean square of what is systematic; of everything, where nothing tells it from noise."""
+        if self.systematic:
+            return max(float(np.mean(self.systematic)), 0.0)
+        return float(np.mean(np.concatenate(self.plain) ** 2))
+
+    @property
+    def noise(self) -> NoiseModel:
+        """The noise; the residual itself, where nothing tells them from each other."""
+        root = float(np.sqrt(self.square))
+        if self.stretches:
+            return measure_noise(self.stretches, self.speeds, root)
+        return flat_noise(root or 1.0)

@@ -88,7 +88,7 @@ def diagnose(
     again = second_look(store, start, grown.present, first, tell)
     if again is not None:
         other = search_on.grown(again)
-        if other.present.error_signal < grown.present.error_signal:
+        if other.present.misfit < grown.present.misfit:
             grown = other
     present, found, rounds = grown.present, grown.found, grown.rounds
     if held is not None:

@@ -39,8 +39,8 @@ def refitted(store: ColumnStore, model: Model, near: Present | None = None) -> P
             others = fit_present(store, present.model - effect, present)
             better = reshaped(store, others, present, effect).effect
             trial = fit_present(store, present.model.with_shapes((better,)), present)
-            if trial.error_signal < present.error_signal:
+            if trial.misfit < present.misfit:
                 present = trial
-        if before.error_signal - present.error_signal < _GAINED * before.error_signal:
+        if before.misfit - present.misfit < _GAINED * before.misfit:
             break
     return present

@@ -15,8 +15,10 @@ from dynident.effects.gaps import Transmitting
 
 _GAPS = (0.0015, 0.004, 0.01, 0.025)
 """rad (a tenth of it in m): gaps that are screened."""
-_DENSE = ((18.0, 28.0, 42.0), (0.13, 0.21, 0.32, 0.46), tuple(np.geomspace(8e-4, 6e-2, 13)))
-"""Hz, 1 and rad: shapes and gaps of a second look."""
+_SOUGHT = ((8.0, 60.0), (0.02, 0.5), (0.05, 0.7))
+"""Hz, 1 and 1: shapes that are searched through."""
+_SOUGHT_GAPS = (8e-4, 6e-2)
+"""rad (a tenth of it in m)."""
 
 
 class Backlash(FlexibleJoint):
@@ -46,10 +48,10 @@ class Backlash(FlexibleJoint):
         for one, gap in product(super().variants(robot), _GAPS):
             yield one.at([scale * gap])
 
-    def dense_variants(self, robot) -> Iterator[Backlash]:
+    def sought_in(self, robot):
         scale = 0.1 if motion_unit(robot, self.joint) == "m" else 1.0
-        for resonance, share, gap in product(*_DENSE):
-            yield self.shaped(resonance, DAMPING.grid[0], share).at([scale * gap])
+        low, high = _SOUGHT_GAPS
+        return (*_SOUGHT, (scale * low, scale * high))
 
     @property
     def gap(self) -> float:

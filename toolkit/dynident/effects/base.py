@@ -167,9 +167,12 @@ class Effect(ABC):
         for shape in product(*(one.grid for one in self.shape_parameters(robot))):
             yield self.shaped(*shape)
 
-    def dense_variants(self, robot: Robot) -> Iterator[Self]:
-        """With many more shapes, where a few may miss the true one; none by default."""
-        yield from ()
+    def sought_in(self, robot: Robot) -> tuple[tuple[float, float], ...]:
+        """Limits of shapes, then of values, to search through where a few shapes may miss the true.
+
+        Empty, the default, for effects whose variants are near enough to any shape.
+        """
+        return ()
 
     def unresolved(self, values: Sequence[float], step: float) -> str:
         """Why such values say nothing at a time of `step` s between samples; empty if they do."""
