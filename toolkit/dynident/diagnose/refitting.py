@@ -7,7 +7,7 @@ from dynident.diagnose.present import Present, fit_present
 from dynident.diagnose.shaping import best_shape, reshaped
 from dynident.model import Model
 
-_REFITS = 4  # of shapes whose columns depend on the bodies
+_REFITS = 12  # of shapes whose columns depend on the bodies
 _GAINED = 0.02  # share of the systematic square that another refit must take away
 
 

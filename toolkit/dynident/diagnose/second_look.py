@@ -48,12 +48,7 @@ def second_look(
     """
     if not start.noise_known or within_noise(on_recordings(store, last)):
         return None
-    quiet = quiet_joints(store, start)
-    sought = [
-        effect
-        for effect in candidates(start.model)
-        if effect.sought_in(start.model.robot) and effect.joint not in quiet
-    ]
+    sought = _sought(store, start, last)
     if not sought:
         return None
     part = _worst_recording(store, start)
@@ -78,6 +73,17 @@ def second_look(
         if one.effect.label != best.effect.label
     ]
     return Ranking((best, *(one for one, _ in rest)), tests, ("", *(why for _, why in rest)))
+
+
+def _sought(store: ColumnStore, start: Present, last: Present) -> list[Effect]:
+    """Effects of many shapes: those that were added with one that may be wrong, or else all."""
+    quiet = quiet_joints(store, start)
+    every = [
+        effect
+        for effect in candidates(start.model)
+        if effect.sought_in(start.model.robot) and effect.joint not in quiet
+    ]
+    return [effect for effect in every if effect in last.model] or every
 
 
 def _worst_recording(store: ColumnStore, start: Present) -> tuple[ColumnStore, Present]:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
-from scipy.optimize import fminbound, minimize, minimize_scalar
+from scipy.linalg import block_diag
+from scipy.optimize import fminbound, least_squares, minimize, minimize_scalar
 
 from dynident.diagnose.evidence import ColumnStore
 from dynident.diagnose.moments import Moments
@@ -31,11 +33,16 @@ _FURTHEST = 1.7  # factor by which a gradient search changes a shape, at most
 _VALUES_TRIED = 10  # of a column that is taken at a value
 _VALUE_RANGE = 0.5  # of the logarithm of that value, to each side
 _PRECISION = 1e-3  # of the logarithm of a shape parameter
+_LEAST_FALL = 1e-4  # relative, of what is left, for which a gradient search goes on
+_ROUNDING = 1e-12  # of the largest curvature, to which others are rounding errors
 
 
 @dataclass(frozen=True)
 class Tangent(Effect):
-    """An effect's columns, then their derivatives by the logarithm of each shape parameter."""
+    """An effect's columns, then their derivatives by the logarithm of each shape parameter.
+
+    Last comes the derivative by the value at which a column is taken, where there is one.
+    """
 
     of: Effect | None = None
     name: ClassVar[str] = "tangent"
@@ -57,12 +64,14 @@ class Tangent(Effect):
         return self.of.parameters(robot)
 
     def columns(self, block: Block) -> np.ndarray:
-        """Columns (T, n, k), then derivatives, shape by shape, (T, n, k + s k)."""
+        """Columns (T, n, k), then derivatives one after the other, (T, n, k + s k)."""
         assert self.of is not None
         plain, slopes = self.of.columns(block), self.of.sensitivities(block)
         assert slopes is not None
         turned = np.moveaxis(slopes, 3, 2).reshape(*slopes.shape[:2], -1)
-        return np.concatenate([plain, turned], axis=2)
+        at_point = self.of.point_slope(block) if self.of.point else None
+        parts = (plain, turned) if at_point is None else (plain, turned, at_point)
+        return np.concatenate(parts, axis=2)
 
 
 @dataclass(frozen=True)
@@ -108,8 +117,7 @@ def refined(
     search = _by_gradient if has_slopes else _by_trial
     if one.effect.point:
         one = _at_best_value(store, present, one, columns_of)
-    one = _better(one, search(store, present, one, columns_of))
-    return _at_best_value(store, present, one, columns_of) if one.effect.point else one
+    return _better(one, search(store, present, one, columns_of))
 
 
 def _better(one: Score, other: Score) -> Score:
@@ -174,17 +182,21 @@ def _by_gradient(
 ) -> Score:
     """Minimise the residual over the shapes with exact derivatives, linear parameters solved for.
 
-    At the best linear parameters the derivative of the residual by a shape is the partial one
-    (variable projection).
+    A value at which a column is taken is sought together with the shapes. Each trial is reduced to
+    its moments, of which a square root is a least-squares problem with few rows.
     """
     effect, k = one.effect, len(one.values)
     shapes = effect.shape_parameters(present.model.robot)
+    pointed = effect.parameters(present.model.robot) if effect.point else ()
+    limits = np.array([(s.lower, s.upper) for s in (*shapes, *pointed)]).T
     grid = _grid(effect, present)
     best = one
 
-    def loss(logarithm: np.ndarray) -> tuple[float, np.ndarray]:
+    @lru_cache(maxsize=1)
+    def at(logarithms: tuple[float, ...]) -> _Trial:
         nonlocal best
-        trial = effect.shaped(*np.clip(np.exp(logarithm), *_limits(shapes)))
+        x = np.clip(np.exp(logarithms), *limits)
+        trial = effect.shaped(*x[: len(shapes)]).at(x[len(shapes) :])
         tangent = Tangent.to(trial)
         ((with_model, with_self),) = candidate_moments(store, present, [tangent], columns_of)
         store.forget(tangent)
@@ -198,43 +210,69 @@ def _by_gradient(
         )
         if found.settled_drop > best.settled_drop and not impossible(found, present.model):
             best = found
-        values = np.array(found.values or (0.0,) * k)
-        slope = _slope(present, with_model.sums()[0], with_self.sums()[0], values)
-        return -found.drop / one.drop, slope / one.drop
+        return _Trial.of(present, found, with_model.sums()[0], with_self.sums()[0])
 
     # Not further than to the next shapes of the grid: beyond, other peaks lead astray.
-    bounds = [
-        tuple(np.log(np.clip([x / _FURTHEST, x * _FURTHEST], s.lower, s.upper)))
-        for s, x in zip(shapes, effect.shape, strict=True)
-    ]
-    options = {"maxfun": _EVALUATIONS, "ftol": 1e-5}
-    minimize(
-        loss, np.log(effect.shape), jac=True, bounds=bounds, method="L-BFGS-B", options=options
+    start = np.array([*effect.shape, *effect.point])
+    low, high = np.log(np.clip(np.outer((1.0 / _FURTHEST, _FURTHEST), start), *limits))
+    least_squares(
+        lambda x: at(tuple(x)).residual,
+        np.log(start),
+        lambda x: at(tuple(x)).jacobian,  # type: ignore[arg-type]
+        bounds=(low - 1e-9, high + 1e-9),
+        max_nfev=_EVALUATIONS,
+        xtol=_PRECISION,
+        ftol=_LEAST_FALL,
     )
     return best
 
 
-def _limits(shapes) -> tuple[list[float], list[float]]:
-    return [s.lower for s in shapes], [s.upper for s in shapes]
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """What is left at one shape, as a least-squares problem with as many rows as unknowns and one.
 
-
-def _slope(
-    present: Present, with_model: np.ndarray, with_self: np.ndarray, values: np.ndarray
-) -> np.ndarray:
-    """Derivative of the squared residual by each shape, (s,), from signal moments.
-
-    Parameters
+    Attributes
     ----------
-    with_model : (p + 1, k + s k) of the model's columns and the torque with the tangent's columns.
-    with_self : (k + s k, k + s k) of the tangent's columns with themselves.
-    values : (k,) the effect's parameters.
+    residual, jacobian : (s + 1,) and (s + 1, s), by the logarithms; their products are those of the
+        whitened residual, whose noise is taken out, and its derivatives.
     """
-    p, k = len(present.values), len(values)
-    back = present.solution.project(with_model[:p, :k])
-    model = np.append(-(present.values - back @ values), 1.0)
-    # Residual with each derivative column, of the model refitted beside the effect.
-    moment = model @ with_model[:, k:] - values @ with_self[:k, k:]
-    return -2.0 * moment.reshape(-1, k) @ values
+
+    residual: np.ndarray
+    jacobian: np.ndarray
+
+    @classmethod
+    def of(
+        cls, present: Present, found: Score, with_model: np.ndarray, with_self: np.ndarray
+    ) -> _Trial:
+        """Return the problem from signal moments.
+
+        Parameters
+        ----------
+        found : the score at this shape.
+        with_model : (p + 1, k + s k) of the model's columns and the torque with the tangent's.
+        with_self : (k + s k, k + s k) of the tangent's columns with themselves.
+        """
+        p, k = len(present.values), len(found.effect.parameters(present.model.robot))
+        values = np.array(found.effect.point or found.values or (0.0,) * k)
+        count = with_self.shape[0] // k - 1
+        # What the torque changes by, along the logarithm of each shape.
+        along = block_diag(np.eye(k), *[values[:, None]] * count)
+        with_model, with_self = with_model @ along, along.T @ with_self @ along
+        back = present.solution.project(with_model[:p])
+        left = with_self - with_model[:p].T @ back
+        right = with_model[p] - back.T @ present.moments.sums()[0][:p, p]
+        curvature, slope = left[k:, k:], right[k:] - left[k:, :k] @ values
+        if not found.effect.point:
+            # Linear parameters follow (Kaufman): what they can do is not the shapes' merit.
+            curvature = curvature - left[k:, :k] @ np.linalg.pinv(left[:k, :k]) @ left[:k, k:]
+        size, turn = np.linalg.eigh(curvature)
+        root = np.sqrt(np.clip(size, _ROUNDING * max(size[-1], 0.0), None))
+        down = np.divide(turn.T @ slope, root, out=np.zeros_like(root), where=root > 0)
+        rest = present.error_signal - found.settled_drop - down @ down
+        return cls(
+            np.append(-down, np.sqrt(max(rest, 0.0))),
+            np.vstack([root[:, None] * turn.T, np.zeros(count)]),
+        )
 
 
 def _by_trial(

@@ -65,6 +65,10 @@ class Backlash(FlexibleJoint):
         found = zip(variants, link.responses(gears), strict=True)
         return [(one.per_unit(0.0) * response.torque)[:, :, None] for one, response in found]
 
+    def point_slope(self, block):
+        _, response = self._response(block)
+        return response.by(0.0, 0.0, 0.0, half_gap=0.5)[:, :, None]
+
     def per_unit(self, stiffness):
         return 1.0 / self.gap
 

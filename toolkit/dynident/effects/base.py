@@ -229,6 +229,17 @@ class Effect(ABC):
         """
         return None
 
+    def point_slope(self, block: Block) -> np.ndarray | None:
+        """Derivative of the torque by the value, at the value where the column is taken.
+
+        Of an effect whose column is the response to one value (`point`), per unit of it.
+
+        Returns
+        -------
+        (T, n, 1) where `sensitivities` are known as well; None where a value is not a point.
+        """
+        return None
+
     # --- how it is simulated: the ways in which an effect can act on a plant -------------------
 
     def simulated_force(self, values: Sequence[float], block: Block) -> np.ndarray:

@@ -240,16 +240,22 @@ class Response:
         changed[:, j] = link.behind(self.gear) * moved.bend
         return -(changed + link.C * rate + link.G * d)
 
-    def by(self, stiffness: float, damping: float, rotor: float) -> np.ndarray:
-        """Return the derivative of the torque (T, n) along a change of these values."""
+    def by(
+        self, stiffness: float, damping: float, rotor: float, half_gap: float = 0.0
+    ) -> np.ndarray:
+        """Return the derivative of the torque (T, n) along a change of these values.
+
+        Exact while the link keeps touching where it touches.
+        """
         lighter = -rotor * self._moves
         d, moved = self._d, self._differences(self._d)
         bent = d - self._side * self.gear.half_gap
         lost = rotor * self._fine.a
         right = -lighter * moved.bend - lost
         right -= self._touches * (stiffness * bent + damping * moved.rate)
+        right += self._side * self.gear.stiffness * half_gap
         rest = -stiffness * (d[:2] - self._rests * self.gear.half_gap)
-        rest -= lost[:2]
+        rest += self._rests * self.gear.stiffness * half_gap - lost[:2]
         change = self._torque(self._samples(self._differences(self._banded(rest, right))))
         at = self._samples(Deflection(lighter, lighter, moved.bend))
         change[:, self._link.joint] -= at.d * at.bend

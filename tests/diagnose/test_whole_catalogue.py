@@ -1,0 +1,89 @@
+"""Effects with a memory, of the session's time, and of the whole robot, found by the diagnosis."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dynident import diagnose as find
+from dynident.diagnose import Diagnosis
+from dynident.effects import effects_of
+from dynident.model import Model
+from dynident.recording import Dataset, Recording
+from synthetic import arm, smooth_motion
+
+NAMES = ("shoulder", "elbow")
+RATE, PERIOD, RUNS = 250.0, 8.0, 4
+HANGING = np.array([-np.pi / 2.0, 0.0])
+"""About which the arm swings, so that its loads change sign."""
+NOISE = np.array([0.12, 0.05])
+FRICTION = {"viscous_friction": (1.2, 0.5), "coulomb_friction": (1.5, 0.6)}
+PLAIN = Model(arm()) + "viscous_friction" + "coulomb_friction"
+
+
+def truth(
+    label: str, values: tuple[float, ...], shape: tuple[float, ...]
+) -> tuple[Model, np.ndarray]:
+    """The model with a hidden effect on board, and its parameters."""
+    (effect,) = effects_of(label, PLAIN.robot)
+    full = PLAIN + (effect.shaped(*shape) if shape else effect).at(values)
+    theta = full.given_values()
+    for name, of_joints in FRICTION.items():
+        for joint, value in zip(NAMES, of_joints, strict=True):
+            theta[full.slices[f"{name}@{joint}"]] = value
+    theta[full.slices[label]] = values
+    return full, theta
+
+
+def recordings(full: Model, theta: np.ndarray) -> list[Recording]:
+    """Runs of a session, one after the other, every motion twice; torques are the model's."""
+    made = []
+    for seed in range(RUNS):
+        rng = np.random.default_rng([seed, 3])
+        t, q, v, a = smooth_motion(2, seed, RATE, 2.0 * PERIOD, PERIOD)
+        q, start = q + HANGING, 20.0 * seed
+        block = full.block(t + start, q, v, a, number=seed + 1)
+        block = replace(block, period=PERIOD, body=full.robot, rotor=np.zeros(2))
+        tau = full.torque(block, theta) + NOISE * rng.normal(size=q.shape)
+        made.append(
+            Recording(
+                t, q, tau, NAMES, period=PERIOD, start=start, number=seed + 1, name=f"run {seed}"
+            )
+        )
+    return made
+
+
+def diagnosed(label: str, values: tuple[float, ...], shape: tuple[float, ...] = ()) -> Diagnosis:
+    made = recordings(*truth(label, values, shape))
+    return find(PLAIN, Dataset(tuple(made[:-1])), Dataset(tuple(made[-1:])))
+
+
+def first_named(found: Diagnosis) -> set[str]:
+    assert found.best is not None
+    return {found.best.effect.label, *(e.label for e in found.best.indistinguishable)}
+
+
+@pytest.mark.parametrize(
+    ("label", "values", "shape"),
+    [
+        ("base_tilt", (0.0, 0.2), ()),
+        ("torque_delay", (0.006,), ()),
+        ("load_friction@shoulder", (0.15,), ()),
+        ("presliding@elbow", (0.5,), (0.03,)),
+        ("thermal_friction@shoulder", (0.8, 0.9), (30.0,)),
+        ("torque_drift@elbow", (0.01,), ()),
+        ("joint_elasticity@shoulder", (2e-3,), (9.0, 0.08, 0.3)),
+        pytest.param("backlash@shoulder", (0.003,), (20.0, 0.1, 0.3), marks=pytest.mark.slow),
+    ],
+)
+def test_a_hidden_effect_is_found(
+    label: str, values: tuple[float, ...], shape: tuple[float, ...]
+) -> None:
+    found = diagnosed(label, values, shape)
+    assert label in first_named(found)
+    assert found.verdict == "explained"
+    assert found.test_error.noise_floor is not None
+    assert found.test_error.before > 1.05 * found.test_error.after
+    assert found.test_error.after < 1.15 * found.test_error.noise_floor
