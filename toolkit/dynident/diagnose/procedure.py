@@ -21,7 +21,7 @@ from dynident.diagnose.pruning import without_superfluous
 from dynident.diagnose.refitting import refitted, shaped
 from dynident.diagnose.runs import gather
 from dynident.diagnose.search import Ranking, candidates, rank
-from dynident.diagnose.second_look import second_look
+from dynident.diagnose.second_look import Asked, second_look
 from dynident.diagnose.simulated import SimulatedMotion, motion_of_loop
 from dynident.diagnose.telling import Found, Search, told
 from dynident.diagnose.verdict import RESOLUTION
@@ -84,10 +84,12 @@ def diagnose(
         start = blunted(store, shaped(store, given))
     search_on = _Growth(store, loop, train, start, most, tell)
     first = rank(store, start, 0, tell)
-    grown = search_on.grown(first)
-    again = second_look(store, start, grown.present, first, tell)
+    nothing = _Grown(start, [], [first])
+    grown = search_on.grown(nothing)
+    again = second_look(store, nothing.asked, grown.asked, tell)
     if again is not None:
-        other = search_on.grown(again)
+        base = grown if again.present is grown.present else nothing
+        other = search_on.grown(replace(base, rounds=[*base.rounds[:-1], again.ranking]))
         if other.present.misfit < grown.present.misfit:
             grown = other
     present, found, rounds = grown.present, grown.found, grown.rounds
@@ -115,6 +117,10 @@ class _Grown:
     found: list[Found]
     rounds: list[Ranking]
 
+    @property
+    def asked(self) -> Asked:
+        return Asked(self.present, self.rounds[-1])
+
 
 @dataclass(frozen=True)
 class _Growth:
@@ -127,11 +133,10 @@ class _Growth:
     most: int
     tell: Callable[[str], None]
 
-    def grown(self, first: Ranking) -> _Grown:
+    def grown(self, one: _Grown) -> _Grown:
         """Add the best effect and ask again, until nothing is material any more."""
-        store, present = self.store, self.start
-        found: list[Found] = []
-        rounds = [first]
+        store, present = self.store, one.present
+        found, rounds = list(one.found), list(one.rounds)
         while len(found) < self.most and not _resolved(store, present, self.train):
             chosen = choose(store, present, rounds[-1])
             if chosen is None:

@@ -9,6 +9,7 @@ from dynident.model import Model
 
 _REFITS = 12  # of shapes whose columns depend on the bodies
 _GAINED = 0.02  # share of the systematic square that another refit must take away
+_NEGLIGIBLE = 0.005  # of the square of the noise, that no refit is worth
 
 
 def shaped(store: ColumnStore, model: Model) -> Present:
@@ -41,6 +42,6 @@ def refitted(store: ColumnStore, model: Model, near: Present | None = None) -> P
             trial = fit_present(store, present.model.with_shapes((better,)), present)
             if trial.misfit < present.misfit:
                 present = trial
-        if before.misfit - present.misfit < _GAINED * before.misfit:
+        if before.misfit - present.misfit < _GAINED * before.misfit + _NEGLIGIBLE:
             break
     return present

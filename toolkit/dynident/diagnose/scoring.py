@@ -40,6 +40,8 @@ class Score:
     p_value : before correction for the number of tests; blocks of time are the sampling units.
     penalised : drop less the price of its parameters and of its grid.
     values, sigma : (k,) its parameters and their standard deviations.
+    fall : of the squared residual with its noise, at the value at which the column is taken. A
+        column that noise drives is other in every repetition: that counts against it.
     losses : (B,) held-out squared residual of each block with the effect in the model.
     gains : (B,) held-out squared residual of each block without it less that with it.
     """
@@ -54,6 +56,7 @@ class Score:
     penalised: float = -np.inf
     values: tuple[float, ...] = ()
     sigma: tuple[float, ...] = ()
+    fall: float = 0.0
     losses: np.ndarray | None = None
     gains: np.ndarray | None = None
 
@@ -193,6 +196,9 @@ def score(
     moment = directions.T @ (signal[p] - back.T @ present.moments.sums()[0][:p, p])
     drop = float(part.values @ moment)
     covariance = directions @ part.covariance @ directions.T
+    at = np.array(effect.point) if len(effect.point) == len(values) else values
+    misfit = np.append(-present.values, 1.0) @ present.moments.sums()[1]
+    with_noise = np.append(-present.values, 1.0) @ total - misfit[:p] @ back
     shapes = len(effect.shape_parameters(present.model.robot))
     price = (part.rank + shapes) * np.log(present.rows) + 2.0 * np.log(grid)
     penalised = drop - price
@@ -208,6 +214,7 @@ def score(
         penalised=float(penalised),
         values=tuple(float(v) for v in values),
         sigma=tuple(float(s) for s in np.sqrt(np.clip(np.diag(covariance), 0.0, None))),
+        fall=float(2.0 * at @ with_noise - at @ left_total @ at),
     )
 
 

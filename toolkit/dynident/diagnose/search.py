@@ -198,6 +198,8 @@ def _score_variants(store: ColumnStore, present: Present, effect: Effect) -> Ite
         return
     seen = _seen(present, effect)
     shapes = [variant.suited(seen) for variant in effect.variants(present.model.robot)]
+    if effect.point:
+        shapes.append(effect)  # found before, where no variant may be near enough
     found = candidate_moments(store, present, shapes, store.screening)
     for shaped, parts in zip(shapes, found, strict=True):
         yield _possible(score(present, shaped, *parts, grid=len(shapes)), present.model)

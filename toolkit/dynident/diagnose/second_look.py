@@ -20,75 +20,102 @@ from dynident.diagnose.held_out import on_recordings
 from dynident.diagnose.noise import systematic_square
 from dynident.diagnose.present import Present, fit_present, residuals
 from dynident.diagnose.scoring import Score, candidate_moments, impossible, score
-from dynident.diagnose.search import Ranking, candidates, judged, quiet_joints
+from dynident.diagnose.search import ALIKE, Ranking, candidates, judged, quiet_joints
 from dynident.diagnose.verdict import within_noise
 from dynident.effects import Effect
+from dynident.model import Model
 
 _LEAST = 0.1  # of the systematic square that the best of all shapes must explain, to be refined
 _ENOUGH = 0.9  # of it that ends the search: the gradient does the rest
 _POPULATION = 12  # shapes of a generation, per unknown
 _GENERATIONS = 25
+_FINALISTS = 24
 _PATIENCE = 6  # generations after which a search that explains nothing is given up
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A model, and what is missing from it by a first or a second look."""
+
+    present: Present
+    ranking: Ranking
 
 
 def second_look(
     store: ColumnStore,
-    start: Present,
-    last: Present,
-    first: Ranking,
+    start: Asked,
+    last: Asked,
     tell: Callable[[str], None] = lambda _: None,
-) -> Ranking | None:
-    """Return the first ranking with an effect at its head that it had missed; None for none.
+) -> Asked | None:
+    """Return one of two models with an effect that was missed at the head of its ranking.
+
+    What explains more or less waits until that is in the model, and comes up again if needed.
 
     Parameters
     ----------
-    store, start : the evidence, and the model before anything was added.
-    last : the model with all that was added.
-    first : the ranking on `start`.
+    store : the evidence.
+    start, last : the model before anything was added, and with all that was added.
+
+    Returns
+    -------
+    That of the two beside which the effect explains more; None if there is none, or no need.
     """
-    if not start.noise_known or within_noise(on_recordings(store, last)):
+    if not last.present.noise_known or within_noise(on_recordings(store, last.present)):
         return None
-    sought = _sought(store, start, last)
+    sought = _sought(store, start.present.model, last.present)
     if not sought:
         return None
-    part = _worst_recording(store, start)
-    searches = []
+    # An effect that is in the last model with a wrong shape is missing from the first one.
+    bases = (start,) if sought[0] in last.present.model else (last, start)
+    part, searches = _worst_recording(store, bases[0].present), []
     for effect in sought:
         tell(f"{effect.label}, a second look")
         searches.append(_Search.of(*part, effect))
-    tests = first.tests + sum(one.tried for one in searches)
-    found = [one.best for one in searches if one.best is not None]
-    best = max(found, key=lambda one: one.settled_drop, default=None)
-    if best is None:
+    finals = [_final(store, one.present, searches) for one in bases]
+    found = [(one, base) for one, base in zip(finals, bases, strict=True) if one is not None]
+    if not found:
         return None
-    (everywhere,) = _scores(store, start, [best.effect])
-    if everywhere.settled_drop < _LEAST * start.error_signal:
-        return None
-    best, refusal = judged(store, start, everywhere, tests)
-    if refusal:
-        return None
-    rest = [
-        (one, why)
-        for one, why in zip(first.scores, first.refusals, strict=True)
+    one, base = max(found, key=lambda pair: pair[0].fall / pair[1].present.error_signal)
+    tests = base.ranking.tests + sum(search.tried for search in searches)
+    best, refusal = judged(store, base.present, one, tests)
+    return None if refusal else Asked(base.present, _headed(base.ranking, best, tests))
+
+
+def _sought(store: ColumnStore, model: Model, last: Present) -> list[Effect]:
+    """Effects of many shapes: those that were added with one that may be wrong, or else all."""
+    quiet = quiet_joints(store, last)
+    every = [one for one in candidates(model) if one.sought_in(model.robot)]
+    added = [one for one in every if one in last.model]
+    return added or [one for one in every if one.joint not in quiet]
+
+
+def _final(store: ColumnStore, present: Present, searches: list[_Search]) -> Score | None:
+    """The best of what was found on one recording, by all of them; None if it explains little."""
+    scores = [
+        score
+        for search in searches
+        if search.finalists
+        for score in _scores(store, present, search.finalists)
+        if not impossible(score, present.model)
+        and score.settled_drop > _LEAST * present.error_signal
+    ]
+    return max(scores, key=lambda one: one.fall, default=None)
+
+
+def _headed(ranking: Ranking, best: Score, tests: int) -> Ranking:
+    """A ranking with another effect at its head."""
+    waits = f"asked again beside {best.effect.label}"
+    others = [
+        (one, why or ("" if abs(one.drop - best.drop) <= ALIKE * best.drop else waits))
+        for one, why in zip(ranking.scores, ranking.refusals, strict=True)
         if one.effect.label != best.effect.label
     ]
-    return Ranking((best, *(one for one, _ in rest)), tests, ("", *(why for _, why in rest)))
+    return Ranking((best, *(one for one, _ in others)), tests, ("", *(why for _, why in others)))
 
 
-def _sought(store: ColumnStore, start: Present, last: Present) -> list[Effect]:
-    """Effects of many shapes: those that were added with one that may be wrong, or else all."""
-    quiet = quiet_joints(store, start)
-    every = [
-        effect
-        for effect in candidates(start.model)
-        if effect.sought_in(start.model.robot) and effect.joint not in quiet
-    ]
-    return [effect for effect in every if effect in last.model] or every
-
-
-def _worst_recording(store: ColumnStore, start: Present) -> tuple[ColumnStore, Present]:
+def _worst_recording(store: ColumnStore, present: Present) -> tuple[ColumnStore, Present]:
     """The recording with the largest systematic residual, and the model as it alone fits it."""
-    left = residuals(store, start.model, start.values)
+    left = residuals(store, present.model, present.values)
     sizes = [
         -1.0
         if run.kind == "single"
@@ -96,8 +123,8 @@ def _worst_recording(store: ColumnStore, start: Present) -> tuple[ColumnStore, P
         for run, e in zip(store.runs, left, strict=True)
     ]
     alone = ColumnStore(store.model, (store.runs[int(np.argmax(sizes))],))
-    alone.prepare(start.model.effects)
-    return alone, fit_present(alone, start.model, start)
+    alone.prepare(present.model.effects)
+    return alone, fit_present(alone, present.model, present)
 
 
 @dataclass
@@ -107,7 +134,7 @@ class _Search:
     store: ColumnStore
     present: Present
     effect: Effect
-    best: Score | None = None
+    best: list[Score] = field(default_factory=list)
     tried: int = 0
     generations: int = field(default=0)
 
@@ -131,7 +158,12 @@ class _Search:
     @property
     def explained(self) -> float:
         """Share of the systematic square that the best shape takes away."""
-        return 0.0 if self.best is None else self.best.settled_drop / self.present.error_signal
+        return self.best[0].fall / self.present.error_signal if self.best else 0.0
+
+    @property
+    def finalists(self) -> list[Effect]:
+        """The best shapes, about which the other recordings are asked."""
+        return [one.effect for one in self.best]
 
     def loss(self, logs: np.ndarray) -> np.ndarray:
         """What the shapes in the columns of `logs` (unknowns, V) leave, (V,)."""
@@ -140,9 +172,8 @@ class _Search:
         scores = _scores(self.store, self.present, tried)
         self.tried += len(tried)
         possible = [one for one in scores if not impossible(one, self.present.model)]
-        best = max(filter(None, [self.best, *possible]), key=lambda s: s.settled_drop, default=None)
-        self.best = best
-        return np.array([-one.settled_drop for one in scores])
+        self.best = sorted([*self.best, *possible], key=lambda s: -s.fall)[:_FINALISTS]
+        return np.array([-one.fall for one in scores])
 
     def ends(self, intermediate_result: OptimizeResult) -> bool:
         """Whether enough is explained, or nothing after so long."""
