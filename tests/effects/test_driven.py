@@ -107,6 +107,17 @@ def test_sensitivities_are_exact_while_no_contact_changes(label: str) -> None:
         np.testing.assert_allclose(found[..., k], expected, atol=limit)
 
 
+@pytest.mark.parametrize("gap", [1e-3, 5e-3])
+def test_the_slope_at_a_gap_is_exact_while_no_contact_changes(gap: float) -> None:
+    (effect,) = effects_of("backlash@elbow", ROBOT)
+    effect, samples, step = effect.shaped(12.0, 0.2, 0.3), block(1), 1e-6 * gap
+    found = effect.at([gap]).point_slope(samples)
+    assert found is not None
+    ends = [g * effect.at([g]).columns(samples) for g in (gap + step, gap - step)]
+    expected = (ends[0] - ends[1]) / (2 * step)
+    np.testing.assert_allclose(found, expected, atol=1e-5 * np.abs(expected).max())
+
+
 def test_a_response_does_not_depend_on_the_rate_of_the_samples() -> None:
     (effect,) = effects_of("joint_elasticity@elbow", ROBOT)
     effect = effect.shaped(40.0, 0.1, 0.3)

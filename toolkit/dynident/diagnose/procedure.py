@@ -82,16 +82,7 @@ def diagnose(
     contacts = Contacts.leave_out(store, held, start)
     if contacts.bumps:
         start = blunted(store, shaped(store, given))
-    search_on = _Growth(store, loop, train, start, most, tell)
-    first = rank(store, start, 0, tell)
-    nothing = _Grown(start, [], [first])
-    grown = search_on.grown(nothing)
-    again = second_look(store, nothing.asked, grown.asked, tell)
-    if again is not None:
-        base = grown if again.present is grown.present else nothing
-        other = search_on.grown(replace(base, rounds=[*base.rounds[:-1], again.ranking]))
-        if other.present.misfit < grown.present.misfit:
-            grown = other
+    grown = _Growth(store, loop, train, start, most, tell).run()
     present, found, rounds = grown.present, grown.found, grown.rounds
     if held is not None:
         decide_payload(held, present)
@@ -132,6 +123,19 @@ class _Growth:
     start: Present
     most: int
     tell: Callable[[str], None]
+
+    def run(self) -> _Grown:
+        """Grow a model from the first one, and again if a second look finds what was missed."""
+        nothing = _Grown(self.start, [], [rank(self.store, self.start, 0, self.tell)])
+        grown = self.grown(nothing)
+        if not self.most:
+            return grown
+        again = second_look(self.store, nothing.asked, grown.asked, self.tell)
+        if again is None:
+            return grown
+        base = grown if again.present is grown.present else nothing
+        other = self.grown(replace(base, rounds=[*base.rounds[:-1], again.ranking]))
+        return other if other.present.misfit < grown.present.misfit else grown
 
     def grown(self, one: _Grown) -> _Grown:
         """Add the best effect and ask again, until nothing is material any more."""

@@ -136,7 +136,7 @@ class _Search:
     effect: Effect
     best: list[Score] = field(default_factory=list)
     tried: int = 0
-    generations: int = field(default=0)
+    generations: int = 0
 
     @classmethod
     def of(cls, store: ColumnStore, present: Present, effect: Effect) -> _Search:
@@ -173,7 +173,9 @@ class _Search:
         self.tried += len(tried)
         possible = [one for one in scores if not impossible(one, self.present.model)]
         self.best = sorted([*self.best, *possible], key=lambda s: -s.fall)[:_FINALISTS]
-        return np.array([-one.fall for one in scores])
+        # How wrong a wrong one is does not matter, and may be beyond all numbers.
+        worst = -self.present.error_signal
+        return np.array([-max(one.fall, worst) for one in scores])
 
     def ends(self, intermediate_result: OptimizeResult) -> bool:
         """Whether enough is explained, or nothing after so long."""

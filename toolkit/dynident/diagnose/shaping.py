@@ -196,7 +196,7 @@ def _by_gradient(
     def at(logarithms: tuple[float, ...]) -> _Trial:
         nonlocal best
         x = np.clip(np.exp(logarithms), *limits)
-        trial = effect.shaped(*x[: len(shapes)]).at(x[len(shapes) :])
+        trial = effect.shaped(*x[: len(shapes)]).at(x[len(shapes) :].tolist())
         tangent = Tangent.to(trial)
         ((with_model, with_self),) = candidate_moments(store, present, [tangent], columns_of)
         store.forget(tangent)
