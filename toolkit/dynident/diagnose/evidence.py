@@ -18,6 +18,8 @@ from dynident.model import Model
 
 _SHARED = 50_000
 """Samples up to which a recording's torque and its derivatives are kept for several effects."""
+_TOGETHER = 2_000_000
+"""Samples, over all shapes, up to which responses in several recordings are evaluated at once."""
 
 
 @dataclass
@@ -139,29 +141,29 @@ class ColumnStore:
             self._screened[effect, run] = self.of(effect, run, model, values)
         return self._screened[effect, run]
 
-    def together(
-        self, variants: Sequence[Effect], run: int, model: Model, values: np.ndarray
-    ) -> None:
+    def together(self, variants: Sequence[Effect], model: Model, values: np.ndarray) -> None:
         """Evaluate the response of one effect with several shapes at once, for `of` to find."""
         first = variants[0]
         if len(variants) < 2 or first in model or not {"body", "whole"} <= first.needs:
             return
         if self.simulation is not None:
-            self.simulation.together(variants, run, model, values)
+            self.simulation.together(variants, model, values)
             return
         self._look_at(model, values)
-        new = [
-            v for v in variants if (v, run) not in self._present and (v, run) not in self._screened
-        ]
-        if not new:
-            return
-        versions = self.runs[run].versions
-        found: list[Signals] = [[] for _ in new]
-        for i, version in enumerate(versions):
-            block = self._block(first, run, i, model, values)
-            for signals, columns in zip(found, first.family(new, block), strict=True):
-                signals.append(version.filtered(columns))
-        self._present.update({(v, run): signals for v, signals in zip(new, found, strict=True)})
+        known = {*self._present, *self._screened}
+        new = [v for v in variants if any((v, r) not in known for r in range(len(self.runs)))]
+        places = [(r, i) for r, run in enumerate(self.runs) for i in range(len(run.versions))]
+        samples = max(version.motion.samples for run in self.runs for version in run.versions)
+        step = max(1, _TOGETHER // (samples * max(len(new), 1)))
+        found: dict[Hashable, Signals] = {(v, r): [] for v in new for r in range(len(self.runs))}
+        for start in range(0, len(places) if new else 0, step):
+            some = places[start : start + step]
+            blocks = [self._block(first, *place, model, values) for place in some]
+            for (r, i), each in zip(some, first.family(new, blocks), strict=True):
+                version = self.runs[r].versions[i]
+                for variant, columns in zip(new, each, strict=True):
+                    found[variant, r].append(version.filtered(columns))
+        self._present.update(found)
 
     def look_again(self) -> None:
         """Let `screening` evaluate everything anew: the model has become another one."""

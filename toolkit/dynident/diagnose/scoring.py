@@ -96,9 +96,9 @@ def candidate_moments(
     mixed = variants[0].timed or timed.any()
     with_model, with_self = None, None
     width = 0
+    if columns_of is None or columns_of == store.screening:
+        store.together(variants, present.model, present.values)
     for r, run in enumerate(store.runs):
-        if columns_of is None or columns_of == store.screening:
-            store.together(variants, r, present.model, present.values)
         each = [look(effect, r, present.model, present.values) for effect in variants]
         width = each[0][0].shape[2]
         signals = [np.concatenate(shapes, axis=2) for shapes in zip(*each, strict=True)]

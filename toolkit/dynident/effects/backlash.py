@@ -9,7 +9,7 @@ import numpy as np
 
 from dynident.effects.along import mean_inertia
 from dynident.effects.base import Block, Parameter, ShapeParameter, motion_unit
-from dynident.effects.driven import DrivenLink
+from dynident.effects.driven import DrivenLink, responses
 from dynident.effects.flexible import DAMPING, RESONANCE, ROTOR_SHARE, FlexibleJoint
 from dynident.effects.gaps import Transmitting
 
@@ -59,11 +59,21 @@ class Backlash(FlexibleJoint):
         given = self.point[0] if self.point else 0.0
         return max(given, _GAPS[0] / 100.0) if given > 0 else _GAPS[1]
 
-    def family(self, variants: Sequence[Backlash], block: Block) -> list[np.ndarray]:
-        link = DrivenLink(block, block.index(self.joint))
-        gears = [Transmitting.of(link.inertia, one.shape, one.gap) for one in variants]
-        found = zip(variants, link.responses(gears), strict=True)
-        return [(one.per_unit(0.0) * response.torque)[:, :, None] for one, response in found]
+    def family(
+        self, variants: Sequence[Backlash], blocks: Sequence[Block]
+    ) -> list[list[np.ndarray]]:
+        links = [DrivenLink(block, block.index(self.joint)) for block in blocks]
+        gears = [
+            [Transmitting.of(link.inertia, one.shape, one.gap) for one in variants]
+            for link in links
+        ]
+        return [
+            [
+                (one.per_unit(0.0) * response.torque)[:, :, None]
+                for one, response in zip(variants, each, strict=True)
+            ]
+            for each in responses(links, gears)
+        ]
 
     def point_slope(self, block):
         _, response = self._response(block)

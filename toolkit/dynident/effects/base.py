@@ -212,9 +212,12 @@ class Effect(ABC):
     def columns(self, block: Block) -> np.ndarray:
         """Torque per unit of each linear parameter, (T, n, k) in N m or N."""
 
-    def family(self, variants: Sequence[Any], block: Block) -> list[np.ndarray]:
-        """Columns of `variants`, this effect with several shapes: for less where that can be."""
-        return [one.columns(block) for one in variants]
+    def family(self, variants: Sequence[Any], blocks: Sequence[Block]) -> list[list[np.ndarray]]:
+        """Columns of `variants`, this effect with several shapes, in each of several blocks.
+
+        For less than one after the other, where that can be.
+        """
+        return [[one.columns(block) for one in variants] for block in blocks]
 
     def clock(self, block: Block) -> np.ndarray:
         """The factor of its columns that depends on the time of the session, (T,)."""

@@ -24,7 +24,7 @@ import numpy as np
 from dynident.effects.along import along_motion, mean_inertia
 from dynident.effects.bands import solve_band
 from dynident.effects.block import Block
-from dynident.effects.gaps import Transmitting, through_gaps
+from dynident.effects.gaps import Driven, Transmitting, Walked, through_gaps
 from dynident.errors import EffectError
 
 _PHASE = 0.3
@@ -76,29 +76,12 @@ class DrivenLink:
         self.step = float(np.mean(np.diff(block.t)))
         self.period = 0 if block.period is None else round(block.period / self.step)
 
-    def response(self, gear: Transmitting) -> Response:
-        """Return how the link moves behind a transmission."""
-        return self.responses([gear])[0]
-
-    def responses(self, gears: Sequence[Transmitting]) -> list[Response]:
-        """Return how the link moves behind each of several transmissions, in the same steps."""
-        per = max(map(self._steps_per_sample, gears))
-        before = max((self.run_up(gear) for gear in gears), key=len)
-        fine = Fine.of(self, per, before)
-        made = [Response(self, fine, gear) for gear in gears]
-        gaps = [one for one in made if one.gear.half_gap > 0]
-        if gaps:
-            m, load = (np.stack([getattr(g, x) for g in gaps], axis=1) for x in ("m", "load"))
-            walked = through_gaps(m, fine.c, fine.g, load, [g.gear for g in gaps], fine.step)
-            for one, d, side in zip(gaps, *(x.T for x in walked), strict=True):
-                one.walked = d, side
-        return made
-
     def behind(self, gear: Transmitting) -> np.ndarray:
         """Return the inertia behind a transmission, (T,): no less than a part of the mean."""
         return np.maximum(self.whole - gear.rotor, _LEAST * self.inertia)
 
-    def _steps_per_sample(self, gear: Transmitting) -> int:
+    def steps_per_sample(self, gear: Transmitting) -> int:
+        """Return how many steps of the recursion follow an oscillation well enough."""
         stiffest = max(float((gear.stiffness + self.G[:, self.joint]).max()), 0.0)
         fastest = np.sqrt(stiffest / self.behind(gear).min())
         return max(1, int(np.ceil(fastest * self.step / _PHASE)))
@@ -153,6 +136,23 @@ class Fine:
         return cls(rows, len(before), per, link.step / per, whole, *samples.T)
 
 
+def responses(
+    links: Sequence[DrivenLink], gears: Sequence[Sequence[Transmitting]]
+) -> list[list[Response]]:
+    """Return how each link moves behind each of its transmissions; all gaps in one walk."""
+    made = []
+    for link, each in zip(links, gears, strict=True):
+        per = max(map(link.steps_per_sample, each))
+        before = max((link.run_up(gear) for gear in each), key=len)
+        fine = Fine.of(link, per, before)
+        made.append([Response(link, fine, gear) for gear in each])
+    gaps = [one for each in made for one in each if one.gear.half_gap > 0]
+    if gaps:
+        for one, walked in zip(gaps, through_gaps([g.driven for g in gaps]), strict=True):
+            one.walked = walked
+    return made
+
+
 class Response:
     """A deflection with its effect on the torque, and the derivatives of both.
 
@@ -164,7 +164,7 @@ class Response:
     ----------
     m, load : (S,) inertia behind the transmission, and the torque that the link needs where nothing
         gives way.
-    walked : deflection and side (S,) of a link in a gap, found step by step; None without a gap.
+    walked : the deflection of a link in a gap, found step by step; None without a gap.
     """
 
     def __init__(self, link: DrivenLink, fine: Fine, gear: Transmitting) -> None:
@@ -173,7 +173,13 @@ class Response:
         self.m = np.maximum(fine.whole - gear.rotor, least)
         self._moves = fine.whole - gear.rotor > least
         self.load = fine.load - gear.rotor * fine.a
-        self.walked: tuple[np.ndarray, np.ndarray] | None = None
+        self.walked: Walked | None = None
+
+    @property
+    def driven(self) -> Driven:
+        """The same for the recursion in time."""
+        fine = self._fine
+        return Driven(self.m, self.load, fine.c, fine.g, self.gear, fine.step)
 
     @cached_property
     def torque(self) -> np.ndarray:
@@ -182,7 +188,7 @@ class Response:
 
     @cached_property
     def _side(self) -> np.ndarray:
-        return np.zeros(len(self.m)) if self.walked is None else self.walked[1]
+        return np.zeros(len(self.m)) if self.walked is None else self.walked.side
 
     @cached_property
     def _touches(self) -> np.ndarray:
@@ -195,7 +201,7 @@ class Response:
     @cached_property
     def _d(self) -> np.ndarray:
         if self.walked is not None:
-            return _bounded(self.walked[0])
+            return _bounded(self.walked.d)
         return self._banded(self.load[:2], self.load)
 
     @cached_property

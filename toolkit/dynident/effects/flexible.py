@@ -8,7 +8,7 @@ import numpy as np
 
 from dynident.effects.along import mean_inertia, share_of_rotor
 from dynident.effects.base import Block, Forceless, ShapeParameter
-from dynident.effects.driven import DrivenLink, Response, Transmitting, stacked
+from dynident.effects.driven import DrivenLink, Response, Transmitting, responses, stacked
 from dynident.effects.transmission import Transmission
 from dynident.robot import Robot
 
@@ -65,7 +65,8 @@ class FlexibleJoint(Forceless):
     def _response(self, block: Block) -> tuple[Transmitting, Response]:
         link = DrivenLink(block, block.index(self.joint))
         gear = Transmitting.of(link.inertia, self.shape, self.gap)
-        return gear, link.response(gear)
+        ((response,),) = responses([link], [[gear]])
+        return gear, response
 
     def transmission(self, robot: Robot, stiffness: float, gap: float) -> Transmission:
         """Return it as a simulator has it, for the motor and the damping of this shape."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -30,110 +30,141 @@ class Transmitting:
         return cls(link * w**2, 2.0 * damping * link * w, gap / 2.0, share * inertia)
 
 
-def through_gaps(
-    m: np.ndarray,
-    c: np.ndarray,
-    g: np.ndarray,
-    load: np.ndarray,
-    gears: Sequence[Transmitting],
-    step: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return deflections of a link in gaps, and the sides that it touches: -1, 0 or 1.
+@dataclass(frozen=True, eq=False)
+class Driven:
+    """A link behind a transmission with a gap, in steps of time.
 
-    Several gaps are walked through together, as a step costs the same for one and for dozens.
-
-    Parameters
+    Attributes
     ----------
-    m, load : (S, V) inertia behind each of V transmissions, and the torque that it needs.
+    m, load : (S,) inertia behind the transmission, and the torque that it needs.
     c, g : (S,) damping and stiffness without a transmission.
-    gears, step : V transmissions, and the time step, s.
-
-    Returns
-    -------
-    d, side : (S, V) each; d is not finite where a link has run away
+    gear, step : the transmission, and the time step, s.
     """
-    half = np.array([one.half_gap for one in gears])
-    K, D = np.array([one.stiffness for one in gears]), np.array([one.damping for one in gears])
-    inertia = 2.0 * m / step**2 - g[:, None]
-    mass, free_damping = m / step**2, c[:, None] / (2.0 * step)
-    touching_damping = free_damping + D / (2.0 * step)
-    free, touching = 1.0 / (mass + free_damping), 1.0 / (mass + touching_damping)
-    free_back, touching_back = (mass - free_damping) * free, (mass - touching_damping) * touching
-    d, side = np.zeros_like(load), np.zeros_like(load)
-    lean = np.where(load[:2] >= 0.0, 1.0, -1.0)
-    d[:2] = (load[:2] + lean * K * half) / (g[:2, None] + K)
-    if len(gears) == 1:
-        walked, touched = _walk(
-            d[:2, 0].tolist(),
-            [x[:, 0].tolist() for x in (load, inertia)],
-            [x[:, 0].tolist() for x in (free, free_back)],
-            [x[:, 0].tolist() for x in (touching, touching_back)],
-            float(half[0]),
-            float(K[0]),
-        )
-        return walked[:, None], touched[:, None]
+
+    m: np.ndarray
+    load: np.ndarray
+    c: np.ndarray
+    g: np.ndarray
+    gear: Transmitting
+    step: float
+
+
+@dataclass(frozen=True, eq=False)
+class Walked:
+    """Deflection of a link in a gap (S,), not finite where it ran away, and the side it touches.
+
+    The side is -1, 0 or 1.
+    """
+
+    d: np.ndarray
+    side: np.ndarray
+
+
+def through_gaps(links: Sequence[Driven]) -> list[Walked]:
+    """Return how links move in gaps: together, as a step costs the same for one and for dozens."""
+    if len(links) == 1:
+        return [_walk(_Recursion.of(links[0], len(links[0].m)))]
+    longest = max(len(link.m) for link in links)
+    each = [_Recursion.of(link, longest) for link in links]
+    together = _Recursion(*(np.stack(x, axis=-1) for x in zip(*map(_fields, each), strict=True)))
     # A link that its load outgrows falls beyond all numbers: the caller sees that it is not finite.
     with np.errstate(over="ignore", invalid="ignore"):
-        _walk_together(d, load, inertia, (free, free_back), (touching, touching_back), half, K)
-        beyond = d[1:-1] - np.clip(d[1:-1], -half, half)
+        d = _walk_together(together)
+        beyond = d[1:-1] - np.clip(d[1:-1], -together.half, together.half)
+        side = np.zeros_like(d)
         side[1:-1] = np.sign(beyond)
-    return d, np.nan_to_num(side)
+    side = np.nan_to_num(side)
+    lengths = [len(link.m) for link in links]
+    return [Walked(d[:s, v], side[:s, v]) for v, s in enumerate(lengths)]
 
 
-def _walk_together(
-    d: np.ndarray,
-    load: np.ndarray,
-    inertia: np.ndarray,
-    free: tuple[np.ndarray, np.ndarray],
-    touching: tuple[np.ndarray, np.ndarray],
-    half: np.ndarray,
-    K: np.ndarray,
-) -> None:
-    """Fill in deflections (S, V) from their first two rows on; nothing is allocated in a step."""
-    low = -half
+@dataclass(frozen=True, eq=False)
+class _Recursion:
+    """What the recursion multiplies by in each step, (S,) or (S, V); K and half are () or (V,)."""
+
+    start: np.ndarray
+    load: np.ndarray
+    inertia: np.ndarray
+    free: np.ndarray
+    free_back: np.ndarray
+    touching: np.ndarray
+    touching_back: np.ndarray
+    K: np.ndarray
+    half: np.ndarray
+
+    @classmethod
+    def of(cls, link: Driven, steps: int) -> _Recursion:
+        """Return it for as many steps, the last one repeated."""
+        rows = np.minimum(np.arange(steps), len(link.m) - 1)
+        m, load, c, g = (x[rows] for x in (link.m, link.load, link.c, link.g))
+        h, gear = link.step, link.gear
+        mass, damping = m / h**2, c / (2.0 * h)
+        more = damping + gear.damping / (2.0 * h)
+        free, touching = 1.0 / (mass + damping), 1.0 / (mass + more)
+        lean = np.where(load[:2] >= 0.0, 1.0, -1.0)
+        start = (load[:2] + lean * gear.stiffness * gear.half_gap) / (g[:2] + gear.stiffness)
+        return cls(
+            start,
+            load,
+            2.0 * mass - g,
+            free,
+            (mass - damping) * free,
+            touching,
+            (mass - more) * touching,
+            np.array(gear.stiffness),
+            np.array(gear.half_gap),
+        )
+
+
+def _fields(one: _Recursion) -> list[np.ndarray]:
+    return [getattr(one, field.name) for field in fields(one)]
+
+
+def _walk_together(r: _Recursion) -> np.ndarray:
+    """Return deflections (S, V) of V links; nothing is allocated in a step."""
+    d = np.zeros_like(r.load)
+    d[:2] = r.start
+    half, low, K = r.half, -r.half, r.K
     beyond, pushed, part = (np.empty_like(half) for _ in range(3))
     ahead, back, touches = np.empty_like(half), np.empty_like(half), np.empty(len(half), dtype=bool)
-    for k in range(1, len(load) - 1):
+    for k in range(1, len(d) - 1):
         now = d[k]
         np.maximum(now, low, out=beyond)
         np.minimum(beyond, half, out=beyond)
         np.subtract(now, beyond, out=beyond)
         np.not_equal(beyond, 0.0, out=touches)
-        np.copyto(ahead, free[0][k])
-        np.copyto(ahead, touching[0][k], where=touches)
-        np.copyto(back, free[1][k])
-        np.copyto(back, touching[1][k], where=touches)
-        np.multiply(inertia[k], now, out=pushed)
-        np.add(pushed, load[k], out=pushed)
+        np.copyto(ahead, r.free[k])
+        np.copyto(ahead, r.touching[k], where=touches)
+        np.copyto(back, r.free_back[k])
+        np.copyto(back, r.touching_back[k], where=touches)
+        np.multiply(r.inertia[k], now, out=pushed)
+        np.add(pushed, r.load[k], out=pushed)
         np.multiply(K, beyond, out=part)
         np.subtract(pushed, part, out=pushed)
         np.multiply(pushed, ahead, out=pushed)
         np.multiply(back, d[k - 1], out=part)
         np.subtract(pushed, part, out=d[k + 1])
+    return d
 
 
-def _walk(
-    start: list[float],
-    driven: list[list[float]],
-    free: list[list[float]],
-    touching: list[list[float]],
-    half: float,
-    K: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    """As `_walk_together`, of one gap: in plain numbers, which are faster than arrays of one."""
-    load, inertia = driven
-    d, side = [*start, *[0.0] * (len(load) - 2)], [0.0] * len(load)
-    before, now = start
+def _walk(r: _Recursion) -> Walked:
+    """As `_walk_together`, of one link: in plain numbers, which are faster than arrays of one."""
+    load, inertia = r.load.tolist(), r.inertia.tolist()
+    free, free_back = r.free.tolist(), r.free_back.tolist()
+    touching, touching_back = r.touching.tolist(), r.touching_back.tolist()
+    K, half = float(r.K), float(r.half)
+    before, now = r.start.tolist()
+    d, side = [before, now, *[0.0] * (len(load) - 2)], [0.0] * len(load)
     for k in range(1, len(load) - 1):
         pushed = load[k] + inertia[k] * now
         if now >= half:
-            after = (pushed - K * (now - half)) * touching[0][k] - touching[1][k] * before
+            after = (pushed - K * (now - half)) * touching[k] - touching_back[k] * before
             side[k] = 1.0
         elif now <= -half:
-            after = (pushed - K * (now + half)) * touching[0][k] - touching[1][k] * before
+            after = (pushed - K * (now + half)) * touching[k] - touching_back[k] * before
             side[k] = -1.0
         else:
-            after = pushed * free[0][k] - free[1][k] * before
+            after = pushed * free[k] - free_back[k] * before
         before, now = now, after
         d[k + 1] = after
-    return np.array(d), np.array(side)
+    return Walked(np.array(d), np.array(side))

@@ -1,0 +1,84 @@
+"""Effects that were added and are not needed are dropped again."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.diagnose.choosing import choose
+from dynident.diagnose.evidence import ColumnStore
+from dynident.diagnose.present import Present, fit_present
+from dynident.diagnose.pruning import without_superfluous
+from dynident.diagnose.runs import gather
+from dynident.diagnose.search import candidates, rank
+from dynident.diagnose.telling import Found
+from dynident.effects import effects_of
+from dynident.model import Model
+from dynident.recording import Dataset
+from synthetic import arm, synthetic, true_values
+
+FRICTION = {"Fv__shoulder": 1.2, "Fv__elbow": 0.5, "Fc__shoulder": 1.5, "Fc__elbow": 0.6}
+PLAIN = Model(arm()) + "viscous_friction" + "coulomb_friction"
+DRAG, OFFSET = "quadratic_drag@shoulder", "torque_offset@elbow"
+
+
+def store_of(seeds: range, drag: float, offset: float) -> ColumnStore:
+    """Recordings of an arm with a drag and an offset that the plain model lacks."""
+    full = PLAIN + DRAG + OFFSET
+    truth = true_values(full, **FRICTION, Fq__shoulder=drag, offset__elbow=offset)
+    made = tuple(
+        synthetic(full, truth, seed, rate_hz=250.0, position_std=2e-5, torque_std=0.3)
+        for seed in seeds
+    )
+    store = ColumnStore(PLAIN, gather(Dataset(made)))
+    every = [v for e in candidates(PLAIN) for v in e.variants(PLAIN.robot)]
+    store.prepare([*PLAIN.effects, *every])
+    return store
+
+
+def added(store: ColumnStore, *labels: str) -> tuple[Present, list[Found]]:
+    """The model with effects added one after the other, as the diagnosis adds them."""
+    present, found = fit_present(store, PLAIN), []
+    for label in labels:
+        (effect,) = effects_of(label, PLAIN.robot)
+        one = choose(store, present, rank(store, present, len(found), only=(effect,)))
+        assert one is not None
+        found.append(one)
+        present = fit_present(store, present.model + effect, present)
+    return present, found
+
+
+def kept(store: ColumnStore, held: ColumnStore | None) -> list[str]:
+    present, found = added(store, DRAG, OFFSET)
+    left = without_superfluous(store, held, present, found, lambda _: None)
+    assert [e.label for e in left.final.model.effects][-len(left.found) :] == [
+        one.score.effect.label for one in left.found
+    ]
+    return [one.score.effect.label for one in left.found]
+
+
+def test_what_helps_in_training_and_in_the_test_stays() -> None:
+    store = store_of(range(3), 0.4, 0.4)
+    assert kept(store, store_of(range(3, 5), 0.4, 0.4)) == [DRAG, OFFSET]
+    assert kept(store, None) == [DRAG, OFFSET]
+
+
+def test_what_does_not_help_in_the_test_recordings_goes() -> None:
+    """The machine of the test recordings has no drag."""
+    assert kept(store_of(range(3), 0.4, 0.4), store_of(range(3, 5), 0.0, 0.4)) == [OFFSET]
+
+
+def test_what_another_effect_explains_as_well_goes() -> None:
+    store = store_of(range(3), 0.4, 0.0)
+    plain = fit_present(store, PLAIN)
+    ripple, drag = (
+        effects_of("torque_ripple@shoulder", PLAIN.robot)[0],
+        effects_of(DRAG, PLAIN.robot)[0],
+    )
+    ranking = rank(store, plain, 0, only=(ripple, drag))
+    found = [Found(s, 0.0, ()) for s in sorted(ranking.scores, key=lambda s: s.drop)]
+    model = PLAIN
+    for one in found:
+        model = model + one.score.effect
+    left = without_superfluous(store, None, fit_present(store, model, plain), found, lambda _: None)
+    assert [one.score.effect.label for one in left.found] == [DRAG]
+    assert np.isclose(left.final.values[left.final.model.slices[DRAG]], 0.4, atol=0.05)
