@@ -1,6 +1,6 @@
 """The command line of the blind study.
 
-    python benchmarks/blind_study run --count 400 --seed 10000 --jobs 2
+    python benchmarks/blind_study run --count 400 --seed 30000 --jobs 2
     python benchmarks/blind_study table
 
 `run` draws the cases of a seed, makes them, asks `dynident explain` about each, and appends what it
