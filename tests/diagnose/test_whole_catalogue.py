@@ -87,3 +87,20 @@ def test_a_hidden_effect_is_found(
     assert found.test_error.noise_floor is not None
     assert found.test_error.before > 1.05 * found.test_error.after
     assert found.test_error.after < 1.15 * found.test_error.noise_floor
+
+
+def test_a_shape_that_is_given_is_refined_though_it_is_one_that_is_screened() -> None:
+    made = recordings(*truth("joint_elasticity@shoulder", (2e-3,), (9.0, 0.08, 0.3)))
+    (given,) = effects_of("joint_elasticity@shoulder", PLAIN.robot)
+    found = find(PLAIN + given, Dataset(tuple(made[:-1])), Dataset(tuple(made[-1:])))
+    assert found.verdict == "nothing_missing"
+    assert found.test_error.noise_floor is not None
+    assert found.test_error.before < 1.15 * found.test_error.noise_floor
+
+
+@pytest.mark.slow
+def test_a_gap_that_is_given_is_refined() -> None:
+    """From the few shapes of the first look, as it is not missing: 0.053 without it."""
+    made = recordings(*truth("backlash@shoulder", (0.003,), (20.0, 0.1, 0.3)))
+    found = find(PLAIN + "backlash@shoulder", Dataset(tuple(made[:-1])), Dataset(tuple(made[-1:])))
+    assert found.test_error.before < 0.03

@@ -60,7 +60,8 @@ def _alike_once_fitted(
         return ()
 
     def explained(effect: Effect) -> float:
-        return present.misfit - fit_present(store, present.model + effect, present).misfit
+        wider = fit_present(store, present.model + effect, present)
+        return present.misfit(present) - wider.misfit(present)
 
     most = explained(best.effect)
     return tuple(s.effect for s in rivals if explained(s.effect) >= (1.0 - ALIKE) * most)
@@ -73,8 +74,9 @@ def breaks_its_promise(present: Present, wider: Present, one: Score) -> bool:
     """
     if not ({"body", "whole"} <= one.effect.needs and present.noise_known):
         return False
-    promised = one.drop / present.error_signal
-    return present.misfit - wider.misfit < _LEAST_KEPT * promised * present.misfit
+    promised = min(one.drop / present.error_signal, 1.0) if present.error_signal > 0 else 1.0
+    before, after = present.misfit(present), wider.misfit(present)
+    return before - after < _LEAST_KEPT * promised * before
 
 
 def _size(one: Score) -> int:

@@ -18,7 +18,7 @@ from dynident.model import Model
 
 _SHARED = 50_000
 """Samples up to which a recording's torque and its derivatives are kept for several effects."""
-_TOGETHER = 2_000_000
+_TOGETHER = 500_000
 """Samples, over all shapes, up to which responses in several recordings are evaluated at once."""
 
 
@@ -151,11 +151,12 @@ class ColumnStore:
             return
         self._look_at(model, values)
         known = {*self._present, *self._screened}
-        new = [v for v in variants if any((v, r) not in known for r in range(len(self.runs)))]
+        every = range(len(self.runs))
+        new = [v for v in dict.fromkeys(variants) if any((v, r) not in known for r in every)]
         places = [(r, i) for r, run in enumerate(self.runs) for i in range(len(run.versions))]
         samples = max(version.motion.samples for run in self.runs for version in run.versions)
         step = max(1, _TOGETHER // (samples * max(len(new), 1)))
-        found: dict[Hashable, Signals] = {(v, r): [] for v in new for r in range(len(self.runs))}
+        found: dict[Hashable, Signals] = {(v, r): [] for v in new for r in every}
         for start in range(0, len(places) if new else 0, step):
             some = places[start : start + step]
             blocks = [self._block(first, *place, model, values) for place in some]

@@ -39,9 +39,9 @@ class Present:
     white : per run and joint, whitened columns and torque, (P, S, p + 1).
     moments : (B, p + 1, p + 1) of columns and torque, over all joints.
     rows : number of whitened rows, over all repetitions and joints; noisy copies do not count.
-    misfit : systematic square of the residual over the variance of the noise (of the torque, where
-        the noise is unknown), summed over joints. By it fits are compared: what is whitened depends
-        on the metric, which is another one when less is missing.
+    error_signal : squared systematic residual, whitened: what no noise explains, in this metric.
+    squares : (n,) mean systematic square of the residual, (N m)^2 or N^2.
+    variances : (n,) of the noise; of the torque, where the noise is unknown or zero.
     """
 
     model: Model
@@ -53,13 +53,17 @@ class Present:
     white: tuple[tuple[np.ndarray, ...], ...]
     moments: Moments
     rows: int
-    misfit: float
+    error_signal: float
+    squares: np.ndarray
+    variances: np.ndarray
 
-    @property
-    def error_signal(self) -> float:
-        """Squared systematic residual, whitened: what no noise explains, in this metric."""
-        combination = np.append(-self.values, 1.0)
-        return float(combination @ self.moments.sums()[0] @ combination)
+    def misfit(self, over: Present) -> float:
+        """Systematic square over the variances of another fit, summed over joints.
+
+        By it fits are compared: `error_signal` depends on the metric, which is another one when
+        less is missing, and noise in a fit's own columns would speak for it.
+        """
+        return float(np.sum(self.squares / over.variances))
 
     @property
     def error_total(self) -> float:
@@ -115,13 +119,20 @@ def fit_present(store: ColumnStore, model: Model, near: Present | None = None) -
         for run, joints in zip(store.runs, white, strict=True)
         for part in joints
     )
-    scale = [one.std for one in noise] if known else torque_std
-    left = [_Left.of(store, columns, values, j).square for j in range(n)]
-    misfit = sum(x / s**2 for x, s in zip(left, scale, strict=True) if s > 0)
-    model = model.at(_held(model, values))
-    covariance = solution.covariance
+    left = [_Left.of(store, columns, values, j) for j in range(n)]
     return Present(
-        model, values, covariance, solution, noise, known, white, summed, rows, float(misfit)
+        model.at(_held(model, values)),
+        values,
+        solution.covariance,
+        solution,
+        noise,
+        known,
+        white,
+        summed,
+        rows,
+        _signal(store, white, values),
+        np.array([one.square for one in left]),
+        np.array([one.variance or s**2 or 1.0 for one, s in zip(left, torque_std, strict=True)]),
     )
 
 
@@ -209,6 +220,16 @@ def _moments(store: ColumnStore, model: Model, white) -> Moments:
     return found
 
 
+def _signal(store: ColumnStore, white, values: np.ndarray) -> float:
+    """Squared whitened residual, of what the versions have in common."""
+    combination = np.append(-values, 1.0)[:, None]
+    return sum(
+        float(run.moments(w @ combination, w @ combination).signal.sum())
+        for run, joints in zip(store.runs, white, strict=True)
+        for w in joints
+    )
+
+
 def with_clock(store: ColumnStore, model: Model, run: int, white: np.ndarray) -> Clocked:
     """Whitened columns of a model and the torque, (P, S, p + 1), with what time does to them."""
     clock = np.ones_like(white)
@@ -240,6 +261,7 @@ class _Left:
     ----------
     stretches, speeds : of noise in the order of time, and the joint's velocity in them.
     plain : residuals of which nothing tells the noise.
+    systematic : mean square of what the versions of a run have in common, for each.
     """
 
     stretches: list[np.ndarray]
@@ -269,6 +291,11 @@ class _Left:
         if self.systematic:
             return max(float(np.mean(self.systematic)), 0.0)
         return float(np.mean(np.concatenate(self.plain) ** 2))
+
+    @property
+    def variance(self) -> float:
+        """Of the noise; zero where there is none, or nothing tells it."""
+        return float(np.mean(np.concatenate(self.stretches) ** 2)) if self.stretches else 0.0
 
     @property
     def noise(self) -> NoiseModel:

@@ -126,16 +126,25 @@ class _Growth:
 
     def run(self) -> _Grown:
         """Grow a model from the first one, and again if a second look finds what was missed."""
+        before = self.store.runs
         nothing = _Grown(self.start, [], [rank(self.store, self.start, 0, self.tell)])
         grown = self.grown(nothing)
-        if not self.most:
-            return grown
+        if not self.most or self.loop.runs:
+            return grown  # simulated motions are renewed as the model grows: there is no way back
         again = second_look(self.store, nothing.asked, grown.asked, self.tell)
         if again is None:
             return grown
-        base = grown if again.present is grown.present else nothing
+        runs = self.store.runs
+        base = grown
+        if again.present is not grown.present:
+            # Who carries a payload, and what was kept for a first look, belong to the other branch.
+            base, self.store.runs = nothing, before
+            self.store.look_again()
         other = self.grown(replace(base, rounds=[*base.rounds[:-1], again.ranking]))
-        return other if other.present.misfit < grown.present.misfit else grown
+        if other.present.misfit(self.start) < grown.present.misfit(self.start):
+            return other
+        self.store.runs = runs
+        return grown
 
     def grown(self, one: _Grown) -> _Grown:
         """Add the best effect and ask again, until nothing is material any more."""

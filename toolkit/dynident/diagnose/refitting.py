@@ -40,8 +40,9 @@ def refitted(store: ColumnStore, model: Model, near: Present | None = None) -> P
             others = fit_present(store, present.model - effect, present)
             better = reshaped(store, others, present, effect).effect
             trial = fit_present(store, present.model.with_shapes((better,)), present)
-            if trial.misfit < present.misfit:
+            if trial.misfit(present) < present.misfit(present):
                 present = trial
-        if before.misfit - present.misfit < _GAINED * before.misfit + _NEGLIGIBLE:
+        had, has = before.misfit(before), present.misfit(before)
+        if had - has < _GAINED * had + _NEGLIGIBLE * before.noise_known:
             break
     return present

@@ -197,8 +197,9 @@ def score(
     drop = float(part.values @ moment)
     covariance = directions @ part.covariance @ directions.T
     at = np.array(effect.point) if len(effect.point) == len(values) else values
-    misfit = np.append(-present.values, 1.0) @ present.moments.sums()[1]
-    with_noise = np.append(-present.values, 1.0) @ total - misfit[:p] @ back
+    combination = np.append(-present.values, 1.0)
+    with_model_columns = (combination @ present.moments.sums()[1])[:p]
+    with_noise = combination @ total - with_model_columns @ back
     shapes = len(effect.shape_parameters(present.model.robot))
     price = (part.rank + shapes) * np.log(present.rows) + 2.0 * np.log(grid)
     penalised = drop - price

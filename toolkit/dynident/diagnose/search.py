@@ -199,7 +199,8 @@ def _score_variants(store: ColumnStore, present: Present, effect: Effect) -> Ite
     seen = _seen(present, effect)
     shapes = [variant.suited(seen) for variant in effect.variants(present.model.robot)]
     if effect.point:
-        shapes.append(effect)  # found before, where no variant may be near enough
+        # Found before, where no variant may be near enough.
+        shapes = list(dict.fromkeys([*shapes, effect]))
     found = candidate_moments(store, present, shapes, store.screening)
     for shaped, parts in zip(shapes, found, strict=True):
         yield _possible(score(present, shaped, *parts, grid=len(shapes)), present.model)

@@ -55,10 +55,11 @@ def second_look(
     ----------
     store : the evidence.
     start, last : the model before anything was added, and with all that was added.
+    tell : told what is being done, for a progress display.
 
     Returns
     -------
-    That of the two beside which the effect explains more; None if there is none, or no need.
+    That of the two of whose residual it explains the larger share; None for none, or no need.
     """
     if not last.present.noise_known or within_noise(on_recordings(store, last.present)):
         return None
@@ -66,12 +67,18 @@ def second_look(
     if not sought:
         return None
     # An effect that is in the last model with a wrong shape is missing from the first one.
-    bases = (start,) if sought[0] in last.present.model else (last, start)
+    wrong = sought[0] in last.present.model or last.present is start.present
+    bases = (start,) if wrong else (last, start)
     part, searches = _worst_recording(store, bases[0].present), []
+    if not part[1].error_signal > 0:
+        return None
     for effect in sought:
         tell(f"{effect.label}, a second look")
-        searches.append(_Search.of(*part, effect))
-    finals = [_final(store, one.present, searches) for one in bases]
+        searches.append(_Search.run(*part, effect))
+    finals = [
+        _final(store, one.present, searches) if one.present.error_signal > 0 else None
+        for one in bases
+    ]
     found = [(one, base) for one, base in zip(finals, bases, strict=True) if one is not None]
     if not found:
         return None
@@ -114,12 +121,15 @@ def _headed(ranking: Ranking, best: Score, tests: int) -> Ranking:
 
 
 def _worst_recording(store: ColumnStore, present: Present) -> tuple[ColumnStore, Present]:
-    """The recording with the largest systematic residual, and the model as it alone fits it."""
+    """The recording with most systematic residual over noise, and the model as it alone fits it."""
     left = residuals(store, present.model, present.values)
     sizes = [
         -1.0
         if run.kind == "single"
-        else sum(systematic_square(e[..., j], run.kind) for j in range(e.shape[-1]))
+        else sum(
+            systematic_square(e[..., j], run.kind) / present.variances[j]
+            for j in range(e.shape[-1])
+        )
         for run, e in zip(store.runs, left, strict=True)
     ]
     alone = ColumnStore(store.model, (store.runs[int(np.argmax(sizes))],))
@@ -139,7 +149,8 @@ class _Search:
     generations: int = 0
 
     @classmethod
-    def of(cls, store: ColumnStore, present: Present, effect: Effect) -> _Search:
+    def run(cls, store: ColumnStore, present: Present, effect: Effect) -> _Search:
+        """Search through all shapes, until enough is explained or no more is to be hoped for."""
         search = cls(store, present, effect)
         differential_evolution(
             search.loss,

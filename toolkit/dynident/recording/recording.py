@@ -284,7 +284,8 @@ class Recording:
                 mend = "give two times in s, the earlier one first"
                 raise RecordingError(f"window = {self.window!r}", self.where, mend)
             object.__setattr__(self, "window", window)
-        if type(self.number) is not int or not 0 <= self.number < 2**31:
+        whole = isinstance(self.number, (int, np.integer)) and not isinstance(self.number, bool)
+        if not (whole and 0 <= self.number < 2**31):
             mend = "give its place, from 1, or 0"
             raise RecordingError(f"number = {self.number!r}", self.where, mend)
         for key, valid in (("use", USES), ("torque", TORQUES)):
