@@ -118,6 +118,20 @@ def test_the_slope_at_a_gap_is_exact_while_no_contact_changes(gap: float) -> Non
     np.testing.assert_allclose(found, expected, atol=1e-5 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize("name", ["joint_elasticity", "backlash"])
+def test_a_link_without_inertia_has_no_response_to_follow(name: str) -> None:
+    """A wrong estimate may take all inertia from a joint: nothing small enough would follow it."""
+    inertia = mean_inertia(ROBOT, 1)
+    (effect,) = effects_of(f"{name}@elbow", ROBOT)
+    variants = [effect, *effect.variants(ROBOT)]
+    for rotor, moves in ((0.0, True), (-inertia, False)):
+        samples = replace(block(2), rotor=np.array([0.0, rotor]))
+        (each,) = cast(Any, effect).family(variants, [samples])
+        for columns in (effect.columns(samples), *each):
+            assert columns.shape == (len(samples.t), 2, 1)
+            assert np.any(columns) == moves
+
+
 def test_a_response_does_not_depend_on_the_rate_of_the_samples() -> None:
     (effect,) = effects_of("joint_elasticity@elbow", ROBOT)
     effect = effect.shaped(40.0, 0.1, 0.3)

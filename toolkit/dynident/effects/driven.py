@@ -29,6 +29,8 @@ from dynident.errors import EffectError
 
 _PHASE = 0.3
 """rad that an oscillation may turn in a step: its frequency is then wrong by 0.4 %."""
+_SHORTEST = 4e-5
+"""s: the stiffest transmission on the lightest link that is possible asks for longer steps."""
 _RUNAWAY = 1e3
 """rad or m, per unit of what drives it."""
 _RUNG_DOWN = np.log(100.0)
@@ -86,6 +88,13 @@ class DrivenLink:
         fastest = np.sqrt(stiffest / self.behind(gear).min())
         return max(1, int(np.ceil(fastest * self.step / _PHASE)))
 
+    def follows(self, gear: Transmitting) -> bool:
+        """Return whether steps of a sensible length follow it: not where an inertia is impossible.
+
+        A wrong estimate may leave next to no inertia at a joint, or less than none.
+        """
+        return self.step / self.steps_per_sample(gear) >= min(_SHORTEST, self.step)
+
     def run_up(self, gear: Transmitting) -> np.ndarray:
         """Return rows of the motion that came before the first, as it repeats itself.
 
@@ -142,11 +151,19 @@ def responses(
     """Return how each link moves behind each of its transmissions; all gaps in one walk."""
     made = []
     for link, each in zip(links, gears, strict=True):
-        per = max(map(link.steps_per_sample, each))
-        before = max((link.run_up(gear) for gear in each), key=len)
+        followed = [gear for gear in each if link.follows(gear)]
+        per = max(map(link.steps_per_sample, followed), default=1)
+        before = max((link.run_up(gear) for gear in followed), key=len, default=np.zeros(0, int))
         fine = Fine.of(link, per, before)
-        made.append([Response(link, fine, gear) for gear in each])
-    gaps = [one for each in made for one in each if one.gear.half_gap > 0]
+        made.append(
+            [(Response if link.follows(gear) else Unmoved)(link, fine, gear) for gear in each]
+        )
+    gaps = [
+        one
+        for each in made
+        for one in each
+        if one.gear.half_gap > 0 and not isinstance(one, Unmoved)
+    ]
     if gaps:
         for one, walked in zip(gaps, through_gaps([g.driven for g in gaps]), strict=True):
             one.walked = walked
@@ -266,6 +283,19 @@ class Response:
         at = self._samples(Deflection(lighter, lighter, moved.bend))
         change[:, self._link.joint] -= at.d * at.bend
         return change
+
+
+class Unmoved(Response):
+    """The response of a link that no steps of a sensible length follow: it explains nothing."""
+
+    @cached_property
+    def torque(self) -> np.ndarray:
+        return np.zeros(self._link.M.shape[:2])
+
+    def by(
+        self, stiffness: float, damping: float, rotor: float, half_gap: float = 0.0
+    ) -> np.ndarray:
+        return np.zeros(self._link.M.shape[:2])
 
 
 def _bounded(d: np.ndarray) -> np.ndarray:

@@ -7,6 +7,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+_TOGETHER = 20_000_000
+"""Steps, over all links, that are walked through at once: ten numbers each are in memory."""
+
 
 @dataclass(frozen=True)
 class Transmitting:
@@ -62,9 +65,13 @@ class Walked:
 
 def through_gaps(links: Sequence[Driven]) -> list[Walked]:
     """Return how links move in gaps: together, as a step costs the same for one and for dozens."""
+    longest = max(len(link.m) for link in links)
+    most = max(1, _TOGETHER // longest)
+    if len(links) > most:
+        parts = [links[k : k + most] for k in range(0, len(links), most)]
+        return [one for part in parts for one in through_gaps(part)]
     if len(links) == 1:
         return [_walk(_Recursion.of(links[0], len(links[0].m)))]
-    longest = max(len(link.m) for link in links)
     each = [_Recursion.of(link, longest) for link in links]
     together = _Recursion(*(np.stack(x, axis=-1) for x in zip(*map(_fields, each), strict=True)))
     # A link that its load outgrows falls beyond all numbers: the caller sees that it is not finite.
