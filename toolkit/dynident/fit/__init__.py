@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from dynident.fit.constrained import Constrained
+from dynident.fit.encoder_noise import encoder_noise
 from dynident.fit.essential import EssentialParameters, essential_parameters
 from dynident.fit.estimate import Estimate, Source
 from dynident.fit.estimate_file import load_estimate
@@ -19,6 +20,7 @@ from dynident.fit.metric import Metric
 from dynident.fit.parameter_file import GivenParameters, read_parameters
 from dynident.fit.prior import Prior
 from dynident.fit.projection import Projection, project
+from dynident.fit.regression import Regression
 from dynident.fit.sampling import Sampled, rows, sample
 from dynident.fit.shapes import refine_shapes, shaped_effects
 from dynident.model import Model
@@ -78,11 +80,13 @@ __all__ = [
     "Metric",
     "Prior",
     "Projection",
+    "Regression",
     "Sampled",
     "SimulatedLoop",
     "Solution",
     "Source",
     "SwappedPeriods",
+    "encoder_noise",
     "essential_parameters",
     "factorise",
     "fit",

@@ -54,6 +54,7 @@ class Estimate:
         them (constrained fits do); None where only the base parameters are known.
     certificate : how far a constrained fit is from the optimum of its problem.
     history : the iterations of an instrumental variable estimate.
+    details : tables of what else the method has to say.
     """
 
     model: Model
@@ -72,6 +73,7 @@ class Estimate:
     links: dict[str, np.ndarray] | None = None
     certificate: Certificate | None = None
     history: Convergence | None = None
+    details: tuple[Table, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -87,9 +89,12 @@ class Estimate:
 
     @property
     def sigma(self) -> np.ndarray:
-        """Standard deviations, (p,); NaN where a parameter is not identified."""
+        """Standard deviations, (p,); NaN where a parameter is not identified.
+
+        All of them NaN where the method has no covariance to give (a matrix of zeros).
+        """
         sigma = np.sqrt(np.clip(np.diag(self.covariance), 0.0, None))
-        return np.where(self.identified, sigma, np.nan)
+        return np.where(self.identified & np.any(self.covariance), sigma, np.nan)
 
     @property
     def relative_sigma(self) -> np.ndarray:
@@ -171,7 +176,8 @@ class Estimate:
         """Everything that `show` prints, in its order."""
         proved = (self.certificate.table(),) if self.certificate else ()
         iterated = self.history.tables() if self.history else ()
-        return (self.parameter_table(), *iterated, self.error_table(), *proved, *self.notes)
+        own = (*iterated, *self.details)
+        return (self.parameter_table(), *own, self.error_table(), *proved, *self.notes)
 
     def summary(self) -> str:
         """The tables as text."""
@@ -186,10 +192,19 @@ class Estimate:
             f"{self.method}; {self.rows} equations, {len(self.basis.independent)} of "
             f"{self.model.size} parameters identified ({_decision(self.basis)}), "
             f"condition number {self.condition_number:.6g}; {self.status}.",
-            "sigma carries the noise of encoders and torque; what the model lacks is not in it."
-            if self.history
-            else "sigma takes the errors of the equations as independent: what the model lacks is "
-            "not in it.",
+            self._words_of_sigma(),
+        )
+
+    def _words_of_sigma(self) -> str:
+        if not np.any(self.covariance):
+            return "No sigma: the method has none to give."
+        if self.history:
+            return (
+                "sigma carries the noise of encoders and torque; what the model lacks is not in it."
+            )
+        return (
+            "sigma takes the errors of the equations as independent: what the model lacks is not "
+            "in it."
         )
 
     # --- files ---------------------------------------------------------------------------------

@@ -1,0 +1,235 @@
+"""What every estimator of this room does: scikit-learn's interface, equivariance, hard input."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import clone
+from sklearn.linear_model import LinearRegression
+from sklearn.model_selection import cross_val_score
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.utils.estimator_checks import parametrize_with_checks
+
+from dynident.errors import FitError
+from dynident.fit.regression.base import StatisticsRegressor
+from dynident.fit.regression.corrected import CorrectedLeastSquares
+from dynident.fit.regression.joint_factors import BayesianFactorRegression, JointFactorRegression
+from dynident.fit.regression.statistics import Statistics
+from dynident.fit.regression.stepwise import StepwiseRegression
+from dynident.fit.regression.total import TotalLeastSquares
+from dynident.fit.regression.truncated import TruncatedLeastSquares
+
+EVERY = [
+    TruncatedLeastSquares(),
+    TotalLeastSquares(),
+    StepwiseRegression(),
+    CorrectedLeastSquares(),
+    JointFactorRegression(max_iter=300),
+    BayesianFactorRegression(max_iter=300),
+    BayesianFactorRegression(queries="noiseless", max_iter=300),
+]
+NAMES = [
+    type(one).__name__ + ("-noiseless" if getattr(one, "queries", "") == "noiseless" else "")
+    for one in EVERY
+]
+every = pytest.mark.parametrize("regression", EVERY, ids=NAMES)
+
+
+def data(seed: int = 0, rows: int = 300) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    T = rng.standard_normal((rows, 5))
+    y = T @ [1.0, -2.0, 0.5, 0.0, 0.0] + 0.3 * rng.standard_normal(rows)
+    return T + 0.2 * rng.standard_normal(T.shape), y
+
+
+@parametrize_with_checks(EVERY)
+@pytest.mark.filterwarnings("ignore::sklearn.exceptions.SkipTestWarning")
+def test_scikit_learns_own_checks(estimator, check) -> None:
+    check(estimator)
+
+
+@every
+def test_it_finds_what_is_there(regression: StatisticsRegressor) -> None:
+    X, y = data(rows=3000)
+    found = clone(regression).fit(X, y)
+    assert found.score(X, y) > 0.9
+    assert abs(found.coef_[1] + 2.0) < 0.2 and np.abs(found.coef_[3:]).max() < 0.05
+
+
+@every
+def test_blocks_give_what_all_rows_give(regression: StatisticsRegressor) -> None:
+    X, y = data()
+    whole, parts = clone(regression).fit(X, y), clone(regression)
+    for a in range(0, 300, 60):
+        parts.partial_fit(X[a : a + 60], y[a : a + 60])
+    np.testing.assert_allclose(parts.coef_, whole.coef_, rtol=1e-9, atol=1e-11)
+    assert parts.intercept_ == pytest.approx(whole.intercept_, abs=1e-10)
+    summed = Statistics.of(X[:40], y[:40]) + Statistics.of(X[40:], y[40:])
+    elsewhere = clone(regression).fit_statistics(summed)
+    np.testing.assert_allclose(elsewhere.predict(X), whole.predict(X), atol=1e-9)
+
+
+@every
+def test_equivariance(regression: StatisticsRegressor) -> None:
+    """To order, scale, sign and offset of the inputs, and to scale and offset of the output."""
+    X, y = data()
+    order = np.array([3, 1, 4, 0, 2])
+    factors = np.array([1e3, -1.0, 1e-4, 2.0, -30.0])
+    first = clone(regression).fit(X, y)
+    other = clone(regression).fit((X * factors + [1.0, -5.0, 0.1, 0.0, 7.0])[:, order], -2 * y + 3)
+    expected = (-2.0 * first.coef_ / factors)[order]
+    np.testing.assert_allclose(
+        other.coef_ / np.abs(expected).max(), expected / np.abs(expected).max(), atol=1e-10
+    )
+    np.testing.assert_allclose(other.coef_ * factors[order], -2.0 * first.coef_[order], atol=1e-10)
+
+
+@every
+def test_without_a_constant_it_goes_through_the_origin(regression: StatisticsRegressor) -> None:
+    X, y = data()
+    found = clone(regression).set_params(fit_intercept=False).fit(X, y)
+    assert found.intercept_ == 0.0
+    mirrored = clone(regression).set_params(fit_intercept=False)
+    # The mirror image of every row says the same of a line through the origin.
+    mirrored.fit(np.vstack([X, -X]), np.concatenate([y, -y]))
+    np.testing.assert_allclose(mirrored.coef_, found.coef_, atol=0.05)
+
+
+@every
+def test_a_constant_column_gets_no_coefficient(regression: StatisticsRegressor) -> None:
+    X, y = data()
+    with_constant = np.column_stack([X[:, :2], np.full(300, 0.1), X[:, 2:]])
+    plain, found = clone(regression).fit(X, y), clone(regression).fit(with_constant, y)
+    assert found.coef_[2] == 0.0 and found.constant_[2]
+    np.testing.assert_allclose(np.delete(found.coef_, 2), plain.coef_, atol=1e-10)
+
+
+@every
+def test_all_columns_constant_leave_the_mean(regression: StatisticsRegressor) -> None:
+    found = clone(regression).fit(np.ones((10, 2)), np.arange(10.0))
+    np.testing.assert_array_equal(found.predict(np.ones((3, 2))), 4.5)
+
+
+@pytest.mark.parametrize(
+    "regression", [one for one in EVERY if not isinstance(one, CorrectedLeastSquares)]
+)
+def test_a_duplicated_column_predicts_as_one(regression: StatisticsRegressor) -> None:
+    X, y = data()
+    twice = np.column_stack([X, X[:, 1]])
+    plain, found = clone(regression).fit(X, y), clone(regression).fit(twice, y)
+    assert np.all(np.isfinite(found.coef_))
+    assert found.score(twice, y) > plain.score(X, y) - 0.02
+
+
+def test_a_duplicated_column_is_refused_where_it_cannot_be_shared_out() -> None:
+    X, y = data()
+    with pytest.raises(FitError, match="combinations of others"):
+        CorrectedLeastSquares(0.01).fit(np.column_stack([X, X[:, 1]]), y)
+    with pytest.raises(FitError, match="combinations of others"):
+        CorrectedLeastSquares().fit(X[:4], y[:4])
+
+
+@pytest.mark.parametrize(
+    "regression", [one for one in EVERY if not isinstance(one, CorrectedLeastSquares)]
+)
+def test_more_columns_than_rows(regression: StatisticsRegressor) -> None:
+    rng = np.random.default_rng(0)
+    X = rng.standard_normal((20, 40))
+    y = 3.0 * X[:, 7] + 0.1 * rng.standard_normal(20)
+    found = clone(regression).fit(X, y)
+    assert np.all(np.isfinite(found.coef_)) and np.all(np.isfinite(found.predict(X)))
+
+
+@every
+def test_scales_of_any_size(regression: StatisticsRegressor) -> None:
+    X, y = data()
+    found = clone(regression).fit(X * [1e120, 1e-120, 1.0, 1e8, 1e-8], 1e100 * y)
+    plain = clone(regression).fit(X, y)
+    np.testing.assert_allclose(
+        found.predict(X * [1e120, 1e-120, 1.0, 1e8, 1e-8]) / 1e100,
+        plain.predict(X),
+        rtol=1e-6,
+        atol=1e-9,
+    )
+
+
+@every
+def test_one_row_is_refused(regression: StatisticsRegressor) -> None:
+    for verb in ("fit", "partial_fit"):
+        with pytest.raises(ValueError, match="n_samples = 1"):
+            getattr(clone(regression), verb)([[1.0, 2.0]], [3.0])
+    with pytest.raises(FitError, match="two rows"):
+        clone(regression).fit_statistics(Statistics.of(np.ones((1, 2)), np.ones(1)))
+
+
+@every
+def test_it_works_in_a_pipeline_and_in_cross_validation(regression: StatisticsRegressor) -> None:
+    X, y = data()
+    scores = cross_val_score(make_pipeline(StandardScaler(), clone(regression)), X, y, cv=3)
+    assert scores.min() > 0.85
+
+
+@every
+def test_columns_of_a_data_frame_have_names(regression: StatisticsRegressor) -> None:
+    X, y = data()
+    frame = pd.DataFrame(X, columns=list("abcde"))
+    found = clone(regression).fit(frame, y)
+    assert found.input_names() == list("abcde")
+    with pytest.raises(ValueError, match="feature names"):
+        found.predict(frame.rename(columns={"a": "z"}))
+
+
+def test_truncated_and_stepwise_are_what_they_say() -> None:
+    X, y = data()
+    want = LinearRegression().fit(X, y)
+    np.testing.assert_allclose(TruncatedLeastSquares().fit(X, y).coef_, want.coef_, rtol=1e-10)
+    # Of all solutions both choose the smallest, here in standardised inputs.
+    dependent = StandardScaler().fit_transform(np.column_stack([X, X[:, 0] + X[:, 1]]))
+    want = LinearRegression().fit(dependent, y)
+    found = TruncatedLeastSquares().fit(dependent, y)
+    assert found.rank_ == 5
+    np.testing.assert_allclose(found.coef_, want.coef_, atol=1e-8)
+    chosen = StepwiseRegression().fit(X, y).chosen_
+    assert {0, 1, 2} <= set(chosen) and len(chosen) <= 4
+    want = LinearRegression().fit(X[:, chosen], y).coef_
+    np.testing.assert_allclose(StepwiseRegression().fit(X, y).coef_[chosen], want, rtol=1e-9)
+
+
+def test_stepwise_keeps_what_is_irrelevant_out_at_its_level() -> None:
+    rng = np.random.default_rng(2)
+    wrong = 0
+    for _ in range(200):
+        X = rng.standard_normal((100, 1))
+        wrong += len(StepwiseRegression().fit(X, rng.standard_normal(100)).chosen_)
+    assert 2 <= wrong <= 20, "5 % of 200"
+
+
+def test_total_least_squares_is_right_where_all_noise_is_alike() -> None:
+    rng = np.random.default_rng(0)
+    T = rng.standard_normal((100_000, 2))
+    y = T @ [1.0, 1.0] / np.sqrt(2.0)
+    X, y = T + 0.3 * rng.standard_normal(T.shape), y + 0.3 * rng.standard_normal(len(y))
+    found = TotalLeastSquares().fit(X, y)
+    np.testing.assert_allclose(found.coef_, 1.0 / np.sqrt(2.0), atol=0.01)
+    assert found.noise_share_ == pytest.approx(0.09 / 1.09, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("regression", "words"),
+    [
+        (StepwiseRegression(enter=0.2, leave=0.1), "enter"),
+        (CorrectedLeastSquares([0.1, 0.2]), "shape"),
+        (CorrectedLeastSquares(-1.0), "covariance"),
+        (CorrectedLeastSquares(float("nan")), "covariance"),
+        (CorrectedLeastSquares(100.0), "input noise is all"),
+        (JointFactorRegression(100.0), "input x"),
+        (JointFactorRegression([0.1, 0.2]), "shape"),
+        (JointFactorRegression(reliability=1.0), "reliability"),
+        (BayesianFactorRegression(queries="both"), "queries"),  # type: ignore[arg-type]
+    ],
+)
+def test_settings_that_cannot_be_are_refused(regression, words: str) -> None:
+    with pytest.raises(FitError, match=words):
+        regression.fit(*data())

@@ -1,0 +1,117 @@
+"""What the estimators of this room share: statistics in, coefficients and predictions out."""
+
+from __future__ import annotations
+
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from dynident.errors import FitError
+from dynident.fit.regression.statistics import Statistics
+
+
+class StatisticsRegressor(RegressorMixin, BaseEstimator):
+    """Linear regression that needs count, means and scatter of the data, and no row twice.
+
+    `partial_fit` adds rows to those seen before; `fit_statistics` takes the sum of statistics that
+    were made elsewhere, recording by recording or on other machines. A subclass solves the
+    standardised problem (`_solve`): inputs and output of mean zero and variance one, no constants.
+
+    Attributes
+    ----------
+    coef_ : (d,) of `predict`.
+    intercept_ : of `predict`.
+    constant_ : (d,) bool, inputs without variation; their coefficients are zero.
+    statistics_ : of all rows seen.
+    """
+
+    def __init__(self, *, fit_intercept: bool = True) -> None:
+        self.fit_intercept = fit_intercept
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
+        """Fit to rows X (N, d) and y (N,).
+
+        Raises
+        ------
+        ValueError
+            If the rows are fewer than two, not finite, or not numbers.
+        FitError
+            As the estimator says of its own.
+        """
+        return self.fit_statistics(self._statistics_of(X, y, reset=True))
+
+    def partial_fit(self, X: ArrayLike, y: ArrayLike) -> Self:
+        """Add rows X (N, d) and y (N,) to those seen before, and fit to all; raises as `fit`."""
+        first = not hasattr(self, "statistics_")
+        here = self._statistics_of(X, y, reset=first)
+        return self.fit_statistics(here if first else self.statistics_ + here)
+
+    def fit_statistics(self, statistics: Statistics) -> Self:
+        """Fit to the sufficient statistics of the data.
+
+        Raises
+        ------
+        FitError
+            If they are of fewer than two rows, or as the estimator says of its own.
+        """
+        if statistics.count < 2:
+            what = f"n_samples = {statistics.count} says nothing of a slope"
+            raise FitError(what, mend="give at least two rows")
+        self.statistics_ = statistics
+        self.n_features_in_ = statistics.inputs
+        used = statistics if self.fit_intercept else statistics.about_origin()
+        scale = used.scale
+        self.constant_ = scale[:-1] == 0
+        inputs = np.flatnonzero(~self.constant_)
+        varied = used.keeping(inputs)
+        kept = np.append(scale[:-1][inputs], scale[-1] or 1.0)
+        unit = Statistics(varied.count, np.zeros(len(kept)), varied.scaled(1.0 / kept).scatter)
+        self._scale, self._mean = scale, used.mean
+        self._solve(unit, inputs)
+        return self
+
+    def predict(self, X: ArrayLike) -> np.ndarray:
+        """Predict the output of rows X (N, d), (N,)."""
+        check_is_fitted(self)
+        rows = validate_data(self, X, reset=False, dtype=np.float64)
+        return rows @ self.coef_ + self.intercept_
+
+    def _solve(self, unit: Statistics, inputs: np.ndarray) -> None:
+        """Set the attributes from standardised statistics of the inputs that vary, by number."""
+        raise NotImplementedError
+
+    def _set(self, coefficients: np.ndarray) -> None:
+        """Set what `predict` uses: coefficients (d,) in the data's units."""
+        self.coef_ = coefficients
+        self.intercept_ = self._intercept(coefficients)
+
+    def _intercept(self, coefficients: np.ndarray) -> float:
+        return float(self._mean[-1] - self._mean[:-1] @ coefficients)
+
+    def _in_units(self, standardised: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Coefficients (d,) in the data's units, of standardised ones of some inputs."""
+        found = np.zeros(len(self._mean) - 1)
+        found[inputs] = standardised * self._scale[-1] / self._scale[inputs]
+        return found
+
+    def _statistics_of(self, X: ArrayLike, y: ArrayLike, *, reset: bool) -> Statistics:
+        rows, output = validate_data(
+            self, X, y, reset=reset, dtype=np.float64, y_numeric=True, ensure_min_samples=1
+        )
+        if reset and len(rows) < 2:
+            raise ValueError(
+                f"n_samples = {len(rows)} says nothing of a slope: give at least two rows"
+            )
+        return Statistics.of(rows, output)
+
+    def __sklearn_is_fitted__(self) -> bool:
+        return hasattr(self, "coef_")
+
+    def input_names(self) -> list[str]:
+        """Return the names of the inputs: those of the data frame, or x0, x1 and so on."""
+        given: Any = getattr(self, "feature_names_in_", None)
+        count = self.n_features_in_
+        return [f"x{m}" for m in range(count)] if given is None else [str(name) for name in given]

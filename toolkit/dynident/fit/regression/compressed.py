@@ -1,0 +1,59 @@
+"""Rows of a regression, folded into few that have the same sums of squares and products.
+
+A triangular factor R of [X, y] has R'R = [X, y]'[X, y]: every linear regression sees the same
+least-squares problem in it, and a regularised one the same path. One factor for each consecutive
+piece of the data also gives cross-validation the errors that it would have on the rows themselves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynident.fit.factors import Factors
+from dynident.fit.regression.statistics import Statistics
+
+
+@dataclass(frozen=True, eq=False)
+class Compressed:
+    """Few rows for many.
+
+    Attributes
+    ----------
+    X, y : (k, p) and (k,), with mean zero: a constant finds nothing to do.
+    piece : (k,) number of the consecutive piece of data that each row stands for.
+    count : rows of the data.
+    """
+
+    X: np.ndarray
+    y: np.ndarray
+    piece: np.ndarray
+    count: int
+
+    @property
+    def statistics(self) -> Statistics:
+        """Statistics of the data about the origin."""
+        both = np.column_stack([self.X, self.y])
+        scatter = both.T @ both * (self.count / len(both))
+        return Statistics(self.count, np.zeros(both.shape[1]), scatter)
+
+
+def compress(pieces: list[Factors], weights: np.ndarray) -> Compressed:
+    """Return few rows for those behind the factors of consecutive pieces of data.
+
+    Parameters
+    ----------
+    pieces : of the same joints.
+    weights : (n,) of each joint's rows.
+    """
+    mirrored, labels = [], []
+    for k, factors in enumerate(pieces):
+        R = factors.pooled(weights) / np.sqrt(2.0)
+        # Each row and its mirror image: the mean is zero, the squares are the same.
+        mirrored.append(np.vstack([R, -R]))
+        labels.append(np.full(2 * len(R), k))
+    rows, count = np.vstack(mirrored), sum(factors.rows for factors in pieces)
+    # Penalties count per row: as many squares a row as the data have.
+    rows *= np.sqrt(len(rows) / count)
+    return Compressed(rows[:, :-1], rows[:, -1], np.concatenate(labels), count)

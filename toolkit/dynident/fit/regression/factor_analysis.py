@@ -1,0 +1,242 @@
+"""Joint factor analysis of noisy inputs and their output: variational EM on sufficient statistics.
+
+Model of sample i with inputs m: y ~ N(sum z_m, py); z_m ~ N(wz_m t_m, pz_m); x_m ~ N(wx_m t_m,
+px_m); t_m ~ N(0, 1). The Bayesian form has wz_m, wx_m ~ N(0, 1/alpha_m) with one relevance
+alpha_m ~ Gamma for both, so that an input that does not matter goes as a whole.
+
+Ting, Mistry, Peters, Schaal and Nakanishi, "Bayesian Nonlinear Parameter Estimation of Rigid Body
+Dynamics", RSS 2006, section III and appendix. There every iteration passes over all samples; given
+z and t eliminated as here it needs X'X, X'y, y'y and N alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+from scipy.special import digamma, gammaln
+
+from dynident.fit.regression.statistics import Statistics
+
+LEAST_VARIANCE = 1e-12
+"""Variance that none falls below, in units of the input's or the output's own."""
+
+
+@dataclass(frozen=True, eq=False)
+class Factors:
+    """The factors' posterior and the variances, (d,) each but py.
+
+    Attributes
+    ----------
+    wz, wx : means of the weights of output and input on the factor t.
+    wz_var, wx_var : their variances; zero in plain joint factor analysis.
+    relevance : mean of alpha, the precision of both weights' prior; zero there too.
+    pz, px : variances of z and of the inputs' noise.
+    py : variance of the output's noise.
+    """
+
+    wz: np.ndarray
+    wx: np.ndarray
+    wz_var: np.ndarray
+    wx_var: np.ndarray
+    relevance: np.ndarray
+    pz: np.ndarray
+    px: np.ndarray
+    py: float
+
+    @property
+    def noisy(self) -> np.ndarray:
+        """Coefficients for inputs with their noise, b_noise = wx wz / (wx^2 + px), (d,)."""
+        return self.wx * self.wz / (self.wx**2 + self.px)
+
+    @property
+    def reliability(self) -> np.ndarray:
+        """Share of each input's variance that is no noise, wx^2 / (wx^2 + px), (d,)."""
+        return self.wx**2 / (self.wx**2 + self.px)
+
+
+class Ending(Enum):
+    """How the iterations ended."""
+
+    CONVERGED = "converged"
+    ROUNDS_EXHAUSTED = "not converged"
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """Factors after the last iteration.
+
+    Attributes
+    ----------
+    factors : as found, in the units of the statistics.
+    coefficients : (d,) of E[y | x] under the factors' posterior; with wz, wx uncertain it differs
+        from `factors.noisy` by their variances.
+    bounds : (rounds,) lower bound of the log evidence in nats; the log-likelihood itself in plain
+        joint factor analysis.
+    ending : whether the last round still gained more than the tolerance.
+    """
+
+    factors: Factors
+    coefficients: np.ndarray
+    bounds: np.ndarray
+    ending: Ending
+
+    @property
+    def bound(self) -> float:
+        """The last bound, nats."""
+        return float(self.bounds[-1])
+
+
+@dataclass(frozen=True)
+class Gamma:
+    """Prior of the relevance alpha: shape a0 and rate b0, both near zero to say nothing."""
+
+    shape: float = 1e-8
+    rate: float = 1e-8
+
+
+def start_of(
+    statistics: Statistics, reliability: np.ndarray | float, prior: Gamma | None
+) -> Factors:
+    """Return factors that predict nearly as least squares does, with a reliability of each input.
+
+    Half of the residual's variance is the output's noise, the rest is shared evenly by the z.
+
+    Parameters
+    ----------
+    statistics : standardised: every input and the output have variance 1.
+    reliability : of the inputs, between 0 and 1; the data alone do not tell it.
+    prior : None for plain joint factor analysis.
+    """
+    d, N = statistics.inputs, statistics.count
+    rho = np.broadcast_to(np.asarray(reliability, dtype=float), (d,))
+    # A ridge of one sample: dependent inputs share what they explain.
+    found = np.linalg.solve(statistics.gram + np.eye(d), statistics.cross)
+    # Where there are more inputs than rows nothing is left, and no variance may be zero.
+    left = max(statistics.residual(found), 1e-3 * statistics.power) / N
+    wx = np.sqrt(rho)
+    wz = found / wx
+    pz, px, py = np.full(d, left / (2 * max(d, 1))), 1.0 - rho, left / 2
+    px = np.maximum(px, LEAST_VARIANCE)
+    return begun(Factors(wz, wx, wx * 0, wx * 0, wx * 0, pz, px, py), N, prior)
+
+
+def begun(factors: Factors, count: int, prior: Gamma | None) -> Factors:
+    """Return factors with the relevance and variances that follow from their weights."""
+    if prior is None:
+        return factors
+    rate = prior.rate + (factors.wz**2 + factors.wx**2) / 2
+    relevance = (prior.shape + 1) / rate
+    return replace(
+        factors,
+        relevance=relevance,
+        wz_var=1 / (count / factors.pz + relevance),
+        wx_var=1 / (count / factors.px + relevance),
+    )
+
+
+def analyse(
+    statistics: Statistics,
+    start: Factors,
+    prior: Gamma | None,
+    known: np.ndarray,
+    *,
+    rounds: int,
+    tolerance: float,
+) -> Analysis:
+    """Iterate until a round gains less than the tolerance.
+
+    Parameters
+    ----------
+    statistics : standardised.
+    start : where to begin.
+    prior : of the relevance; None for maximum likelihood (plain joint factor analysis).
+    known : (d,) bool, inputs whose noise px is what the start says.
+    rounds : at most so many.
+    tolerance : nats that a round has to gain.
+    """
+    factors, bounds = start, []
+    ending = Ending.ROUNDS_EXHAUSTED
+    for _ in range(rounds):
+        at = _Posterior(factors, statistics)
+        bounds.append(at.bound(prior))
+        if len(bounds) > 1 and bounds[-1] - bounds[-2] <= tolerance:
+            ending = Ending.CONVERGED
+            break
+        factors = at.updated(prior, known)
+    else:
+        at = _Posterior(factors, statistics)
+    return Analysis(factors, at.b, np.array(bounds), ending)
+
+
+class _Posterior:
+    """Q(Z, T) of all samples at once; names as in the module's docstring, sums over the samples.
+
+    The covariance of (z, t) is the same for every sample. With t eliminated, which is diagonal,
+    one Sherman-Morrison step is left: <z_i> = b x_i + kappa (y_i - b'x_i) and
+    <t_i> = ct x_i + e <z_i>.
+    """
+
+    def __init__(self, factors: Factors, statistics: Statistics) -> None:
+        self.factors, self.statistics = factors, statistics
+        f = factors
+        mz, mx, pz, px, py = f.wz, f.wx, f.pz, f.px, f.py
+        self.Ez, self.Ex = mz**2 + f.wz_var, mx**2 + f.wx_var
+        self.a = 1 + self.Ez / pz + self.Ex / px
+        self.p = 1 / pz - mz**2 / (pz**2 * self.a)
+        self.g = 1 / self.p
+        self.s = float(self.g.sum())
+        self.k = mz * mx / (pz * px * self.a)
+        self.b = self.g * self.k
+        self.kappa = self.g / (py + self.s)
+        self.ct, self.e = mx / (px * self.a), mz / (pz * self.a)
+        self.v = statistics.cross - statistics.gram @ self.b
+        self.R = statistics.power - self.b @ statistics.cross - self.b @ self.v
+        self.Gd = np.diag(statistics.gram)
+
+    def bound(self, prior: Gamma | None) -> float:
+        """Lower bound of the log evidence, nats."""
+        f, N, d = self.factors, self.statistics.count, self.statistics.inputs
+        logs = np.sum(np.log(f.pz) + np.log(f.px) + np.log(self.a) + np.log(self.p))
+        constant = (d + 1) * np.log(2 * np.pi) + np.log(f.py) + logs + np.log1p(self.s / f.py)
+        squares = self.Gd * (1 / f.px - f.wx**2 / (f.px**2 * self.a) - self.g * self.k**2)
+        likelihood = -N / 2 * constant - 0.5 * (self.R / (f.py + self.s) + np.sum(squares))
+        return float(likelihood + (self._of_weights(prior) if prior else 0.0))
+
+    def _of_weights(self, prior: Gamma) -> float:
+        """What the priors of weights and relevance, and their entropies, add to the bound."""
+        f, a0, b0 = self.factors, prior.shape, prior.rate
+        shape, rate = a0 + 1, (a0 + 1) / f.relevance
+        log_relevance = digamma(shape) - np.log(rate)
+        weights = log_relevance - np.log(2 * np.pi) - f.relevance * (self.Ez + self.Ex) / 2
+        weights += (np.log(2 * np.pi * np.e * f.wz_var) + np.log(2 * np.pi * np.e * f.wx_var)) / 2
+        own = a0 * np.log(b0) - gammaln(a0) + (a0 - 1) * log_relevance - b0 * f.relevance
+        entropy = shape - np.log(rate) + gammaln(shape) + (1 - shape) * digamma(shape)
+        return float(np.sum(weights + own + entropy))
+
+    def updated(self, prior: Gamma | None, known: np.ndarray) -> Factors:
+        """Return weights, relevance and variances that maximise the bound, one after the other."""
+        f, N = self.factors, self.statistics.count
+        Gd, b, kappa, ct, e = self.Gd, self.b, self.kappa, self.ct, self.e
+        var_z = self.g - self.g**2 / (f.py + self.s)
+        xz = b * Gd + kappa * self.v
+        zz_mean = b**2 * Gd + 2 * b * kappa * self.v + kappa**2 * self.R
+        zz = zz_mean + N * var_z
+        xt = ct * Gd + e * xz
+        zt = ct * xz + e * zz_mean + N * e * var_z
+        tt = ct**2 * Gd + 2 * ct * e * xz + e**2 * zz_mean + N * (1 / self.a + e**2 * var_z)
+
+        wz_var, wx_var = 1 / (tt / f.pz + f.relevance), 1 / (tt / f.px + f.relevance)
+        wz, wx = wz_var * zt / f.pz, wx_var * xt / f.px
+        relevance = f.relevance
+        if prior is None:
+            wz_var, wx_var = np.zeros_like(wz), np.zeros_like(wx)
+        Ez, Ex = wz**2 + wz_var, wx**2 + wx_var
+        if prior is not None:
+            relevance = (prior.shape + 1) / (prior.rate + (Ez + Ex) / 2)
+        shrink = f.py / (f.py + self.s)
+        py = max(shrink**2 * self.R / N + self.s * shrink, LEAST_VARIANCE)
+        pz = np.maximum((zz - 2 * wz * zt + Ez * tt) / N, LEAST_VARIANCE)
+        px = np.maximum((Gd - 2 * wx * xt + Ex * tt) / N, LEAST_VARIANCE)
+        return Factors(wz, wx, wz_var, wx_var, relevance, pz, np.where(known, f.px, px), float(py))

@@ -1,0 +1,34 @@
+"""Least squares by truncated singular values: what the data do not excite stays at zero."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.fit.regression.base import StatisticsRegressor
+from dynident.fit.regression.statistics import Statistics
+
+
+class TruncatedLeastSquares(StatisticsRegressor):
+    """Ordinary least squares, by singular values of the standardised inputs down to a tolerance.
+
+    Parameters
+    ----------
+    rcond : singular values below this share of the largest are taken as zero; from statistics
+        nothing below 1e-8 can be told from rounding.
+    fit_intercept : False for a regression through the origin.
+
+    Attributes
+    ----------
+    rank_ : directions kept.
+    """
+
+    def __init__(self, rcond: float = 1e-7, *, fit_intercept: bool = True) -> None:
+        super().__init__(fit_intercept=fit_intercept)
+        self.rcond = rcond
+
+    def _solve(self, unit: Statistics, inputs: np.ndarray) -> None:
+        values, vectors = np.linalg.eigh(unit.gram)
+        kept = values > self.rcond**2 * values.max(initial=0.0)
+        self.rank_ = int(kept.sum())
+        along = vectors[:, kept]
+        self._set(self._in_units(along @ ((along.T @ unit.cross) / values[kept]), inputs))
