@@ -16,6 +16,7 @@ SCRIPTS = (
     "constrained_fit.py",
     "chain_length.py",
     "closed_loop.py",
+    "input_noise.py",
 )
 
 

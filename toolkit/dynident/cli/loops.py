@@ -159,12 +159,11 @@ def _controller(study: Study, recordings: Dataset) -> Controller:
 
 
 def _estimate(study: Study, saved: Path | None, chosen: Chosen) -> Estimate:
-    from dynident.fit import LeastSquares, fit, load_estimate
+    from dynident.fit import fit, load_estimate
 
     if saved is None:
         with progress("fitting") as tell:
-            iv = chosen.method == "iv"
-            method = chosen.iv(study, "joint", tell) if iv else LeastSquares()
+            method = chosen.estimator(study, "joint", tell)
             return fit(study.model, study.train, method)
     found = load_estimate(saved)
     if found.model.robot.names != study.robot.names:

@@ -13,8 +13,22 @@ from dynident.errors import DynidentError, StudyError
 
 if TYPE_CHECKING:
     from dynident.closed_loop import Controller
-    from dynident.fit import IV
+    from dynident.fit import IV, Method
     from dynident.study import Study
+
+
+REGRESSIONS = (
+    "truncated",
+    "ridge",
+    "lasso",
+    "pls",
+    "stepwise",
+    "total",
+    "corrected",
+    "factors",
+    "bayes",
+)
+"""Names of `fit.regression`, which the command line cannot ask for without loading it."""
 
 
 @dataclass(frozen=True)
@@ -23,18 +37,24 @@ class Chosen:
 
     Attributes
     ----------
-    method : "least-squares" or "iv".
+    method : "least-squares", "iv", or one of `REGRESSIONS`.
     instruments : "loop", "periods" or "filtered"; None where nothing is said.
     cutoff : Hz, of filtered instruments.
     start : where the iterations begin; None where nothing is said.
+    input_noise : "repeats" or "encoders": where a regression takes it from; None for nowhere.
     """
 
-    method: Literal["least-squares", "iv"]
+    method: str
     instruments: Literal["loop", "periods", "filtered"] | None
     cutoff: float | None
     start: Literal["least_squares", "description", "regular"] | None
+    input_noise: Literal["repeats", "encoders"] | None = None
 
     def __post_init__(self) -> None:
+        if self.input_noise is not None and self.method not in ("corrected", "factors", "bayes"):
+            raise click.UsageError("--input-noise goes with --method corrected, factors or bayes")
+        if self.method == "corrected" and self.input_noise is None:
+            raise click.UsageError("--method corrected needs --input-noise repeats or encoders")
         for name in ("instruments", "cutoff", "start"):
             if self.method != "iv" and getattr(self, name) is not None:
                 raise click.UsageError(f"--{name} goes with --method iv")
@@ -44,6 +64,18 @@ class Chosen:
             raise click.UsageError(
                 f"--start has no part in --instruments {self.instruments}: nothing is iterated"
             )
+
+    def estimator(
+        self, study: Study, weighting: Literal["joint", "none"], tell: Callable[..., Any]
+    ) -> Method:
+        """Return the estimator of a study; raises what `iv` raises."""
+        from dynident.fit import LeastSquares, Regression
+
+        if self.method == "iv":
+            return self.iv(study, weighting, tell)
+        if self.method in REGRESSIONS:
+            return Regression(self.method, self.input_noise or "none")
+        return LeastSquares(weighting)
 
     def iv(self, study: Study, weighting: Literal["joint", "none"], tell: Callable[..., Any]) -> IV:
         """Return the instrumental variable estimator of a study.
@@ -97,10 +129,16 @@ def method_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @click.option(
         "--method",
-        type=click.Choice(["least-squares", "iv"]),
+        type=click.Choice(["least-squares", "iv", *REGRESSIONS]),
         default="least-squares",
         show_default=True,
-        help="iv: instrumental variables, right although the positions are noisy.",
+        help="iv: instrumental variables, right although the positions are noisy. corrected: least "
+        "squares less a known input noise. bayes: joint factor analysis. The rest to compare with.",
+    )
+    @click.option(
+        "--input-noise",
+        type=click.Choice(["repeats", "encoders"]),
+        help="Of corrected, factors and bayes: measured on repetitions, or carried from [noise].",
     )
     @click.option(
         "--instruments",
@@ -114,7 +152,8 @@ def method_options(command: Callable[..., Any]) -> Callable[..., Any]:
         help="Where iv begins to iterate; default: least_squares.",
     )
     @wraps(command)
-    def run(*args: Any, method, instruments, cutoff, start, **options: Any) -> Any:
-        return command(*args, chosen=Chosen(method, instruments, cutoff, start), **options)
+    def run(*args: Any, method, instruments, cutoff, start, input_noise, **options: Any) -> Any:
+        chosen = Chosen(method, instruments, cutoff, start, input_noise)
+        return command(*args, chosen=chosen, **options)
 
     return run

@@ -95,12 +95,15 @@ def fit(
 
     Example: dynident fit study.toml --out estimate.json --robot identified.urdf
     """
-    from dynident.fit import Constrained, LeastSquares, essential_parameters, factorise, rows
+    from dynident.fit import Constrained, essential_parameters, factorise, rows
     from dynident.fit import fit as fit_model
     from dynident.nlp import Within
 
-    if chosen.method == "iv" and consistency != "none":
-        raise click.UsageError("--consistency goes with least squares, not with --method iv")
+    if chosen.method != "least-squares" and consistency != "none":
+        what = f"--consistency goes with least squares, not with --method {chosen.method}"
+        raise click.UsageError(what)
+    if ordinary and chosen.method not in ("least-squares", "iv"):
+        raise click.UsageError(f"--ordinary does not go with --method {chosen.method}")
     if plot is not None and chosen.method != "iv":
         raise click.UsageError("--plot goes with --method iv")
     require_places(study, out, robot, plot)
@@ -108,11 +111,9 @@ def fit(
     loaded = load_study(study)
     with progress("fitting") as tell:
         weighting = "none" if ordinary else "joint"
-        method = LeastSquares(weighting)
+        method = chosen.estimator(loaded, weighting, tell)
         if consistency != "none":
             method = Constrained(Within(consistency), weighting=weighting)
-        if chosen.method == "iv":
-            method = chosen.iv(loaded, weighting, tell)
         estimate = fit_model(loaded.model, loaded.train, method)
         tables, result = list(estimate.tables()), estimate.to_dict()
         if essential:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynident.closed_loop.controllers import Controller
+from dynident.closed_loop.mechanism import Mechanism
 from dynident.robot import Robot
 
 
@@ -50,7 +51,7 @@ class Drive:
         self,
         controller: Controller,
         reference: ReferenceSamples,
-        nominal: Sequence[Robot],
+        nominal: Sequence[Robot | Mechanism],
         scale: np.ndarray | None = None,
         settled: np.ndarray | None = None,
     ) -> None:
@@ -124,7 +125,9 @@ class Drive:
         return torque.ravel()
 
 
-def _distinct(robots: Sequence[Robot]) -> list[tuple[Robot, list[int]]]:
+def _distinct(
+    robots: Sequence[Robot | Mechanism],
+) -> list[tuple[Robot | Mechanism, list[int]]]:
     """Return each robot once, with where it stands."""
     by_id = {id(robot): robot for robot in robots}
     return [

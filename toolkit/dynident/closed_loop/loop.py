@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dynident.closed_loop.controllers import Controller
+from dynident.closed_loop.mechanism import Mechanism
 from dynident.closed_loop.rollout import LEAD_IN, Rollout, Task
 from dynident.closed_loop.sensors import Sensors, rounded
 from dynident.errors import SimulationError
@@ -234,13 +235,14 @@ def _rollout(
 def _check(task: Task, n: int, controller: Controller) -> None:
     robot = task.mechanism.robot
     counts = [("robot", robot.n), ("trajectory", task.trajectory.n)]
-    if task.nominal is not None:
-        counts.append(("nominal robot", task.nominal.n))
+    nominal = task.nominal.robot if isinstance(task.nominal, Mechanism) else task.nominal
+    if nominal is not None:
+        counts.append(("nominal robot", nominal.n))
     for what, count in counts:
         if count != controller.n or count != n:
             what = f"a {what} of {count} joints under a controller of {controller.n}"
             raise SimulationError(what, task.name or None, "give each as many joints as the robot")
-    for one in (robot, task.nominal or robot):
+    for one in (robot, nominal or robot):
         if not np.isfinite(one.theta).all():
             mend = "mend the inertial elements of its description"
             raise SimulationError("has inertial values that are not finite", one.name, mend)

@@ -288,6 +288,10 @@ class Mechanism:
         self._require_no_past()
         return self.stiff_command(t, q, v, a)
 
+    def inverse_dynamics(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """Return the command at time zero, as a controller that believes in it has it, (T, n)."""
+        return self.command(np.zeros(len(q)), q, v, a)
+
     def stiff_command(
         self, t: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray
     ) -> np.ndarray:

@@ -27,8 +27,8 @@ class Task:
     start : s, when the first sample is taken in the session.
     rng : of the encoder's noise; None for none.
     name : for messages.
-    nominal : the model inside the controller (a computed torque, a feed-forward); None for the
-        mechanism's own robot.
+    nominal : the model inside the controller (a computed torque, a feed-forward): bodies alone, or
+        with effects; None for the mechanism's own robot.
     """
 
     mechanism: Mechanism
@@ -37,7 +37,7 @@ class Task:
     start: float = 0.0
     rng: np.random.Generator | None = None
     name: str = ""
-    nominal: Robot | None = None
+    nominal: Robot | Mechanism | None = None
 
 
 @dataclass(frozen=True, eq=False)

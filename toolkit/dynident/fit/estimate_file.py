@@ -38,7 +38,7 @@ def to_dict(estimate: Estimate) -> dict[str, Any]:
             {
                 "name": name,
                 "value": float(estimate.values[i]),
-                "sigma": float(sigma[i]) if estimate.identified[i] else None,
+                "sigma": float(sigma[i]) if np.isfinite(sigma[i]) else None,
                 "unit": model.units[i],
                 "expression": model.expressions[i],
             }

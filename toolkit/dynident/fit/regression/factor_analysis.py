@@ -173,6 +173,9 @@ def analyse(
 class _Posterior:
     """Q(Z, T) of all samples at once; names as in the module's docstring, sums over the samples.
 
+    Given the inputs, t has the precision a; `seen` is each input's variance with the weights'
+    doubt in it.
+
     The covariance of (z, t) is the same for every sample. With t eliminated, which is diagonal,
     one Sherman-Morrison step is left: <z_i> = b x_i + kappa (y_i - b'x_i) and
     <t_i> = ct x_i + e <z_i>.
@@ -183,12 +186,13 @@ class _Posterior:
         f = factors
         mz, mx, pz, px, py = f.wz, f.wx, f.pz, f.px, f.py
         self.Ez, self.Ex = mz**2 + f.wz_var, mx**2 + f.wx_var
-        self.a = 1 + self.Ez / pz + self.Ex / px
-        self.p = 1 / pz - mz**2 / (pz**2 * self.a)
-        self.g = 1 / self.p
+        # Sums of what is positive throughout: with little noise, differences would lose all digits.
+        self.A = 1 + f.wz_var / pz + f.wx_var / px
+        self.a = self.A + mz**2 / pz + mx**2 / px
+        self.seen = px * self.A + mx**2
+        self.g = pz * px * self.a / self.seen
         self.s = float(self.g.sum())
-        self.k = mz * mx / (pz * px * self.a)
-        self.b = self.g * self.k
+        self.b = mz * mx / self.seen
         self.kappa = self.g / (py + self.s)
         self.ct, self.e = mx / (px * self.a), mz / (pz * self.a)
         self.v = statistics.cross - statistics.gram @ self.b
@@ -198,10 +202,9 @@ class _Posterior:
     def bound(self, prior: Gamma | None) -> float:
         """Lower bound of the log evidence, nats."""
         f, N, d = self.factors, self.statistics.count, self.statistics.inputs
-        logs = np.sum(np.log(f.pz) + np.log(f.px) + np.log(self.a) + np.log(self.p))
-        constant = (d + 1) * np.log(2 * np.pi) + np.log(f.py) + logs + np.log1p(self.s / f.py)
-        squares = self.Gd * (1 / f.px - f.wx**2 / (f.px**2 * self.a) - self.g * self.k**2)
-        likelihood = -N / 2 * constant - 0.5 * (self.R / (f.py + self.s) + np.sum(squares))
+        logs = np.sum(np.log(self.seen)) + np.log(f.py) + np.log1p(self.s / f.py)
+        squares = self.R / (f.py + self.s) + np.sum(self.Gd * self.A / self.seen)
+        likelihood = -N / 2 * ((d + 1) * np.log(2 * np.pi) + logs) - 0.5 * squares
         return float(likelihood + (self._of_weights(prior) if prior else 0.0))
 
     def _of_weights(self, prior: Gamma) -> float:

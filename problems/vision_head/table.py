@@ -1,0 +1,18 @@
+"""The vision head of seven joints: four estimates inside a computed torque.
+
+python problems/vision_head/table.py
+python problems/vision_head/table.py --samples 50000
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE.parent))
+
+from tracking import main  # noqa: E402
+
+if __name__ == "__main__":
+    main(HERE, __doc__)

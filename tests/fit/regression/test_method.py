@@ -1,0 +1,163 @@
+"""Regressions as methods of `di.fit`: rows of all joints, known noise of the inputs, penalties."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sklearn.linear_model import LassoCV, RidgeCV
+from sklearn.model_selection import PredefinedSplit
+
+import dynident as di
+from dynident.errors import FitError
+from dynident.fit import Factors, encoder_noise, factorise, input_noise, load_estimate, rows
+from dynident.fit.regression.compressed import compress
+from dynident.fit.regression.joint_factors import BayesianFactorRegression
+from dynident.fit.regression.named import NAMES
+from synthetic import arm, synthetic, true_values
+
+STD = 2e-4
+ROUGH = di.Filter(80.0, 60.0, 250.0)
+"""Lets much of the encoders' noise through."""
+KNOWN = di.Noise(np.full(2, STD), np.full(2, 0.1))
+
+
+@cache
+def model() -> di.Model:
+    return di.Model(arm()) + di.effects_of("viscous_friction", arm())
+
+
+@cache
+def truth() -> np.ndarray:
+    return true_values(model(), Fv__shoulder=1.0, Fv__elbow=0.5)
+
+
+@cache
+def noisy(seed: int = 3, position_std: float = STD) -> di.Dataset:
+    one = synthetic(
+        model(), truth(), seed, duration=32.0, position_std=position_std, torque_std=0.1
+    )
+    return di.Dataset((one,), ROUGH, KNOWN)
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "corrected"])
+def test_every_regression_finds_the_truth_where_there_is_no_input_noise(name: str) -> None:
+    found = di.fit(model(), noisy(3, 0.0), di.Regression(name))
+    size = np.abs(truth()).max()
+    # The two factor analyses unfold by a reliability that no data tell: b_noise is at most halved.
+    most = 0.3 if name in ("factors", "bayes") else 0.02
+    np.testing.assert_allclose(found.values, truth(), atol=most * size)
+    assert found.rows == 2 * sum(len(torque) for _, torque in rows(model(), noisy(3, 0.0)))
+    assert found.error < 0.1 and found.summary()
+
+
+def test_the_noise_of_encoders_is_what_it_adds_to_the_columns() -> None:
+    """Carried through the filters, measured on repetitions, and as it truly is."""
+    clean = noisy(3, 0.0)
+    true = np.zeros((model().size, model().size))
+    std = di.fit(model(), noisy()).torque_std
+    for (with_noise, _), (without, _) in zip(
+        rows(model(), noisy()), rows(model(), clean), strict=True
+    ):
+        difference = ((with_noise - without) / std[:, None]).reshape(-1, model().size)
+        true += difference.T @ difference
+    for found in (encoder_noise(model(), noisy()), input_noise(model(), noisy())):
+        size = np.sqrt(np.diag(true))
+        np.testing.assert_allclose(
+            found.gram / np.outer(size, size), true / np.outer(size, size), atol=0.12
+        )
+        assert np.all((found.share >= 0) & (found.share < 1))
+
+
+@pytest.mark.parametrize("noise", ["encoders", "repeats"])
+def test_corrected_least_squares_is_right_where_least_squares_is_wrong(noise) -> None:
+    corrected = di.fit(model(), noisy(), di.Regression("corrected", noise))
+    plain = di.fit(model(), noisy())
+    off = np.abs(corrected.values - truth()) / corrected.sigma
+    assert np.all(off < 4), off
+    assert np.max(np.abs(plain.values - truth()) / plain.sigma) > 50
+    inertia = corrected.names.index("Izz.fore")
+    assert abs(plain.values[inertia]) < 0.7 * truth()[inertia]
+    assert "worst direction" in corrected.summary()
+
+
+def test_bayes_says_that_its_inputs_are_correlated() -> None:
+    found = di.fit(model(), noisy(), di.Regression("bayes", "encoders"))
+    assert np.isnan(found.sigma).all() and "not independent" in found.summary()
+    assert "No sigma" in found.summary()
+    free = di.fit(model(), noisy(), di.Regression("bayes"))
+    assert "was not given" in free.summary() and np.isnan(free.sigma).all()
+
+
+def test_an_estimator_may_be_set_up_otherwise() -> None:
+    few = di.Regression(BayesianFactorRegression(max_iter=3))
+    found = di.fit(model(), noisy(), few)
+    assert found.status == "not converged" and "Not converged: 3 rounds" in found.summary()
+
+
+def test_an_estimate_without_intervals_is_saved_and_read(tmp_path: Path) -> None:
+    found = di.fit(model(), noisy(), di.Regression("ridge"))
+    again = load_estimate(found.save(tmp_path / "estimate.json"))
+    np.testing.assert_array_equal(again.values, found.values)
+    assert np.isnan(again.sigma).all() and again.method == found.method
+
+
+def test_few_rows_stand_for_many() -> None:
+    """Folded rows have the statistics of all, and penalties validated on them are the same."""
+    rng = np.random.default_rng(0)
+    X = rng.standard_normal((4000, 6)) @ rng.standard_normal((6, 6))
+    y = X @ [1.0, 0.0, 2.0, 0.0, 0.0, -1.0] + 2.0 * rng.standard_normal(4000)
+    piece = np.repeat(np.arange(4), 1000)
+    parts: list[Factors] = [
+        factorise([(X[piece == k][:, None], y[piece == k][:, None])]) for k in range(4)
+    ]
+    few = compress(parts, np.ones(1))
+    assert len(few.X) == 4 * 2 * 7 and few.count == 4000
+    both = np.column_stack([X, y])
+    np.testing.assert_allclose(few.statistics.scatter, both.T @ both, rtol=1e-10, atol=1e-8)
+    np.testing.assert_allclose(few.X.mean(axis=0), 0.0, atol=1e-12)
+
+    on_few, on_all = PredefinedSplit(few.piece), PredefinedSplit(piece)
+    options = {"fit_intercept": False, "alphas": np.logspace(-4, 0, 30), "max_iter": 50_000}
+    lasso = LassoCV(cv=on_few, **options).fit(few.X, few.y)
+    want = LassoCV(cv=on_all, **options).fit(X, y)
+    assert lasso.alpha_ == want.alpha_
+    np.testing.assert_allclose(lasso.coef_, want.coef_, atol=1e-3)
+    penalties, scoring = np.logspace(-6, 1, 30), "neg_mean_squared_error"
+    ridge = RidgeCV(penalties * len(few.X), fit_intercept=False, cv=on_few, scoring=scoring)
+    other = RidgeCV(penalties * 4000, fit_intercept=False, cv=on_all, scoring=scoring)
+    ridge.fit(few.X, few.y), other.fit(X, y)
+    assert ridge.alpha_ / len(few.X) == pytest.approx(other.alpha_ / 4000)
+    np.testing.assert_allclose(ridge.coef_, other.coef_, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("method", "words"),
+    [
+        (di.Regression("rigde"), "ridge"),
+        (di.Regression("corrected"), "needs the noise"),
+        (di.Regression("ridge", "encoders"), "no place"),
+        (di.Regression("stepwise", "repeats"), "no place"),
+        (di.Regression("bayes", "sensors"), "repeats or encoders"),  # type: ignore[arg-type]
+    ],
+)
+def test_what_does_not_fit_together_is_refused(method: di.Regression, words: str) -> None:
+    with pytest.raises(FitError, match=words):
+        di.fit(model(), noisy(), method)
+
+
+def test_noise_that_nobody_knows_is_asked_for() -> None:
+    with pytest.raises(FitError, match="position_std"):
+        di.fit(model(), replace(noisy(), noise=None), di.Regression("corrected", "encoders"))
+    once = noisy().recordings[0].replace(period=None)
+    with pytest.raises(FitError, match="no recording repeats"):
+        di.fit(model(), replace(noisy(), recordings=(once,)), di.Regression("bayes", "repeats"))
+
+
+def test_more_noise_than_signal_is_refused_in_words() -> None:
+    rough = replace(noisy(), filter=di.Filter())
+    with pytest.raises(FitError, match="in some direction the input noise"):
+        di.fit(model(), rough, di.Regression("corrected", "encoders"))
