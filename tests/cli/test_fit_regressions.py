@@ -1,4 +1,4 @@
-"""`dynident fit --method NAME` for regressions: names, the noise of the inputs, options that fit."""
+"""`dynident fit --method NAME` for regressions: names, noise of the inputs, options that fit."""
 
 from __future__ import annotations
 

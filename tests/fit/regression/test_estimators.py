@@ -197,6 +197,35 @@ def test_truncated_and_stepwise_are_what_they_say() -> None:
     np.testing.assert_allclose(StepwiseRegression().fit(X, y).coef_[chosen], want, rtol=1e-9)
 
 
+@every
+def test_a_constant_output_needs_no_input(regression: StatisticsRegressor) -> None:
+    X, _ = data()
+    for constant in (0.0, 0.1, 1e5):
+        found = clone(regression).fit(X, np.full(300, constant))
+        np.testing.assert_array_equal(found.coef_, 0.0)
+        np.testing.assert_allclose(found.predict(X), constant)
+
+
+@every
+def test_rows_that_are_refused_have_not_been_seen(regression: StatisticsRegressor) -> None:
+    X, y = data()
+    found = clone(regression).partial_fit(X[:100], y[:100])
+    with pytest.raises(ValueError, match="NaN"):
+        found.partial_fit(np.full((3, 5), np.nan), y[:3])
+    assert found.statistics_.count == 100
+    first = CorrectedLeastSquares(0.01)
+    with pytest.raises(FitError, match="combinations"):
+        first.partial_fit(X[:3], y[:3])
+    assert not hasattr(first, "statistics_")
+
+
+def test_an_exact_law_takes_no_other_inputs_in() -> None:
+    rng = np.random.default_rng(0)
+    X = rng.standard_normal((1000, 20))
+    found = StepwiseRegression().fit(X, 3 * X[:, 1] - X[:, 5])
+    np.testing.assert_array_equal(found.chosen_, [1, 5])
+
+
 def test_stepwise_keeps_what_is_irrelevant_out_at_its_level() -> None:
     rng = np.random.default_rng(2)
     wrong = 0
@@ -227,6 +256,8 @@ def test_total_least_squares_is_right_where_all_noise_is_alike() -> None:
         (JointFactorRegression(100.0), "input x"),
         (JointFactorRegression([0.1, 0.2]), "shape"),
         (JointFactorRegression(reliability=1.0), "reliability"),
+        (JointFactorRegression(max_iter=0), "max_iter"),
+        (BayesianFactorRegression(relevance_shape=0.0), "relevance_shape"),
         (BayesianFactorRegression(queries="both"), "queries"),  # type: ignore[arg-type]
     ],
 )

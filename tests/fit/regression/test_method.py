@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sklearn.linear_model import LassoCV, RidgeCV
+from sklearn.linear_model import LassoCV, Ridge, RidgeCV
 from sklearn.model_selection import PredefinedSplit
 
 import dynident as di
@@ -16,6 +16,7 @@ from dynident.errors import FitError
 from dynident.fit import Factors, encoder_noise, factorise, input_noise, load_estimate, rows
 from dynident.fit.regression.compressed import compress
 from dynident.fit.regression.joint_factors import BayesianFactorRegression
+from dynident.fit.regression.method import _pieces
 from dynident.fit.regression.named import NAMES
 from synthetic import arm, synthetic, true_values
 
@@ -86,10 +87,39 @@ def test_corrected_least_squares_is_right_where_least_squares_is_wrong(noise) ->
 
 def test_bayes_says_that_its_inputs_are_correlated() -> None:
     found = di.fit(model(), noisy(), di.Regression("bayes", "encoders"))
-    assert np.isnan(found.sigma).all() and "not independent" in found.summary()
-    assert "No sigma" in found.summary()
+    assert "not independent. Prefer it" in found.summary()
+    corrected = di.fit(model(), noisy(), di.Regression("corrected", "encoders"))
+    off = np.hypot(found.values - corrected.values, corrected.sigma)
+    np.testing.assert_allclose(found.sigma, off, rtol=1e-6)
     free = di.fit(model(), noisy(), di.Regression("bayes"))
     assert "was not given" in free.summary() and np.isnan(free.sigma).all()
+    assert "No sigma" in free.summary()
+
+
+@pytest.mark.slow
+def test_intervals_of_corrected_least_squares_cover_though_noise_is_filtered() -> None:
+    """25 draws of the noise, 8 parameters: filtered rows are not independent, the pieces are."""
+    off = []
+    for seed in range(25):
+        one = replace(
+            noisy(),
+            recordings=(
+                synthetic(model(), truth(), 3, duration=32.0, position_std=0.0, torque_std=0.0),
+            ),
+        )
+        rng = np.random.default_rng(seed)
+        clean = one.recordings[0]
+        recording = clean.replace(
+            q=clean.q + STD * rng.standard_normal(clean.q.shape),
+            tau=clean.tau + 0.1 * rng.standard_normal(clean.q.shape),
+        )
+        found = di.fit(
+            model(), replace(one, recordings=(recording,)), di.Regression("corrected", "encoders")
+        )
+        off.append((found.values - truth()) / found.sigma)
+    covered = np.mean(np.abs(off) < 1.96)
+    assert covered > 0.85, covered
+    assert np.sqrt(np.mean(np.square(off), axis=0)).max() < 2.0
 
 
 def test_an_estimator_may_be_set_up_otherwise() -> None:
@@ -147,6 +177,26 @@ def test_few_rows_stand_for_many() -> None:
 def test_what_does_not_fit_together_is_refused(method: di.Regression, words: str) -> None:
     with pytest.raises(FitError, match=words):
         di.fit(model(), noisy(), method)
+
+
+def test_noise_of_another_model_is_refused() -> None:
+    other = encoder_noise(di.Model(arm()), noisy())
+    with pytest.raises(FitError, match="other parameters"):
+        di.fit(model(), noisy(), di.Regression("corrected", other))
+    own = BayesianFactorRegression(0.1)
+    with pytest.raises(FitError, match="own input_noise"):
+        di.fit(model(), noisy(), di.Regression(own))
+    with pytest.raises(FitError, match="Ridge is no regression"):
+        di.fit(model(), noisy(), di.Regression(Ridge()))  # type: ignore[arg-type]
+
+
+def test_recordings_of_unequal_length_are_cut_into_equal_pieces() -> None:
+    short = synthetic(model(), truth(), 4, duration=8.0, torque_std=0.1)
+    both = replace(noisy(), recordings=(short, *noisy().recordings))
+    pieces = _pieces(model(), both, None)
+    counts = np.array([piece.rows for piece in pieces])
+    assert len(pieces) == 20 and np.ptp(counts) <= 2
+    assert counts.sum() == sum(torque.size for _, torque in rows(model(), both))
 
 
 def test_noise_that_nobody_knows_is_asked_for() -> None:

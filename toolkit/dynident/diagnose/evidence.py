@@ -224,11 +224,15 @@ class ColumnStore:
         key = (run, version, effect.needs & {"body", "rigid", "torque"}, label)
         if key in self._blocks:
             return self._blocks[key]
-        block = model.ready(effect, sampled.block(model, rigid=False), values)
+        # One motion for all effects: what a robot does along it is then evaluated once.
+        motion = self._blocks.get(("motion", run, version))
+        motion = sampled.block(model, rigid=False) if motion is None else motion
+        block = model.ready(effect, motion, values)
         if "torque" in effect.needs:
             block = replace(block, torque=self._torque(effect, run, version, block, model, values))
         if sampled.motion.samples <= _SHARED:
             self._blocks[key] = block
+            self._blocks["motion", run, version] = motion
         return block
 
     def _torque(

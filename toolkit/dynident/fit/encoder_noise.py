@@ -29,7 +29,7 @@ def encoder_noise(
 
     Noise is drawn anew onto the filtered positions and goes the way of the measurement: low-pass,
     differences, regressor, low-pass, decimation. What it changes in the columns is the input
-    noise, row by row and along the trajectory, with whatever the filters make of its colour.
+    noise, summed along the trajectory, with whatever the filters make of its colour.
 
     It is exact to first order, where what the filter left of the recording's own noise does not
     matter. In a closed loop the robot moves with a part of the noise; that part is not independent
@@ -59,21 +59,16 @@ def encoder_noise(
     gram = np.zeros((p, p))
     for recording in dataset.recordings:
         smooth = _smooth(recording, dataset)
-        q = smooth.q
+        clean = list(_columns(model, smooth, dataset, values))
         for _ in range(draws):
-            noise = dataset.noise.position_std * rng.standard_normal(q.shape)
-            noisy = smooth.replace(q=q + noise)
-            pairs = zip(
-                _columns(model, smooth, dataset, values),
-                _columns(model, noisy, dataset, values),
-                strict=True,
-            )
-            for clean, other in pairs:
-                difference = ((other - clean) / std[:, None]).reshape(-1, p)
+            noise = dataset.noise.position_std * rng.standard_normal(smooth.q.shape)
+            noisy = _columns(model, smooth.replace(q=smooth.q + noise), dataset, values)
+            for one, other in zip(clean, noisy, strict=True):
+                difference = ((other - one) / std[:, None]).reshape(-1, p)
                 gram += difference.T @ difference / draws
     size = np.sum(total**2, axis=0)
     share = np.divide(np.diag(gram), size, out=np.zeros(p), where=size > 0)
-    return InputNoise(gram, share, model.names)
+    return InputNoise(gram, share, model.names, factors.rows)
 
 
 def _smooth(recording: Recording, dataset: Dataset) -> Recording:

@@ -24,33 +24,52 @@ class InputNoise:
     gram : (p, p) N Psi, in units of the torque noise as `Metric.matrix` is.
     share : (p,) of each parameter's squared column: how much of it is noise.
     names : of the parameters.
+    rows : equations, N: of all joints.
     """
 
     gram: np.ndarray
     share: np.ndarray
     names: tuple[str, ...]
+    rows: int
+
+    def per_row(self, names: tuple[str, ...]) -> np.ndarray:
+        """Return Psi, the covariance of one row's noise, (p, p).
+
+        Raises
+        ------
+        FitError
+            If it belongs to other parameters.
+        """
+        if names != self.names:
+            what = f"the input noise is that of {len(self.names)} other parameters"
+            raise FitError(what, mend="take it from the model that is fitted")
+        return self.gram / self.rows
 
 
 @single_threaded
-def input_noise(model: Model, dataset: Dataset) -> InputNoise:
+def input_noise(model: Model, dataset: Dataset, values: np.ndarray | None = None) -> InputNoise:
     """Estimate the input noise from recordings whose excitation repeats.
 
     Two repetitions have the same noiseless columns, so that half the Gram matrix of their
     difference is the noise of either.
+
+    Parameters
+    ----------
+    values : (p,) at which columns that depend on the present model are taken.
 
     Raises
     ------
     FitError
         If no recording repeats.
     """
-    factors = factorise(rows(model, dataset))
+    factors = factorise(rows(model, dataset, values))
     std = solve_factors(model, factors).torque_std
     p = model.size
     total = factors.pooled(1.0 / std)[:p, :p]
     gram, seen, used = np.zeros((p, p)), 0, 0
     for recording in dataset.recordings:
         sampled = sample(recording, dataset.filter)
-        columns = np.concatenate(list(sampled.columns(model)))
+        columns = np.concatenate(list(sampled.columns(model, values)))
         used += len(columns)
         if recording.period is None:
             continue
@@ -67,4 +86,4 @@ def input_noise(model: Model, dataset: Dataset) -> InputNoise:
     gram *= used / seen
     size = np.sum(total**2, axis=0)
     share = np.divide(np.diag(gram), size, out=np.zeros(p), where=size > 0)
-    return InputNoise(gram, share, model.names)
+    return InputNoise(gram, share, model.names, factors.rows)

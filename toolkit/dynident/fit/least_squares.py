@@ -102,11 +102,11 @@ def solve_factors(
     if not np.any(factors.torque_norms > 0):
         raise FitError("the torque is zero throughout", mend="is it the right column?")
     ordinary = _solve(model, factors, np.ones(len(factors.counts)))
-    std = _residual_std(factors, ordinary)
+    std = residual_std(factors, ordinary)
     if weighting == "none" or len(std) == 1:
         return replace(ordinary, torque_std=std)
     weighted = _solve(model, factors, 1.0 / std)
-    return replace(weighted, torque_std=_residual_std(factors, weighted))
+    return replace(weighted, torque_std=residual_std(factors, weighted))
 
 
 def _solve(model: Model, factors: Factors, weights: np.ndarray) -> Solution:
@@ -141,7 +141,7 @@ def _solve(model: Model, factors: Factors, weights: np.ndarray) -> Solution:
     )
 
 
-def _residual_std(factors: Factors, solution: Solution) -> np.ndarray:
+def residual_std(factors: Factors, solution: Solution) -> np.ndarray:
     """Standard deviation of each joint's residual, its share of the parameters accounted for."""
     share = solution.basis.rank / len(factors.counts)
     std = factors.residual_norms(solution.values) / np.sqrt(np.maximum(factors.counts - share, 1.0))

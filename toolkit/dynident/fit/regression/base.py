@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,11 +22,14 @@ class StatisticsRegressor(RegressorMixin, BaseEstimator):
 
     Attributes
     ----------
+    words : what the estimator is called.
     coef_ : (d,) of `predict`.
     intercept_ : of `predict`.
     constant_ : (d,) bool, inputs without variation; their coefficients are zero.
     statistics_ : of all rows seen.
     """
+
+    words: ClassVar[str]
 
     def __init__(self, *, fit_intercept: bool = True) -> None:
         self.fit_intercept = fit_intercept
@@ -60,17 +63,23 @@ class StatisticsRegressor(RegressorMixin, BaseEstimator):
         if statistics.count < 2:
             what = f"n_samples = {statistics.count} says nothing of a slope"
             raise FitError(what, mend="give at least two rows")
-        self.statistics_ = statistics
-        self.n_features_in_ = statistics.inputs
         used = statistics if self.fit_intercept else statistics.about_origin()
         scale = used.scale
         self.constant_ = scale[:-1] == 0
         inputs = np.flatnonzero(~self.constant_)
         varied = used.keeping(inputs)
         kept = np.append(scale[:-1][inputs], scale[-1] or 1.0)
-        unit = Statistics(varied.count, np.zeros(len(kept)), varied.scaled(1.0 / kept).scatter)
-        self._scale, self._mean = scale, used.mean
+        scatter = varied.scaled(1.0 / kept).scatter
+        if scale[-1] == 0:
+            scatter[-1], scatter[:, -1] = 0.0, 0.0  # of a constant output only rounding is left
+        unit = Statistics(varied.count, np.zeros(len(kept)), scatter)
+        self._scale, self._mean, self._seen = scale, used.mean, statistics
+        self.n_features_in_ = statistics.inputs
+        if len(getattr(self, "feature_names_in_", ())) not in (0, statistics.inputs):
+            del self.feature_names_in_
         self._solve(unit, inputs)
+        # Only now: rows that are refused have not been seen, and may be given again.
+        self.statistics_ = statistics
         return self
 
     def predict(self, X: ArrayLike) -> np.ndarray:
@@ -82,6 +91,10 @@ class StatisticsRegressor(RegressorMixin, BaseEstimator):
     def _solve(self, unit: Statistics, inputs: np.ndarray) -> None:
         """Set the attributes from standardised statistics of the inputs that vary, by number."""
         raise NotImplementedError
+
+    def _freedom(self, unit: Statistics, used: int) -> int:
+        """Degrees of freedom that some coefficients and the constant leave."""
+        return unit.count - used - int(self.fit_intercept)
 
     def _set(self, coefficients: np.ndarray) -> None:
         """Set what `predict` uses: coefficients (d,) in the data's units."""

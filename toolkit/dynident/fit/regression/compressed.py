@@ -1,8 +1,9 @@
 """Rows of a regression, folded into few that have the same sums of squares and products.
 
 A triangular factor R of [X, y] has R'R = [X, y]'[X, y]: every linear regression sees the same
-least-squares problem in it, and a regularised one the same path. One factor for each consecutive
-piece of the data also gives cross-validation the errors that it would have on the rows themselves.
+least-squares problem in it, and a regularised one the same path. One factor for each of some
+consecutive pieces of the data, equally long, also gives cross-validation the errors that it would
+have on the rows themselves, and estimates the scatter between the pieces.
 """
 
 from __future__ import annotations
@@ -57,3 +58,32 @@ def compress(pieces: list[Factors], weights: np.ndarray) -> Compressed:
     # Penalties count per row: as many squares a row as the data have.
     rows *= np.sqrt(len(rows) / count)
     return Compressed(rows[:, :-1], rows[:, -1], np.concatenate(labels), count)
+
+
+def sandwich(rows: Compressed, coefficients: np.ndarray, psi: np.ndarray) -> np.ndarray:
+    """Return the covariance of corrected least squares from the scatter between pieces, (p, p).
+
+    Filtered noise is not independent from row to row, nor between the joints of one instant: what
+    the pieces contribute to the normal equations is, if they are long against the filter.
+
+    Parameters
+    ----------
+    rows : in pieces.
+    coefficients : (p,) of corrected least squares.
+    psi : (p, p) input noise of a row.
+
+    Notes
+    -----
+    White, "Maximum likelihood estimation of misspecified models" (1982), by clusters of rows.
+    """
+    X, piece = rows.X, rows.piece
+    M = X.T @ X - len(X) * psi
+    scores = []
+    for k in np.unique(piece):
+        own = X[piece == k]
+        left = rows.y[piece == k] - own @ coefficients
+        scores.append(own.T @ left + len(own) * psi @ coefficients)
+    every = np.array(scores)
+    inverse = np.linalg.inv(M)
+    count = len(every)
+    return inverse @ (every.T @ every) @ inverse * count / max(count - 1, 1)

@@ -11,7 +11,7 @@ from dynident.fit.regression.base import StatisticsRegressor
 from dynident.fit.regression.noise import covariance_of
 from dynident.fit.regression.statistics import Statistics
 
-_DEPENDENT = 1e-12  # eigenvalue of the inputs' correlations that is rounding around zero
+_DEPENDENT = 1e-14  # eigenvalue of the inputs' correlations that is rounding around zero, per input
 
 
 class CorrectedLeastSquares(StatisticsRegressor):
@@ -29,16 +29,18 @@ class CorrectedLeastSquares(StatisticsRegressor):
     Attributes
     ----------
     covariance_ : (d, d) of the coefficients, for Gaussian noise that is independent from row to
-        row and known exactly.
+        row and known exactly; NaN where no degree of freedom is left.
     sigma_ : (d,) standard deviations from it.
     signal_share_ : of the direction in which noise is worst, the share of X'X that is no noise.
     condition_number_ : of X'X - N Psi, for standardised inputs.
-    noise_variance_ : of the output.
+    noise_variance_ : of the output; negative where the input noise is overstated.
 
     Notes
     -----
     Fuller, "Measurement Error Models" (1987), section 2.2.
     """
+
+    words = "corrected least squares"
 
     def __init__(self, input_noise: ArrayLike = 0.0, *, fit_intercept: bool = True) -> None:
         super().__init__(fit_intercept=fit_intercept)
@@ -50,7 +52,7 @@ class CorrectedLeastSquares(StatisticsRegressor):
         psi = covariance_of(self.input_noise, len(scale) - 1)[own]
         psi = psi / np.outer(scale[inputs], scale[inputs])
         signal = unit.gram / N - psi
-        if np.linalg.eigvalsh(unit.gram / N).min(initial=1.0) < _DEPENDENT:
+        if np.linalg.eigvalsh(unit.gram / N).min(initial=1.0) < _DEPENDENT * max(len(inputs), 1):
             what = "some inputs are combinations of others: no row tells them apart"
             raise FitError(what, mend="leave them out, or give more rows than inputs")
         # Of an empty set of inputs all is signal.
@@ -64,7 +66,8 @@ class CorrectedLeastSquares(StatisticsRegressor):
         found = inverse @ unit.cross / N
         self.condition_number_ = float(np.linalg.cond(signal)) if len(psi) else 1.0
         # The residual y - x'b holds the output's noise and, through the inputs', psi b.
-        seen = unit.residual(found) / max(N - len(found), 1)
+        freedom = self._freedom(unit, len(found))
+        seen = unit.residual(found) / freedom if freedom > 0 else np.nan
         covariance = inverse * seen
         covariance += inverse @ (psi * seen + np.outer(psi @ found, psi @ found)) @ inverse
         covariance /= N

@@ -19,8 +19,12 @@ from scipy.special import digamma, gammaln
 
 from dynident.fit.regression.statistics import Statistics
 
-LEAST_VARIANCE = 1e-12
-"""Variance that none falls below, in units of the input's or the output's own."""
+LEAST_VARIANCE = 1e-9
+"""Variance that none falls below, in units of the input's or the output's own: below it the bound
+of a million samples would be rounding."""
+
+_ROUNDING = 10 * float(np.finfo(float).eps)
+_DEPENDENT = 1e-13  # eigenvalue over the largest, below which inputs are combinations of others
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +64,7 @@ class Ending(Enum):
     """How the iterations ended."""
 
     CONVERGED = "converged"
+    ROUNDING = "ended in rounding"
     ROUNDS_EXHAUSTED = "not converged"
 
 
@@ -99,7 +104,7 @@ class Gamma:
 def start_of(
     statistics: Statistics, reliability: np.ndarray | float, prior: Gamma | None
 ) -> Factors:
-    """Return factors that predict nearly as least squares does, with a reliability of each input.
+    """Return factors that predict as least squares does, with a reliability of each input.
 
     Half of the residual's variance is the output's noise, the rest is shared evenly by the z.
 
@@ -111,14 +116,18 @@ def start_of(
     """
     d, N = statistics.inputs, statistics.count
     rho = np.broadcast_to(np.asarray(reliability, dtype=float), (d,))
-    # A ridge of one sample: dependent inputs share what they explain.
-    found = np.linalg.solve(statistics.gram + np.eye(d), statistics.cross)
+    spectrum = np.linalg.eigvalsh(statistics.gram)
+    full = d > 0 and spectrum[0] > _DEPENDENT * spectrum[-1] and d + 1 < N
+    # Else a ridge of one sample: dependent inputs share what they explain.
+    ridge = np.zeros((d, d)) if full else np.eye(d)
+    found = np.linalg.solve(statistics.gram + ridge, statistics.cross)
     # Where there are more inputs than rows nothing is left, and no variance may be zero.
-    left = max(statistics.residual(found), 1e-3 * statistics.power) / N
+    least = 0.0 if full else 1e-3 * statistics.power
+    left = max(statistics.residual(found), least) / N
     wx = np.sqrt(rho)
     wz = found / wx
-    pz, px, py = np.full(d, left / (2 * max(d, 1))), 1.0 - rho, left / 2
-    px = np.maximum(px, LEAST_VARIANCE)
+    pz = np.full(d, max(left / (2 * max(d, 1)), LEAST_VARIANCE))
+    px, py = np.maximum(1.0 - rho, LEAST_VARIANCE), max(left / 2, LEAST_VARIANCE)
     return begun(Factors(wz, wx, wx * 0, wx * 0, wx * 0, pz, px, py), N, prior)
 
 
@@ -145,7 +154,10 @@ def analyse(
     rounds: int,
     tolerance: float,
 ) -> Analysis:
-    """Iterate until a round gains less than the tolerance.
+    """Iterate until hardly anything is left to gain.
+
+    What is left is told from the last two gains, as if they went on to shrink by the same factor
+    (Aitken): a slow convergence ends no sooner for being slow.
 
     Parameters
     ----------
@@ -154,20 +166,34 @@ def analyse(
     prior : of the relevance; None for maximum likelihood (plain joint factor analysis).
     known : (d,) bool, inputs whose noise px is what the start says.
     rounds : at most so many.
-    tolerance : nats that a round has to gain.
+    tolerance : nats that may be left.
     """
     factors, bounds = start, []
+    at = _Posterior(factors, statistics)
     ending = Ending.ROUNDS_EXHAUSTED
     for _ in range(rounds):
-        at = _Posterior(factors, statistics)
         bounds.append(at.bound(prior))
-        if len(bounds) > 1 and bounds[-1] - bounds[-2] <= tolerance:
-            ending = Ending.CONVERGED
+        ended = _ended(bounds, tolerance, at.rounding)
+        if ended is not None:
+            ending = ended
             break
         factors = at.updated(prior, known)
-    else:
         at = _Posterior(factors, statistics)
     return Analysis(factors, at.b, np.array(bounds), ending)
+
+
+def _ended(bounds: list[float], tolerance: float, rounding: float) -> Ending | None:
+    """Return how the iterations have ended, None if they have not; rounding is of a bound."""
+    if len(bounds) < 2:
+        return None
+    gain = bounds[-1] - bounds[-2]
+    if abs(gain) <= rounding < tolerance:
+        return Ending.CONVERGED
+    if gain <= rounding:
+        return Ending.ROUNDING
+    before = bounds[-2] - bounds[-3] if len(bounds) > 2 else 0.0
+    shrinks = gain < before
+    return Ending.CONVERGED if shrinks and gain**2 <= tolerance * (before - gain) else None
 
 
 class _Posterior:
@@ -196,8 +222,15 @@ class _Posterior:
         self.kappa = self.g / (py + self.s)
         self.ct, self.e = mx / (px * self.a), mz / (pz * self.a)
         self.v = statistics.cross - statistics.gram @ self.b
-        self.R = statistics.power - self.b @ statistics.cross - self.b @ self.v
+        self.R = statistics.residual(self.b)
         self.Gd = np.diag(statistics.gram)
+
+    @property
+    def rounding(self) -> float:
+        """Nats of the bound that are rounding: of its logarithms, and of the residual's squares."""
+        N, d = self.statistics.count, self.statistics.inputs
+        squares = self.statistics.power / (self.factors.py + self.s)
+        return _ROUNDING * (N * (d + 1) + squares)
 
     def bound(self, prior: Gamma | None) -> float:
         """Lower bound of the log evidence, nats."""

@@ -10,6 +10,7 @@ from sklearn.base import clone
 
 from dynident.errors import FitError
 from dynident.fit.regression.joint_factors import JointFactorRegression
+from dynident.fit.regression.noise import variances_of
 from dynident.tables import Table, number
 
 TOLD = 1.92
@@ -25,7 +26,7 @@ class StartSensitivity:
     Attributes
     ----------
     reliabilities : (k,) where the iterations started.
-    coef_true : (k, d) b_true that came of each.
+    coef_true : (k, d) b_noise over the reliability, as it came of each: not pruned, not held.
     bounds : (k,) lower bound reached, nats.
     converged : (k,) bool.
     """
@@ -117,10 +118,15 @@ def start_sensitivity(
     ]
     return StartSensitivity(
         np.array(reliabilities, dtype=float),
-        np.array([one.coef_true_ for one in each]),
+        np.array([_unfolded(one) for one in each]),
         np.array([one.bounds_[-1] for one in each]),
         np.array([one.converged_ for one in each]),
     )
+
+
+def _unfolded(regression: JointFactorRegression) -> np.ndarray:
+    rho = regression.reliability_
+    return np.divide(regression.coef_noisy_, rho, out=np.zeros_like(rho), where=rho > 0)
 
 
 def reliability_profile(
@@ -144,7 +150,7 @@ def reliability_profile(
     statistics = regression.statistics_
     used = statistics if regression.fit_intercept else statistics.about_origin()
     variance = used.scale[:-1] ** 2
-    given = np.where(regression.known_, (1 - regression.reliability_) * variance, np.nan)
+    given = variances_of(regression.input_noise, statistics.inputs)
     likelihoods, bounds = [], []
     for rho in reliabilities:
         noise = np.where(regression.known_, given, (1 - rho) * variance)

@@ -10,17 +10,17 @@ from scipy import stats
 
 from dynident.errors import FitError
 from dynident.fit.regression.base import StatisticsRegressor
+from dynident.fit.regression.corrected import CorrectedLeastSquares
 from dynident.fit.regression.factor_analysis import Analysis, Ending, Gamma, analyse, start_of
-from dynident.fit.regression.independence import independent
 from dynident.fit.regression.noise import variances_of
 from dynident.fit.regression.statistics import Statistics
+from dynident.fit.regression.truncated import squared_tolerance
 from dynident.robot import BaseParameters, base_parameters
 
 LEAST_RELIABILITY = 0.5
-"""Least reliability that b_true is unfolded with where the input's noise is not known."""
+"""Least reliability that the Bayesian form unfolds b_true with where the noise is not known."""
 _EXPLAINS = 2.0
 """Standard errors of an input alone, below which its coefficient explains no more than noise."""
-
 _DEPENDENT = 1e-7  # share of an input that the others leave, below which it is their combination
 
 
@@ -32,15 +32,19 @@ class JointFactorRegression(StatisticsRegressor):
     without noise: b_noise over the reliability of each input. **The data do not tell the
     reliability**: where `input_noise` is not given, maximum likelihood leaves it where it started.
 
+    The model takes the inputs as independent. Where they are not, b_true is biased even with noise
+    that is known; `corrected_` is not, and stands beside it.
+
     Parameters
     ----------
     input_noise : variance of the inputs' noise: one for all, or (d,) with NaN for an input whose
-        noise is not known; None where none is. A full covariance counts by its diagonal, since
-        the model takes the inputs as independent.
+        noise is not known, or its covariance (d, d), whose diagonal counts; None where it is not
+        known of any.
     reliability : share of the inputs' variance that is signal, where the iterations start.
     queries : what `predict` and `coef_` are for: "noisy" inputs or "noiseless" ones.
     max_iter : at most so many rounds of expectation maximisation.
-    tol : nats that a round has to gain in the bound, or the iterations end.
+    tol : nats of the bound that all further rounds together may still gain, as the last ones
+        shrink, when the iterations end.
     fit_intercept : False for a regression through the origin.
 
     Attributes
@@ -49,18 +53,18 @@ class JointFactorRegression(StatisticsRegressor):
     intercept_noisy_, intercept_true_ : to go with them.
     reliability_ : (d,) of each input, found or known; zero of constant ones.
     known_ : (d,) bool, inputs whose noise was given.
-    pruned_ : (d,) bool, inputs that explain no more than noise does, and whose reliability, not
-        being known, fell below one half: their b_true is zero. That of others whose reliability
-        fell there is twice b_noise, and no more.
+    pruned_ : (d,) bool, inputs that were taken out: their b_true is zero.
     basis_ : which inputs are combinations of the others, and the rank decision.
     bounds_ : (n_iter_,) lower bound of the log evidence in nats, in order.
-    converged_ : whether the last round gained no more than `tol`.
+    ending_ : how the iterations ended, in words.
+    converged_ : whether by themselves.
     n_iter_ : rounds.
-    noise_variance_ : of the output, what no input explains (z's variance counts as explained).
-    sigma_noisy_, sigma_true_ : (d,) standard deviations; NaN for combinations of other inputs.
-        Those of b_true need an input noise that is known, and inputs that are independent.
-    independent_ : whether the data let the inputs count as independent, as the model has them;
-        if not, b_true is biased, has no intervals, and corrected least squares is what is needed.
+    least_squares_, sigma_noisy_ : (d,) ordinary least squares and its standard deviations, which
+        are b_noise's before anything was shrunk; NaN for combinations of other inputs.
+    corrected_ : corrected least squares with the same noise; None where the noise is not known of
+        every input, or too much.
+    sigma_true_ : (d,) standard deviation of b_true: that of `corrected_`, and how far b_true is
+        from it; NaN without one.
 
     Notes
     -----
@@ -69,13 +73,15 @@ class JointFactorRegression(StatisticsRegressor):
     b_true = wz/wx.
     """
 
+    words = "joint factor analysis"
+
     def __init__(
         self,
         input_noise: ArrayLike | None = None,
         reliability: float = 0.8,
         queries: Literal["noisy", "noiseless"] = "noisy",
         max_iter: int = 20_000,
-        tol: float = 1e-4,
+        tol: float = 1e-3,
         *,
         fit_intercept: bool = True,
     ) -> None:
@@ -91,13 +97,18 @@ class JointFactorRegression(StatisticsRegressor):
         return None
 
     def interval(self, level: float = 0.95) -> np.ndarray:
-        """Return intervals of the coefficients of `predict`, (d, 2); NaN where there is none.
+        """Return intervals of what `predict` estimates, (d, 2); NaN where there is none.
 
-        They are as wide as those of least squares: shrinking and pruning make none narrower.
+        For noisy inputs these are those of least squares: what was shrunk or pruned has none of
+        its own, and would not be in the middle of an honest one. For noiseless inputs the middle
+        is b_true.
         """
-        sigma = self.sigma_noisy_ if self.queries == "noisy" else self.sigma_true_
-        half = stats.norm.ppf((1 + level) / 2) * sigma
-        return np.column_stack([self.coef_ - half, self.coef_ + half])
+        if self.queries == "noisy":
+            middle, sigma = self.least_squares_, self.sigma_noisy_
+        else:
+            middle, sigma = self.coef_true_, self.sigma_true_
+        half = stats.t.ppf((1 + level) / 2, max(self.freedom_, 1)) * sigma
+        return np.column_stack([middle - half, middle + half])
 
     def summary(self) -> str:
         """Return inputs, coefficients and caveats as text."""
@@ -133,75 +144,81 @@ class JointFactorRegression(StatisticsRegressor):
             raise FitError(f"queries = {self.queries!r}", mend='choose "noisy" or "noiseless"')
         if not 0 < self.reliability < 1:
             raise FitError(f"reliability = {self.reliability!r}", mend="choose it between 0 and 1")
+        if self.max_iter < 1 or not self.tol > 0:
+            what = f"max_iter = {self.max_iter!r}, tol = {self.tol!r}"
+            raise FitError(what, mend="choose both above 0")
 
     def _keep(self, analysis: Analysis, unit: Statistics, inputs: np.ndarray) -> None:
         d, factors = len(self._scale) - 1, analysis.factors
         self.bounds_, self.n_iter_ = analysis.bounds, len(analysis.bounds)
-        self.converged_ = analysis.ending is Ending.CONVERGED
-        self.reliability_ = np.zeros(d)
+        self.ending_ = analysis.ending.value
+        self.converged_ = analysis.ending is not Ending.ROUNDS_EXHAUSTED
+        self.reliability_, self.pruned_ = np.zeros(d), np.zeros(d, dtype=bool)
         self.reliability_[inputs] = factors.reliability
-        lost = self._irrelevant(analysis, unit) & ~self.known_[inputs]
-        self.pruned_ = np.zeros(d, dtype=bool)
-        self.pruned_[inputs] = lost
-        # Where nothing but the prior speaks of a reliability, it may not blow a coefficient up.
-        floor = np.where(self.known_[inputs], 0.0, LEAST_RELIABILITY)
-        free = factors.reliability > floor
-        true = np.where(
-            free, factors.wz / np.where(free, factors.wx, 1.0), factors.noisy / LEAST_RELIABILITY
-        )
-        true = np.where(lost, 0.0, true)
         self.coef_noisy_ = self._in_units(analysis.coefficients, inputs)
-        self.coef_true_ = self._in_units(true, inputs)
+        self.coef_true_ = self._in_units(self._unfolded(analysis, unit, inputs), inputs)
         self.intercept_noisy_ = self._intercept(self.coef_noisy_)
         self.intercept_true_ = self._intercept(self.coef_true_)
-        self.noise_variance_ = factors.py * float(self._scale[-1]) ** 2
         self.basis_ = self._basis(unit, inputs)
-        self.independent_ = independent(unit.keeping(~lost), true[~lost], factors.px[~lost])
-        self._sigma(unit)
+        self._least_squares(unit, inputs)
+        self._correct(unit)
         self._set(self.coef_noisy_ if self.queries == "noisy" else self.coef_true_)
 
-    def _irrelevant(self, analysis: Analysis, unit: Statistics) -> np.ndarray:
-        """Inputs that lost their reliability and explain no more than noise does, (d,) bool."""
-        b = analysis.coefficients
-        alone = np.sqrt(unit.residual(b) / unit.count / np.diag(unit.gram))
-        lost = analysis.factors.reliability < LEAST_RELIABILITY
-        return lost & (np.abs(b) < _EXPLAINS * alone)
+    def _unfolded(self, analysis: Analysis, unit: Statistics, inputs: np.ndarray) -> np.ndarray:
+        """Return b_true = wz / wx of standardised inputs; zero where both are."""
+        wz, wx = analysis.factors.wz, analysis.factors.wx
+        return np.divide(wz, wx, out=np.zeros_like(wz), where=wx != 0)
 
     def _basis(self, unit: Statistics, inputs: np.ndarray) -> BaseParameters | None:
         names = tuple(self.input_names()[m] for m in inputs)
         values, vectors = np.linalg.eigh(unit.gram)
         root = np.sqrt(np.clip(values, 0.0, None))[:, None] * vectors.T
-        return base_parameters(root, names, _DEPENDENT) if len(names) else None
+        # Eigenvalues have the rounding of the largest, which its square root makes visible.
+        hidden = np.sqrt(squared_tolerance(unit, 0.0) * values.max(initial=0.0) / unit.count)
+        return base_parameters(root, names, max(_DEPENDENT, hidden)) if len(names) else None
 
-    def _sigma(self, unit: Statistics) -> None:
-        """Set the standard deviations: those of least squares, which no shrinking makes smaller."""
-        d, N = len(self._scale) - 1, unit.count
-        self.sigma_noisy_, self.sigma_true_ = np.full(d, np.nan), np.full(d, np.nan)
-        varied = np.flatnonzero(~self.constant_)
-        if self.basis_ is None or len(varied) >= N:
+    def _least_squares(self, unit: Statistics, inputs: np.ndarray) -> None:
+        """Set ordinary least squares, with its standard deviations and degrees of freedom."""
+        d = len(self._scale) - 1
+        self.least_squares_, self.sigma_noisy_ = np.full(d, np.nan), np.full(d, np.nan)
+        kept = [] if self.basis_ is None else list(self.basis_.independent)
+        self.freedom_ = self._freedom(unit, len(kept))
+        if self.basis_ is None or self.freedom_ <= 0:
             return
-        kept = list(self.basis_.independent)
         G, c = unit.gram[np.ix_(kept, kept)], unit.cross[kept]
-        variance = max(unit.power - c @ np.linalg.solve(G, c), 0.0) / (N - len(kept))
+        found = np.linalg.solve(G, c)
+        variance = max(unit.power - c @ found, 0.0) / self.freedom_
         # What is a combination of others has no value of its own, nor have those its parts.
         alone = [not np.any(self.basis_.K[i]) for i in range(len(kept))]
-        own = varied[kept][alone]
-        sigma = np.sqrt(variance * np.diag(np.linalg.inv(G)))[alone]
-        self.sigma_noisy_[own] = sigma * self._scale[-1] / self._scale[own]
-        if not self.independent_:
+        own = inputs[kept][alone]
+        units = self._scale[-1] / self._scale[own]
+        self.least_squares_[own] = found[alone] * units
+        self.sigma_noisy_[own] = np.sqrt(variance * np.diag(np.linalg.inv(G)))[alone] * units
+
+    def _correct(self, unit: Statistics) -> None:
+        """Set corrected least squares, and what it says of b_true."""
+        self.corrected_: CorrectedLeastSquares | None = None
+        self.sigma_true_ = np.full(len(self._scale) - 1, np.nan)
+        if not np.all(self.known_ | self.constant_):
             return
-        # The reliability is 1 - noise / variance of the input, and that variance is estimated.
-        rho = np.where(self.known_, self.reliability_, np.nan)[own]
-        of_rho = self.coef_true_[own] * (1 - rho) / rho * np.sqrt(2 / N)
-        self.sigma_true_[own] = np.hypot(self.sigma_noisy_[own] / rho, of_rho)
+        noise = np.array(self.input_noise, dtype=float)
+        if noise.shape == self.known_.shape:
+            noise = np.where(self.known_, noise, 0.0)  # of constants
+        regression = CorrectedLeastSquares(noise, fit_intercept=self.fit_intercept)
+        try:
+            self.corrected_ = regression.fit_statistics(self._seen)
+        except FitError:
+            return
+        self.sigma_true_ = np.hypot(regression.sigma_, self.coef_true_ - regression.coef_)
 
 
 class BayesianFactorRegression(JointFactorRegression):
     """Bayesian joint factor analysis: as its parent, and inputs that do not matter are pruned.
 
     One relevance for both weights of an input, with a Gamma prior, takes inputs out that explain
-    little. It also moves the reliability of the rest: where `input_noise` is not given, b_true is
-    what start and prior say, and `start_sensitivity` shows how much.
+    little. It also speaks against the reliability of the rest: where `input_noise` is not given,
+    b_true is what start and prior say, and `start_sensitivity` shows how much. It is held at
+    twice b_noise there, and at zero where an input explains no more than noise does.
 
     Parameters
     ----------
@@ -221,7 +238,7 @@ class BayesianFactorRegression(JointFactorRegression):
         reliability: float = 0.8,
         queries: Literal["noisy", "noiseless"] = "noisy",
         max_iter: int = 20_000,
-        tol: float = 1e-4,
+        tol: float = 1e-3,
         relevance_shape: float = 1e-8,
         relevance_rate: float = 1e-8,
         *,
@@ -233,9 +250,27 @@ class BayesianFactorRegression(JointFactorRegression):
         self.relevance_shape = relevance_shape
         self.relevance_rate = relevance_rate
 
+    words = "Bayesian regression with input noise"
+
     def prior(self) -> Gamma:
         """Return the prior of the inputs' relevance."""
         return Gamma(self.relevance_shape, self.relevance_rate)
+
+    def _check(self) -> None:
+        super()._check()
+        if not (self.relevance_shape > 0 and self.relevance_rate > 0):
+            what = f"relevance_shape = {self.relevance_shape!r}, rate {self.relevance_rate!r}"
+            raise FitError(what, mend="choose both above 0")
+
+    def _unfolded(self, analysis: Analysis, unit: Statistics, inputs: np.ndarray) -> np.ndarray:
+        low = (analysis.factors.reliability < LEAST_RELIABILITY) & ~self.known_[inputs]
+        b = analysis.coefficients
+        alone = np.sqrt(unit.residual(b) / unit.count / np.diag(unit.gram))
+        self.pruned_[inputs] = low & (np.abs(b) < _EXPLAINS * alone)
+        true = super()._unfolded(analysis, unit, inputs)
+        # Where nothing but the prior speaks of a reliability, it may not blow a coefficient up.
+        true = np.where(low, analysis.factors.noisy / LEAST_RELIABILITY, true)
+        return np.where(self.pruned_[inputs], 0.0, true)
 
     def _keep(self, analysis: Analysis, unit: Statistics, inputs: np.ndarray) -> None:
         super()._keep(analysis, unit, inputs)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
@@ -12,9 +13,15 @@ from dynident.fit.encoder_noise import encoder_noise
 from dynident.fit.estimate import Estimate
 from dynident.fit.factors import Factors, factorise
 from dynident.fit.input_noise import InputNoise, input_noise
-from dynident.fit.least_squares import LeastSquares, Solution, estimate_of, solve_factors
-from dynident.fit.regression.compressed import Compressed, compress
-from dynident.fit.sampling import rows
+from dynident.fit.least_squares import (
+    LeastSquares,
+    Solution,
+    estimate_of,
+    residual_std,
+    solve_factors,
+)
+from dynident.fit.regression.compressed import Compressed, compress, sandwich
+from dynident.fit.sampling import rows, sample
 from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.tables import Table
@@ -22,8 +29,11 @@ from dynident.threads import single_threaded
 
 if TYPE_CHECKING:
     from dynident.fit.regression.base import StatisticsRegressor
+    from dynident.fit.regression.corrected import CorrectedLeastSquares
 
-_PIECES = 5  # consecutive pieces of data between which penalties are validated
+PIECES = 20
+"""Consecutive pieces of the data, between which estimates scatter."""
+_FOLDS = 5  # of these pieces, between which penalties are validated
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +46,8 @@ class Regression:
     Parameters
     ----------
     estimator : "truncated", "ridge", "lasso", "pls", "stepwise", "total", "corrected", "factors",
-        "bayes"; or an estimator of `fit.regression` that is set up otherwise (its input noise, if
-        any, is then replaced by that of `noise`).
+        "bayes"; or an estimator of `fit.regression` that is set up otherwise. What is taken as
+        the parameters is b_true.
     noise : of the inputs: "none" is known; "repeats" measures it on recordings that repeat;
         "encoders" carries the stated noise of the encoders through the filters; or an
         `InputNoise`. Corrected least squares needs one.
@@ -81,8 +91,7 @@ class Regression:
             first.condition_number,
             (*first.notes, *found.notes),
         )
-        std = factors.residual_norms(lifted) / np.sqrt(factors.counts)
-        solution = replace(solution, torque_std=std)
+        solution = replace(solution, torque_std=residual_std(factors, solution))
         estimate = estimate_of(found.words, "joint", model, dataset, factors, solution)
         return replace(estimate, status=found.status, details=found.details)
 
@@ -99,7 +108,7 @@ class Regression:
         regressor = own(self.estimator) if isinstance(self.estimator, str) else self.estimator
         if regressor is not None:
             noise = self._noise(model, dataset, values)
-            psi = None if noise is None else noise.gram[np.ix_(kept, kept)] / compressed.count
+            psi = None if noise is None else noise.per_row(model.names)[np.ix_(kept, kept)]
             return _fitted(regressor, compressed, psi, tuple(model.names[i] for i in kept))
         if self.estimator not in NAMES:
             what = f"no regression '{self.estimator}'"
@@ -109,9 +118,11 @@ class Regression:
             what = f"{self.estimator} has no place for the noise of its inputs"
             raise FitError(what, mend="leave it out, or choose corrected, factors or bayes")
         scale = np.sqrt(np.mean(compressed.X**2, axis=0))
-        chosen = validated(self.estimator, replace(compressed, X=compressed.X / scale))
+        folds = compressed.piece * _FOLDS // (compressed.piece.max() + 1)
+        unit = replace(compressed, X=compressed.X / scale, piece=folds)
+        chosen = validated(self.estimator, unit)
         notes = (
-            f"{self.estimator}, {chosen.choice}, chosen between {_PIECES} consecutive pieces of "
+            f"{self.estimator}, {chosen.choice}, chosen between {_FOLDS} consecutive pieces of "
             "the data. No intervals: they would have to carry the bias of the penalty.",
         )
         words = f"{self.estimator} regression"
@@ -123,7 +134,7 @@ class Regression:
         if isinstance(self.noise, InputNoise):
             return self.noise
         if self.noise == "repeats":
-            return input_noise(model, dataset)
+            return input_noise(model, dataset, values)
         if self.noise == "encoders":
             return encoder_noise(model, dataset, values)
         if self.noise != "none":
@@ -153,19 +164,18 @@ def _fitted(
     """Fit one of this room's estimators to the statistics."""
     from sklearn.base import clone
 
+    from dynident.fit.regression.base import StatisticsRegressor
     from dynident.fit.regression.corrected import CorrectedLeastSquares
     from dynident.fit.regression.joint_factors import JointFactorRegression
     from dynident.fit.regression.summary import summary
 
-    regressor = clone(regressor).set_params(fit_intercept=False)
-    words = {
-        "TruncatedLeastSquares": "least squares by truncated singular values",
-        "TotalLeastSquares": "total least squares",
-        "StepwiseRegression": "stepwise regression",
-        "CorrectedLeastSquares": "corrected least squares",
-        "JointFactorRegression": "joint factor analysis",
-        "BayesianFactorRegression": "Bayesian regression with input noise",
-    }[type(regressor).__name__]
+    if not isinstance(regressor, StatisticsRegressor):
+        what = f"a {type(regressor).__name__} is no regression from sufficient statistics"
+        raise FitError(what, mend="name one, or give an estimator of dynident.fit.regression")
+    if np.any(getattr(regressor, "input_noise", None)):
+        what = "the estimator's own input_noise is in units that only its rows have"
+        raise FitError(what, mend="give it as noise = of Regression")
+    regressor, words = clone(regressor).set_params(fit_intercept=False), regressor.words
     takes_noise = isinstance(regressor, CorrectedLeastSquares | JointFactorRegression)
     if psi is not None and not takes_noise:
         what = f"{words} has no place for the noise of its inputs"
@@ -174,39 +184,54 @@ def _fitted(
         mend = 'state noise = "repeats" or "encoders"'
         raise FitError("corrected least squares needs the noise of the inputs", mend=mend)
     if psi is not None:
-        regressor.set_params(
-            input_noise=psi if isinstance(regressor, CorrectedLeastSquares) else np.diag(psi)
-        )
+        regressor.set_params(input_noise=psi)
     regressor.feature_names_in_ = np.array(names, dtype=object)
     regressor.fit_statistics(compressed.statistics)
     if isinstance(regressor, CorrectedLeastSquares):
-        notes = (
-            "What is left of X'X when the input noise is taken off: "
-            f"{100 * regressor.signal_share_:.3g} % in the worst direction, condition number "
-            f"{regressor.condition_number_:.3g}. Right if that noise is independent of the motion; "
-            "in a closed loop the robot moves with a part of it.",
-        )
-        return _Found(regressor.coef_, regressor.covariance_, words, "solved", notes, ())
+        assert psi is not None
+        covariance = sandwich(compressed, regressor.coef_, psi)
+        return _Found(regressor.coef_, covariance, words, "solved", _worth(regressor), ())
     if isinstance(regressor, JointFactorRegression):
-        table, sigma = summary(regressor), regressor.sigma_true_
-        told = np.diag(sigma**2) if np.all(np.isfinite(sigma)) else None
-        status = "converged" if regressor.converged_ else "not converged"
-        return _Found(regressor.coef_true_, told, words, status, (), table)
+        status, table, true = regressor.ending_, summary(regressor), regressor.coef_true_
+        if psi is None or regressor.corrected_ is None:
+            return _Found(true, None, words, status, (), table)
+        covariance = sandwich(compressed, regressor.corrected_.coef_, psi)
+        away = true - regressor.corrected_.coef_
+        return _Found(true, covariance + np.outer(away, away), words, status, (), table)
     return _Found(regressor.coef_, None, words, "solved", ("No intervals.",), ())
 
 
+def _worth(regressor: CorrectedLeastSquares) -> tuple[str, ...]:
+    """What corrected least squares rests on, in words."""
+    notes = (
+        "What is left of X'X when the input noise is taken off: "
+        f"{100 * regressor.signal_share_:.3g} % in the worst direction, condition number "
+        f"{regressor.condition_number_:.3g}. Right if that noise is independent of the motion; "
+        "in a closed loop the robot moves with a part of it.",
+        f"sigma from the scatter between {PIECES} consecutive pieces of the data; the doubt of the "
+        "input noise itself is not in it.",
+    )
+    if regressor.noise_variance_ < 0:
+        overstated = "The input noise is overstated: it would leave the torque less than none."
+        notes = (overstated, *notes)
+    return notes
+
+
 def _pieces(model: Model, dataset: Dataset, values: np.ndarray | None) -> list[Factors]:
-    """Factors of consecutive pieces of the data, of about the same length."""
-    blocks: list[Factors] = []
+    """Factors of consecutive pieces of the data, equally long to a row."""
+    total = sum(len(sample(one, dataset.filter).t) for one in dataset.recordings)
+    borders = np.round(np.arange(1, PIECES + 1) * total / PIECES).astype(int)
+    pieces: list[list[Factors]] = [[] for _ in borders]
+    first = 0
     for columns, torque in rows(model, dataset, values):
-        parts = zip(np.array_split(columns, _PIECES), np.array_split(torque, _PIECES), strict=True)
-        blocks.extend(factorise([part]) for part in parts if len(part[1]))
-    counts = np.cumsum([block.rows for block in blocks])
-    place = np.minimum((_PIECES * (counts - 1)) // counts[-1], _PIECES - 1)
-    return [
-        _whole([block for block, k in zip(blocks, place, strict=True) if k == piece])
-        for piece in sorted(set(place))
-    ]
+        last = first + len(torque)
+        cuts = np.unique(np.clip(np.append(borders, [first, last]), first, last))
+        for start, stop in pairwise(cuts):
+            part = slice(start - first, stop - first)
+            piece = int(np.searchsorted(borders, start, side="right"))
+            pieces[piece].append(factorise([(columns[part], torque[part])]))
+        first = last
+    return [_whole(parts) for parts in pieces if parts]
 
 
 def _whole(parts: list[Factors]) -> Factors:

@@ -72,7 +72,9 @@ def validated(name: str, rows: Compressed) -> Validated:
             cv=split,
             scoring="neg_mean_squared_error",
         ).fit(X, y)
-        return Validated(found.coef_, f"penalty {found.alpha_ / len(X):.3g} of the squares")
+        penalty = found.alpha_ / len(X)
+        border = ", the end of what was tried" if penalty in (_PENALTIES[0], _PENALTIES[-1]) else ""
+        return Validated(found.coef_, f"penalty {penalty:.3g} of the squares{border}")
     if name == "lasso":
         found = LassoCV(eps=1e-5, fit_intercept=False, cv=split, max_iter=100_000, tol=1e-6)
         found.fit(X, y)

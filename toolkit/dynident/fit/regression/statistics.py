@@ -45,9 +45,10 @@ class Statistics:
             raise FitError(what, mend="give (N, d) and (N,), N at least 1")
         # About the block's own mean: sums of squares about zero lose digits to a large offset.
         rows = np.column_stack([X, y])
-        mean = rows.mean(axis=0)
-        rows -= mean
-        scatter = rows.T @ rows
+        with np.errstate(over="ignore", invalid="ignore"):  # told below, by name
+            mean = rows.mean(axis=0)
+            rows -= mean
+            scatter = rows.T @ rows
         if not np.all(np.isfinite(np.diag(scatter))):
             bad = np.flatnonzero(~np.isfinite(np.diag(scatter)))
             where = "the output" if bad[0] == X.shape[1] else f"input {bad[0]}"

@@ -13,6 +13,8 @@ _DEPENDENT = (
     1e-10  # share of an input's squares that the chosen ones leave, below which it is theirs
 )
 
+_EXACT = 1e-12  # share of the output's squares below which nothing is left but rounding
+
 
 class StepwiseRegression(StatisticsRegressor):
     """Forward selection with backward elimination (Draper and Smith 1981).
@@ -32,6 +34,8 @@ class StepwiseRegression(StatisticsRegressor):
     chosen_ : numbers of the inputs in the model, in ascending order.
     n_iter_ : steps taken.
     """
+
+    words = "stepwise regression"
 
     def __init__(
         self,
@@ -53,6 +57,8 @@ class StepwiseRegression(StatisticsRegressor):
         chosen: list[int] = []
         self.n_iter_ = 0
         while self.n_iter_ < self.max_iter:
+            if unit.residual(_at(unit, chosen, _solved(unit, chosen))) <= _EXACT * unit.power:
+                break  # what is left is rounding: any input would explain it
             added = self._entering(unit, chosen)
             if added is None:
                 break
@@ -94,10 +100,10 @@ class StepwiseRegression(StatisticsRegressor):
         return chosen[worst] if p > self.leave else None
 
     def _p_value(self, unit: Statistics, gain: float, left: float, used: int) -> float:
-        freedom = unit.count - used - int(self.fit_intercept)
+        freedom = self._freedom(unit, used)
         if freedom <= 0:
             return 1.0
-        F = gain * freedom / left if left > 0 else np.inf
+        F = gain * freedom / max(left, _EXACT * unit.power)
         return float(stats.f.sf(F, 1, freedom))
 
 

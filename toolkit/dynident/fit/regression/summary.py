@@ -7,35 +7,32 @@ import numpy as np
 from dynident.fit.regression.joint_factors import LEAST_RELIABILITY, JointFactorRegression
 from dynident.tables import Table, number
 
+_AGREES = 3.0  # standard deviations of corrected least squares
+
 
 def summary(regression: JointFactorRegression) -> tuple[Table, ...]:
-    """Return a fitted regression as a table of its inputs, and its caveats."""
-    names = regression.input_names()
-    sigma_true = regression.sigma_true_
-    rows = tuple(
-        (
+    """Return a fitted regression as a table of its inputs, with its caveats."""
+    names, corrected = regression.input_names(), regression.corrected_
+    relevance = getattr(regression, "relevance_", None)
+    rows = []
+    for m, name in enumerate(names):
+        row = [
             name,
             number(regression.coef_noisy_[m], 5),
-            number(regression.sigma_noisy_[m], 3),
             number(regression.coef_true_[m], 5),
-            number(sigma_true[m], 3),
+            number(regression.sigma_true_[m], 3),
             number(regression.reliability_[m], 3),
-            "given" if regression.known_[m] else "start and prior",
-            _word(regression, m),
-        )
-        for m, name in enumerate(names)
-    )
-    columns = (
-        "input",
-        "b_noise",
-        "sigma",
-        "b_true",
-        "sigma",
-        "reliability",
-        "which is",
-        "",
-    )
-    return (Table("Regression with noisy inputs", columns, rows, _notes(regression)),)
+            "given" if regression.known_[m] else "start, prior",
+        ]
+        row += [] if relevance is None else [number(relevance[m], 3)]
+        if corrected is not None:
+            row += [number(corrected.coef_[m], 5), number(corrected.sigma_[m], 3)]
+        rows.append((*row, _word(regression, m)))
+    columns = ["input", "b_noise", "b_true", "sigma", "reliability", "which is"]
+    columns += [] if relevance is None else ["alpha"]
+    columns += [] if corrected is None else ["corrected", "sigma"]
+    title = regression.words[0].upper() + regression.words[1:]
+    return (Table(title, (*columns, ""), tuple(rows), _notes(regression)),)
 
 
 def _word(regression: JointFactorRegression, m: int) -> str:
@@ -45,33 +42,32 @@ def _word(regression: JointFactorRegression, m: int) -> str:
 
 
 def _notes(regression: JointFactorRegression) -> tuple[str, ...]:
-    names = regression.input_names()
-    rounds = f"{regression.n_iter_} rounds, bound {regression.bounds_[-1]:.9g} nats"
+    names, corrected = regression.input_names(), regression.corrected_
     notes = [
-        f"Converged: {rounds}."
-        if regression.converged_
-        else f"Not converged: {rounds}, and the last one still gained "
-        f"{regression.bounds_[-1] - regression.bounds_[-2]:.2g}. Raise max_iter.",
+        _ended(regression),
         "b_noise predicts the output of inputs with noise; b_true is the law for inputs without.",
     ]
+    if hasattr(regression, "relevance_"):
+        notes.append("alpha is the precision of an input's prior: large where it is switched off.")
     unknown = ~regression.known_ & ~regression.constant_
     if np.any(unknown):
         words = "all inputs" if unknown.all() else _listed(names, unknown)
         notes.append(
-            f"The noise of {words} was not given. The data do not tell it: their b_true is what "
-            "start and prior say, and has no interval."
+            f"The noise of {words} was not given. The data do not tell it: b_true is what start "
+            "and prior say, and has no sigma."
         )
-    elif not regression.independent_:
+    elif corrected is None:
         notes.append(
-            "The inputs are not independent, as this model has them: b_true is not what corrected "
-            "least squares finds, which allows for correlation. It has no intervals; use that."
+            "Taking the noise off leaves nothing in some direction: the data cannot carry "
+            "corrected least squares, and b_true has no sigma."
         )
-    if np.any(regression.pruned_ & ~regression.constant_):
-        which = _listed(names, regression.pruned_ & ~regression.constant_)
+    else:
+        notes.append(_beside(regression))
+    if np.any(regression.pruned_):
+        which = _listed(names, regression.pruned_)
         notes.append(f"Pruned, since they explain no more than noise (b_true zero): {which}.")
-    low = regression.reliability_ < LEAST_RELIABILITY
-    low &= ~(regression.known_ | regression.pruned_ | regression.constant_)
-    if np.any(low):
+    low = (regression.reliability_ < LEAST_RELIABILITY) & unknown & ~regression.pruned_
+    if np.any(low) and hasattr(regression, "relevance_"):
         notes.append(
             f"Reliability below {LEAST_RELIABILITY:g} by the prior alone, b_true therefore held at "
             f"{1 / LEAST_RELIABILITY:g} b_noise: {_listed(names, low)}."
@@ -80,6 +76,34 @@ def _notes(regression: JointFactorRegression) -> tuple[str, ...]:
         lost = ", ".join(regression.basis_.names[i] for i in regression.basis_.dependent)
         notes.append(f"Not told on their own, being combinations of other inputs: {lost}.")
     return tuple(notes)
+
+
+def _ended(regression: JointFactorRegression) -> str:
+    bounds = regression.bounds_
+    rounds = f"{regression.n_iter_} rounds, bound {bounds[-1]:.9g} nats"
+    if regression.converged_:
+        return f"Iterations {regression.ending_}: {rounds}."
+    last = (
+        f", and the last one still gained {bounds[-1] - bounds[-2]:.2g}" if len(bounds) > 1 else ""
+    )
+    return f"Not converged: {rounds}{last}. Raise max_iter."
+
+
+def _beside(regression: JointFactorRegression) -> str:
+    """What corrected least squares says of b_true."""
+    corrected = regression.corrected_
+    assert corrected is not None
+    varied = ~regression.constant_
+    sigma = np.where(varied & (corrected.sigma_ > 0), corrected.sigma_, 1.0)
+    apart = float(np.max(np.abs(corrected.coef_ - regression.coef_true_) / sigma, initial=0.0))
+    words = (
+        f"Corrected least squares, which allows inputs to be correlated, stands beside it: "
+        f"{100 * corrected.signal_share_:.3g} % of the worst direction is signal, condition number "
+        f"{corrected.condition_number_:.3g}. b_true differs from it by up to {apart:.2g} of its "
+    )
+    return words + (
+        "sigma." if apart < _AGREES else "sigma: the inputs are not independent. Prefer it."
+    )
 
 
 def _listed(names: list[str], which: np.ndarray) -> str:

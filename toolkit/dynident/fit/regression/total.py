@@ -7,6 +7,7 @@ import numpy as np
 from dynident.errors import FitError
 from dynident.fit.regression.base import StatisticsRegressor
 from dynident.fit.regression.statistics import Statistics
+from dynident.fit.regression.truncated import squared_tolerance
 
 _NO_OUTPUT = 1e-8  # part of the output in the null direction, below which there is no solution
 
@@ -29,13 +30,17 @@ class TotalLeastSquares(StatisticsRegressor):
     noise_share_ : variance of the noise of every column, relative to the column's own.
     """
 
+    words = "total least squares"
+
     def __init__(self, rcond: float = 1e-7, *, fit_intercept: bool = True) -> None:
         super().__init__(fit_intercept=fit_intercept)
         self.rcond = rcond
 
     def _solve(self, unit: Statistics, inputs: np.ndarray) -> None:
         spectrum = np.linalg.eigvalsh(unit.gram)
-        self.rank_ = int(np.sum(spectrum > self.rcond**2 * spectrum.max(initial=0.0)))
+        self.rank_ = int(
+            np.sum(spectrum > squared_tolerance(unit, self.rcond) * spectrum.max(initial=0.0))
+        )
         values, vectors = np.linalg.eigh(unit.scatter)
         null = vectors[:, : len(spectrum) + 1 - self.rank_]
         self.noise_share_ = float(max(values[len(spectrum) - self.rank_], 0.0) / unit.count)
