@@ -34,6 +34,7 @@ def test_a_record_states_its_counts_and_their_interval(monkeypatch) -> None:
 
 
 def test_what_is_shipped_is_a_count_of_many() -> None:
+    assert module._COUNTS
     for right, cases in module._COUNTS.values():
         assert 0 <= right <= cases
         assert cases >= module.LEAST_CASES

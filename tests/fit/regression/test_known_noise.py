@@ -81,10 +81,10 @@ def test_intervals_cover(coupling: float) -> None:
         T = rng.standard_normal((rows, 4)) @ mixing
         y = T @ weak + 0.5 * rng.standard_normal(rows)
         X = T + np.sqrt(NOISE) * rng.standard_normal(T.shape)
-        one = BayesianFactorRegression(NOISE, queries="noiseless", tol=0.1).fit(X, y)
+        one = JointFactorRegression(NOISE, queries="noiseless", tol=0.1).fit(X, y)
         low, high = one.interval().T
         covered["true"] += int(np.sum((low < weak) & (high > weak)))
-        low, high = BayesianFactorRegression(queries="noisy", tol=0.1).fit(X, y).interval().T
+        low, high = JointFactorRegression(queries="noisy", tol=0.1).fit(X, y).interval().T
         covered["noisy"] += int(np.sum((low < noisy) & (high > noisy)))
         assert one.corrected_ is not None
         off = np.abs(one.corrected_.coef_ - weak)

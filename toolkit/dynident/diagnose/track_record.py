@@ -22,8 +22,18 @@ LARGE = 1.5
 LEAST_CASES = 8
 """Answers below which nothing is said."""
 
-_COUNTS: MappingProxyType[tuple[Said, Size], tuple[int, int]] = MappingProxyType({})
-"""Right answers, and answers: of cases 0 to 199 of seed 30000."""
+_COUNTS: MappingProxyType[tuple[Said, Size], tuple[int, int]] = MappingProxyType(
+    {
+        ("explained", "large"): (62, 62),
+        ("explained", "small"): (43, 45),
+        ("nothing_missing", "small"): (73, 74),
+    }
+)
+"""Right answers, and answers: of cases 0 to 199 of seed 30000.
+
+Of cases 200 to 399 they were 63 of 63, 41 of 43 and 70 of 71. Of an answer "in part" 3 of 9 and of
+"none of these" 8 of 10 were right in cases 0 to 199, 4 of 10 and 9 of 10 later: too few to print.
+"""
 
 _CLAIMS: dict[Said, str] = {
     "nothing_missing": "nothing that is seen above the noise was missing",
