@@ -44,7 +44,7 @@ class JointFactorRegression(StatisticsRegressor):
     queries : what `predict` and `coef_` are for: "noisy" inputs or "noiseless" ones.
     max_iter : at most so many rounds of expectation maximisation.
     tol : nats of the bound that all further rounds together may still gain, as the last ones
-        shrink, when the iterations end.
+        shrink, when the iterations end; half a nat is what one standard deviation is worth.
     fit_intercept : False for a regression through the origin.
 
     Attributes
@@ -81,7 +81,7 @@ class JointFactorRegression(StatisticsRegressor):
         reliability: float = 0.8,
         queries: Literal["noisy", "noiseless"] = "noisy",
         max_iter: int = 20_000,
-        tol: float = 1e-3,
+        tol: float = 0.01,
         *,
         fit_intercept: bool = True,
     ) -> None:
@@ -238,7 +238,7 @@ class BayesianFactorRegression(JointFactorRegression):
         reliability: float = 0.8,
         queries: Literal["noisy", "noiseless"] = "noisy",
         max_iter: int = 20_000,
-        tol: float = 1e-3,
+        tol: float = 0.01,
         relevance_shape: float = 1e-8,
         relevance_rate: float = 1e-8,
         *,
