@@ -90,7 +90,7 @@ def iteration_over_rows(data: Rows) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--rows", type=int, default=1_000_000)
     parser.add_argument("--inputs", type=int, default=110)
     asked = parser.parse_args()

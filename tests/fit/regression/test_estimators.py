@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn.base import clone
 from sklearn.linear_model import LinearRegression
 from sklearn.model_selection import cross_val_score
 from sklearn.pipeline import make_pipeline
@@ -53,7 +52,7 @@ def test_scikit_learns_own_checks(estimator, check) -> None:
 @every
 def test_it_finds_what_is_there(regression: StatisticsRegressor) -> None:
     X, y = data(rows=3000)
-    found = clone(regression).fit(X, y)
+    found = regression.another().fit(X, y)
     assert found.score(X, y) > 0.9
     assert abs(found.coef_[1] + 2.0) < 0.2 and np.abs(found.coef_[3:]).max() < 0.05
 
@@ -61,13 +60,13 @@ def test_it_finds_what_is_there(regression: StatisticsRegressor) -> None:
 @every
 def test_blocks_give_what_all_rows_give(regression: StatisticsRegressor) -> None:
     X, y = data()
-    whole, parts = clone(regression).fit(X, y), clone(regression)
+    whole, parts = regression.another().fit(X, y), regression.another()
     for a in range(0, 300, 60):
         parts.partial_fit(X[a : a + 60], y[a : a + 60])
     np.testing.assert_allclose(parts.coef_, whole.coef_, rtol=1e-9, atol=1e-11)
     assert parts.intercept_ == pytest.approx(whole.intercept_, abs=1e-10)
     summed = Statistics.of(X[:40], y[:40]) + Statistics.of(X[40:], y[40:])
-    elsewhere = clone(regression).fit_statistics(summed)
+    elsewhere = regression.another().fit_statistics(summed)
     np.testing.assert_allclose(elsewhere.predict(X), whole.predict(X), atol=1e-9)
 
 
@@ -77,8 +76,10 @@ def test_equivariance(regression: StatisticsRegressor) -> None:
     X, y = data()
     order = np.array([3, 1, 4, 0, 2])
     factors = np.array([1e3, -1.0, 1e-4, 2.0, -30.0])
-    first = clone(regression).fit(X, y)
-    other = clone(regression).fit((X * factors + [1.0, -5.0, 0.1, 0.0, 7.0])[:, order], -2 * y + 3)
+    first = regression.another().fit(X, y)
+    other = regression.another().fit(
+        (X * factors + [1.0, -5.0, 0.1, 0.0, 7.0])[:, order], -2 * y + 3
+    )
     expected = (-2.0 * first.coef_ / factors)[order]
     np.testing.assert_allclose(
         other.coef_ / np.abs(expected).max(), expected / np.abs(expected).max(), atol=1e-10
@@ -89,9 +90,9 @@ def test_equivariance(regression: StatisticsRegressor) -> None:
 @every
 def test_without_a_constant_it_goes_through_the_origin(regression: StatisticsRegressor) -> None:
     X, y = data()
-    found = clone(regression).set_params(fit_intercept=False).fit(X, y)
+    found = regression.another(fit_intercept=False).fit(X, y)
     assert found.intercept_ == 0.0
-    mirrored = clone(regression).set_params(fit_intercept=False)
+    mirrored = regression.another(fit_intercept=False)
     # The mirror image of every row says the same of a line through the origin.
     mirrored.fit(np.vstack([X, -X]), np.concatenate([y, -y]))
     np.testing.assert_allclose(mirrored.coef_, found.coef_, atol=0.05)
@@ -101,14 +102,14 @@ def test_without_a_constant_it_goes_through_the_origin(regression: StatisticsReg
 def test_a_constant_column_gets_no_coefficient(regression: StatisticsRegressor) -> None:
     X, y = data()
     with_constant = np.column_stack([X[:, :2], np.full(300, 0.1), X[:, 2:]])
-    plain, found = clone(regression).fit(X, y), clone(regression).fit(with_constant, y)
+    plain, found = regression.another().fit(X, y), regression.another().fit(with_constant, y)
     assert found.coef_[2] == 0.0 and found.constant_[2]
     np.testing.assert_allclose(np.delete(found.coef_, 2), plain.coef_, atol=1e-10)
 
 
 @every
 def test_all_columns_constant_leave_the_mean(regression: StatisticsRegressor) -> None:
-    found = clone(regression).fit(np.ones((10, 2)), np.arange(10.0))
+    found = regression.another().fit(np.ones((10, 2)), np.arange(10.0))
     np.testing.assert_array_equal(found.predict(np.ones((3, 2))), 4.5)
 
 
@@ -118,7 +119,7 @@ def test_all_columns_constant_leave_the_mean(regression: StatisticsRegressor) ->
 def test_a_duplicated_column_predicts_as_one(regression: StatisticsRegressor) -> None:
     X, y = data()
     twice = np.column_stack([X, X[:, 1]])
-    plain, found = clone(regression).fit(X, y), clone(regression).fit(twice, y)
+    plain, found = regression.another().fit(X, y), regression.another().fit(twice, y)
     assert np.all(np.isfinite(found.coef_))
     assert found.score(twice, y) > plain.score(X, y) - 0.02
 
@@ -138,15 +139,15 @@ def test_more_columns_than_rows(regression: StatisticsRegressor) -> None:
     rng = np.random.default_rng(0)
     X = rng.standard_normal((20, 40))
     y = 3.0 * X[:, 7] + 0.1 * rng.standard_normal(20)
-    found = clone(regression).fit(X, y)
+    found = regression.another().fit(X, y)
     assert np.all(np.isfinite(found.coef_)) and np.all(np.isfinite(found.predict(X)))
 
 
 @every
 def test_scales_of_any_size(regression: StatisticsRegressor) -> None:
     X, y = data()
-    found = clone(regression).fit(X * [1e120, 1e-120, 1.0, 1e8, 1e-8], 1e100 * y)
-    plain = clone(regression).fit(X, y)
+    found = regression.another().fit(X * [1e120, 1e-120, 1.0, 1e8, 1e-8], 1e100 * y)
+    plain = regression.another().fit(X, y)
     np.testing.assert_allclose(
         found.predict(X * [1e120, 1e-120, 1.0, 1e8, 1e-8]) / 1e100,
         plain.predict(X),
@@ -159,15 +160,15 @@ def test_scales_of_any_size(regression: StatisticsRegressor) -> None:
 def test_one_row_is_refused(regression: StatisticsRegressor) -> None:
     for verb in ("fit", "partial_fit"):
         with pytest.raises(ValueError, match="n_samples = 1"):
-            getattr(clone(regression), verb)([[1.0, 2.0]], [3.0])
+            getattr(regression.another(), verb)([[1.0, 2.0]], [3.0])
     with pytest.raises(FitError, match="two rows"):
-        clone(regression).fit_statistics(Statistics.of(np.ones((1, 2)), np.ones(1)))
+        regression.another().fit_statistics(Statistics.of(np.ones((1, 2)), np.ones(1)))
 
 
 @every
 def test_it_works_in_a_pipeline_and_in_cross_validation(regression: StatisticsRegressor) -> None:
     X, y = data()
-    scores = cross_val_score(make_pipeline(StandardScaler(), clone(regression)), X, y, cv=3)
+    scores = cross_val_score(make_pipeline(StandardScaler(), regression.another()), X, y, cv=3)
     assert scores.min() > 0.85
 
 
@@ -175,7 +176,7 @@ def test_it_works_in_a_pipeline_and_in_cross_validation(regression: StatisticsRe
 def test_columns_of_a_data_frame_have_names(regression: StatisticsRegressor) -> None:
     X, y = data()
     frame = pd.DataFrame(X, columns=list("abcde"))
-    found = clone(regression).fit(frame, y)
+    found = regression.another().fit(frame, y)
     assert found.input_names() == list("abcde")
     with pytest.raises(ValueError, match="feature names"):
         found.predict(frame.rename(columns={"a": "z"}))
@@ -201,7 +202,7 @@ def test_truncated_and_stepwise_are_what_they_say() -> None:
 def test_a_constant_output_needs_no_input(regression: StatisticsRegressor) -> None:
     X, _ = data()
     for constant in (0.0, 0.1, 1e5):
-        found = clone(regression).fit(X, np.full(300, constant))
+        found = regression.another().fit(X, np.full(300, constant))
         np.testing.assert_array_equal(found.coef_, 0.0)
         np.testing.assert_allclose(found.predict(X), constant)
 
@@ -209,7 +210,7 @@ def test_a_constant_output_needs_no_input(regression: StatisticsRegressor) -> No
 @every
 def test_rows_that_are_refused_have_not_been_seen(regression: StatisticsRegressor) -> None:
     X, y = data()
-    found = clone(regression).partial_fit(X[:100], y[:100])
+    found = regression.another().partial_fit(X[:100], y[:100])
     with pytest.raises(ValueError, match="NaN"):
         found.partial_fit(np.full((3, 5), np.nan), y[:3])
     assert found.statistics_.count == 100

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, cast
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -121,7 +123,7 @@ def test_the_likelihood_is_that_of_a_gaussian() -> None:
     covariance = np.block([[spread, across[:, None]], [across[None], np.array([[own]])]])
     N, S = statistics.count, statistics.scatter
     # Sum of log densities over samples with this scatter about zero.
-    constant = stats.multivariate_normal(cov=covariance).logpdf(np.zeros(4)) * N
+    constant = cast(Any, stats.multivariate_normal).logpdf(np.zeros(4), cov=covariance) * N
     expected = constant - 0.5 * np.trace(np.linalg.solve(covariance, S))
     assert found.bounds[-1] == pytest.approx(expected, rel=1e-12)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -157,9 +158,10 @@ def test_few_rows_stand_for_many() -> None:
     assert lasso.alpha_ == want.alpha_
     np.testing.assert_allclose(lasso.coef_, want.coef_, atol=1e-3)
     penalties, scoring = np.logspace(-6, 1, 30), "neg_mean_squared_error"
-    ridge = RidgeCV(penalties * len(few.X), fit_intercept=False, cv=on_few, scoring=scoring)
-    other = RidgeCV(penalties * 4000, fit_intercept=False, cv=on_all, scoring=scoring)
-    ridge.fit(few.X, few.y), other.fit(X, y)
+    ridge: Any = RidgeCV(penalties * len(few.X), fit_intercept=False, cv=on_few, scoring=scoring)
+    other: Any = RidgeCV(penalties * 4000, fit_intercept=False, cv=on_all, scoring=scoring)
+    ridge.fit(few.X, few.y)
+    other.fit(X, y)
     assert ridge.alpha_ / len(few.X) == pytest.approx(other.alpha_ / 4000)
     np.testing.assert_allclose(ridge.coef_, other.coef_, atol=1e-8)
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Self
+from collections.abc import Sequence
+from typing import Any, ClassVar, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
-from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from dynident.errors import FitError
 from dynident.fit.regression.statistics import Statistics
+
+_checked: Any = validate_data  # whose signature names strings only
 
 
 class StatisticsRegressor(RegressorMixin, BaseEstimator):
@@ -33,6 +36,15 @@ class StatisticsRegressor(RegressorMixin, BaseEstimator):
 
     def __init__(self, *, fit_intercept: bool = True) -> None:
         self.fit_intercept = fit_intercept
+
+    def another(self, **changed: Any) -> Self:
+        """Return an estimator set up alike but for what is changed, not fitted."""
+        return cast(Self, clone(cast(Any, self))).set_params(**changed)
+
+    def named(self, names: Sequence[str]) -> Self:
+        """Give the inputs names, which statistics do not carry."""
+        self.feature_names_in_: np.ndarray = np.array(names, dtype=object)
+        return self
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
         """Fit to rows X (N, d) and y (N,).
@@ -76,7 +88,7 @@ class StatisticsRegressor(RegressorMixin, BaseEstimator):
         self._scale, self._mean, self._seen = scale, used.mean, statistics
         self.n_features_in_ = statistics.inputs
         if len(getattr(self, "feature_names_in_", ())) not in (0, statistics.inputs):
-            del self.feature_names_in_
+            delattr(self, "feature_names_in_")
         self._solve(unit, inputs)
         # Only now: rows that are refused have not been seen, and may be given again.
         self.statistics_ = statistics
@@ -85,7 +97,7 @@ class StatisticsRegressor(RegressorMixin, BaseEstimator):
     def predict(self, X: ArrayLike) -> np.ndarray:
         """Predict the output of rows X (N, d), (N,)."""
         check_is_fitted(self)
-        rows = validate_data(self, X, reset=False, dtype=np.float64)
+        rows = _checked(self, X, reset=False, dtype=np.float64)
         return rows @ self.coef_ + self.intercept_
 
     def _solve(self, unit: Statistics, inputs: np.ndarray) -> None:
@@ -111,7 +123,7 @@ class StatisticsRegressor(RegressorMixin, BaseEstimator):
         return found
 
     def _statistics_of(self, X: ArrayLike, y: ArrayLike, *, reset: bool) -> Statistics:
-        rows, output = validate_data(
+        rows, output = _checked(
             self, X, y, reset=reset, dtype=np.float64, y_numeric=True, ensure_min_samples=1
         )
         if reset and len(rows) < 2:

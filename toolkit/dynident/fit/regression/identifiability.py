@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from sklearn.base import clone
 
 from dynident.errors import FitError
 from dynident.fit.regression.joint_factors import JointFactorRegression
@@ -113,7 +112,7 @@ def start_sensitivity(
     reliabilities : where to start, between 0 and 1.
     """
     each = [
-        clone(regression).set_params(reliability=rho).fit_statistics(regression.statistics_)
+        regression.another(reliability=rho).fit_statistics(regression.statistics_)
         for rho in reliabilities
     ]
     return StartSensitivity(
@@ -154,7 +153,7 @@ def reliability_profile(
     likelihoods, bounds = [], []
     for rho in reliabilities:
         noise = np.where(regression.known_, given, (1 - rho) * variance)
-        own = clone(regression).set_params(input_noise=noise).fit_statistics(statistics)
+        own = regression.another(input_noise=noise).fit_statistics(statistics)
         plain = JointFactorRegression(
             noise,
             max_iter=regression.max_iter,

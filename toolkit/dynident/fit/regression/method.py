@@ -162,8 +162,6 @@ def _fitted(
     names: tuple[str, ...],
 ) -> _Found:
     """Fit one of this room's estimators to the statistics."""
-    from sklearn.base import clone
-
     from dynident.fit.regression.base import StatisticsRegressor
     from dynident.fit.regression.corrected import CorrectedLeastSquares
     from dynident.fit.regression.joint_factors import JointFactorRegression
@@ -175,7 +173,7 @@ def _fitted(
     if np.any(getattr(regressor, "input_noise", None)):
         what = "the estimator's own input_noise is in units that only its rows have"
         raise FitError(what, mend="give it as noise = of Regression")
-    regressor, words = clone(regressor).set_params(fit_intercept=False), regressor.words
+    regressor, words = regressor.another(fit_intercept=False), regressor.words
     takes_noise = isinstance(regressor, CorrectedLeastSquares | JointFactorRegression)
     if psi is not None and not takes_noise:
         what = f"{words} has no place for the noise of its inputs"
@@ -185,8 +183,7 @@ def _fitted(
         raise FitError("corrected least squares needs the noise of the inputs", mend=mend)
     if psi is not None:
         regressor.set_params(input_noise=psi)
-    regressor.feature_names_in_ = np.array(names, dtype=object)
-    regressor.fit_statistics(compressed.statistics)
+    regressor.named(names).fit_statistics(compressed.statistics)
     if isinstance(regressor, CorrectedLeastSquares):
         assert psi is not None
         covariance = sandwich(compressed, regressor.coef_, psi)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from sklearn.cross_decomposition import PLSRegression
@@ -64,6 +65,7 @@ def validated(name: str, rows: Compressed) -> Validated:
         If there is no such regression.
     """
     X, y, split = rows.X, rows.y, PredefinedSplit(rows.piece)
+    found: Any
     if name == "ridge":
         # The inputs have variance one: their squares sum up to the number of rows.
         found = RidgeCV(
