@@ -189,5 +189,7 @@ def test_statistics_of_recordings_suffice() -> None:
     parts = [Statistics.of(X[k::3], y[k::3]) for k in range(3)]
     # As many rounds for both: rounding may end one of them a round sooner.
     one = BayesianFactorRegression(NOISE, max_iter=200).fit(X, y)
-    other = BayesianFactorRegression(NOISE, max_iter=200).fit_statistics(parts[2] + (parts[0] + parts[1]))
+    other = BayesianFactorRegression(NOISE, max_iter=200).fit_statistics(
+        parts[2] + (parts[0] + parts[1])
+    )
     np.testing.assert_allclose(other.coef_true_, one.coef_true_, rtol=1e-8)
