@@ -53,9 +53,13 @@ def true_values(one: Arm) -> np.ndarray:
 
 def errors(one: Arm, found: di.Estimate) -> Errors:
     """Judge an estimate along the true validation motion."""
-    block, true = one.model.block(one.t, one.q, one.v, one.a), true_values(one)
-    sizes = np.linalg.norm(one.model.columns(block).reshape(-1, one.model.size), axis=0)
-    off = np.linalg.norm(sizes * (found.values - true)) / np.linalg.norm(sizes * true)
+    block, basis = one.model.block(one.t, one.q, one.v, one.a), found.basis
+    # What data can tell: a rotor's inertia and that of its link count as their sum.
+    kept = list(basis.independent)
+    true = basis.coordinates(true_values(one))
+    sizes = np.linalg.norm(one.model.columns(block).reshape(-1, one.model.size)[:, kept], axis=0)
+    off = np.linalg.norm(sizes * (basis.coordinates(found.values) - true))
+    off /= np.linalg.norm(sizes * true)
     return Errors(one.error(found), float(off))
 
 
