@@ -304,15 +304,21 @@ class Mechanism:
         return np.tanh(v / self.friction_width)
 
     def _require_no_past(self) -> None:
-        acting = [one for one in self.effects if np.any(one.values)]
-        for one in acting:
+        if self._with_a_past is not None:
+            raise SimulationError(
+                "its torque is not a function of the motion at an instant",
+                self._with_a_past,
+                "simulate it in a closed loop",
+            )
+
+    @cached_property
+    def _with_a_past(self) -> str | None:
+        """The first effect whose torque depends on what went before."""
+        for one in self.effects:
             gives = one.effect.simulated_transmission(one.values, self.robot) is not None
-            if gives or one.effect.memory:
-                raise SimulationError(
-                    "its torque is not a function of the motion at an instant",
-                    one.effect.label,
-                    "simulate it in a closed loop",
-                )
+            if np.any(one.values) and (gives or one.effect.memory):
+                return one.effect.label
+        return None
 
     def acceleration(
         self,

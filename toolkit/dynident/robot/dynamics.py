@@ -103,6 +103,10 @@ class Dynamics:
         self.n = robot.n
         # q_pin = q[:, order]; a permutation is applied only where the order differs.
         self.order = None if order == list(range(self.n)) else np.array(order)
+        # A simulation asks for one sample at a time, of parameters that stay the same.
+        self._held: Array | None = None
+        self._judged: Array | None = None
+        self._extra: Array | None = None
 
     def _sorted(self, *motion: Array) -> list[Array]:
         if self.order is None:
@@ -128,14 +132,23 @@ class Dynamics:
         phi = theta.reshape(self.n, 10)
         if not np.all(np.isfinite(phi)):
             return np.full(q.shape, np.nan)
-        if all(_representable(body) for body in phi):
+        extra = self._extra_masses(phi)
+        if extra is None:
             return self._rnea(q, v, a, phi)
+        return self._rnea(q, v, a, phi + extra) - self._rnea(q, v, a, extra)
+
+    def _extra_masses(self, phi: Array) -> Array | None:
         # Pinocchio holds mass, centre of mass and central inertia, which a massless body with a
         # first moment does not have. The torque is linear in theta: give every body a mass
         # large enough to represent, and take the torque of those masses off again.
-        extra = np.zeros((self.n, 10))
-        extra[:, 0] = np.where([_representable(body) for body in phi], 0.0, _mass_offset(phi))
-        return self._rnea(q, v, a, phi + extra) - self._rnea(q, v, a, extra)
+        if self._judged is None or not np.array_equal(phi, self._judged):
+            sound = [_representable(body) for body in phi]
+            self._extra = None
+            if not all(sound):
+                self._extra = np.zeros((self.n, 10))
+                self._extra[:, 0] = np.where(sound, 0.0, _mass_offset(phi))
+            self._judged = phi.copy()
+        return self._extra
 
     def derivatives(self, q: Array, v: Array, a: Array, theta: Array) -> TorqueDerivatives:
         """Return the derivatives of tau, in the robot's order; theta must be representable."""
@@ -157,10 +170,14 @@ class Dynamics:
         return TorqueDerivatives(*sorted_back)
 
     def _set_inertias(self, phi: Array) -> None:
+        if self._held is not None and np.array_equal(phi, self._held):
+            return
+        self._held = None
         order = range(self.n) if self.order is None else self.order
         for pin_id, index in enumerate(order, start=1):
             body = phi[index]
             self.model.inertias[pin_id] = _inertia(body) if np.any(body) else pin.Inertia.Zero()
+        self._held = phi.copy()
 
     def _rnea(self, q: Array, v: Array, a: Array, phi: Array) -> Array:
         model, data, evaluate = self.model, self.data, pin.rnea
