@@ -24,11 +24,23 @@ def test_a_regression_by_name(run, tmp_path, words):
     assert values["Fv@shoulder"] == pytest.approx(2.0, rel=0.1)
 
 
+def test_what_the_data_do_not_tell(run, tmp_path):
+    path = write_loop_study(tmp_path, LOOP_STUDY)
+    done = run("fit", path, "--method", "factors", "--identifiability")
+    assert done.status == 0
+    assert "Sensitivity of b_true to the start" in done.out
+    assert "What the data tell of the reliability" in done.out
+    told = run("fit", path, "--method", "factors", "--identifiability", "--json").json
+    assert len(told["identifiability"]["starts"]["b_true"]["Fv@shoulder"]) == 3
+    assert isinstance(told["identifiability"]["profile"]["flat"], bool)
+
+
 def test_options_that_do_not_fit(run, tmp_path):
     path = write_loop_study(tmp_path, LOOP_STUDY)
     for words, message in (
         (("--method", "ridge", "--input-noise", "repeats"), "--input-noise goes with"),
         (("--method", "corrected"), "needs --input-noise"),
+        (("--method", "ridge", "--identifiability"), "--identifiability goes with"),
         (("--method", "bayes", "--ordinary"), "--ordinary does not go"),
         (("--method", "bayes", "--consistency", "full"), "--consistency goes with least squares"),
         (("--method", "bayes", "--instruments", "loop"), "--instruments goes with --method iv"),

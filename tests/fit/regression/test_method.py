@@ -17,8 +17,8 @@ from dynident.errors import FitError
 from dynident.fit import Factors, encoder_noise, factorise, input_noise, load_estimate, rows
 from dynident.fit.regression.compressed import compress
 from dynident.fit.regression.joint_factors import BayesianFactorRegression
-from dynident.fit.regression.method import _pieces
 from dynident.fit.regression.named import NAMES
+from dynident.fit.regression.posed import pieces_of
 from synthetic import arm, synthetic, true_values
 
 STD = 2e-4
@@ -192,10 +192,21 @@ def test_noise_of_another_model_is_refused() -> None:
         di.fit(model(), noisy(), di.Regression(Ridge()))  # type: ignore[arg-type]
 
 
+def test_the_estimator_itself_is_handed_out() -> None:
+    method = di.Regression("factors", "encoders")
+    found, estimate = method.regressor(model(), noisy()), di.fit(model(), noisy(), method)
+    assert isinstance(found, di.JointFactorRegression) and found.known_.all()
+    kept = list(estimate.basis.independent)
+    assert found.input_names() == [estimate.names[i] for i in kept]
+    np.testing.assert_array_equal(found.coef_true_, estimate.values[kept])
+    with pytest.raises(FitError, match="ridge is scikit-learn's"):
+        di.Regression("ridge").regressor(model(), noisy())
+
+
 def test_recordings_of_unequal_length_are_cut_into_equal_pieces() -> None:
     short = synthetic(model(), truth(), 4, duration=8.0, torque_std=0.1)
     both = replace(noisy(), recordings=(short, *noisy().recordings))
-    pieces = _pieces(model(), both, None)
+    pieces = pieces_of(model(), both, None)
     counts = np.array([piece.rows for piece in pieces])
     assert len(pieces) == 20 and np.ptp(counts) <= 2
     assert counts.sum() == sum(torque.size for _, torque in rows(model(), both))

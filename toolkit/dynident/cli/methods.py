@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -14,6 +14,7 @@ from dynident.errors import DynidentError, StudyError
 if TYPE_CHECKING:
     from dynident.closed_loop import Controller
     from dynident.fit import IV, Method
+    from dynident.fit.regression.identifiability import ReliabilityProfile, StartSensitivity
     from dynident.study import Study
 
 
@@ -76,6 +77,21 @@ class Chosen:
         if self.method in REGRESSIONS:
             return Regression(self.method, self.input_noise or "none")
         return LeastSquares(weighting)
+
+    def require_unknown_noise(self) -> None:
+        """Refuse to ask what data tell of the inputs' noise where there is none to find."""
+        if self.method not in ("factors", "bayes") or self.input_noise:
+            raise click.UsageError(
+                "--identifiability goes with --method factors or bayes, without --input-noise"
+            )
+
+    def identifiability(self, study: Study) -> tuple[StartSensitivity, ReliabilityProfile]:
+        """Return what start and prior decide of the inputs' noise instead of the data."""
+        from dynident.fit import Regression
+        from dynident.fit.regression.identifiability import reliability_profile, start_sensitivity
+
+        found: Any = Regression(self.method).regressor(study.model, study.train)
+        return start_sensitivity(found), reliability_profile(found)
 
     def iv(self, study: Study, weighting: Literal["joint", "none"], tell: Callable[..., Any]) -> IV:
         """Return the instrumental variable estimator of a study.
@@ -152,8 +168,9 @@ def method_options(command: Callable[..., Any]) -> Callable[..., Any]:
         help="Where iv begins to iterate; default: least_squares.",
     )
     @wraps(command)
-    def run(*args: Any, method, instruments, cutoff, start, input_noise, **options: Any) -> Any:
-        chosen = Chosen(method, instruments, cutoff, start, input_noise)
+    def run(*args: Any, **options: Any) -> Any:
+        names = [field.name for field in fields(Chosen)]
+        chosen = Chosen(**{name: options.pop(name) for name in names})
         return command(*args, chosen=chosen, **options)
 
     return run

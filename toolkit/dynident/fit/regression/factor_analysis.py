@@ -1,4 +1,4 @@
-"""Joint factor analysis of noisy inputs and their output: variational EM on sufficient statistics.
+"""Joint factor analysis of noisy inputs and output: a round of EM on sufficient statistics.
 
 Model of sample i with inputs m: y ~ N(sum z_m, py); z_m ~ N(wz_m t_m, pz_m); x_m ~ N(wx_m t_m,
 px_m); t_m ~ N(0, 1). The Bayesian form has wz_m, wx_m ~ N(0, 1/alpha_m) with one relevance
@@ -12,7 +12,6 @@ z and t eliminated as here it needs X'X, X'y, y'y and N alone.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from enum import Enum
 
 import numpy as np
 from scipy.special import digamma, gammaln
@@ -58,39 +57,6 @@ class Factors:
     def reliability(self) -> np.ndarray:
         """Share of each input's variance that is no noise, wx^2 / (wx^2 + px), (d,)."""
         return self.wx**2 / (self.wx**2 + self.px)
-
-
-class Ending(Enum):
-    """How the iterations ended."""
-
-    CONVERGED = "converged"
-    ROUNDING = "ended in rounding"
-    ROUNDS_EXHAUSTED = "not converged"
-
-
-@dataclass(frozen=True, eq=False)
-class Analysis:
-    """Factors after the last iteration.
-
-    Attributes
-    ----------
-    factors : as found, in the units of the statistics.
-    coefficients : (d,) of E[y | x] under the factors' posterior; with wz, wx uncertain it differs
-        from `factors.noisy` by their variances.
-    bounds : (rounds,) lower bound of the log evidence in nats; the log-likelihood itself in plain
-        joint factor analysis.
-    ending : whether the last round still gained more than the tolerance.
-    """
-
-    factors: Factors
-    coefficients: np.ndarray
-    bounds: np.ndarray
-    ending: Ending
-
-    @property
-    def bound(self) -> float:
-        """The last bound, nats."""
-        return float(self.bounds[-1])
 
 
 @dataclass(frozen=True)
@@ -145,62 +111,11 @@ def begun(factors: Factors, count: int, prior: Gamma | None) -> Factors:
     )
 
 
-def analyse(
-    statistics: Statistics,
-    start: Factors,
-    prior: Gamma | None,
-    known: np.ndarray,
-    *,
-    rounds: int,
-    tolerance: float,
-) -> Analysis:
-    """Iterate until hardly anything is left to gain.
-
-    What is left is told from the last two gains, as if they went on to shrink by the same factor
-    (Aitken): a slow convergence ends no sooner for being slow.
-
-    Parameters
-    ----------
-    statistics : standardised.
-    start : where to begin.
-    prior : of the relevance; None for maximum likelihood (plain joint factor analysis).
-    known : (d,) bool, inputs whose noise px is what the start says.
-    rounds : at most so many.
-    tolerance : nats that may be left.
-    """
-    factors, bounds = start, []
-    at = _Posterior(factors, statistics)
-    ending = Ending.ROUNDS_EXHAUSTED
-    for _ in range(rounds):
-        bounds.append(at.bound(prior))
-        ended = _ended(bounds, tolerance, at.rounding)
-        if ended is not None:
-            ending = ended
-            break
-        factors = at.updated(prior, known)
-        at = _Posterior(factors, statistics)
-    return Analysis(factors, at.b, np.array(bounds), ending)
-
-
-def _ended(bounds: list[float], tolerance: float, rounding: float) -> Ending | None:
-    """Return how the iterations have ended, None if they have not; rounding is of a bound."""
-    if len(bounds) < 2:
-        return None
-    gain = bounds[-1] - bounds[-2]
-    if abs(gain) <= rounding < tolerance:
-        return Ending.CONVERGED
-    if gain <= rounding:
-        return Ending.ROUNDING
-    before = bounds[-2] - bounds[-3] if len(bounds) > 2 else 0.0
-    shrinks = gain < before
-    return Ending.CONVERGED if shrinks and gain**2 <= tolerance * (before - gain) else None
-
-
-class _Posterior:
+class Posterior:
     """Q(Z, T) of all samples at once; names as in the module's docstring, sums over the samples.
 
     Given the inputs, t has the precision a; `seen` is each input's variance with the weights'
-    doubt in it.
+    doubt in it; `b` is that of E[y | x], which differs from `factors.noisy` by that doubt.
 
     The covariance of (z, t) is the same for every sample. With t eliminated, which is diagonal,
     one Sherman-Morrison step is left: <z_i> = b x_i + kappa (y_i - b'x_i) and
@@ -252,7 +167,10 @@ class _Posterior:
         return float(np.sum(weights + own + entropy))
 
     def updated(self, prior: Gamma | None, known: np.ndarray) -> Factors:
-        """Return weights, relevance and variances that maximise the bound, one after the other."""
+        """Return weights, relevance and variances that maximise the bound, one after the other.
+
+        Inputs that are `known` (d,) keep the variance px of their noise.
+        """
         f, N = self.factors, self.statistics.count
         Gd, b, kappa, ct, e = self.Gd, self.b, self.kappa, self.ct, self.e
         var_z = self.g - self.g**2 / (f.py + self.s)

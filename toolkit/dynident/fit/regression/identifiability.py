@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from dynident.errors import FitError
 from dynident.fit.regression.joint_factors import JointFactorRegression
 from dynident.fit.regression.noise import variances_of
+from dynident.fit.regression.statistics import Statistics
 from dynident.tables import Table, number
 
 TOLD = 1.92
 """Nats of log-likelihood between two values of one parameter that tell them apart at 95 %."""
 
 _RELIABILITIES = (0.5, 0.8, 0.95)
+_WORST = 3  # inputs that are shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,38 +27,64 @@ class StartSensitivity:
 
     Attributes
     ----------
+    names : (d,) of the inputs.
     reliabilities : (k,) where the iterations started.
-    coef_true : (k, d) b_noise over the reliability, as it came of each: not pruned, not held.
+    coef_true : (k, d) b_true of each, in the data's units.
+    sizes : (d,) root mean square of each input about its mean.
     bounds : (k,) lower bound reached, nats.
     converged : (k,) bool.
     """
 
+    names: tuple[str, ...]
     reliabilities: np.ndarray
     coef_true: np.ndarray
+    sizes: np.ndarray
     bounds: np.ndarray
     converged: np.ndarray
 
     @property
+    def ranges(self) -> np.ndarray:
+        """Largest difference between two starts' b_true, (d,), times the size of the input."""
+        return np.ptp(self.coef_true, axis=0) * self.sizes
+
+    @property
     def spread(self) -> float:
-        """Largest distance of two starts' b_true over the largest norm of one."""
-        apart = self.coef_true[:, None] - self.coef_true[None]
-        size = np.linalg.norm(self.coef_true, axis=1).max()
-        return float(np.linalg.norm(apart, axis=2).max() / size) if size > 0 else 0.0
+        """Norm of these over the largest norm of one start's, each in units of the output."""
+        size = np.linalg.norm(self.coef_true * self.sizes, axis=1).max()
+        return float(np.linalg.norm(self.ranges) / size) if size > 0 else 0.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what JSON holds: b_true of each start by input, and the bounds in nats."""
+        return {
+            "reliabilities": self.reliabilities.tolist(),
+            "b_true": dict(zip(self.names, self.coef_true.T.tolist(), strict=True)),
+            "bounds": self.bounds.tolist(),
+            "converged": self.converged.tolist(),
+            "spread": self.spread,
+        }
 
     def table(self) -> Table:
-        """Return the starts, the bounds that they reach, and the size of their b_true."""
+        """Return the starts, the bounds that they reach, and the inputs that they move most."""
+        worst = np.argsort(-self.ranges)[:_WORST]
+        worst = worst[self.ranges[worst] > 0]
         rows = tuple(
-            (number(rho, 3), number(bound, 9), number(float(np.linalg.norm(b)), 5), word)
-            for rho, bound, b, word in zip(
-                self.reliabilities,
-                self.bounds,
-                self.coef_true,
-                np.where(self.converged, "converged", "not converged"),
-                strict=True,
+            (
+                number(rho, 3),
+                number(bound, 9),
+                "converged" if ended else "not converged",
+                *(number(b[m], 4) for m in worst),
+            )
+            for rho, bound, ended, b in zip(
+                self.reliabilities, self.bounds, self.converged, self.coef_true, strict=True
             )
         )
-        words = f"Between starts b_true differs by up to {100 * self.spread:.2g} %."
-        columns = ("start of the reliability", "bound, nats", "norm of b_true", "")
+        words = f"Between starts b_true differs by {100 * self.spread:.2g} % of its size"
+        words += "; the inputs that differ most are shown." if len(worst) else "."
+        if np.ptp(self.bounds) > TOLD:
+            words += (
+                " The bounds differ by more than the data allow for: these are different optima."
+            )
+        columns = ("start of the reliability", "bound, nats", "", *(self.names[m] for m in worst))
         return Table("Sensitivity of b_true to the start", columns, rows, (words,))
 
 
@@ -79,6 +108,15 @@ class ReliabilityProfile:
         """Whether the data leave all these reliabilities open, at 95 %."""
         return float(np.ptp(self.likelihoods)) < TOLD
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return what JSON holds; likelihoods and bounds in nats."""
+        return {
+            "reliabilities": self.reliabilities.tolist(),
+            "likelihoods": self.likelihoods.tolist(),
+            "bounds": self.bounds.tolist(),
+            "flat": self.flat,
+        }
+
     def table(self) -> Table:
         """Return the profile, with what follows from it."""
         rows = tuple(
@@ -92,8 +130,8 @@ class ReliabilityProfile:
         words = f"Between reliabilities {least:g} and {most:g} the likelihood changes by "
         words += f"{change:.2g} nats: "
         words += (
-            "the data do not tell the reliability, and b_true = b_noise / reliability is what "
-            "start and prior say. Give the input noise."
+            "means and covariances do not tell the reliability, and b_true = b_noise / "
+            "reliability is what start and prior say. Give the input noise."
             if self.flat
             else "the data speak against some of them."
         )
@@ -116,16 +154,18 @@ def start_sensitivity(
         for rho in reliabilities
     ]
     return StartSensitivity(
+        tuple(regression.input_names()),
         np.array(reliabilities, dtype=float),
-        np.array([_unfolded(one) for one in each]),
+        np.array([one.coef_true_ for one in each]),
+        _used(regression).scale[:-1],
         np.array([one.bounds_[-1] for one in each]),
         np.array([one.converged_ for one in each]),
     )
 
 
-def _unfolded(regression: JointFactorRegression) -> np.ndarray:
-    rho = regression.reliability_
-    return np.divide(regression.coef_noisy_, rho, out=np.zeros_like(rho), where=rho > 0)
+def _used(regression: JointFactorRegression) -> Statistics:
+    statistics = regression.statistics_
+    return statistics if regression.fit_intercept else statistics.about_origin()
 
 
 def reliability_profile(
@@ -147,8 +187,7 @@ def reliability_profile(
         mend = "there is nothing to profile: leave one to be found"
         raise FitError("the noise of every input is given", mend=mend)
     statistics = regression.statistics_
-    used = statistics if regression.fit_intercept else statistics.about_origin()
-    variance = used.scale[:-1] ** 2
+    variance = _used(regression).scale[:-1] ** 2
     given = variances_of(regression.input_noise, statistics.inputs)
     likelihoods, bounds = [], []
     for rho in reliabilities:

@@ -11,7 +11,8 @@ from scipy import stats
 from dynident.errors import FitError
 from dynident.fit.regression.base import StatisticsRegressor
 from dynident.fit.regression.corrected import CorrectedLeastSquares
-from dynident.fit.regression.factor_analysis import Analysis, Ending, Gamma, analyse, start_of
+from dynident.fit.regression.factor_analysis import Gamma, start_of
+from dynident.fit.regression.iterations import Analysis, Ending, analyse
 from dynident.fit.regression.noise import variances_of
 from dynident.fit.regression.statistics import Statistics
 from dynident.fit.regression.truncated import squared_tolerance
@@ -43,8 +44,8 @@ class JointFactorRegression(StatisticsRegressor):
     reliability : share of the inputs' variance that is signal, where the iterations start.
     queries : what `predict` and `coef_` are for: "noisy" inputs or "noiseless" ones.
     max_iter : at most so many rounds of expectation maximisation.
-    tol : nats of the bound that all further rounds together may still gain, as the last ones
-        shrink, when the iterations end; half a nat is what one standard deviation is worth.
+    tol : nats of the bound that some thousand further rounds may still gain when the iterations
+        end; half a nat is what one standard deviation is worth.
     fit_intercept : False for a regression through the origin.
 
     Attributes
@@ -55,7 +56,7 @@ class JointFactorRegression(StatisticsRegressor):
     known_ : (d,) bool, inputs whose noise was given.
     pruned_ : (d,) bool, inputs that were taken out: their b_true is zero.
     basis_ : which inputs are combinations of the others, and the rank decision.
-    bounds_ : (n_iter_,) lower bound of the log evidence in nats, in order.
+    bounds_ : lower bound of the log evidence in nats, in order: of rounds, and of leaps over some.
     ending_ : how the iterations ended, in words.
     converged_ : whether by themselves.
     n_iter_ : rounds.
@@ -150,7 +151,7 @@ class JointFactorRegression(StatisticsRegressor):
 
     def _keep(self, analysis: Analysis, unit: Statistics, inputs: np.ndarray) -> None:
         d, factors = len(self._scale) - 1, analysis.factors
-        self.bounds_, self.n_iter_ = analysis.bounds, len(analysis.bounds)
+        self.bounds_, self.n_iter_ = analysis.bounds, analysis.rounds
         self.ending_ = analysis.ending.value
         self.converged_ = analysis.ending is not Ending.ROUNDS_EXHAUSTED
         self.reliability_, self.pruned_ = np.zeros(d), np.zeros(d, dtype=bool)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
@@ -11,17 +10,10 @@ import numpy as np
 from dynident.errors import FitError
 from dynident.fit.encoder_noise import encoder_noise
 from dynident.fit.estimate import Estimate
-from dynident.fit.factors import Factors, factorise
 from dynident.fit.input_noise import InputNoise, input_noise
-from dynident.fit.least_squares import (
-    LeastSquares,
-    Solution,
-    estimate_of,
-    residual_std,
-    solve_factors,
-)
-from dynident.fit.regression.compressed import Compressed, compress, sandwich
-from dynident.fit.sampling import rows, sample
+from dynident.fit.least_squares import Solution, estimate_of, residual_std
+from dynident.fit.regression.compressed import Compressed, sandwich
+from dynident.fit.regression.posed import PIECES, Posed, pose
 from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.tables import Table
@@ -31,9 +23,7 @@ if TYPE_CHECKING:
     from dynident.fit.regression.base import StatisticsRegressor
     from dynident.fit.regression.corrected import CorrectedLeastSquares
 
-PIECES = 20
-"""Consecutive pieces of the data, between which estimates scatter."""
-_FOLDS = 5  # of these pieces, between which penalties are validated
+_FOLDS = 5  # of the pieces, between which penalties are validated
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,54 +59,68 @@ class Regression:
             If there is no such regression, it needs an input noise that is not given, or the data
             cannot carry the model.
         """
-        settled = LeastSquares().fit(model, dataset)
-        model, basis = settled.model, settled.basis
-        values = settled.values if model.needs_values else None
-        pieces = _pieces(model, dataset, values)
-        factors = _whole(pieces)
-        first = solve_factors(model, factors)
-        kept = list(basis.independent)
-        compressed = compress(pieces, 1.0 / first.torque_std)
-        compressed = replace(compressed, X=compressed.X[:, kept])
-        found = self._regressed(model, dataset, values, compressed, kept)
-        lifted = basis.lift(found.values, model.given_values())
-        covariance = np.zeros((model.size, model.size))
+        posed = pose(model, dataset)
+        found = self._found(posed, dataset)
+        covariance = np.zeros((posed.model.size, posed.model.size))
         if found.covariance is not None:
-            covariance[np.ix_(kept, kept)] = found.covariance
+            covariance[np.ix_(posed.kept, posed.kept)] = found.covariance
+        first = posed.first
         solution = Solution(
-            lifted,
+            posed.basis.lift(found.values, posed.model.given_values()),
             covariance,
-            basis,
+            posed.basis,
             first.torque_std,
             first.condition_number,
             (*first.notes, *found.notes),
         )
-        solution = replace(solution, torque_std=residual_std(factors, solution))
-        estimate = estimate_of(found.words, "joint", model, dataset, factors, solution)
+        solution = replace(solution, torque_std=residual_std(posed.factors, solution))
+        estimate = estimate_of(found.words, "joint", posed.model, dataset, posed.factors, solution)
         return replace(estimate, status=found.status, details=found.details)
 
-    def _regressed(
-        self,
-        model: Model,
-        dataset: Dataset,
-        values: np.ndarray | None,
-        compressed: Compressed,
-        kept: list[int],
-    ) -> _Found:
-        from dynident.fit.regression.named import NAMES, own, validated
+    @single_threaded
+    def regressor(self, model: Model, dataset: Dataset) -> StatisticsRegressor:
+        """Return the fitted estimator itself, its inputs named as the parameters are.
 
-        regressor = own(self.estimator) if isinstance(self.estimator, str) else self.estimator
-        if regressor is not None:
-            noise = self._noise(model, dataset, values)
-            psi = None if noise is None else noise.per_row(model.names)[np.ix_(kept, kept)]
-            return _fitted(regressor, compressed, psi, tuple(model.names[i] for i in kept))
+        It knows more than an estimate holds: `start_sensitivity` and `reliability_profile` take
+        it, and say what the data tell of the noise in the inputs.
+
+        Raises
+        ------
+        FitError
+            As `fit`; or if the regression is one of scikit-learn's.
+        """
+        regressor = self._own()
+        if regressor is None:
+            what = f"{self.estimator} is scikit-learn's, fitted to compressed rows"
+            raise FitError(
+                what, mend="choose bayes, factors, corrected, truncated, stepwise or total"
+            )
+        posed = pose(model, dataset)
+        return _fitted(regressor, posed, self._psi(posed, dataset))
+
+    def _own(self) -> StatisticsRegressor | None:
+        """Return this room's estimator of that name; None if it is scikit-learn's."""
+        from dynident.fit.regression.named import NAMES, own
+
+        if not isinstance(self.estimator, str):
+            return self.estimator
         if self.estimator not in NAMES:
             what = f"no regression '{self.estimator}'"
             raise FitError(what, mend=f"choose {', '.join(NAMES)}")
+        return own(self.estimator)
+
+    def _found(self, posed: Posed, dataset: Dataset) -> _Found:
+        from dynident.fit.regression.named import validated
+
+        regressor = self._own()
+        if regressor is not None:
+            psi = self._psi(posed, dataset)
+            return _told(_fitted(regressor, posed, psi), posed.compressed, psi)
         assert isinstance(self.estimator, str)
         if not (isinstance(self.noise, str) and self.noise == "none"):
             what = f"{self.estimator} has no place for the noise of its inputs"
             raise FitError(what, mend="leave it out, or choose corrected, factors or bayes")
+        compressed = posed.compressed
         scale = np.sqrt(np.mean(compressed.X**2, axis=0))
         folds = compressed.piece * _FOLDS // (compressed.piece.max() + 1)
         unit = replace(compressed, X=compressed.X / scale, piece=folds)
@@ -127,6 +131,13 @@ class Regression:
         )
         words = f"{self.estimator} regression"
         return _Found(chosen.coefficients / scale, None, words, "solved", notes, ())
+
+    def _psi(self, posed: Posed, dataset: Dataset) -> np.ndarray | None:
+        """Covariance of the inputs' noise in a row; None where it is not known."""
+        noise = self._noise(posed.model, dataset, posed.values)
+        if noise is None:
+            return None
+        return noise.per_row(posed.model.names)[np.ix_(posed.kept, posed.kept)]
 
     def _noise(
         self, model: Model, dataset: Dataset, values: np.ndarray | None
@@ -156,16 +167,12 @@ class _Found:
 
 
 def _fitted(
-    regressor: StatisticsRegressor,
-    compressed: Compressed,
-    psi: np.ndarray | None,
-    names: tuple[str, ...],
-) -> _Found:
+    regressor: StatisticsRegressor, posed: Posed, psi: np.ndarray | None
+) -> StatisticsRegressor:
     """Fit one of this room's estimators to the statistics."""
     from dynident.fit.regression.base import StatisticsRegressor
     from dynident.fit.regression.corrected import CorrectedLeastSquares
     from dynident.fit.regression.joint_factors import JointFactorRegression
-    from dynident.fit.regression.summary import summary
 
     if not isinstance(regressor, StatisticsRegressor):
         what = f"a {type(regressor).__name__} is no regression from sufficient statistics"
@@ -173,17 +180,27 @@ def _fitted(
     if np.any(getattr(regressor, "input_noise", None)):
         what = "the estimator's own input_noise is in units that only its rows have"
         raise FitError(what, mend="give it as noise = of Regression")
-    regressor, words = regressor.another(fit_intercept=False), regressor.words
+    regressor = regressor.another(fit_intercept=False)
     takes_noise = isinstance(regressor, CorrectedLeastSquares | JointFactorRegression)
     if psi is not None and not takes_noise:
-        what = f"{words} has no place for the noise of its inputs"
+        what = f"{regressor.words} has no place for the noise of its inputs"
         raise FitError(what, mend="leave it out, or choose corrected, factors or bayes")
     if psi is None and isinstance(regressor, CorrectedLeastSquares):
         mend = 'state noise = "repeats" or "encoders"'
         raise FitError("corrected least squares needs the noise of the inputs", mend=mend)
     if psi is not None:
         regressor.set_params(input_noise=psi)
-    regressor.named(names).fit_statistics(compressed.statistics)
+    names = [posed.model.names[i] for i in posed.kept]
+    return regressor.named(names).fit_statistics(posed.compressed.statistics)
+
+
+def _told(regressor: StatisticsRegressor, compressed: Compressed, psi: np.ndarray | None) -> _Found:
+    """Take from a fitted estimator what an estimate holds."""
+    from dynident.fit.regression.corrected import CorrectedLeastSquares
+    from dynident.fit.regression.joint_factors import JointFactorRegression
+    from dynident.fit.regression.summary import summary
+
+    words = regressor.words
     if isinstance(regressor, CorrectedLeastSquares):
         assert psi is not None
         covariance = sandwich(compressed, regressor.coef_, psi)
@@ -212,31 +229,3 @@ def _worth(regressor: CorrectedLeastSquares) -> tuple[str, ...]:
         overstated = "The input noise is overstated: it would leave the torque less than none."
         notes = (overstated, *notes)
     return notes
-
-
-def _pieces(model: Model, dataset: Dataset, values: np.ndarray | None) -> list[Factors]:
-    """Factors of consecutive pieces of the data, equally long to a row."""
-    total = sum(len(sample(one, dataset.filter).t) for one in dataset.recordings)
-    borders = np.round(np.arange(1, PIECES + 1) * total / PIECES).astype(int)
-    pieces: list[list[Factors]] = [[] for _ in borders]
-    first = 0
-    for columns, torque in rows(model, dataset, values):
-        last = first + len(torque)
-        cuts = np.unique(np.clip(np.append(borders, [first, last]), first, last))
-        for start, stop in pairwise(cuts):
-            part = slice(start - first, stop - first)
-            piece = int(np.searchsorted(borders, start, side="right"))
-            pieces[piece].append(factorise([(columns[part], torque[part])]))
-        first = last
-    return [_whole(parts) for parts in pieces if parts]
-
-
-def _whole(parts: list[Factors]) -> Factors:
-    """Factors of all the parts together."""
-    R = np.stack(
-        [
-            np.linalg.qr(np.vstack([part.R[j] for part in parts]), mode="r")
-            for j in range(len(parts[0].counts))
-        ]
-    )
-    return Factors(R, np.sum([part.counts for part in parts], axis=0))

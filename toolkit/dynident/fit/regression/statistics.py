@@ -24,6 +24,17 @@ class Statistics:
     count : rows seen, N.
     mean : (d + 1,) of the inputs, and of the output at the end.
     scatter : (d + 1, d + 1) sums of products about the mean, the output last.
+
+    Examples
+    --------
+    Each recording where its file is, and their sum over processes or a Dask cluster:
+
+    >>> def of_file(path):
+    ...     X, y = rows_of(path)
+    ...     return di.Statistics.of(X, y)
+    >>> futures = client.map(of_file, paths)  # client: of dask.distributed
+    >>> total = client.submit(reduce, operator.add, futures).result()
+    >>> di.BayesianFactorRegression().fit_statistics(total)
     """
 
     count: int

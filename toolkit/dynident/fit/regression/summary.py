@@ -53,8 +53,8 @@ def _notes(regression: JointFactorRegression) -> tuple[str, ...]:
     if np.any(unknown):
         words = "all inputs" if unknown.all() else _listed(names, unknown)
         notes.append(
-            f"The noise of {words} was not given. The data do not tell it: b_true is what start "
-            "and prior say, and has no sigma."
+            f"The noise of {words} was not given. Means and covariances do not tell it: b_true is "
+            "what start and prior say, and has no sigma."
         )
     elif corrected is None:
         notes.append(

@@ -1,0 +1,164 @@
+"""Rounds of variational EM until hardly anything is left to gain, faster where they creep.
+
+Along a reliability that the data hardly tell, EM takes ten thousand rounds and more. Near where it
+goes it is a linear iteration whose errors shrink by factors between 0 and 1, and Chebyshev
+polynomials of it gain with the square of their degree what rounds gain one by one. A leap of that
+kind is kept where the bound is higher after it; how much leaps still gain tells when to stop.
+
+Golub and Varga, "Chebyshev semi-iterative methods, successive overrelaxation iterative methods, and
+second order Richardson iterative methods", Numerische Mathematik 3 (1961). Schemes that tell their
+steps from the last differences (SQUAREM) are no faster, and their paths are chaotic: inputs in
+another order or unit, whose rounding differs, would get another answer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from dynident.fit.regression.factor_analysis import LEAST_VARIANCE, Factors, Gamma, Posterior
+from dynident.fit.regression.statistics import Statistics
+
+_QUIET = 5
+"""Leaps in a row that gain next to nothing: one may just have been unlucky."""
+_NOTHING = 1e-3  # of the tolerance: a leap that gains no more is neither right nor wrong
+_DEGREES = (2, 32)  # of a leap, least and most
+_GROWTH, _RETREAT = 1.3, 2.0  # of the degree, after a leap that was right and one that was not
+_LOGARITHM = 80.0  # largest, of a variance that a leap may ask for
+
+
+class Ending(Enum):
+    """How the iterations ended."""
+
+    CONVERGED = "converged"
+    ROUNDING = "ended in rounding"
+    ROUNDS_EXHAUSTED = "not converged"
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """Where the iterations ended.
+
+    Attributes
+    ----------
+    factors : in the units of the statistics.
+    coefficients : (d,) of E[y | x] under the factors' posterior; with wz, wx uncertain it differs
+        from `factors.noisy` by their variances.
+    rounds : how many there were, those of leaps counted.
+    bounds : lower bound of the log evidence in nats, of every plain round and every leap; the last
+        one is that of `factors`. In plain joint factor analysis the log-likelihood itself.
+    ending : whether they ended by themselves.
+    """
+
+    factors: Factors
+    coefficients: np.ndarray
+    rounds: int
+    bounds: np.ndarray
+    ending: Ending
+
+    @property
+    def bound(self) -> float:
+        """The last bound, nats."""
+        return float(self.bounds[-1])
+
+
+def analyse(
+    statistics: Statistics,
+    start: Factors,
+    prior: Gamma | None,
+    known: np.ndarray,
+    *,
+    rounds: int,
+    tolerance: float,
+) -> Analysis:
+    """Iterate until hardly anything is left to gain.
+
+    What is left is told from what leaps gain, in proportion to the square of their degree up to the
+    largest, which is worth two thousand rounds of slow progress. Rounds do not tell it: where they
+    creep, the difference between two gains is rounding.
+
+    Parameters
+    ----------
+    statistics : standardised.
+    start : where to begin.
+    prior : of the relevance; None for maximum likelihood (plain joint factor analysis).
+    known : (d,) bool, inputs whose noise px is what the start says.
+    rounds : at most so many.
+    tolerance : nats that a leap of the largest degree may still gain.
+    """
+    here = Posterior(start, statistics)
+    bounds, used, in_a_row, degree, quiet = [here.bound(prior)], 0, 0, _DEGREES[0], 0
+    ending = Ending.ROUNDS_EXHAUSTED
+    while used < rounds:
+        here = Posterior(here.updated(prior, known), statistics)
+        bounds.append(here.bound(prior))
+        used, in_a_row = used + 1, in_a_row + 1
+        gain = bounds[-1] - bounds[-2]
+        if gain <= here.rounding:
+            at_rest = abs(gain) <= here.rounding < tolerance
+            ending = Ending.CONVERGED if at_rest else Ending.ROUNDING
+            break
+        if in_a_row < 2 or used + degree > rounds:
+            continue
+        used, in_a_row = used + degree, 0
+        # Gains that grow are those of a saddle that is being left.
+        growing = gain - (bounds[-2] - bounds[-3]) > here.rounding
+        there = _leap(here, prior, known, degree)
+        won, nothing = there.bound(prior) - bounds[-1], max(_NOTHING * tolerance, here.rounding)
+        if not won >= -nothing:
+            degree = max(int(degree / _RETREAT), _DEGREES[0])
+            continue
+        little = won * (_DEGREES[1] / degree) ** 2 <= tolerance
+        quiet = quiet + 1 if little and not growing else 0
+        degree = min(int(_GROWTH * degree + 1), _DEGREES[1])
+        if won > nothing:
+            here = there
+            bounds.append(bounds[-1] + won)
+        if quiet == _QUIET:
+            ending = Ending.CONVERGED
+            break
+    return Analysis(here.factors, here.b, used, np.array(bounds), ending)
+
+
+def _leap(here: Posterior, prior: Gamma | None, known: np.ndarray, degree: int) -> Posterior:
+    """Apply T_n(2 M - 1) for the linear map M that a round is near its end; n is the degree."""
+
+    def place(coordinates: np.ndarray) -> Posterior:
+        found = _factors(coordinates, here.factors)
+        found = replace(found, px=np.where(known, here.factors.px, found.px))
+        return Posterior(found, here.statistics)
+
+    last = _coordinates(here.factors)
+    now = 2 * _coordinates(here.updated(prior, known)) - last
+    for _ in range(degree - 1):
+        after = _coordinates(place(now).updated(prior, known))
+        last, now = now, 2 * (2 * after - now) - last
+    return place(now)
+
+
+_POSITIVE = ("wz_var", "wx_var", "relevance", "pz", "px")
+
+
+def _positive(factors: Factors) -> tuple[str, ...]:
+    """Names of what is positive; the weights' variances are zero in plain joint factor analysis."""
+    return _POSITIVE if np.all(factors.wz_var > 0) else _POSITIVE[3:]
+
+
+def _coordinates(factors: Factors) -> np.ndarray:
+    """Return weights, and logarithms of what is positive."""
+    logs = [np.log(getattr(factors, name)) for name in _positive(factors)]
+    return np.concatenate([factors.wz, factors.wx, *logs, [np.log(factors.py)]])
+
+
+def _factors(coordinates: np.ndarray, like: Factors) -> Factors:
+    names = _positive(like)
+    wz, wx, *logs = coordinates[:-1].reshape(2 + len(names), -1)
+    sizes = {
+        name: np.exp(np.clip(log, -_LOGARITHM, _LOGARITHM))
+        for name, log in zip(names, logs, strict=True)
+    }
+    pz, px = (np.maximum(sizes.pop(name), LEAST_VARIANCE) for name in ("pz", "px"))
+    py = max(float(np.exp(np.clip(coordinates[-1], None, _LOGARITHM))), LEAST_VARIANCE)
+    return replace(like, wz=wz, wx=wx, pz=pz, px=px, py=py, **sizes)
