@@ -17,7 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynident.fit.regression.factor_analysis import Gamma, analyse, start_of
+from dynident.fit.regression.factor_analysis import Gamma, start_of
+from dynident.fit.regression.iterations import analyse
 from dynident.fit.regression.statistics import Statistics
 from dynident.threads import single_threaded
 
@@ -69,8 +70,8 @@ def iterations(statistics: Statistics) -> float:
     prior, known = Gamma(), np.zeros(unit.inputs, dtype=bool)
     start = start_of(unit, 0.8, prior)
     began = time.process_time()
-    analyse(unit, start, prior, known, rounds=ROUNDS, tolerance=-np.inf)
-    return (time.process_time() - began) / ROUNDS
+    found = analyse(unit, start, prior, known, rounds=ROUNDS, tolerance=-np.inf)
+    return (time.process_time() - began) / found.rounds
 
 
 @single_threaded
