@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import copy
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import nbformat
@@ -26,17 +29,28 @@ def code_cells(notebook: nbformat.NotebookNode) -> list[nbformat.NotebookNode]:
     return [cell for cell in notebook.cells if cell.cell_type == "code"]
 
 
+@pytest.fixture(scope="session")
+def fonts(tmp_path_factory) -> Path:
+    """Matplotlib's folder, with a list of its own fonts alone."""
+    folder = tmp_path_factory.mktemp("matplotlib")
+    own = {"MPLCONFIGDIR": str(folder), "MPL_IGNORE_SYSTEM_FONTS": "1"}
+    listing = [sys.executable, "-c", "import matplotlib.font_manager"]
+    subprocess.run(listing, env={**os.environ, **own}, check=True)
+    return folder
+
+
 def test_there_are_notebooks() -> None:
     assert NOTEBOOKS
     assert all(re.fullmatch(r"\d\d_[a-z0-9_]+", path.stem) for path in NOTEBOOKS)
 
 
 @each_notebook
-def test_it_runs_from_top_to_bottom(path: Path, tmp_path: Path, monkeypatch) -> None:
+def test_it_runs_from_top_to_bottom(path: Path, tmp_path: Path, fonts: Path, monkeypatch) -> None:
     from nbclient import NotebookClient
 
-    # Nothing of the user's own: no start-up files, no history.
+    # Nothing of the user's own: no start-up files, no history, no list of fonts from before.
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path))
+    monkeypatch.setenv("MPLCONFIGDIR", str(fonts))
     notebook = copy.deepcopy(read(path))
     for cell in code_cells(notebook):
         cell.outputs, cell.execution_count = [], None
