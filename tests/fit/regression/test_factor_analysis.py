@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from scipy import stats
 
 from dynident.fit.regression.factor_analysis import Factors, Gamma, Posterior, begun, start_of
-from dynident.fit.regression.iterations import Analysis, Ending, analyse
+from dynident.fit.regression.iterations import Analysis, Ending, _leap, analyse
 from dynident.fit.regression.statistics import Statistics
 
 
@@ -183,6 +184,17 @@ def test_leaps_end_where_plain_rounds_end(prior: Gamma | None) -> None:
     assert found.ending is Ending.CONVERGED
     assert found.bound == pytest.approx(at.bound(prior), abs=0.02)
     np.testing.assert_allclose(found.coefficients, at.b, atol=2e-3)
+
+
+def test_leaps_out_of_the_numbers_have_no_bound() -> None:
+    """Over a variance that underflows, as it may far from the end: such a leap is not taken."""
+    statistics = random_problem(17)
+    factors = start_of(statistics, 0.8, Gamma())
+    known = np.zeros(statistics.inputs, dtype=bool)
+    lost = replace(factors, wz_var=np.where(np.arange(len(known)) == 0, 0.0, factors.wz_var))
+    with np.errstate(all="ignore"):
+        there = _leap(Posterior(lost, statistics), Gamma(), known, 4)
+        assert np.isnan(there.bound(Gamma()))
 
 
 def test_rounds_that_do_not_suffice_are_told() -> None:

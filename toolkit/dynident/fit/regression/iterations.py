@@ -105,9 +105,11 @@ def analyse(
         used, in_a_row = used + degree, 0
         # Gains that grow are those of a saddle that is being left.
         growing = gain - (bounds[-2] - bounds[-3]) > here.rounding
-        there = _leap(here, prior, known, degree)
-        won, nothing = there.bound(prior) - bounds[-1], max(_NOTHING * tolerance, here.rounding)
-        if not won >= -nothing:
+        with np.errstate(all="ignore"):  # it may go anywhere: its bound tells
+            there = _leap(here, prior, known, degree)
+            won = there.bound(prior) - bounds[-1]
+        nothing = max(_NOTHING * tolerance, here.rounding)
+        if not -nothing <= won < np.inf:
             degree = max(int(degree / _RETREAT), _DEGREES[0])
             continue
         little = won * (_DEGREES[1] / degree) ** 2 <= tolerance
@@ -123,42 +125,42 @@ def analyse(
 
 
 def _leap(here: Posterior, prior: Gamma | None, known: np.ndarray, degree: int) -> Posterior:
-    """Apply T_n(2 M - 1) for the linear map M that a round is near its end; n is the degree."""
+    """Apply T_n(2 M - 1) for the linear map M that a round is near its end; n is the degree.
+
+    Far from there it may end anywhere, out of the numbers as well: then its bound is no number.
+    """
+    # The weights have no variance in plain joint factor analysis.
+    positive = _VARIANCES if prior is None else _POSITIVE
 
     def place(coordinates: np.ndarray) -> Posterior:
-        found = _factors(coordinates, here.factors)
+        found = _factors(coordinates, positive, here.factors)
         found = replace(found, px=np.where(known, here.factors.px, found.px))
         return Posterior(found, here.statistics)
 
-    last = _coordinates(here.factors)
-    now = 2 * _coordinates(here.updated(prior, known)) - last
+    last = _coordinates(here.factors, positive)
+    now = 2 * _coordinates(here.updated(prior, known), positive) - last
     for _ in range(degree - 1):
-        after = _coordinates(place(now).updated(prior, known))
+        after = _coordinates(place(now).updated(prior, known), positive)
         last, now = now, 2 * (2 * after - now) - last
     return place(now)
 
 
-_POSITIVE = ("wz_var", "wx_var", "relevance", "pz", "px")
+_VARIANCES = ("pz", "px")
+_POSITIVE = ("wz_var", "wx_var", "relevance", *_VARIANCES)
 
 
-def _positive(factors: Factors) -> tuple[str, ...]:
-    """Names of what is positive; the weights' variances are zero in plain joint factor analysis."""
-    return _POSITIVE if np.all(factors.wz_var > 0) else _POSITIVE[3:]
-
-
-def _coordinates(factors: Factors) -> np.ndarray:
+def _coordinates(factors: Factors, positive: tuple[str, ...]) -> np.ndarray:
     """Return weights, and logarithms of what is positive."""
-    logs = [np.log(getattr(factors, name)) for name in _positive(factors)]
+    logs = [np.log(getattr(factors, name)) for name in positive]
     return np.concatenate([factors.wz, factors.wx, *logs, [np.log(factors.py)]])
 
 
-def _factors(coordinates: np.ndarray, like: Factors) -> Factors:
-    names = _positive(like)
-    wz, wx, *logs = coordinates[:-1].reshape(2 + len(names), -1)
+def _factors(coordinates: np.ndarray, positive: tuple[str, ...], like: Factors) -> Factors:
+    wz, wx, *logs = coordinates[:-1].reshape(2 + len(positive), -1)
     sizes = {
         name: np.exp(np.clip(log, -_LOGARITHM, _LOGARITHM))
-        for name, log in zip(names, logs, strict=True)
+        for name, log in zip(positive, logs, strict=True)
     }
-    pz, px = (np.maximum(sizes.pop(name), LEAST_VARIANCE) for name in ("pz", "px"))
+    pz, px = (np.maximum(sizes.pop(name), LEAST_VARIANCE) for name in _VARIANCES)
     py = max(float(np.exp(np.clip(coordinates[-1], None, _LOGARITHM))), LEAST_VARIANCE)
     return replace(like, wz=wz, wx=wx, pz=pz, px=px, py=py, **sizes)
