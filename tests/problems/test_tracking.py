@@ -77,6 +77,13 @@ def test_a_true_model_follows_best_and_a_wrong_one_is_lost(head: Any) -> None:
     assert tracking.tracked(head, wrong, 1, SHORT) == ()
 
 
+def test_a_controller_that_cannot_be_is_no_failure_of_an_estimate(head: Any) -> None:
+    settings = {**head.published["controller"], "damping": -1.0}
+    wrong = replace(head, published={**head.published, "controller": settings})
+    with pytest.raises(di.errors.SimulationError, match=r"controller\.kd"):
+        tracking.tracked(wrong, head.experiment.mechanism(), 1, SHORT)
+
+
 def test_adding_the_missing_friction_is_worth_more_than_any_regression(
     head: Any,
 ) -> None:
