@@ -16,6 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from joblib import Parallel, delayed
+from rich.progress import track
 from scipy import stats
 
 import dynident as di
@@ -23,6 +25,7 @@ from dynident.closed_loop import ClosedLoop, Fourier, Mechanism, Rollout, Task
 from dynident.errors import SimulationError
 from dynident.fit import Metric
 from dynident.tables import Table, number, print_tables
+from dynident.threads import single_threaded
 
 RUN = 60.0
 """s of one recording; each has sinusoids of its own."""
@@ -30,6 +33,8 @@ FOLLOWED = 20.0
 """s that each motion lasts."""
 MOTIONS = 6
 """How many motions each controller is given to follow."""
+SETS = 5
+"""Training sets that a table is a mean over."""
 LOST = 1.0
 """RMS position error of a joint, in units of its upper limit, beyond which a loop has failed."""
 FAILURES = ("unstable", "inertia", "massless")
@@ -45,8 +50,13 @@ METHODS: dict[str, Any] = {
     "corrected": di.Regression("corrected", "encoders"),
 }
 
-ADDED = "dry friction added"
-"""Least squares again, with the effect that the model lacks."""
+ADDED: dict[str, Any] = {
+    "dry friction added": di.LeastSquares(),
+    "dry friction added, corrected": di.Regression("corrected", "encoders"),
+}
+"""Once more, with the effect that the model lacks."""
+
+EVERY = (*METHODS, *ADDED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +107,7 @@ def sinusoids(robot: di.Robot, seed: int, published: dict[str, Any]) -> Fourier:
     return Fourier(period, np.zeros(robot.n), sine, cosine)
 
 
-def setting(folder: Path, samples: int, seed: int = 1, progress: Any = None) -> Setting:
+def setting(folder: Path, samples: int, seed: int = 1) -> Setting:
     """Record a robot for so many samples, in pieces of a minute."""
     published = tomllib.loads((folder / "published.toml").read_text())
     experiment = di.load_experiment(folder / "experiment.toml")
@@ -116,7 +126,7 @@ def setting(folder: Path, samples: int, seed: int = 1, progress: Any = None) -> 
         for k, length in enumerate(lengths)
     )
     experiment = replace(experiment, runs=runs, seed=seed)
-    recordings = tuple(one.replace(period=None) for one in experiment.run(progress))
+    recordings = tuple(one.replace(period=None) for one in experiment.run())
     nominal = experiment.nominal or experiment.robot
     model = di.Model(
         nominal,
@@ -140,7 +150,7 @@ def setting(folder: Path, samples: int, seed: int = 1, progress: Any = None) -> 
 def estimates(one: Setting, only: Collection[str]) -> Iterator[tuple[str, di.Estimate | str]]:
     """Each method's estimate, projected; or why there is none."""
     entrants = [(name, one.model, method) for name, method in METHODS.items()]
-    entrants.append((ADDED, one.richer, di.LeastSquares()))
+    entrants += [(name, one.richer, method) for name, method in ADDED.items()]
     metric_of = cache(lambda model: Metric.of_data(model, one.dataset))
     for name, model, method in entrants:
         if name in only:
@@ -202,65 +212,82 @@ def _errors(rollout: Rollout, task: Task, nominal: Mechanism) -> Tracking:
     return Tracking(*(float(np.sqrt(np.mean(x**2))) for x in each))
 
 
-def table(one: Setting, motions: int = MOTIONS, only: Collection[str] = (*METHODS, ADDED)) -> Table:
-    """The paper's table: every method in the loop, over some motions, beside its figures."""
-    rows, first = [], None
-    for name, estimate in estimates(one, only):
-        refused = isinstance(estimate, str)
-        each = () if refused else tracked(one, believed(estimate), motions)
-        first = each if first is None else first
-        claimed = one.published["paper"].get(name.lower(), ())
-        told = " / ".join(str(x) for x in claimed)
-        rows.append((name, *_cells(each), _change(each, first), told, estimate if refused else ""))
+Outcome = tuple[Tracking, ...] | str
+"""Of an estimate: its errors, motion by motion, none where the loop failed; or why it is none."""
+
+
+@single_threaded
+def trial(
+    folder: Path, samples: int, seed: int, motions: int = MOTIONS, only: Collection[str] = EVERY
+) -> dict[str, Outcome]:
+    """Record one training set, and try every method that it is asked for in the loop."""
+    one = setting(folder, samples, seed)
+    return {
+        name: found if isinstance(found, str) else tracked(one, believed(found), motions)
+        for name, found in estimates(one, only)
+    }
+
+
+def table(trials: Sequence[dict[str, Outcome]], paper: dict[str, Any]) -> Table:
+    """The paper's table: means over training sets and motions, beside its figures.
+
+    Standard errors are those between training sets, whose motions are the same.
+    """
+    first, *_ = names = tuple(trials[0])
+    base = [one[first] for one in trials]
+    rows = []
+    for name in names:
+        each = [one[name] for one in trials]
+        told = " / ".join(str(x) for x in paper.get(name.lower(), ()))
+        refused = next((x for x in each if isinstance(x, str)), "")
+        change = "" if name == first else _change(each, base)
+        rows.append((name, *_cells(each), change, told, refused))
     errors = ("position, rad", "velocity, rad/s", "feedback, N m")
-    columns = ("method", *errors, f"position, against {rows[0][0]}", "paper", "")
-    rate = one.experiment.controller.simulated_rate()
-    samples = sum(recording.samples for recording in one.dataset.recordings)
-    title = f"Computed torque, root mean squares over all joints; {samples} samples at {rate:g} Hz"
-    return Table(title, columns, tuple(rows))
+    columns = ("method", *errors, f"position, against {first}", "paper", "")
+    title = "Computed torque, root mean squares over all joints"
+    sets = f"Mean of {len(trials)} training sets, and its standard error."
+    return Table(title, columns, tuple(rows), (sets,))
 
 
-def _cells(each: Sequence[Tracking]) -> tuple[str, ...]:
-    """Means over the motions, with standard errors; FAILURE where there is none."""
-    if not each:
-        return ("FAILURE",) * 3
+def _cells(each: Sequence[Outcome]) -> tuple[str, ...]:
+    """Means over the training sets, with standard errors; FAILURE where there is none."""
+    sound = [one for one in each if one and not isinstance(one, str)]
+    if len(sound) < len(each):
+        lost = len(each) - len(sound)
+        return ("FAILURE" if len(each) == 1 else f"FAILURE in {lost} of {len(each)}",) * 3
     cells = []
     for part in ("position", "velocity", "feedback"):
-        values = np.array([getattr(x, part) for x in each])
+        values = np.array([np.mean([getattr(x, part) for x in one]) for one in sound])
         doubt = f" +- {number(float(stats.sem(values)), 1)}" if len(values) > 1 else ""
         cells.append(number(float(np.mean(values)), 3) + doubt)
     return tuple(cells)
 
 
-def _change(each: Sequence[Tracking], first: Sequence[Tracking]) -> str:
-    """Change of the position error, motion by motion, with its standard error; per cent."""
-    if each is first or not each or not first:
-        return ""
-    own, other = (np.array([x.position for x in some]) for some in (each, first))
-    change = 100 * (own / other - 1)
-    doubt = f" +- {float(stats.sem(change)):.1f}" if len(change) > 1 else ""
-    return f"{float(np.mean(change)):+.1f}{doubt} %"
+def _change(each: Sequence[Outcome], first: Sequence[Outcome]) -> str:
+    """Change of the position error, set by set, with its standard error; per cent."""
+    changes = []
+    for pair in zip(each, first, strict=True):
+        if any(isinstance(one, str) or not one for one in pair):
+            return ""
+        own, other = (np.mean([x.position for x in one]) for one in pair)  # type: ignore[union-attr]
+        changes.append(100 * (own / other - 1))
+    doubt = f" +- {float(stats.sem(changes)):.1f}" if len(changes) > 1 else ""
+    return f"{float(np.mean(changes)):+.1f}{doubt} %"
 
 
 def main(folder: Path, doc: str) -> None:
     """Print the table of one robot."""
-    from rich.progress import Progress
-
     parser = argparse.ArgumentParser(description=doc.splitlines()[0])
     published = tomllib.loads((folder / "published.toml").read_text())
     parser.add_argument("--samples", type=int, default=published["samples"])
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--sets", type=int, default=SETS, help="training sets")
     parser.add_argument("--motions", type=int, default=MOTIONS)
-    names = (*METHODS, ADDED)
-    parser.add_argument("--only", nargs="+", choices=names, default=names, metavar="METHOD")
+    parser.add_argument("--only", nargs="+", choices=EVERY, default=EVERY, metavar="METHOD")
+    parser.add_argument("--jobs", type=int, default=1, help="training sets at a time; 2 GB each")
     asked = parser.parse_args()
-    with Progress(transient=True) as bar:
-        task = bar.add_task("recording", total=None)
-
-        def tell(name: str, done: float, total: float) -> None:
-            bar.update(task, completed=done, total=total)
-
-        one = setting(folder, asked.samples, asked.seed, tell)
-        bar.update(task, description="estimating and controlling", total=None)
-        found = table(one, asked.motions, asked.only)
-    print_tables(found)
+    work = Parallel(n_jobs=asked.jobs, return_as="generator")(
+        delayed(trial)(folder, asked.samples, seed, asked.motions, asked.only)
+        for seed in range(1, asked.sets + 1)
+    )
+    shown: Any = track(work, "training sets", total=asked.sets, transient=True)
+    print_tables(table(list(shown), published["paper"]))
