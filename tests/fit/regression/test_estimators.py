@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pandas as pd
 import pytest
+from sklearn.exceptions import NotFittedError
 from sklearn.linear_model import LinearRegression
 from sklearn.model_selection import cross_val_score
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-from dynident.errors import FitError
+from dynident.errors import DynidentWarning, FitError
 from dynident.fit.regression.base import StatisticsRegressor
 from dynident.fit.regression.corrected import CorrectedLeastSquares
 from dynident.fit.regression.joint_factors import BayesianFactorRegression, JointFactorRegression
@@ -178,9 +181,8 @@ def test_scales_of_any_size(regression: StatisticsRegressor) -> None:
 
 @every
 def test_one_row_is_refused(regression: StatisticsRegressor) -> None:
-    for verb in ("fit", "partial_fit"):
-        with pytest.raises(ValueError, match="n_samples = 1"):
-            getattr(regression.another(), verb)([[1.0, 2.0]], [3.0])
+    with pytest.raises(ValueError, match="n_samples = 1"):
+        regression.another().fit([[1.0, 2.0]], [3.0])
     with pytest.raises(FitError, match="two rows"):
         regression.another().fit_statistics(Statistics.of(np.ones((1, 2)), np.ones(1)))
 
@@ -234,10 +236,61 @@ def test_rows_that_are_refused_have_not_been_seen(regression: StatisticsRegresso
     with pytest.raises(ValueError, match="NaN"):
         found.partial_fit(np.full((3, 5), np.nan), y[:3])
     assert found.statistics_.count == 100
-    first = CorrectedLeastSquares(0.01)
-    with pytest.raises(FitError, match="combinations"):
-        first.partial_fit(X[:3], y[:3])
-    assert not hasattr(first, "statistics_")
+
+
+@every
+def test_a_fit_that_is_refused_leaves_the_one_before(regression: StatisticsRegressor) -> None:
+    X, y = data()
+    found = regression.another().fit(X, y)
+    before = found.predict(X)
+    with pytest.raises(FitError, match="two rows"):
+        found.fit_statistics(Statistics.of(np.ones((1, 2)), np.ones(1)))
+    bad = Statistics(100, np.zeros(4), np.full((4, 4), np.nan))
+    with pytest.raises(FitError, match="not finite"):
+        found.fit_statistics(bad)
+    assert found.n_features_in_ == 5
+    np.testing.assert_array_equal(found.predict(X), before)
+
+
+@every
+def test_blocks_may_be_shorter_than_a_fit_needs(regression: StatisticsRegressor) -> None:
+    X, y = data()
+    found = regression.another()
+    with pytest.warns(DynidentWarning, match=r"not fitted yet: n_samples = 1.*two rows"):
+        found.partial_fit(X[:1], y[:1])
+    with pytest.raises(NotFittedError):
+        found.predict(X)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DynidentWarning)
+        for first in range(1, 60, 2):
+            found.partial_fit(X[first : first + 2], y[first : first + 2])
+    whole = regression.another().fit(X[:61], y[:61])
+    np.testing.assert_allclose(found.predict(X), whole.predict(X), rtol=1e-4, atol=1e-4)
+
+
+@every
+def test_units_so_small_that_squares_underflow(regression: StatisticsRegressor) -> None:
+    """Down to where they do the answer is the same, and below they are refused by name."""
+    X, y = data()
+    usual = regression.another().fit(X, y).predict(X)
+    for size in (1e-140, 1e140):
+        unit = np.array([size, 1.0, 1.0, 1.0, 1.0])
+        found = regression.another().fit(X * unit, y)
+        np.testing.assert_allclose(found.predict(X * unit), usual, rtol=1e-6, atol=1e-8)
+    with pytest.raises(FitError, match=r"input 0.*underflow"):
+        regression.another().fit(X * [1e-155, 1, 1, 1, 1], y)
+    with pytest.raises(FitError, match=r"the output.*underflow"):
+        regression.another().fit(X, y * 1e-160)
+
+
+@every
+def test_constants_are_constants_however_long(regression: StatisticsRegressor) -> None:
+    rng = np.random.default_rng(1)
+    X = np.column_stack([rng.standard_normal(200_000), *np.full((2, 200_000), [[0.1], [0.3]])])
+    y = 2 * X[:, 0] + 1e4
+    found = regression.another().fit(X, y)
+    np.testing.assert_array_equal(found.constant_, [False, True, True])
+    np.testing.assert_array_equal(found.coef_[1:], 0.0)
 
 
 def test_an_exact_law_takes_no_other_inputs_in() -> None:
@@ -269,7 +322,11 @@ def test_total_least_squares_is_right_where_all_noise_is_alike() -> None:
 @pytest.mark.parametrize(
     ("regression", "words"),
     [
-        (StepwiseRegression(enter=0.2, leave=0.1), "enter"),
+        (StepwiseRegression(enter=0.2, leave=0.1), "leave = 0.1"),
+        (StepwiseRegression(max_iter=0), "max_iter"),
+        (TruncatedLeastSquares(rcond=float("nan")), "rcond"),
+        (TotalLeastSquares(rcond="a"), "rcond"),  # type: ignore[arg-type]
+        (CorrectedLeastSquares("repeats"), "'repeats' is no number"),
         (CorrectedLeastSquares([0.1, 0.2]), "shape"),
         (CorrectedLeastSquares(-1.0), "covariance"),
         (CorrectedLeastSquares(float("nan")), "covariance"),
@@ -277,6 +334,8 @@ def test_total_least_squares_is_right_where_all_noise_is_alike() -> None:
         (JointFactorRegression(100.0), "input x"),
         (JointFactorRegression([0.1, 0.2]), "shape"),
         (JointFactorRegression(reliability=1.0), "reliability"),
+        (JointFactorRegression(reliability=1e-300), "reliability"),
+        (JointFactorRegression(tol="a"), "tol"),  # type: ignore[arg-type]
         (JointFactorRegression(max_iter=0), "max_iter"),
         (BayesianFactorRegression(relevance_shape=0.0), "relevance_shape"),
         (BayesianFactorRegression(queries="both"), "queries"),  # type: ignore[arg-type]

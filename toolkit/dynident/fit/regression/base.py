@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
+from numbers import Real
 from typing import Any, ClassVar, Self, cast
 
 import numpy as np
@@ -10,7 +12,7 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from dynident.errors import FitError
+from dynident.errors import DynidentWarning, FitError
 from dynident.fit.regression.statistics import Statistics
 
 _checked: Any = validate_data  # whose signature names strings only
@@ -56,13 +58,29 @@ class StatisticsRegressor(RegressorMixin, BaseEstimator):
         FitError
             As the estimator says of its own.
         """
-        return self.fit_statistics(self._statistics_of(X, y, reset=True))
+        statistics = self._statistics_of(X, y, reset=True)
+        if statistics.count < 2:
+            raise ValueError("n_samples = 1 says nothing of a slope: give at least two rows")
+        return self.fit_statistics(statistics)
 
     def partial_fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Add rows X (N, d) and y (N,) to those seen before, and fit to all; raises as `fit`."""
+        """Add rows X (N, d) and y (N,) to those seen before, and fit to all; raises as `fit`.
+
+        While the rows are too few, no more than inputs, a warning says what is missing, and the
+        estimator is not fitted. Each block is a fit: add `Statistics` up where only the last one
+        is wanted.
+        """
         first = not hasattr(self, "statistics_")
         here = self._statistics_of(X, y, reset=first)
-        return self.fit_statistics(here if first else self.statistics_ + here)
+        seen = here if first else self.statistics_ + here
+        try:
+            return self.fit_statistics(seen)
+        except FitError as error:
+            if hasattr(self, "coef_") or seen.count > seen.inputs + 1:
+                raise
+            warnings.warn(f"not fitted yet: {error}", DynidentWarning, stacklevel=2)
+        self.statistics_ = seen
+        return self
 
     def fit_statistics(self, statistics: Statistics) -> Self:
         """Fit to the sufficient statistics of the data.
@@ -70,11 +88,24 @@ class StatisticsRegressor(RegressorMixin, BaseEstimator):
         Raises
         ------
         FitError
-            If they are of fewer than two rows, or as the estimator says of its own.
+            If they are of fewer than two rows, not finite, or as the estimator says of its own;
+            an earlier fit then stands.
         """
         if statistics.count < 2:
             what = f"n_samples = {statistics.count} says nothing of a slope"
             raise FitError(what, mend="give at least two rows")
+        if not np.all(np.isfinite(statistics.scatter)) or not np.all(np.isfinite(statistics.mean)):
+            raise FitError("the statistics are not finite", mend="clean or scale the data first")
+        before = dict(vars(self))
+        try:
+            self._fit(statistics)
+        except BaseException:
+            vars(self).clear()
+            vars(self).update(before)
+            raise
+        return self
+
+    def _fit(self, statistics: Statistics) -> None:
         used = statistics if self.fit_intercept else statistics.about_origin()
         scale = used.scale
         self.constant_ = scale[:-1] == 0
@@ -90,9 +121,7 @@ class StatisticsRegressor(RegressorMixin, BaseEstimator):
         if len(getattr(self, "feature_names_in_", ())) not in (0, statistics.inputs):
             delattr(self, "feature_names_in_")
         self._solve(unit, inputs)
-        # Only now: rows that are refused have not been seen, and may be given again.
         self.statistics_ = statistics
-        return self
 
     def predict(self, X: ArrayLike) -> np.ndarray:
         """Predict the output of rows X (N, d), (N,)."""
@@ -126,11 +155,14 @@ class StatisticsRegressor(RegressorMixin, BaseEstimator):
         rows, output = _checked(
             self, X, y, reset=reset, dtype=np.float64, y_numeric=True, ensure_min_samples=1
         )
-        if reset and len(rows) < 2:
-            raise ValueError(
-                f"n_samples = {len(rows)} says nothing of a slope: give at least two rows"
-            )
         return Statistics.of(rows, output)
+
+    def _require(self, setting: str, least: float, most: float) -> None:
+        """Raise FitError unless a setting is a number, at least and at most so large."""
+        value = getattr(self, setting)
+        if not isinstance(value, Real) or not least <= float(value) <= most:
+            mend = f"choose a number from {least:g} to {most:g}"
+            raise FitError(f"{setting} = {value!r}", mend=mend)
 
     def __sklearn_is_fitted__(self) -> bool:
         return hasattr(self, "coef_")

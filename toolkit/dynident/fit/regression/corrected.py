@@ -29,7 +29,7 @@ class CorrectedLeastSquares(StatisticsRegressor):
     Attributes
     ----------
     covariance_ : (d, d) of the coefficients, for Gaussian noise that is independent from row to
-        row and known exactly; NaN where no degree of freedom is left.
+        row and known exactly; NaN of constants, and where no degree of freedom is left.
     sigma_ : (d,) standard deviations from it.
     signal_share_ : of the direction in which noise is worst, the share of X'X that is no noise.
     condition_number_ : of X'X - N Psi, for standardised inputs.
@@ -73,8 +73,8 @@ class CorrectedLeastSquares(StatisticsRegressor):
         covariance /= N
         self._set(self._in_units(found, inputs))
         units = scale[-1] / scale[inputs]
-        self.covariance_ = np.zeros((len(scale) - 1,) * 2)
-        self.sigma_ = np.zeros(len(scale) - 1)
+        self.covariance_ = np.full((len(scale) - 1,) * 2, np.nan)
+        self.sigma_ = np.full(len(scale) - 1, np.nan)
         self.sigma_[inputs] = np.sqrt(np.diag(covariance)) * units
         with np.errstate(over="ignore"):  # units whose squares no number holds
             self.covariance_[own] = covariance * np.outer(units, units)

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from sklearn.utils.validation import check_is_fitted
 
 from dynident.errors import FitError
-from dynident.fit.regression.joint_factors import JointFactorRegression
+from dynident.fit.regression.joint_factors import RELIABILITIES, JointFactorRegression
 from dynident.fit.regression.noise import variances_of
 from dynident.fit.regression.statistics import Statistics
 from dynident.tables import Table, number
@@ -149,6 +150,7 @@ def start_sensitivity(
     regression : fitted.
     reliabilities : where to start, between 0 and 1.
     """
+    _checked(regression, reliabilities)
     each = [
         regression.another(reliability=rho).fit_statistics(regression.statistics_)
         for rho in reliabilities
@@ -161,6 +163,14 @@ def start_sensitivity(
         np.array([one.bounds_[-1] for one in each]),
         np.array([one.converged_ for one in each]),
     )
+
+
+def _checked(regression: JointFactorRegression, reliabilities: Sequence[float]) -> None:
+    check_is_fitted(regression)
+    least, most = RELIABILITIES
+    if not len(reliabilities) or not all(least <= rho <= most for rho in reliabilities):
+        what = f"reliabilities {list(reliabilities)}"
+        raise FitError(what, mend="give at least one, each between 0 and 1")
 
 
 def _used(regression: JointFactorRegression) -> Statistics:
@@ -183,6 +193,7 @@ def reliability_profile(
     FitError
         If the noise of every input is given.
     """
+    _checked(regression, reliabilities)
     if np.all(regression.known_ | regression.constant_):
         mend = "there is nothing to profile: leave one to be found"
         raise FitError("the noise of every input is given", mend=mend)

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
+from sklearn.utils.validation import check_is_fitted
 
 from dynident.errors import FitError
 from dynident.fit.regression.base import StatisticsRegressor
@@ -18,6 +19,8 @@ from dynident.fit.regression.statistics import Statistics
 from dynident.fit.regression.truncated import squared_tolerance
 from dynident.robot import BaseParameters, base_parameters
 
+RELIABILITIES = (1e-3, 1.0 - 1e-6)
+"""Least and largest that the iterations may start from, or be held at."""
 LEAST_RELIABILITY = 0.5
 """Least reliability that the Bayesian form unfolds b_true with where the noise is not known."""
 _EXPLAINS = 2.0
@@ -103,7 +106,15 @@ class JointFactorRegression(StatisticsRegressor):
         For noisy inputs these are those of least squares: what was shrunk or pruned has none of
         its own, and would not be in the middle of an honest one. For noiseless inputs the middle
         is b_true.
+
+        Raises
+        ------
+        FitError
+            If the level is not between 0 and 1.
         """
+        check_is_fitted(self)
+        if not 0 < level < 1:
+            raise FitError(f"level = {level!r}", mend="choose it between 0 and 1, such as 0.95")
         if self.queries == "noisy":
             middle, sigma = self.least_squares_, self.sigma_noisy_
         else:
@@ -113,6 +124,7 @@ class JointFactorRegression(StatisticsRegressor):
 
     def summary(self) -> str:
         """Return inputs, coefficients and caveats as text."""
+        check_is_fitted(self)
         # Imported where it is used: the tables know the estimator.
         from dynident.fit.regression.summary import summary
 
@@ -143,11 +155,9 @@ class JointFactorRegression(StatisticsRegressor):
     def _check(self) -> None:
         if self.queries not in ("noisy", "noiseless"):
             raise FitError(f"queries = {self.queries!r}", mend='choose "noisy" or "noiseless"')
-        if not 0 < self.reliability < 1:
-            raise FitError(f"reliability = {self.reliability!r}", mend="choose it between 0 and 1")
-        if self.max_iter < 1 or not self.tol > 0:
-            what = f"max_iter = {self.max_iter!r}, tol = {self.tol!r}"
-            raise FitError(what, mend="choose both above 0")
+        self._require("reliability", *RELIABILITIES)
+        self._require("max_iter", 1, np.inf)
+        self._require("tol", 1e-300, np.inf)
 
     def _keep(self, analysis: Analysis, unit: Statistics, inputs: np.ndarray) -> None:
         d, factors = len(self._scale) - 1, analysis.factors
@@ -259,9 +269,8 @@ class BayesianFactorRegression(JointFactorRegression):
 
     def _check(self) -> None:
         super()._check()
-        if not (self.relevance_shape > 0 and self.relevance_rate > 0):
-            what = f"relevance_shape = {self.relevance_shape!r}, rate {self.relevance_rate!r}"
-            raise FitError(what, mend="choose both above 0")
+        for setting in ("relevance_shape", "relevance_rate"):
+            self._require(setting, 1e-300, 1e300)
 
     def _unfolded(self, analysis: Analysis, unit: Statistics, inputs: np.ndarray) -> np.ndarray:
         low = (analysis.factors.reliability < LEAST_RELIABILITY) & ~self.known_[inputs]

@@ -88,7 +88,8 @@ def validated(name: str, rows: Compressed) -> Validated:
             PLSRegression(scale=False), components, cv=split, scoring="neg_mean_squared_error"
         ).fit(X, y)
         count = search.best_params_["n_components"]
-        return Validated(np.ravel(search.best_estimator_.coef_), f"{count} components")
+        border = ", the most that were tried" if count == _COMPONENTS else ""
+        return Validated(np.ravel(search.best_estimator_.coef_), f"{count} components{border}")
     mend = f"choose {', '.join(NAMES)}"
     raise FitError(f"no regression '{name}'", mend=mend)
 

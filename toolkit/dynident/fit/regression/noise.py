@@ -23,15 +23,14 @@ def covariance_of(noise: ArrayLike, inputs: int) -> np.ndarray:
     FitError
         If it has another shape, or is no covariance.
     """
-    given = np.asarray(noise, dtype=float)
+    given = _numbers(noise)
     if given.shape not in ((), (inputs,), (inputs, inputs)):
         what = f"input noise of shape {given.shape} for {inputs} inputs"
         raise FitError(what, mend=f"give a variance, ({inputs},) or ({inputs}, {inputs})")
     psi = given if given.ndim == 2 else np.diag(np.broadcast_to(given, (inputs,)))
-    sound = bool(np.all(np.isfinite(psi))) and np.allclose(psi, psi.T, rtol=1e-8, atol=0)
-    if not sound or np.linalg.eigvalsh(psi).min(initial=0.0) < -_ROUNDING * np.abs(psi).max(
-        initial=0.0
-    ):
+    rounding = _ROUNDING * np.abs(psi).max(initial=0.0)
+    sound = bool(np.all(np.isfinite(psi))) and np.allclose(psi, psi.T, rtol=0, atol=rounding)
+    if not sound or np.linalg.eigvalsh(psi).min(initial=0.0) < -rounding:
         what = "the input noise is no covariance"
         raise FitError(what, mend="give variances that are not negative, symmetric where (d, d)")
     return (psi + psi.T) / 2
@@ -53,9 +52,17 @@ def variances_of(noise: ArrayLike | None, inputs: int) -> np.ndarray:
     """
     if noise is None:
         return np.full(inputs, np.nan)
-    given = np.asarray(noise, dtype=float)
+    given = _numbers(noise)
     if given.shape == (inputs,):
         unknown = np.isnan(given)
         known = covariance_of(np.where(unknown, 0.0, given), inputs)
         return np.where(unknown, np.nan, np.diag(known))
     return np.diag(covariance_of(given, inputs)).copy()
+
+
+def _numbers(noise: ArrayLike) -> np.ndarray:
+    try:
+        return np.asarray(noise, dtype=float)
+    except (TypeError, ValueError):
+        what = f"input noise {noise!r} is no number, and no array of numbers"
+        raise FitError(what, mend="give variances, or a covariance") from None

@@ -13,6 +13,8 @@ from dynident.errors import FitError
 
 _CONSTANT = 1e-12
 """Spread over magnitude below which an input is a constant and the rest is rounding."""
+_LEAST_SQUARES = 1e-290
+"""Sum of squares below which products of inputs lose digits, or are zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,24 +50,33 @@ class Statistics:
         Raises
         ------
         FitError
-            If there is no row, X and y differ in their rows, or a number is not finite.
+            If there is no row, X and y differ in their rows, or a number is not finite, or too
+            large or too small to be squared.
         """
         X, y = np.asarray(X, dtype=float), np.asarray(y, dtype=float)
         if X.ndim != 2 or y.shape != X.shape[:1] or not len(X):
             what = f"inputs of shape {X.shape} beside an output of shape {y.shape}"
             raise FitError(what, mend="give (N, d) and (N,), N at least 1")
         # About the block's own mean: sums of squares about zero lose digits to a large offset.
-        rows = np.column_stack([X, y])
-        with np.errstate(over="ignore", invalid="ignore"):  # told below, by name
+        # From the first row: what is constant is then zero, not the rounding of a long sum.
+        first = np.append(X[0], y[0])
+        rows = np.empty((len(X), len(first)))
+        with np.errstate(over="ignore", under="ignore", invalid="ignore"):  # told below, by name
+            np.subtract(X, first[:-1], out=rows[:, :-1])
+            np.subtract(y, first[-1], out=rows[:, -1])
             mean = rows.mean(axis=0)
             rows -= mean
             scatter = rows.T @ rows
-        if not np.all(np.isfinite(np.diag(scatter))):
-            bad = np.flatnonzero(~np.isfinite(np.diag(scatter)))
+        squares = np.diag(scatter)
+        lost = [m for m in np.flatnonzero(squares < _LEAST_SQUARES) if np.any(rows[:, m])]
+        bad = sorted([*np.flatnonzero(~np.isfinite(squares)), *lost])
+        if bad:
             where = "the output" if bad[0] == X.shape[1] else f"input {bad[0]}"
             what = "holds NaN, infinity, or numbers whose squares overflow"
+            if bad[0] in lost:
+                what = "varies by so little that the squares underflow"
             raise FitError(what, where, "clean or scale it first")
-        return cls(len(X), mean, scatter)
+        return cls(len(X), first + mean, scatter)
 
     @classmethod
     def over(cls, blocks: Iterable[tuple[np.ndarray, np.ndarray]]) -> Statistics:
@@ -130,9 +141,9 @@ class Statistics:
 
     def scaled(self, factors: np.ndarray) -> Statistics:
         """Return the statistics of inputs and output times their factors, (d + 1,)."""
-        return Statistics(
-            self.count, self.mean * factors, self.scatter * np.outer(factors, factors)
-        )
+        # One side after the other: the product of two factors may be no number.
+        scatter = self.scatter * factors * factors[:, None]
+        return Statistics(self.count, self.mean * factors, scatter)
 
     def keeping(self, inputs: np.ndarray) -> Statistics:
         """Return the statistics of some inputs, by number or mask, and the output."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
-from dynident.errors import FitError
 from dynident.fit.regression.base import StatisticsRegressor
 from dynident.fit.regression.statistics import Statistics
 
@@ -51,9 +50,9 @@ class StepwiseRegression(StatisticsRegressor):
         self.max_iter = max_iter
 
     def _solve(self, unit: Statistics, inputs: np.ndarray) -> None:
-        if not 0 < self.enter <= self.leave < 1:
-            what = f"enter = {self.enter!r}, leave = {self.leave!r}"
-            raise FitError(what, mend="choose 0 < enter <= leave < 1")
+        for setting, least, most in (("enter", 1e-300, 0.999), ("max_iter", 1, np.inf)):
+            self._require(setting, least, most)
+        self._require("leave", self.enter, 0.999)
         chosen: list[int] = []
         self.n_iter_ = 0
         while self.n_iter_ < self.max_iter:

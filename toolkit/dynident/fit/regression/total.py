@@ -37,6 +37,7 @@ class TotalLeastSquares(StatisticsRegressor):
         self.rcond = rcond
 
     def _solve(self, unit: Statistics, inputs: np.ndarray) -> None:
+        self._require("rcond", 0.0, 0.5)
         spectrum = np.linalg.eigvalsh(unit.gram)
         self.rank_ = int(
             np.sum(spectrum > squared_tolerance(unit, self.rcond) * spectrum.max(initial=0.0))

@@ -36,6 +36,7 @@ class TruncatedLeastSquares(StatisticsRegressor):
         self.rcond = rcond
 
     def _solve(self, unit: Statistics, inputs: np.ndarray) -> None:
+        self._require("rcond", 0.0, 0.5)
         values, vectors = np.linalg.eigh(unit.gram)
         kept = values > squared_tolerance(unit, self.rcond) * values.max(initial=0.0)
         self.rank_ = int(kept.sum())
