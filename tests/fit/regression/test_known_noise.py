@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from sklearn.exceptions import NotFittedError
 
 from dynident.errors import FitError
 from dynident.fit.regression.corrected import CorrectedLeastSquares
-from dynident.fit.regression.identifiability import reliability_profile, start_sensitivity
+from dynident.fit.regression.identifiability import (
+    StartSensitivity,
+    reliability_profile,
+    start_sensitivity,
+)
 from dynident.fit.regression.joint_factors import BayesianFactorRegression, JointFactorRegression
 from dynident.fit.regression.statistics import Statistics
 from dynident.fit.regression.truncated import TruncatedLeastSquares
@@ -76,6 +81,7 @@ def test_intervals_cover(coupling: float) -> None:
     weak = np.array([1.0, -2.0, 0.5, 0.13])
     noisy = np.linalg.solve(mixing.T @ mixing + NOISE * np.eye(4), mixing.T @ mixing @ weak)
     covered = dict.fromkeys(("true", "noisy", "corrected"), 0)
+    off_true, off_corrected = [], []
     for seed in range(trials):
         rng = np.random.default_rng([seed, 3])
         T = rng.standard_normal((rows, 4)) @ mixing
@@ -89,10 +95,15 @@ def test_intervals_cover(coupling: float) -> None:
         assert one.corrected_ is not None
         off = np.abs(one.corrected_.coef_ - weak)
         covered["corrected"] += int(np.sum(off < 1.96 * one.corrected_.sigma_))
+        off_corrected.append(off / one.corrected_.sigma_)
+        off_true.append((one.coef_true_ - weak) / one.sigma_true_)
     rates = {name: count / (4 * trials) for name, count in covered.items()}
     assert 0.92 < rates["noisy"] < 0.98 and 0.92 < rates["corrected"] < 0.98, rates
     # b_true is not what its interval is made for: that is wide enough, and wider.
     assert rates["true"] > 0.93, rates
+    # In units of sigma: 1, where sigma is neither too small nor too large.
+    assert 0.9 < np.sqrt(np.mean(np.square(off_corrected))) < 1.1
+    assert 0.6 < np.sqrt(np.mean(np.square(off_true))) < 1.05
 
 
 def test_without_degrees_of_freedom_there_are_no_intervals() -> None:
@@ -138,11 +149,98 @@ def test_what_the_data_do_tell_is_said_too() -> None:
     y = X @ [1.0, 1.0, 0.0] + 0.1 * rng.standard_normal(3000)
     found = JointFactorRegression(max_iter=2000).fit(X, y)
     profile = reliability_profile(found)
-    assert not profile.flat and "speak against" in str(profile.table())
+    words = " ".join(str(profile.table()).split())
+    assert not profile.flat and "independent inputs would speak against" in words
+    assert "not independent" not in words
     assert profile.likelihoods[0] < profile.likelihoods[-1] - 100
     given = JointFactorRegression(0.01).fit(X, y)
     with pytest.raises(FitError, match="given"):
         reliability_profile(given)
+
+
+def test_correlated_inputs_do_not_speak_of_their_noise() -> None:
+    """The likelihood prefers less noise than there is; that is told to be no evidence."""
+    rng = np.random.default_rng(0)
+    T = rng.multivariate_normal(np.zeros(3), 0.1 * np.eye(3) + 0.9, size=5000)
+    X = T + 0.5 * rng.standard_normal(T.shape)
+    y = T @ [1.0, 2.0, 3.0] + 0.1 * rng.standard_normal(5000)
+    profile = reliability_profile(JointFactorRegression().fit(X, y), (0.8, 0.95))
+    assert profile.likelihoods[1] > profile.likelihoods[0] + 2, "0.8 is the truth"
+    assert profile.correlation == pytest.approx(0.9 / 1.25, abs=0.03)
+    words = " ".join(str(profile.table()).split())
+    assert "not independent" in words and "no evidence" in words
+
+
+def test_bounds_are_other_optima_only_where_they_converged() -> None:
+    def sensitivity(*converged: bool) -> str:
+        k = len(converged)
+        words = tuple("converged" if one else "not converged" for one in converged)
+        found = StartSensitivity(
+            ("a",),
+            np.linspace(0.5, 0.9, k),
+            np.ones((k, 1)),
+            np.ones(1),
+            -10.0 * np.arange(k),
+            words,
+            np.array(converged),
+        )
+        return " ".join(str(found.table()).split())
+
+    assert "different optima" in sensitivity(True, True)
+    assert "different" not in sensitivity(True, False)
+    assert "not converged" in sensitivity(True, False)
+
+
+def test_a_flat_ridge_is_told_with_what_is_left_along_it() -> None:
+    """A single input: nothing but the prior speaks of its reliability, and that hardly."""
+    rng = np.random.default_rng(1)
+    t = rng.standard_normal(100_000)
+    X, y = (t + 0.5 * rng.standard_normal(len(t)))[:, None], 2 * t + rng.standard_normal(len(t))
+    statistics = Statistics.of(X, y)
+    usual = [BayesianFactorRegression(reliability=r).fit_statistics(statistics) for r in (0.5, 0.9)]
+    patient = [
+        BayesianFactorRegression(reliability=r, tol=1e-4, max_iter=100_000).fit_statistics(
+            statistics
+        )
+        for r in (0.5, 0.9)
+    ]
+    best = max(one.bounds_[-1] for one in patient)
+    for one in usual:
+        assert not one.converged_ and one.ending_ == "ended on a flat ridge"
+        assert 0.5 * (best - one.bounds_[-1]) < one.left_ < 1.1 * (best - one.bounds_[-1])
+        assert "flat ridge" in one.summary()
+    assert all(one.converged_ for one in patient)
+    np.testing.assert_allclose(patient[0].coef_true_, patient[1].coef_true_, rtol=1e-2)
+    assert abs(usual[0].coef_true_[0] / usual[1].coef_true_[0] - 1) > 0.02
+
+
+def test_what_is_asked_of_a_fit_that_is_none_is_refused() -> None:
+    found = JointFactorRegression()
+    for asked in (found.summary, found.interval, lambda: start_sensitivity(found)):
+        with pytest.raises(NotFittedError):
+            asked()
+    found.fit(*data(0, 200))
+    for level in (95, 0.0, -1.0):
+        with pytest.raises(FitError, match="level"):
+            found.interval(level)
+    for wrong in ((), (float("nan"),), (0.5, 1.0)):
+        with pytest.raises(FitError, match="reliabilities"):
+            reliability_profile(found, wrong)
+
+
+def test_a_covariance_with_the_rounding_of_a_product_is_one() -> None:
+    X, y = data(4, 400)
+    Q = np.linalg.qr(np.random.default_rng(0).standard_normal((4, 4)))[0]
+    found = CorrectedLeastSquares(Q @ (NOISE * np.eye(4)) @ Q.T).fit(X, y)
+    np.testing.assert_allclose(found.coef_, CorrectedLeastSquares(NOISE).fit(X, y).coef_)
+
+
+def test_constants_have_no_interval() -> None:
+    X, y = data(0, 300)
+    X = np.column_stack([X, np.full(300, 3.0)])
+    found = JointFactorRegression(NOISE * np.array([1, 1, 1, 1, 0.0])).fit(X, y)
+    assert found.corrected_ is not None and np.isnan(found.corrected_.sigma_[-1])
+    assert np.isnan(found.sigma_true_[-1]) and np.all(np.isfinite(found.sigma_true_[:-1]))
 
 
 def test_noise_known_of_some_inputs_only() -> None:

@@ -119,8 +119,38 @@ def test_intervals_of_corrected_least_squares_cover_though_noise_is_filtered() -
         )
         off.append((found.values - truth()) / found.sigma)
     covered = np.mean(np.abs(off) < 1.96)
-    assert covered > 0.85, covered
-    assert np.sqrt(np.mean(np.square(off), axis=0)).max() < 2.0
+    assert covered > 0.9, covered
+    # Wider than needed: what the noise does changes with the motion, between pieces, too.
+    size = np.sqrt(np.mean(np.square(off), axis=0))
+    assert size.max() < 1.2 and 0.4 < np.sqrt(np.mean(size**2)) < 1.1
+
+
+def test_input_noise_that_is_overstated_is_told_and_no_other() -> None:
+    for seed in range(3):
+        quiet = synthetic(
+            model(), truth(), seed, duration=32.0, position_std=STD / 3, torque_std=0.001
+        )
+        stated = di.Noise(np.full(2, STD / 3), np.full(2, 0.001))
+        dataset = di.Dataset((quiet,), ROUGH, stated)
+        noise = encoder_noise(model(), dataset)
+        found = di.fit(model(), dataset, di.Regression("corrected", noise))
+        assert "overstated" not in found.summary()
+        more = replace(noise, gram=1.3 * noise.gram)
+        found = di.fit(model(), dataset, di.Regression("corrected", more))
+        assert "overstated: it would leave" in " ".join(found.summary().split())
+
+
+def test_one_sigma_is_printed_with_what_it_holds(tmp_path: Path) -> None:
+    """In the table of parameters, in that of the regression, and in the file."""
+    found = di.fit(model(), noisy(), di.Regression("bayes", "encoders"))
+    text = " ".join(found.summary().split())
+    assert "scatter between 20 consecutive pieces" in text and "as independent" not in text
+    regressor: Any = di.Regression("bayes", "encoders").regressor(model(), noisy())
+    np.testing.assert_allclose(regressor.sigma_true_, found.sigma, rtol=1e-9)
+    again = load_estimate(found.save(tmp_path / "estimate.json"))
+    assert again.words_of_sigma == found.words_of_sigma
+    plain = di.fit(model(), noisy())
+    assert "as independent" in plain.words_of_sigma
 
 
 def test_an_estimator_may_be_set_up_otherwise() -> None:

@@ -55,6 +55,7 @@ class Estimate:
     certificate : how far a constrained fit is from the optimum of its problem.
     history : the iterations of an instrumental variable estimate.
     details : tables of what else the method has to say.
+    sigma_words : what the standard deviations hold, where the method has its own.
     """
 
     model: Model
@@ -74,6 +75,7 @@ class Estimate:
     certificate: Certificate | None = None
     history: Convergence | None = None
     details: tuple[Table, ...] = ()
+    sigma_words: str = ""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -192,10 +194,14 @@ class Estimate:
             f"{self.method}; {self.rows} equations, {len(self.basis.independent)} of "
             f"{self.model.size} parameters identified ({_decision(self.basis)}), "
             f"condition number {self.condition_number:.6g}; {self.status}.",
-            self._words_of_sigma(),
+            self.words_of_sigma,
         )
 
-    def _words_of_sigma(self) -> str:
+    @property
+    def words_of_sigma(self) -> str:
+        """What the standard deviations hold, and what they do not."""
+        if self.sigma_words:
+            return self.sigma_words
         if not np.any(self.covariance):
             return "No sigma: the method has none to give."
         if self.history:

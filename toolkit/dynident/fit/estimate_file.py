@@ -61,6 +61,7 @@ def to_dict(estimate: Estimate) -> dict[str, Any]:
         "condition_number": estimate.condition_number,
         "rows": estimate.rows,
         "notes": list(estimate.notes),
+        "sigma_words": estimate.words_of_sigma,
         "recordings": [vars(source) for source in estimate.sources],
         "links": links and {name: phi.tolist() for name, phi in links.items()},
         "certificate": certificate and certificate.to_dict(),
@@ -153,6 +154,7 @@ def _estimate(content: EstimateFile, model: Model, where: str) -> Estimate:
         tuple(content.notes),
         tuple(Source(one.file, one.sha256, one.filter) for one in content.recordings),
         links,
+        sigma_words=content.sigma_words,
     )
 
 

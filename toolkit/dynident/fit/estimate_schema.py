@@ -96,6 +96,7 @@ class EstimateFile(_Part):
     condition_number: _Told
     rows: Annotated[int, Field(ge=0, le=10**15)]
     notes: list[str]
+    sigma_words: str = ""
     recordings: list[_Recording]
     links: dict[str, list[_Number]] | None = None
     certificate: dict[str, Any] | None = None

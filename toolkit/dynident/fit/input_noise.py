@@ -50,8 +50,9 @@ class InputNoise:
 def input_noise(model: Model, dataset: Dataset, values: np.ndarray | None = None) -> InputNoise:
     """Estimate the input noise from recordings whose excitation repeats.
 
-    Two repetitions have the same noiseless columns, so that half the Gram matrix of their
-    difference is the noise of either.
+    Two repetitions of the same motion have the same noiseless columns, so that half the Gram
+    matrix of their difference is the noise of either. In a closed loop the robot answers the
+    noise: what it truly does differently each time is counted as noise, and overstates it.
 
     Parameters
     ----------

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
 from dynident.fit.factors import Factors
 from dynident.fit.regression.statistics import Statistics
@@ -87,3 +88,30 @@ def sandwich(rows: Compressed, coefficients: np.ndarray, psi: np.ndarray) -> np.
     inverse = np.linalg.inv(M)
     count = len(every)
     return inverse @ (every.T @ every) @ inverse * count / max(count - 1, 1)
+
+
+@dataclass(frozen=True)
+class OutputNoise:
+    """What the input noise leaves of the residual's variance.
+
+    Attributes
+    ----------
+    variance : per row; may come out negative.
+    sigma : its standard deviation, from the scatter between the pieces.
+    """
+
+    variance: float
+    sigma: float
+
+
+def output_noise(rows: Compressed, coefficients: np.ndarray, psi: np.ndarray) -> OutputNoise:
+    """Return the output's noise: the variance of y - X b, less what input noise makes of it.
+
+    Parameters
+    ----------
+    rows, coefficients, psi : as of `sandwich`.
+    """
+    squares = (rows.y - rows.X @ coefficients) ** 2
+    each = np.array([np.mean(squares[rows.piece == k]) for k in np.unique(rows.piece)])
+    left = each - coefficients @ psi @ coefficients
+    return OutputNoise(float(np.mean(left)), float(stats.sem(left)) if len(left) > 1 else np.inf)

@@ -11,6 +11,8 @@ from dynident.fit.regression.base import StatisticsRegressor
 from dynident.fit.regression.noise import covariance_of
 from dynident.fit.regression.statistics import Statistics
 
+LEAST_SHARE = 4.0
+"""Standard deviations of the signal's share, below which intervals are too narrow."""
 _DEPENDENT = 1e-14  # eigenvalue of the inputs' correlations that is rounding around zero, per input
 
 
@@ -32,6 +34,7 @@ class CorrectedLeastSquares(StatisticsRegressor):
         row and known exactly; NaN of constants, and where no degree of freedom is left.
     sigma_ : (d,) standard deviations from it.
     signal_share_ : of the direction in which noise is worst, the share of X'X that is no noise.
+    signal_share_doubt_ : its standard deviation, if the rows were independent.
     condition_number_ : of X'X - N Psi, for standardised inputs.
     noise_variance_ : of the output; negative where the input noise is overstated.
 
@@ -58,6 +61,8 @@ class CorrectedLeastSquares(StatisticsRegressor):
         # Of an empty set of inputs all is signal.
         shares = eigh(psi, unit.gram / N, eigvals_only=True) if len(psi) else np.zeros(1)
         self.signal_share_ = 1.0 - float(shares[-1])
+        # X'X of a Gaussian direction has a relative variance of 2 / N.
+        self.signal_share_doubt_ = float(shares[-1]) * np.sqrt(2.0 / N)
         if self.signal_share_ <= 0:
             what = "in some direction the input noise is all that the inputs hold"
             mend = "excite more, leave inputs out, or look whether the noise is overstated"

@@ -18,6 +18,8 @@ from dynident.tables import Table, number
 TOLD = 1.92
 """Nats of log-likelihood between two values of one parameter that tell them apart at 95 %."""
 
+_CORRELATED = 0.2
+"""Correlation from which inputs are not called independent."""
 _RELIABILITIES = (0.5, 0.8, 0.95)
 _WORST = 3  # inputs that are shown
 
@@ -33,6 +35,7 @@ class StartSensitivity:
     coef_true : (k, d) b_true of each, in the data's units.
     sizes : (d,) root mean square of each input about its mean.
     bounds : (k,) lower bound reached, nats.
+    endings : (k,) of the iterations, in words.
     converged : (k,) bool.
     """
 
@@ -41,6 +44,7 @@ class StartSensitivity:
     coef_true: np.ndarray
     sizes: np.ndarray
     bounds: np.ndarray
+    endings: tuple[str, ...]
     converged: np.ndarray
 
     @property
@@ -72,18 +76,19 @@ class StartSensitivity:
             (
                 number(rho, 3),
                 number(bound, 9),
-                "converged" if ended else "not converged",
+                ended,
                 *(number(b[m], 4) for m in worst),
             )
             for rho, bound, ended, b in zip(
-                self.reliabilities, self.bounds, self.converged, self.coef_true, strict=True
+                self.reliabilities, self.bounds, self.endings, self.coef_true, strict=True
             )
         )
         words = f"Between starts b_true differs by {100 * self.spread:.2g} % of its size"
         words += "; the inputs that differ most are shown." if len(worst) else "."
-        if np.ptp(self.bounds) > TOLD:
+        if np.sum(self.converged) > 1 and np.ptp(self.bounds[self.converged]) > TOLD:
             words += (
-                " The bounds differ by more than the data allow for: these are different optima."
+                " Converged bounds differ by more than the data allow for: these are different "
+                "optima."
             )
         columns = ("start of the reliability", "bound, nats", "", *(self.names[m] for m in worst))
         return Table("Sensitivity of b_true to the start", columns, rows, (words,))
@@ -98,11 +103,15 @@ class ReliabilityProfile:
     reliabilities : (k,) of all inputs whose noise is not given, held.
     likelihoods : (k,) log-likelihood, maximised over all else, nats.
     bounds : (k,) the estimator's own bound there: what its prior adds is in it.
+    converged : (k,) bool, whether the maximisation was.
+    correlation : largest between two inputs, in size: the likelihood is that of independent ones.
     """
 
     reliabilities: np.ndarray
     likelihoods: np.ndarray
     bounds: np.ndarray
+    converged: np.ndarray
+    correlation: float
 
     @property
     def flat(self) -> bool:
@@ -116,14 +125,21 @@ class ReliabilityProfile:
             "likelihoods": self.likelihoods.tolist(),
             "bounds": self.bounds.tolist(),
             "flat": self.flat,
+            "converged": self.converged.tolist(),
+            "correlation": self.correlation,
         }
 
     def table(self) -> Table:
         """Return the profile, with what follows from it."""
         rows = tuple(
-            (number(rho, 3), number(likelihood, 9), number(bound, 9))
-            for rho, likelihood, bound in zip(
-                self.reliabilities, self.likelihoods, self.bounds, strict=True
+            (
+                number(rho, 3),
+                number(likelihood, 9),
+                number(bound, 9),
+                "" if ended else "not converged",
+            )
+            for rho, likelihood, bound, ended in zip(
+                self.reliabilities, self.likelihoods, self.bounds, self.converged, strict=True
             )
         )
         change = float(np.ptp(self.likelihoods))
@@ -134,9 +150,16 @@ class ReliabilityProfile:
             "means and covariances do not tell the reliability, and b_true = b_noise / "
             "reliability is what start and prior say. Give the input noise."
             if self.flat
-            else "the data speak against some of them."
+            else "data with independent inputs would speak against some of them."
         )
-        columns = ("reliability", "log-likelihood, nats", "bound, nats")
+        if not self.flat and self.correlation > _CORRELATED:
+            words += (
+                f" These inputs are not independent (correlations up to {self.correlation:.2g}), "
+                "and what the likelihood prefers may be what mends that: no evidence of the noise."
+            )
+        if not np.all(self.converged):
+            words += " Where the iterations did not converge the likelihood is a lower bound."
+        columns = ("reliability", "log-likelihood, nats", "bound, nats", "")
         return Table("What the data tell of the reliability", columns, rows, (words,))
 
 
@@ -161,6 +184,7 @@ def start_sensitivity(
         np.array([one.coef_true_ for one in each]),
         _used(regression).scale[:-1],
         np.array([one.bounds_[-1] for one in each]),
+        tuple(one.ending_ for one in each),
         np.array([one.converged_ for one in each]),
     )
 
@@ -200,7 +224,7 @@ def reliability_profile(
     statistics = regression.statistics_
     variance = _used(regression).scale[:-1] ** 2
     given = variances_of(regression.input_noise, statistics.inputs)
-    likelihoods, bounds = [], []
+    likelihoods, bounds, converged = [], [], []
     for rho in reliabilities:
         noise = np.where(regression.known_, given, (1 - rho) * variance)
         own = regression.another(input_noise=noise).fit_statistics(statistics)
@@ -212,6 +236,19 @@ def reliability_profile(
         ).fit_statistics(statistics)
         bounds.append(own.bounds_[-1])
         likelihoods.append(plain.bounds_[-1])
+        converged.append(plain.converged_ or plain.left_ < TOLD / 10)
     return ReliabilityProfile(
-        np.array(reliabilities, dtype=float), np.array(likelihoods), np.array(bounds)
+        np.array(reliabilities, dtype=float),
+        np.array(likelihoods),
+        np.array(bounds),
+        np.array(converged),
+        _correlation(_used(regression)),
     )
+
+
+def _correlation(statistics: Statistics) -> float:
+    """Largest correlation between two inputs that vary, in size."""
+    varied = statistics.keeping(statistics.scale[:-1] > 0)
+    size = np.sqrt(np.diag(varied.gram))
+    between = np.abs(varied.gram / size / size[:, None]) - np.eye(varied.inputs)
+    return float(np.max(between, initial=0.0))

@@ -48,7 +48,8 @@ class JointFactorRegression(StatisticsRegressor):
     queries : what `predict` and `coef_` are for: "noisy" inputs or "noiseless" ones.
     max_iter : at most so many rounds of expectation maximisation.
     tol : nats of the bound that some thousand further rounds may still gain when the iterations
-        end; half a nat is what one standard deviation is worth.
+        end; half a nat is what one standard deviation is worth. Where the noise is not known, the
+        bound may go on along the reliability, ever slower: `left_` says how far.
     fit_intercept : False for a regression through the origin.
 
     Attributes
@@ -61,7 +62,8 @@ class JointFactorRegression(StatisticsRegressor):
     basis_ : which inputs are combinations of the others, and the rank decision.
     bounds_ : lower bound of the log evidence in nats, in order: of rounds, and of leaps over some.
     ending_ : how the iterations ended, in words.
-    converged_ : whether by themselves.
+    converged_ : whether by themselves, and not on a flat ridge of the bound.
+    left_ : nats of the bound that are seen to be left there; NaN where nobody looked.
     n_iter_ : rounds.
     least_squares_, sigma_noisy_ : (d,) ordinary least squares and its standard deviations, which
         are b_noise's before anything was shrunk; NaN for combinations of other inputs.
@@ -163,7 +165,8 @@ class JointFactorRegression(StatisticsRegressor):
         d, factors = len(self._scale) - 1, analysis.factors
         self.bounds_, self.n_iter_ = analysis.bounds, analysis.rounds
         self.ending_ = analysis.ending.value
-        self.converged_ = analysis.ending is not Ending.ROUNDS_EXHAUSTED
+        self.converged_ = analysis.ending in (Ending.CONVERGED, Ending.ROUNDING)
+        self.left_ = analysis.left
         self.reliability_, self.pruned_ = np.zeros(d), np.zeros(d, dtype=bool)
         self.reliability_[inputs] = factors.reliability
         self.coef_noisy_ = self._in_units(analysis.coefficients, inputs)

@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
+from scipy import stats
 
 from dynident.errors import FitError
 from dynident.fit.encoder_noise import encoder_noise
 from dynident.fit.estimate import Estimate
 from dynident.fit.input_noise import InputNoise, input_noise
 from dynident.fit.least_squares import Solution, estimate_of, residual_std
-from dynident.fit.regression.compressed import Compressed, sandwich
+from dynident.fit.regression.compressed import Compressed, OutputNoise, output_noise, sandwich
 from dynident.fit.regression.posed import PIECES, Posed, pose
 from dynident.model import Model
 from dynident.recording import Dataset
@@ -23,6 +24,11 @@ if TYPE_CHECKING:
     from dynident.fit.regression.base import StatisticsRegressor
     from dynident.fit.regression.corrected import CorrectedLeastSquares
 
+_SIGMA = (
+    f"sigma from the scatter between {PIECES} consecutive pieces of the data, for each parameter "
+    f"by itself (the covariance has no more than {PIECES - 1} directions); the doubt of the input "
+    "noise itself, and what the model lacks, are not in it."
+)
 _FOLDS = 5  # of the pieces, between which penalties are validated
 
 
@@ -75,7 +81,9 @@ class Regression:
         )
         solution = replace(solution, torque_std=residual_std(posed.factors, solution))
         estimate = estimate_of(found.words, "joint", posed.model, dataset, posed.factors, solution)
-        return replace(estimate, status=found.status, details=found.details)
+        return replace(
+            estimate, status=found.status, details=found.details, sigma_words=found.sigma
+        )
 
     @single_threaded
     def regressor(self, model: Model, dataset: Dataset) -> StatisticsRegressor:
@@ -165,6 +173,11 @@ class _Found:
     notes: tuple[str, ...]
     details: tuple[Table, ...]
 
+    @property
+    def sigma(self) -> str:
+        """What its standard deviations hold, in words."""
+        return _SIGMA if self.covariance is not None else ""
+
 
 def _fitted(
     regressor: StatisticsRegressor, posed: Posed, psi: np.ndarray | None
@@ -191,7 +204,24 @@ def _fitted(
     if psi is not None:
         regressor.set_params(input_noise=psi)
     names = [posed.model.names[i] for i in posed.kept]
-    return regressor.named(names).fit_statistics(posed.compressed.statistics)
+    found = regressor.named(names).fit_statistics(posed.compressed.statistics)
+    if psi is not None:
+        _cluster(found, posed.compressed, psi)
+    return found
+
+
+def _cluster(regressor: StatisticsRegressor, compressed: Compressed, psi: np.ndarray) -> None:
+    """Take standard deviations from the scatter between pieces: rows are not independent."""
+    from dynident.fit.regression.corrected import CorrectedLeastSquares
+    from dynident.fit.regression.joint_factors import JointFactorRegression
+
+    if isinstance(regressor, CorrectedLeastSquares):
+        regressor.covariance_ = sandwich(compressed, regressor.coef_, psi)
+        regressor.sigma_ = np.sqrt(np.diag(regressor.covariance_))
+    elif isinstance(regressor, JointFactorRegression) and regressor.corrected_ is not None:
+        corrected = regressor.corrected_
+        _cluster(corrected, compressed, psi)
+        regressor.sigma_true_ = np.hypot(corrected.sigma_, regressor.coef_true_ - corrected.coef_)
 
 
 def _told(regressor: StatisticsRegressor, compressed: Compressed, psi: np.ndarray | None) -> _Found:
@@ -203,29 +233,40 @@ def _told(regressor: StatisticsRegressor, compressed: Compressed, psi: np.ndarra
     words = regressor.words
     if isinstance(regressor, CorrectedLeastSquares):
         assert psi is not None
-        covariance = sandwich(compressed, regressor.coef_, psi)
-        return _Found(regressor.coef_, covariance, words, "solved", _worth(regressor), ())
+        notes = _worth(regressor, output_noise(compressed, regressor.coef_, psi))
+        return _Found(regressor.coef_, regressor.covariance_, words, "solved", notes, ())
     if isinstance(regressor, JointFactorRegression):
         status, table, true = regressor.ending_, summary(regressor), regressor.coef_true_
         if psi is None or regressor.corrected_ is None:
             return _Found(true, None, words, status, (), table)
-        covariance = sandwich(compressed, regressor.corrected_.coef_, psi)
         away = true - regressor.corrected_.coef_
-        return _Found(true, covariance + np.outer(away, away), words, status, (), table)
-    return _Found(regressor.coef_, None, words, "solved", ("No intervals.",), ())
+        covariance = regressor.corrected_.covariance_ + np.outer(away, away)
+        return _Found(true, covariance, words, status, (), table)
+    alone = "No intervals: they would have to carry what the noise of the inputs does."
+    return _Found(regressor.coef_, None, words, "solved", (alone,), ())
 
 
-def _worth(regressor: CorrectedLeastSquares) -> tuple[str, ...]:
+def _worth(regressor: CorrectedLeastSquares, noise: OutputNoise) -> tuple[str, ...]:
     """What corrected least squares rests on, in words."""
-    notes = (
+    from dynident.fit.regression.corrected import LEAST_SHARE
+
+    notes = [
         "What is left of X'X when the input noise is taken off: "
         f"{100 * regressor.signal_share_:.3g} % in the worst direction, condition number "
         f"{regressor.condition_number_:.3g}. Right if that noise is independent of the motion; "
-        "in a closed loop the robot moves with a part of it.",
-        f"sigma from the scatter between {PIECES} consecutive pieces of the data; the doubt of the "
-        "input noise itself is not in it.",
-    )
-    if regressor.noise_variance_ < 0:
-        overstated = "The input noise is overstated: it would leave the torque less than none."
-        notes = (overstated, *notes)
-    return notes
+        "in a closed loop the robot moves with a part of it, which sigma does not hold.",
+    ]
+    doubt = regressor.signal_share_doubt_
+    if regressor.signal_share_ < LEAST_SHARE * doubt:
+        notes.append(
+            f"That share is known to {100 * doubt:.2g} % only: intervals along that direction are "
+            "too narrow."
+        )
+    t = float(stats.t.ppf(0.95, PIECES - 1))
+    if noise.variance < -t * noise.sigma:
+        notes.insert(
+            0,
+            "The input noise is overstated: it would leave the torque a variance of "
+            f"{noise.variance:.2g} +- {noise.sigma:.1g} of what least squares leaves.",
+        )
+    return tuple(notes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from dynident.fit.regression.corrected import LEAST_SHARE
 from dynident.fit.regression.joint_factors import LEAST_RELIABILITY, JointFactorRegression
 from dynident.tables import Table, number
 
@@ -83,6 +84,12 @@ def _ended(regression: JointFactorRegression) -> str:
     rounds = f"{regression.n_iter_} rounds, bound {bounds[-1]:.9g} nats"
     if regression.converged_:
         return f"Iterations {regression.ending_}: {rounds}."
+    if regression.left_ > 0:
+        return (
+            f"Iterations ended on a flat ridge of the bound: {rounds}; {regression.left_:.2g} nats "
+            "are left along it, where half a nat is worth one standard deviation. b_true depends "
+            "on where they ended: lower tol to go on."
+        )
     last = (
         f", and the last one still gained {bounds[-1] - bounds[-2]:.2g}" if len(bounds) > 1 else ""
     )
@@ -101,9 +108,10 @@ def _beside(regression: JointFactorRegression) -> str:
         f"{100 * corrected.signal_share_:.3g} % of the worst direction is signal, condition number "
         f"{corrected.condition_number_:.3g}. b_true differs from it by up to {apart:.2g} of its "
     )
-    return words + (
-        "sigma." if apart < _AGREES else "sigma: the inputs are not independent. Prefer it."
-    )
+    words += "sigma." if apart < _AGREES else "sigma: the inputs are not independent. Prefer it."
+    if corrected.signal_share_ < LEAST_SHARE * corrected.signal_share_doubt_:
+        words += " So little signal is hardly known: intervals along that direction are too narrow."
+    return words
 
 
 def _listed(names: list[str], which: np.ndarray) -> str:
