@@ -26,6 +26,8 @@ _QUIET = 5
 _NOTHING = 1e-3  # of the tolerance: a leap that gains no more is neither right nor wrong
 _DEGREES = (2, 32)  # of a leap, least and most
 _LITTLE = 0.05  # nats, where half a nat is worth one standard deviation
+_STILL = 0.01  # change of a reliability, below which b_true does not depend on the end
+_MATTERS = 0.01  # of the largest coefficient of standardised inputs
 _FAR = (64, 128, 256, 512)  # degrees of leaps that are only looked at
 _GROWTH, _RETREAT = 1.3, 2.0  # of the degree, after a leap that was right and one that was not
 _LOGARITHM = 80.0  # largest, of a variance that a leap may ask for
@@ -54,6 +56,7 @@ class Analysis:
         one is that of `factors`. In plain joint factor analysis the log-likelihood itself.
     ending : whether they ended by themselves.
     left : nats that are seen to be left where they ended; NaN where nobody looked.
+    drift : how far a reliability would go on for them, at most; NaN where nobody looked.
     """
 
     factors: Factors
@@ -62,6 +65,7 @@ class Analysis:
     bounds: np.ndarray
     ending: Ending
     left: float = np.nan
+    drift: float = np.nan
 
     @property
     def bound(self) -> float:
@@ -98,7 +102,7 @@ def analyse(
     """
     here = Posterior(start, statistics)
     bounds, used, in_a_row, degree, quiet = [here.bound(prior)], 0, 0, _DEGREES[0], 0
-    ending, left = Ending.ROUNDS_EXHAUSTED, np.nan
+    ending, ahead = Ending.ROUNDS_EXHAUSTED, None
     while used < rounds:
         here = Posterior(here.updated(prior, known), statistics)
         bounds.append(here.bound(prior))
@@ -127,18 +131,36 @@ def analyse(
             here = there
             bounds.append(bounds[-1] + won)
         if quiet == _QUIET:
-            left = _left(here, prior, known)
-            ending = Ending.CONVERGED if left < _LITTLE else Ending.FLAT
+            ahead = _ahead(here, prior, known)
+            ending = Ending.CONVERGED
             break
-    return Analysis(here.factors, here.b, used, np.array(bounds), ending, left)
+    left = drift = np.nan
+    if ahead is not None:
+        left = ahead.bound(prior) - here.bound(prior)
+        drift = _drift(here, ahead)
+        if left > _LITTLE and drift > _STILL:
+            ending = Ending.FLAT
+    return Analysis(here.factors, here.b, used, np.array(bounds), ending, left, drift)
 
 
-def _left(here: Posterior, prior: Gamma | None, known: np.ndarray) -> float:
-    """Nats that leaps of any degree are seen to gain; zero where none gains."""
+def _ahead(here: Posterior, prior: Gamma | None, known: np.ndarray) -> Posterior:
+    """Where the best leap of any degree ends; here where none gains."""
+    best, highest = here, here.bound(prior)
     with np.errstate(all="ignore"):
-        reached = [_leap(here, prior, known, degree).bound(prior) for degree in _FAR]
-    gains = np.array(reached) - here.bound(prior)
-    return float(np.max(gains, where=np.isfinite(gains), initial=0.0))
+        for degree in _FAR:
+            there = _leap(here, prior, known, degree)
+            bound = there.bound(prior)
+            if highest < bound < np.inf:
+                best, highest = there, bound
+    return best
+
+
+def _drift(here: Posterior, there: Posterior) -> float:
+    """Largest change of a reliability, among inputs that matter."""
+    size = np.abs(here.b)
+    matters = size > _MATTERS * size.max(initial=0.0)
+    change = np.abs(there.factors.reliability - here.factors.reliability)
+    return float(np.max(change, where=matters, initial=0.0))
 
 
 def _leap(here: Posterior, prior: Gamma | None, known: np.ndarray, degree: int) -> Posterior:

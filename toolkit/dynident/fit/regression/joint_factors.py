@@ -63,7 +63,8 @@ class JointFactorRegression(StatisticsRegressor):
     bounds_ : lower bound of the log evidence in nats, in order: of rounds, and of leaps over some.
     ending_ : how the iterations ended, in words.
     converged_ : whether by themselves, and not on a flat ridge of the bound.
-    left_ : nats of the bound that are seen to be left there; NaN where nobody looked.
+    left_, drift_ : nats of the bound that are seen to be left there, and how far a reliability
+        would go on for them; NaN where nobody looked.
     n_iter_ : rounds.
     least_squares_, sigma_noisy_ : (d,) ordinary least squares and its standard deviations, which
         are b_noise's before anything was shrunk; NaN for combinations of other inputs.
@@ -166,7 +167,7 @@ class JointFactorRegression(StatisticsRegressor):
         self.bounds_, self.n_iter_ = analysis.bounds, analysis.rounds
         self.ending_ = analysis.ending.value
         self.converged_ = analysis.ending in (Ending.CONVERGED, Ending.ROUNDING)
-        self.left_ = analysis.left
+        self.left_, self.drift_ = analysis.left, analysis.drift
         self.reliability_, self.pruned_ = np.zeros(d), np.zeros(d, dtype=bool)
         self.reliability_[inputs] = factors.reliability
         self.coef_noisy_ = self._in_units(analysis.coefficients, inputs)

@@ -84,11 +84,11 @@ def _ended(regression: JointFactorRegression) -> str:
     rounds = f"{regression.n_iter_} rounds, bound {bounds[-1]:.9g} nats"
     if regression.converged_:
         return f"Iterations {regression.ending_}: {rounds}."
-    if regression.left_ > 0:
+    if regression.drift_ > 0:
         return (
-            f"Iterations ended on a flat ridge of the bound: {rounds}; {regression.left_:.2g} nats "
-            "are left along it, where half a nat is worth one standard deviation. b_true depends "
-            "on where they ended: lower tol to go on."
+            f"Iterations {regression.ending_} of the bound: {rounds}; for {regression.left_:.2g} "
+            f"nats more a reliability would move by {regression.drift_:.2g}, and b_true with it "
+            "(half a nat is worth one standard deviation). Lower tol to go on."
         )
     last = (
         f", and the last one still gained {bounds[-1] - bounds[-2]:.2g}" if len(bounds) > 1 else ""
