@@ -74,6 +74,8 @@ def test_the_change_against_ols_has_its_own_standard_error() -> None:
         own = 0.6 * plain * (1 + 0.05 * rng.standard_normal(30))
         study = table.Study({(one, "OLS", "noisy"): plain, (one, "Bayes", "noisy"): own})
         change, doubt = study.change(one, "Bayes", "noisy")
+        back, _ = study.change(one, "OLS", "noisy", "Bayes")
+        assert (1 + change / 100) * (1 + back / 100) == pytest.approx(1.0)
         changes.append(change)
         doubts.append(doubt)
     assert np.mean(changes) == pytest.approx(-40.0, abs=0.2)
@@ -92,5 +94,9 @@ def test_tables_and_bars_show_every_cell_and_method() -> None:
     )
     for kind in table.SETS:
         assert len(found.table(kind).rows) == len(table.CELLS) * len(table.METHODS)
+    assert [row[0] for row in found.rivals().rows] == [one.name for one in table.CELLS]
+    assert (
+        len(found.rivals().columns) == 2 + len(table.METHODS) - 2
+    )  # those with Bayes are no rivals
     bars = [bar for panel in table.figure(found).axes for bar in panel.patches]
     assert len(bars) == len(table.CELLS) * len(table.METHODS)

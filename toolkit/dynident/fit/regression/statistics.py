@@ -31,6 +31,8 @@ class Statistics:
     --------
     Each recording where its file is, and their sum over processes or a Dask cluster:
 
+    >>> import operator
+    >>> from functools import reduce
     >>> def of_file(path):
     ...     X, y = rows_of(path)
     ...     return di.Statistics.of(X, y)
