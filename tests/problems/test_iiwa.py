@@ -73,3 +73,15 @@ def test_recordings_are_those_of_the_experiment() -> None:
         assert found.q_ref is not None and one.q_ref is not None
         np.testing.assert_allclose(found.q_ref, one.q_ref, atol=1e-9)
         np.testing.assert_allclose(found.q, one.q, atol=2e-4)
+
+
+@pytest.mark.slow
+def test_the_closing_table_ranks_estimators_as_the_readme_says() -> None:
+    """One draw of three: known noise takes half of the error off, instruments nearly all."""
+    rivals = script("iiwa", "rivals")
+    found = rivals.rivals(1e-4, 1)
+    torque = {name: one.torque for name, one in found.items()}
+    assert 0.015 < torque["OLS"] < 0.025 and 0.015 < torque["ridge"] < 0.025
+    assert torque["corrected LS, noise from the encoders"] < 0.5 * torque["OLS"]
+    assert torque["corrected LS, noise from repetitions"] < 0.7 * torque["OLS"]
+    assert torque["IV, simulated loop"] < 0.1 * torque["OLS"]

@@ -95,8 +95,7 @@ def test_tables_and_bars_show_every_cell_and_method() -> None:
     for kind in table.SETS:
         assert len(found.table(kind).rows) == len(table.CELLS) * len(table.METHODS)
     assert [row[0] for row in found.rivals().rows] == [one.name for one in table.CELLS]
-    assert (
-        len(found.rivals().columns) == 2 + len(table.METHODS) - 2
-    )  # those with Bayes are no rivals
+    # The inputs, the claim, and every method but the two that are Bayes.
+    assert len(found.rivals().columns) == 2 + len(table.METHODS) - 2
     bars = [bar for panel in table.figure(found).axes for bar in panel.patches]
     assert len(bars) == len(table.CELLS) * len(table.METHODS)

@@ -52,6 +52,9 @@ def test_every_regression_finds_the_truth_where_there_is_no_input_noise(name: st
     # The two factor analyses unfold by a reliability that no data tell: b_noise is at most halved.
     most = 0.3 if name in ("factors", "bayes") else 0.02
     np.testing.assert_allclose(found.values, truth(), atol=most * size)
+    if name == "factors":  # b_noise is that of least squares to the small ones
+        regressor: Any = di.Regression(name).regressor(model(), noisy(3, 0.0))
+        np.testing.assert_allclose(regressor.coef_noisy_, truth(), atol=0.02 * size)
     assert found.rows == 2 * sum(len(torque) for _, torque in rows(model(), noisy(3, 0.0)))
     assert found.error < 0.1 and found.summary()
 
