@@ -92,6 +92,7 @@ def test_adding_the_missing_friction_is_worth_more_than_any_regression() -> None
     off = {name: one.position for name, (one,) in found.items()}
     best = min(off[name] for name in tracking.METHODS)
     assert all(off[name] < 0.7 * best for name in tracking.ADDED)
+    assert off["dry friction added"] < 0.5 * off["least squares"]
     ((name, arm),) = tracking.trial(
         PROBLEMS / "anthropomorphic_arm", 480 * 20, 1, 1, ["dry friction added"]
     ).items()

@@ -102,7 +102,7 @@ def analyse(
     """
     here = Posterior(start, statistics)
     bounds, used, in_a_row, degree, quiet = [here.bound(prior)], 0, 0, _DEGREES[0], 0
-    ending, ahead = Ending.ROUNDS_EXHAUSTED, None
+    ending, left, drift = Ending.ROUNDS_EXHAUSTED, np.nan, np.nan
     while used < rounds:
         here = Posterior(here.updated(prior, known), statistics)
         bounds.append(here.bound(prior))
@@ -132,14 +132,10 @@ def analyse(
             bounds.append(bounds[-1] + won)
         if quiet == _QUIET:
             ahead = _ahead(here, prior, known)
-            ending = Ending.CONVERGED
+            left, drift = ahead.bound(prior) - here.bound(prior), _drift(here, ahead)
+            flat = left > _LITTLE and drift > _STILL
+            ending = Ending.FLAT if flat else Ending.CONVERGED
             break
-    left = drift = np.nan
-    if ahead is not None:
-        left = ahead.bound(prior) - here.bound(prior)
-        drift = _drift(here, ahead)
-        if left > _LITTLE and drift > _STILL:
-            ending = Ending.FLAT
     return Analysis(here.factors, here.b, used, np.array(bounds), ending, left, drift)
 
 

@@ -90,7 +90,8 @@ class Regression:
         """Return the fitted estimator itself, its inputs named as the parameters are.
 
         It knows more than an estimate holds: `start_sensitivity` and `reliability_profile` take
-        it, and say what the data tell of the noise in the inputs.
+        it, and say what the data tell of the noise in the inputs. Its standard deviations are from
+        the scatter between pieces of the data, as those of the estimate.
 
         Raises
         ------
