@@ -16,11 +16,12 @@ import time
 
 import numpy as np
 
-from dynident.fit.consistent import Solver, solve
-from dynident.fit.posterior import sized
-from dynident.fit.prior import Prior
+from dynident.constraints import Consistency, ParameterSpace, Within
+from dynident.fitting.consistent.posterior import sized
+from dynident.fitting.consistent.prior import Prior
+from dynident.fitting.consistent.programs import Solver, solve
 from dynident.model import Model
-from dynident.nlp import Consistency, ParameterSpace, Problem, Within
+from dynident.nlp import Problem
 from dynident.robot import Robot
 from dynident.threads import single_threaded
 

@@ -40,7 +40,7 @@ from pydrake.systems.primitives import Adder, LogVectorOutput
 
 import dynident as di
 from dynident.closed_loop import ClosedLoop, Task
-from dynident.closed_loop.plant import Plant
+from dynident.closed_loop.plant.diagram import Plant
 from dynident.threads import single_threaded
 
 PROBLEMS = Path(__file__).parents[1] / "problems"
@@ -62,7 +62,7 @@ class Loop:
     """
 
     task: Task
-    controller: di.Controller
+    controller: di.closed_loop.Controller
     urdf: Path
     q_ref: np.ndarray
     v_ref: np.ndarray
@@ -82,7 +82,7 @@ class Loop:
 
 
 def loop() -> Loop:
-    experiment = di.load_experiment(PROBLEMS / "iiwa" / "experiment.toml")
+    experiment = di.closed_loop.load_experiment(PROBLEMS / "iiwa" / "experiment.toml")
     mechanism = experiment.mechanism()
     (test,) = (run for run in experiment.runs if run.use == "test")
     rate = experiment.controller.simulated_rate()

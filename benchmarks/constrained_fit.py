@@ -30,12 +30,13 @@ from typing import Any
 import numpy as np
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
-from dynident.fit.consistent import solve
-from dynident.fit.posterior import sized
-from dynident.fit.prior import Prior
+from dynident.constraints import ParameterSpace, Within
+from dynident.fitting.consistent.posterior import sized
+from dynident.fitting.consistent.prior import Prior
+from dynident.fitting.consistent.programs import solve
 from dynident.inertia import pseudo_inertia
 from dynident.model import Model
-from dynident.nlp import ParameterSpace, Problem, Within
+from dynident.nlp import Problem
 from dynident.threads import single_threaded
 from least_squares_memory import arm
 

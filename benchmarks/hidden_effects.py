@@ -23,8 +23,8 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from blind_study.foreign import PositionDependentViscosity
-from dynident.closed_loop import Controller, Experiment, Fourier, Run, Sensors, TrueEffect
-from dynident.diagnose import diagnose
+from dynident.closed_loop import Controller, Experiment, ExperimentRun, Fourier, Sensors, TrueEffect
+from dynident.diagnosis import diagnose
 from dynident.effects import catalogue
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
@@ -134,7 +134,7 @@ def _recordings(
     case: Case, robot: Robot, truth: list[TrueEffect], runs: int
 ) -> tuple[Recording, ...]:
     made = tuple(
-        Run(
+        ExperimentRun(
             Fourier.random(robot, PERIOD, [case.seed, r], amplitude=[1.6, 1.8], speed=[2.5, 3.0]),
             DURATION,
             f"run{r + 1}.csv",
@@ -147,10 +147,10 @@ def _recordings(
 
 def _scaled(case: Case, robot: Robot, known: list[TrueEffect], hidden: TrueEffect) -> TrueEffect:
     """Scale an effect so that it leaves `strength` times the noise in the residual."""
-    from dynident.diagnose.evidence import ColumnStore
-    from dynident.diagnose.held_out import on_recordings
-    from dynident.diagnose.present import fit_present
-    from dynident.diagnose.runs import gather
+    from dynident.evidence.column_store import ColumnStore
+    from dynident.evidence.evidence_fit import fit_present
+    from dynident.evidence.held_out import on_recordings
+    from dynident.evidence.runs import gather
 
     model = Model(robot, tuple(one.effect for one in known))
     for _ in range(3):

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynident.fit.regression.factor_analysis import Gamma, start_of
-from dynident.fit.regression.iterations import analyse
-from dynident.fit.regression.statistics import Statistics
+from dynident.regression.factor_analysis import Gamma, start_of
+from dynident.regression.iterations import analyse
+from dynident.regression.statistics import Statistics
 from dynident.threads import single_threaded
 
 BLOCK = 8192

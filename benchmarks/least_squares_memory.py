@@ -15,8 +15,8 @@ import tracemalloc
 
 import numpy as np
 
-from dynident.fit import LeastSquares
-from dynident.fit.sampling import sample
+from dynident.fitting import LeastSquares
+from dynident.fitting.sampling import sample
 from dynident.model import Model
 from dynident.recording import Dataset, Filter, Recording
 from dynident.robot import Robot

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 import dynident as di
-from dynident.report.content import AFTER_COLOUR, BEFORE_COLOUR, GREY, bars
-from dynident.report.ellipsoids import inertia_ellipsoids
+from dynident.reporting.content import AFTER_COLOUR, BEFORE_COLOUR, GREY, bars
+from dynident.reporting.pictures.ellipsoids import inertia_ellipsoids
 
 HERE = Path(__file__).resolve().parent
 STUDY = HERE.parent / "problems" / "hidden_effect" / "study.toml"
@@ -81,7 +81,7 @@ def noisy_positions() -> None:
     figure.savefig(HERE / "noisy_positions.png", dpi=150, facecolor="white")
 
 
-def report_page(diagnosis: di.Diagnosis) -> None:
+def report_page(diagnosis: di.diagnosis.Diagnosis) -> None:
     """The top of the report as a browser shows it; left as it is where there is no chromium."""
     browser = which("chromium")
     if browser is None:
@@ -109,7 +109,7 @@ def impossible_links() -> None:
     picture.savefig(HERE / "impossible_links.png", facecolor="white")
 
 
-def residual(axes: Axes, diagnosis: di.Diagnosis) -> None:
+def residual(axes: Axes, diagnosis: di.diagnosis.Diagnosis) -> None:
     """Mean residual against velocity, before and after, with the band of the noise."""
     (one,) = (m for m in diagnosis.maps if (m.joint, m.against) == (JOINT, "velocity"))
     axes.fill_between(one.at, -one.band, one.band, color=GREY, alpha=0.35, lw=0, label="noise")
@@ -127,7 +127,7 @@ def residual(axes: Axes, diagnosis: di.Diagnosis) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def waterfall(axes: Axes, diagnosis: di.Diagnosis) -> None:
+def waterfall(axes: Axes, diagnosis: di.diagnosis.Diagnosis) -> None:
     """Held-out error as effects are added, down to the noise floor."""
     rows = bars(diagnosis)
     colours = {"given": BEFORE_COLOUR, "added": "white", "final": AFTER_COLOUR}
@@ -163,7 +163,7 @@ def waterfall(axes: Axes, diagnosis: di.Diagnosis) -> None:
     axes.spines[["top", "right", "left"]].set_visible(False)
 
 
-def found(diagnosis: di.Diagnosis) -> str:
+def found(diagnosis: di.diagnosis.Diagnosis) -> str:
     """Name the effects that were added."""
     return proper(" and ".join(s.effect.name.replace("_", " ") for s in diagnosis.steps))
 

@@ -23,7 +23,7 @@ from scipy import stats
 import dynident as di
 from dynident.closed_loop import ClosedLoop, Fourier, Mechanism, Rollout, Task
 from dynident.errors import SimulationError
-from dynident.fit import Metric
+from dynident.fitting import Metric
 from dynident.tables import Table, number, print_tables
 from dynident.threads import single_threaded
 
@@ -72,7 +72,7 @@ class Setting:
     published : the paper's figures, and the settings of the controller.
     """
 
-    experiment: di.Experiment
+    experiment: di.closed_loop.Experiment
     model: di.Model
     richer: di.Model
     dataset: di.Dataset
@@ -110,7 +110,7 @@ def sinusoids(robot: di.Robot, seed: int, published: dict[str, Any]) -> Fourier:
 def setting(folder: Path, samples: int, seed: int = 1) -> Setting:
     """Record a robot for so many samples, in pieces of a minute."""
     published = tomllib.loads((folder / "published.toml").read_text())
-    experiment = di.load_experiment(folder / "experiment.toml")
+    experiment = di.closed_loop.load_experiment(folder / "experiment.toml")
     rate = experiment.controller.simulated_rate()
     lengths = [RUN] * int(samples / (rate * RUN))
     if (rest := samples / rate - RUN * len(lengths)) > 2.0:
@@ -139,7 +139,7 @@ def setting(folder: Path, samples: int, seed: int = 1) -> Setting:
     cutoff = published["position_cutoff_hz"]
     edge = 3.0 / cutoff
     n = nominal.n
-    noise = di.Noise(
+    noise = di.recording.Noise(
         experiment.sensors.each("position_std", n), experiment.sensors.each("torque_std", n)
     )
     settings = di.Filter(position_cutoff_hz=cutoff, edge_s=(edge, edge))
@@ -173,7 +173,7 @@ def tracked(
     """Errors of the loop that has this model inside its controller; none where a motion fails."""
     settings, robot = one.published["controller"], one.experiment.robot
     w, damping = 2 * np.pi * settings["natural_frequency_hz"], settings["damping"]
-    controller = di.Controller(
+    controller = di.closed_loop.Controller(
         "computed_torque",
         one.experiment.controller.rate_hz,
         kp=(w**2,) * robot.n,

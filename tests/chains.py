@@ -8,12 +8,13 @@ from typing import Literal
 
 import numpy as np
 
-from dynident.fit import Estimate, LeastSquares, Prior, fit
-from dynident.fit.posterior import sized
+from dynident.constraints import ParameterSpace, Within
+from dynident.constraints.space import body_scale
+from dynident.fitting import Estimate, LeastSquares, Prior, fit
+from dynident.fitting.consistent.posterior import sized
 from dynident.inertia import PARAMETERS, UNITS, distance_rows, from_pseudo_inertia, reference_body
 from dynident.model import Model
-from dynident.nlp import ParameterSpace, Problem, Within
-from dynident.nlp.space import body_scale
+from dynident.nlp import Problem
 from dynident.recording import Dataset, Filter, Recording
 from dynident.robot import Robot
 from synthetic import smooth_motion

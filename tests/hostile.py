@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dynident.fit import Estimate, fit
+from dynident.fitting import Estimate, fit
 from dynident.model import Model
 from dynident.recording import Dataset
 from synthetic import arm, synthetic, true_values

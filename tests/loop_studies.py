@@ -5,8 +5,9 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from dynident.closed_loop import Controller, Experiment, Fourier, Run, TrueEffect
-from dynident.recording import Recording, write
+from dynident.closed_loop import Controller, Experiment, ExperimentRun, Fourier, TrueEffect
+from dynident.recording import Recording
+from dynident.recording.formats import write
 from synthetic import ARM, arm
 
 LOOP_STUDY = """\
@@ -37,7 +38,7 @@ def recordings() -> tuple[Recording, ...]:
     robot = arm()
     truth = TrueEffect.of("viscous_friction@shoulder", robot, [2.0])
     runs = [
-        Run(Fourier.random(robot, 2.0, seed, harmonics=3), 4.0, name)
+        ExperimentRun(Fourier.random(robot, 2.0, seed, harmonics=3), 4.0, name)
         for seed, name in enumerate(("train.csv", "test.csv"))
     ]
     controller = Controller("pd", 250.0, (400.0, 120.0), (50.0, 8.0))

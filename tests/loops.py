@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynident.closed_loop import Controller, Experiment, Fourier, Run, Sensors, TrueEffect
+from dynident.closed_loop import Controller, Experiment, ExperimentRun, Fourier, Sensors, TrueEffect
 from dynident.model import Model
 from dynident.recording import Dataset, Filter
 from dynident.robot import Robot
@@ -70,7 +70,7 @@ def experiment(
         if coulomb:
             effects += TrueEffect.of(f"coulomb_friction@{joint}", arm, (COULOMB[j],))
     motion = Fourier.random(arm, 10.0, 3, amplitude=1.0, speed=3.0)
-    runs = tuple(Run(motion, seconds, f"run{k}.npz") for k in range(motions))
+    runs = tuple(ExperimentRun(motion, seconds, f"run{k}.npz") for k in range(motions))
     sensors = Sensors(position_std=position_std)
     loop = controller or LOOP
     return Experiment(arm, loop, runs, tuple(effects), sensors, seed)

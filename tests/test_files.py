@@ -12,10 +12,10 @@ import pytest
 import dynident as di
 from dynident import files
 from dynident.errors import FileError
-from dynident.recording.write import write as write_recording
+from dynident.recording.formats.write import write as write_recording
 from dynident.robot import Robot
+from dynident.robot.patching import write as write_robot
 from dynident.robot.verify import write_verified
-from dynident.robot.write import write as write_robot
 from dynident.study import add_effects
 from study_files import STUDY, write_study
 from synthetic import ARM, arm, synthetic, true_values

@@ -10,7 +10,7 @@ from scipy import signal
 from blind_study.cases import Case
 from blind_study.foreign import sensor_error
 from blind_study.robots import Specimen
-from dynident.closed_loop import Experiment, Fourier, Run, Sensors, TrueEffect
+from dynident.closed_loop import Experiment, ExperimentRun, Fourier, Sensors, TrueEffect
 from dynident.recording import Recording
 
 PERIOD, REPETITIONS, PAUSE = 8.0, 2, 120.0
@@ -113,13 +113,13 @@ class Plan:
         made = self._laboratory(runs, hidden, errors)
         return made if noisy else replace(made, sensors=Sensors(), torque_noise=())
 
-    def _runs(self) -> tuple[Run, ...]:
+    def _runs(self) -> tuple[ExperimentRun, ...]:
         made, case = self.made, self.case
         hidden = {one.effect for one in case.hidden}
         always = case.kind == "absorbed" and "payload" in hidden
         carried = case.payload or "payload" in hidden
         return tuple(
-            Run(
+            ExperimentRun(
                 Fourier.random(
                     made.robot,
                     PERIOD,

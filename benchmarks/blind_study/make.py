@@ -18,7 +18,7 @@ from blind_study.foreign import EFFECTS, SENSOR_ERRORS
 from blind_study.robots import TWO, specimen
 from dynident.closed_loop import TrueEffect, write_experiment
 from dynident.effects import FRICTION_WIDTH, Effect, catalogue
-from dynident.fit import fit, rows
+from dynident.fitting import fit, rows
 from dynident.model import Model
 from dynident.recording import Dataset
 

@@ -6,7 +6,7 @@ from collections import Counter
 
 from blind_study.foreign import KIN
 from blind_study.judge import Judged
-from dynident.diagnose.track_record import kind_of
+from dynident.diagnosis.track_record import kind_of
 
 SEEN = 0.7
 """Ratio from which an effect counts as seen above the noise."""

@@ -17,7 +17,7 @@ from scipy import stats
 from blind_study import record
 from blind_study.judge import Judged, judge
 from blind_study.robots import MANY, TWO
-from dynident.diagnose.track_record import LARGE, track_record
+from dynident.diagnosis.track_record import LARGE, track_record
 
 LEAST = 0.7
 """Ratio below which an effect need not be found."""

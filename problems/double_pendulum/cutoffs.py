@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 import dynident as di
-from dynident.fit.instrumental import Filtered
+from dynident.fitting.instrumental import Filtered
 from dynident.recording import uniform
 from dynident.tables import Table, number, print_tables
 

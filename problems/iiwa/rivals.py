@@ -44,7 +44,7 @@ class Errors:
 
 def true_values(one: Arm) -> np.ndarray:
     """Return the parameters that the virtual arm has, (p,)."""
-    experiment = di.load_experiment(HERE / "experiment.toml")
+    experiment = di.closed_loop.load_experiment(HERE / "experiment.toml")
     values = one.model.given_values()
     for effect in experiment.effects:
         values[one.model.slices[effect.effect.label]] = effect.values
@@ -66,7 +66,9 @@ def errors(one: Arm, found: di.Estimate) -> Errors:
 def rivals(position_std: float, seed: int) -> dict[str, Errors | str]:
     """Errors of each estimator; the complaint of one that does not work here."""
     one = arm(position_std, seed)
-    noise = di.Noise(np.full(one.model.robot.n, position_std), np.zeros(one.model.robot.n))
+    noise = di.recording.Noise(
+        np.full(one.model.robot.n, position_std), np.zeros(one.model.robot.n)
+    )
     dataset = di.Dataset(one.recordings, None, noise)
     methods = {**METHODS, "IV, simulated loop": di.IV(one.controller, start="regular")}
     found: dict[str, Errors | str] = {}

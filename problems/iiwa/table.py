@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 import dynident as di
-from dynident.fit.instrumental import SimulatedLoop
+from dynident.fitting.instrumental import SimulatedLoop
 from dynident.tables import Table, number, percent, print_tables
 
 HERE = Path(__file__).parent
@@ -45,7 +45,7 @@ class Arm:
 
     model: di.Model
     filter: di.Filter
-    controller: di.Controller
+    controller: di.closed_loop.Controller
     recordings: tuple[di.Recording, ...]
     t: np.ndarray
     q: np.ndarray
@@ -67,7 +67,7 @@ class Arm:
 @cache
 def arm(position_std: float, seed: int = 1, duration: float | None = None) -> Arm:
     """Record the arm with encoders of this noise (rad), for some time (s)."""
-    experiment = di.load_experiment(HERE / "experiment.toml")
+    experiment = di.closed_loop.load_experiment(HERE / "experiment.toml")
     train = tuple(
         replace(run, duration=duration or run.duration)
         for run in experiment.runs

@@ -27,9 +27,9 @@ from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from dynident.fit.regression.joint_factors import BayesianFactorRegression, JointFactorRegression
-from dynident.fit.regression.stepwise import StepwiseRegression
-from dynident.fit.regression.truncated import TruncatedLeastSquares
+from dynident.regression.joint_factors import BayesianFactorRegression, JointFactorRegression
+from dynident.regression.stepwise import StepwiseRegression
+from dynident.regression.truncated import TruncatedLeastSquares
 from dynident.tables import Table, print_tables
 from dynident.threads import single_threaded
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 import dynident as di
-from dynident.fit.instrumental import SimulatedLoop
+from dynident.fitting.instrumental import SimulatedLoop
 from dynident.tables import Table, number, percent, print_tables
 
 HERE = Path(__file__).parent
@@ -105,7 +105,10 @@ def in_paper_terms(values: np.ndarray, names: tuple[str, ...]) -> np.ndarray:
 
 def truth() -> np.ndarray:
     """The virtual robot's parameters in the paper's terms, (8,)."""
-    study, experiment = di.load(HERE / "study.toml"), di.load_experiment(HERE / "experiment.toml")
+    study, experiment = (
+        di.load(HERE / "study.toml"),
+        di.closed_loop.load_experiment(HERE / "experiment.toml"),
+    )
     model = study.model
     values = model.given_values()
     for one in experiment.effects:

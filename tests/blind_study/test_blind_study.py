@@ -19,7 +19,7 @@ from blind_study.robots import specimen
 from blind_study.strengths import KNOWN, start
 from blind_study.table import Rate, figures, load
 from dynident.effects import catalogue
-from dynident.fit import fit
+from dynident.fitting import fit
 from dynident.study import load as load_study
 
 TINY = Size(rate_of_two=200.0, rate_of_many=200.0, runs=2, tests=1)

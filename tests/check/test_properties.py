@@ -18,7 +18,7 @@ from dynident.robot.rotations import from_rpy
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-def fore_of(found: di.Check):
+def fore_of(found: di.consistency.Check):
     return next(one for one in found.links if one.name == "fore")
 
 

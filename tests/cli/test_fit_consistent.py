@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dynident.fit import load_estimate
+from dynident.fitting import load_estimate
 from dynident.inertia import margins
 from study_files import STUDY
 

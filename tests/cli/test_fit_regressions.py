@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from dynident.cli.methods import REGRESSIONS
-from dynident.fit.regression.named import NAMES
+from dynident.fitting.noisy_inputs.named import NAMES
 from loop_studies import LOOP_STUDY, write_loop_study
 from study_files import edited
 

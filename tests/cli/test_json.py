@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dynident.effects import catalogue
-from dynident.fit import load_estimate
+from dynident.fitting import load_estimate
 from dynident.robot import Robot
 from study_files import CONTROLLER, STUDY, edited, listing
 from synthetic import ARM, arm

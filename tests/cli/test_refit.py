@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from dynident.fit import load_estimate
+from dynident.fitting import load_estimate
 from dynident.inertia import PARAMETERS, margins
 from dynident.robot import Robot
 from study_files import listing

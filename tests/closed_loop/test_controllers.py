@@ -10,7 +10,7 @@ import pytest
 from tests.synthetic import arm
 
 from dynident.closed_loop import Controller, ControllerFile
-from dynident.closed_loop.drive import Drive, ReferenceSamples
+from dynident.closed_loop.plant.drive import Drive, ReferenceSamples
 from dynident.errors import SimulationError, StudyError
 from dynident.robot import Robot
 

@@ -14,15 +14,15 @@ from tests.synthetic import ARM, arm
 from dynident.closed_loop import (
     Controller,
     Experiment,
+    ExperimentRun,
     Fourier,
-    Run,
     Sensors,
     TrueEffect,
     load_experiment,
     write_experiment,
 )
 from dynident.errors import DynidentError, EffectError, SimulationError, StudyError
-from dynident.recording import read
+from dynident.recording.formats import read
 from dynident.study import load
 
 RATE = 250.0
@@ -83,7 +83,8 @@ def small(**changes: Any) -> Experiment:
         "robot": robot,
         "controller": Controller("pd", RATE, (300.0, 100.0), (40.0, 5.0)),
         "runs": tuple(
-            Run(Fourier.random(robot, 0.5, k, speed=2.0), 1.0, f"run{k}.csv") for k in range(2)
+            ExperimentRun(Fourier.random(robot, 0.5, k, speed=2.0), 1.0, f"run{k}.csv")
+            for k in range(2)
         ),
         "sensors": Sensors(2e-5, 1e-5, 0.05, 1e-3),
         "seed": 1,

@@ -116,8 +116,8 @@ def test_many_motions_are_simulated_a_plant_at_a_time() -> None:
 @pytest.mark.parametrize("name", catalogue())
 def test_terms_are_the_force(name: str) -> None:
     """Native terms, of any sign, in a plant of two robots, to the last digits."""
-    from dynident.closed_loop.compiled import Bodies
-    from dynident.closed_loop.layers import Terms
+    from dynident.closed_loop.plant.layers import Terms
+    from dynident.closed_loop.plant.point_force import Bodies
 
     robot, rng = arm(), np.random.default_rng(0)
     (effect,) = effects_of(name + PLACES[catalogue()[name].place], robot)
@@ -139,7 +139,7 @@ def evaluated(terms: Any, states: np.ndarray) -> np.ndarray:
     from pydrake.systems.framework import DiagramBuilder
     from pydrake.systems.primitives import ConstantVectorSource, PassThrough
 
-    from dynident.closed_loop.layers import Layers, summed
+    from dynident.closed_loop.plant.layers import Layers, summed
 
     builder: Any = DiagramBuilder()
     state = builder.AddSystem(PassThrough(states.shape[1]))

@@ -13,9 +13,9 @@ from dynident.closed_loop import (
     ClosedLoop,
     Controller,
     Experiment,
+    ExperimentRun,
     Fourier,
     Mechanism,
-    Run,
     SampledReference,
     Sensors,
     TrueEffect,
@@ -37,7 +37,9 @@ def experiment(**changes: Any) -> Experiment:
         "robot": robot,
         "controller": PD,
         "runs": tuple(
-            Run(Fourier.random(robot, 2.0, k, speed=2.0), 1.0 + k, f"run{k}.csv", start=5.0 * k)
+            ExperimentRun(
+                Fourier.random(robot, 2.0, k, speed=2.0), 1.0 + k, f"run{k}.csv", start=5.0 * k
+            )
             for k in range(2)
         ),
         "effects": (*effects, *TrueEffect.of("payload", robot, LOAD)),

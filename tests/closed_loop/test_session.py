@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dynident.closed_loop import Controller, Experiment, Fourier, Run, Sensors, TrueEffect
+from dynident.closed_loop import Controller, Experiment, ExperimentRun, Fourier, Sensors, TrueEffect
+from dynident.closed_loop.experiments.virtual_study import write_experiment
 from dynident.closed_loop.sensors import delayed
-from dynident.closed_loop.virtual_study import write_experiment
 from dynident.robot import Robot
 from dynident.study import load
 
@@ -24,7 +24,7 @@ STARTS = (0.0, 100.0)
 def experiment(*effects: TrueEffect, **changes: Any) -> Experiment:
     robot = Robot.from_text(ARM)
     trajectory = Fourier.random(robot, 1.0, 1, harmonics=2, speed=2.0)
-    runs = [Run(trajectory, 2.0, f"run{k}.csv", start=s) for k, s in enumerate(STARTS)]
+    runs = [ExperimentRun(trajectory, 2.0, f"run{k}.csv", start=s) for k, s in enumerate(STARTS)]
     controller = Controller("pd", RATE, (100.0,), (5.0,))
     return Experiment(robot, controller, tuple(runs), effects, lead_in=1.0, **changes)
 

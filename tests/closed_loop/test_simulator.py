@@ -13,7 +13,7 @@ from scipy.special import ellipk
 from tests.synthetic import arm
 
 from dynident.closed_loop import Controller, Fourier, Mechanism, Rollout, Sensors, Task, TrueEffect
-from dynident.closed_loop.compiled import Bodies, PlainForce, TracedForce, point_force
+from dynident.closed_loop.plant.point_force import Bodies, PlainForce, TracedForce, point_force
 from dynident.closed_loop.simulator import simulate
 from dynident.effects import Effect, catalogue, effects_of
 from dynident.errors import SimulationError

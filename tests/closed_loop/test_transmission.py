@@ -8,7 +8,7 @@ from tests.synthetic import arm
 
 from dynident.closed_loop import ClosedLoop, Controller, Fourier, Mechanism, Task, TrueEffect
 from dynident.closed_loop.rollout import Rollout
-from dynident.effects.driven import mean_inertia
+from dynident.effects.transmissions.driven import mean_inertia
 from dynident.errors import SimulationError
 from dynident.robot import Robot
 
@@ -37,7 +37,7 @@ def elastic(robot: Robot, resonance: float, damping: float, joint: str, rotor: f
 
 def swung(mechanism: Mechanism, link: float, seconds: float) -> np.ndarray:
     """Position of the one link, let go at `link` rad while a controller holds the motor at 0."""
-    from dynident.closed_loop.plant import Plant
+    from dynident.closed_loop.plant.diagram import Plant
 
     plant = Plant([mechanism])
     plant.set([mechanism], [0.0])
@@ -94,7 +94,7 @@ def test_a_link_in_a_gap_flies_freely_and_starts_where_the_load_leans() -> None:
     free = Mechanism.of(pendulum(), effects)
     states = swung(free, -0.01, 0.01)
     np.testing.assert_allclose(states[:, 1], states[0, 1], atol=1e-6)
-    from dynident.closed_loop.plant import Plant
+    from dynident.closed_loop.plant.diagram import Plant
 
     hanging = Mechanism.of(robot, effects)
     plant = Plant([hanging])
@@ -205,7 +205,7 @@ def test_what_runs_in_python_is_said() -> None:
 
 
 def test_an_acceleration_just_after_a_sample_is_the_diagrams_own() -> None:
-    from dynident.closed_loop.plant import Plant
+    from dynident.closed_loop.plant.diagram import Plant
 
     robot, rng = arm(), np.random.default_rng(3)
     effects = [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynident.diagnose.confidence_set import confidence_set
+from dynident.diagnosis.search.confidence_set import confidence_set
 
 BLOCKS = 20
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from dynident.diagnose.changes import Repeated, changes_of, scanned
-from dynident.diagnose.contact import LEVEL, WIDTHS, Bump, bumps_in, without
-from dynident.diagnose.runs import Run
+from dynident.diagnosis.nuisances.changes import Repeated, changes_of, scanned
+from dynident.diagnosis.nuisances.pulse_search import LEVEL, WIDTHS, Bump, bumps_in, without
+from dynident.evidence.runs import Run
 
 STEP = 0.02
 INSTANTS = 250

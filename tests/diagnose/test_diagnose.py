@@ -10,9 +10,10 @@ import pytest
 from dynident import compare
 from dynident import diagnose as find
 from dynident import fit as fit_model
-from dynident.diagnose import Diagnosis, compare_models
+from dynident.diagnosis import Diagnosis
 from dynident.effects import effects_of
 from dynident.errors import FitError, RecordingError
+from dynident.evidence import compare_models
 from dynident.model import Model
 from dynident.recording import Dataset, Noise
 from synthetic import arm, synthetic, true_values

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from dynident import diagnose as find
-from dynident.diagnose.encoders import rounding_power
-from dynident.diagnose.evidence import ColumnStore
-from dynident.diagnose.held_out import on_recordings
-from dynident.diagnose.present import fit_present
-from dynident.diagnose.runs import gather
+from dynident.diagnosis.nuisances.quantisation import rounding_power
+from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.evidence_fit import fit_present
+from dynident.evidence.held_out import on_recordings
+from dynident.evidence.runs import gather
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
 from synthetic import arm, synthetic, true_values

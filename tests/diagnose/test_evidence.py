@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynident.diagnose.evidence import ColumnStore
-from dynident.diagnose.runs import gather
 from dynident.effects import catalogue
+from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.runs import gather
 from dynident.model import Model
 from dynident.recording import Dataset
 from synthetic import arm, synthetic, true_values

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dynident.diagnose.experiments import Adviser, revealing, separating
-from dynident.diagnose.trials import Recorded, Trial, Trials
+from dynident.diagnosis.advice.candidate_experiments import Recorded, Trial, Trials
+from dynident.diagnosis.advice.experiments import Adviser, revealing, separating
 from dynident.effects import catalogue, effects_of
 from dynident.model import Model
 from dynident.robot import Robot

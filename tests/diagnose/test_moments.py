@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dynident.diagnose.moments import moments, solve
-from dynident.diagnose.noise import differences, measure_noise, systematic_square
+from dynident.evidence.noise_model import differences, measure_noise, systematic_square
+from dynident.moments.replicated import moments, solve
 
 RNG = np.random.default_rng(11)
 

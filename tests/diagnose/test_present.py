@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import dynident as di
-from dynident.diagnose.evidence import ColumnStore
-from dynident.diagnose.present import fit_present
-from dynident.diagnose.runs import gather
 from dynident.effects import catalogue
+from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.evidence_fit import fit_present
+from dynident.evidence.runs import gather
 from problem_scripts import PROBLEMS
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynident.diagnose.choosing import choose
-from dynident.diagnose.evidence import ColumnStore
-from dynident.diagnose.present import Present, fit_present
-from dynident.diagnose.pruning import without_superfluous
-from dynident.diagnose.runs import gather
-from dynident.diagnose.search import candidates, rank
-from dynident.diagnose.telling import Found
+from dynident.diagnosis.assembly import Found
+from dynident.diagnosis.search.pruning import without_superfluous
+from dynident.diagnosis.search.ranking import candidates, rank
+from dynident.diagnosis.search.selection import choose
 from dynident.effects import effects_of
+from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.evidence_fit import Present, fit_present
+from dynident.evidence.runs import gather
 from dynident.model import Model
 from dynident.recording import Dataset
 from synthetic import arm, synthetic, true_values

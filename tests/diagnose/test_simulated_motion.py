@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from dynident.closed_loop import Controller, Experiment, Fourier, Sensors, TrueEffect
-from dynident.closed_loop import Run as Motion
-from dynident.diagnose import diagnose
-from dynident.diagnose.evidence import ColumnStore
-from dynident.diagnose.present import fit_present, model_columns
-from dynident.diagnose.simulated import motion_of_loop
+from dynident.closed_loop import ExperimentRun as Motion
+from dynident.diagnosis import diagnose
+from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.evidence_fit import fit_present, model_columns
+from dynident.evidence.simulated_motion import motion_of_loop
 from dynident.model import Model
 from dynident.recording import Dataset
 from synthetic import arm

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from dynident.diagnose import track_record as module
-from dynident.diagnose.track_record import LARGE, TrackRecord, kind_of, track_record
+from dynident.diagnosis import track_record as module
+from dynident.diagnosis.track_record import LARGE, TrackRecord, kind_of, track_record
 
 
 @pytest.mark.parametrize(

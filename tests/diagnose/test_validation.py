@@ -13,22 +13,23 @@ import pytest
 from dynident.closed_loop import (
     Controller,
     Experiment,
+    ExperimentRun,
     Fourier,
     Mechanism,
-    Run,
     Sensors,
     TrueEffect,
 )
-from dynident.diagnose import compare, validate
-from dynident.diagnose.control_law import law_torque, time_constant
-from dynident.diagnose.loop_signals import _noise
 from dynident.errors import SimulationError
-from dynident.fit import Estimate
-from dynident.fit.given import given_estimate
-from dynident.fit.sampling import sample
+from dynident.evidence import comparison as compare
+from dynident.fitting import Estimate
+from dynident.fitting.given import given_estimate
+from dynident.fitting.sampling import sample
 from dynident.model import Model
 from dynident.recording import Dataset, Noise, Recording
 from dynident.robot import Robot
+from dynident.validation import validate
+from dynident.validation.control_law import law_torque, time_constant
+from dynident.validation.loop_signals import _noise
 from synthetic import arm
 
 GAINS: dict[str, Any] = {"kp": (400.0, 120.0), "kd": (50.0, 8.0)}
@@ -52,7 +53,8 @@ def recordings(
         for one in TrueEffect.of(f"viscous_friction@{joint}", robot, [value])
     ]
     runs = [
-        Run(Fourier.random(robot, 2.0, seed, harmonics=3), 4.0, f"run{seed}.csv") for seed in (1, 2)
+        ExperimentRun(Fourier.random(robot, 2.0, seed, harmonics=3), 4.0, f"run{seed}.csv")
+        for seed in (1, 2)
     ]
     sensors = Sensors(position_std=noise, torque_std=1e3 * noise)
     experiment = Experiment(robot, controller, tuple(runs), tuple(truth), sensors, torque=torque)
@@ -340,7 +342,7 @@ def test_a_limit_that_is_reached_is_said() -> None:
 
 def test_the_window_and_the_time_constant_are_heeded() -> None:
     mechanism = Experiment(
-        arm(), CONTROLLER, (Run(Fourier.random(arm(), 2.0, 1), 1.0),)
+        arm(), CONTROLLER, (ExperimentRun(Fourier.random(arm(), 2.0, 1), 1.0),)
     ).mechanism()
     slowest = time_constant(CONTROLLER, mechanism, recordings()[0].q)
     found = validate(estimate(), dataset(), CONTROLLER)
@@ -368,7 +370,9 @@ SLOW = Controller("pd", 250.0, (400.0,), (80.0,))
 
 
 def mechanism_of(robot: Robot, controller: Controller) -> Mechanism:
-    return Experiment(robot, controller, (Run(Fourier.random(robot, 2.0, 1), 1.0),)).mechanism()
+    return Experiment(
+        robot, controller, (ExperimentRun(Fourier.random(robot, 2.0, 1), 1.0),)
+    ).mechanism()
 
 
 def test_the_control_law_at_another_rate_is_near() -> None:

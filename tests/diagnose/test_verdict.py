@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dynident import diagnose as find
-from dynident.diagnose import compare_models
+from dynident.evidence import compare_models
 from dynident.model import Model
 from dynident.recording import Dataset, Noise, Recording
 from synthetic import arm, synthetic, true_values

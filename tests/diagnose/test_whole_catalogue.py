@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dynident import diagnose as find
-from dynident.diagnose import Diagnosis
+from dynident.diagnosis import Diagnosis
 from dynident.effects import effects_of
 from dynident.model import Model
 from dynident.recording import Dataset, Recording

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from dynident.closed_loop import Mechanism, TrueEffect
 from dynident.effects import Block, Effect, catalogue, effects_of
-from dynident.effects.base import force_unit, motion_unit
+from dynident.effects.effect import force_unit, motion_unit
 from dynident.errors import EffectError
 from dynident.model import Model
 from dynident.robot import Robot

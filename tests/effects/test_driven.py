@@ -11,9 +11,10 @@ from scipy.signal import butter, filtfilt
 from tests.synthetic import arm, smooth_motion
 
 from dynident.closed_loop import ClosedLoop, Controller, Fourier, Mechanism, Task, TrueEffect
-from dynident.effects import Block, Effect, along, effects_of
-from dynident.effects.along import mean_inertia
-from dynident.effects.backlash import Backlash
+from dynident.effects import Block, Effect, effects_of
+from dynident.effects.transmissions import along
+from dynident.effects.transmissions.along import mean_inertia
+from dynident.effects.transmissions.backlash import Backlash
 
 ROBOT = arm()
 ROTORS = (0.1, 0.07)

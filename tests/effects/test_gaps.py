@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynident.effects.gaps import Driven, Transmitting, through_gaps
+from dynident.effects.transmissions.gaps import Driven, Transmitting, through_gaps
 
 STEP, STEPS = 1e-3, 4000
 

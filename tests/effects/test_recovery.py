@@ -7,7 +7,7 @@ import pytest
 
 from chains import chain
 from dynident.effects import effects_of
-from dynident.fit import fit, load_estimate
+from dynident.fitting import fit, load_estimate
 from dynident.model import Model
 from dynident.recording import Dataset, Filter, Recording, central_difference
 from synthetic import smooth_motion
@@ -102,7 +102,7 @@ def test_effects_of_the_bodies_build_on_each_other() -> None:
 
 
 def test_columns_of_a_whole_recording_do_not_depend_on_its_blocks(monkeypatch) -> None:
-    from dynident.fit import sampling
+    from dynident.fitting import sampling
 
     model = (PLAIN + "torque_delay").at(np.zeros((PLAIN + "torque_delay").size))
     values = model.given_values()

@@ -5,7 +5,7 @@ import pytest
 
 from dynident.closed_loop import Mechanism, TrueEffect
 from dynident.effects import Block, effects_of
-from dynident.effects.thermal_friction import ThermalFriction
+from dynident.effects.friction.thermal_friction import ThermalFriction
 from dynident.robot import Robot
 
 SLIDER = """<robot name="axis"><link name="rail"/><link name="bob"><inertial>

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from chains import SOLVERS, chain_text, least
+from dynident.constraints import Bounds, Known, TotalMass, Within
 from dynident.errors import FitError
-from dynident.fit import (
+from dynident.fitting import (
     Constrained,
     Estimate,
     LeastSquares,
     Metric,
     Prior,
-    factorise,
     fit,
     load_estimate,
     project,
@@ -23,7 +23,7 @@ from dynident.fit import (
 )
 from dynident.inertia import margins
 from dynident.model import Model
-from dynident.nlp import Bounds, Known, TotalMass, Within
+from dynident.moments import factorise
 from dynident.nlp.certificate import OPTIMAL
 from dynident.recording import Dataset, Filter
 from dynident.robot import Robot

@@ -16,12 +16,9 @@ from chains import (
     pseudo,
     recorded,
 )
-from dynident.fit import (
-    Prior,
-    project,
-)
+from dynident.constraints import Within
+from dynident.fitting import Prior, project
 from dynident.inertia import frame_change
-from dynident.nlp import Within
 from dynident.recording import Recording
 from dynident.robot import Robot
 from dynident.robot.rotations import from_rpy

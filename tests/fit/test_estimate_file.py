@@ -11,7 +11,7 @@ import pytest
 
 import dynident as di
 from dynident.errors import FileError, FitError
-from dynident.fit import Estimate, load_estimate
+from dynident.fitting import Estimate, load_estimate
 from hostile import MUTATIONS, changed, estimate_of_arm
 from synthetic import arm
 

@@ -7,8 +7,9 @@ import pytest
 
 from dynident import fit as fit_model
 from dynident.errors import FitError, RecordingError
-from dynident.fit import LeastSquares, essential_parameters, factorise, load_estimate, rows
+from dynident.fitting import LeastSquares, essential_parameters, load_estimate, rows
 from dynident.model import Model
+from dynident.moments import factorise
 from dynident.recording import Dataset, Filter
 from dynident.robot import Robot
 from synthetic import arm, smooth_motion, synthetic, true_values

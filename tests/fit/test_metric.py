@@ -14,15 +14,9 @@ from chains import (
     noisy_estimate,
     recorded,
 )
+from dynident.constraints import ParameterSpace
 from dynident.errors import FitError
-from dynident.fit import (
-    Estimate,
-    Metric,
-    Prior,
-    given_estimate,
-    project,
-)
-from dynident.nlp import ParameterSpace
+from dynident.fitting import Estimate, Metric, Prior, given_estimate, project
 from dynident.recording import Dataset
 from dynident.robot import Robot
 

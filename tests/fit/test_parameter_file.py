@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dynident.errors import DynidentWarning, FileError
-from dynident.fit import read_parameters
+from dynident.fitting import read_parameters
 from dynident.inertia import PAPER_ORDER, PARAMETERS, to_paper
 from dynident.model import Model
 from dynident.robot import Robot

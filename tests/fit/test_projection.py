@@ -19,17 +19,10 @@ from chains import (
     pseudo,
     recorded,
 )
+from dynident.constraints import Known, ParameterSpace, TotalMass, Within
 from dynident.errors import FitError
-from dynident.fit import (
-    Estimate,
-    Metric,
-    Prior,
-    given_estimate,
-    load_estimate,
-    project,
-)
+from dynident.fitting import Estimate, Metric, Prior, given_estimate, load_estimate, project
 from dynident.inertia import margins
-from dynident.nlp import Known, ParameterSpace, TotalMass, Within
 from dynident.nlp.certificate import OPTIMAL
 from dynident.robot import Robot
 

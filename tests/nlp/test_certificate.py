@@ -8,22 +8,10 @@ import numpy as np
 import pytest
 
 from chains import Case, chain_case, one_body
-from dynident.fit.consistent import solve
+from dynident.constraints import CentreInBox, CentreInEllipsoid, Symmetric, TotalMass, Within
+from dynident.fitting.consistent.programs import solve
 from dynident.inertia import distance_rows, from_com
-from dynident.nlp import (
-    Bound,
-    CentreInBox,
-    CentreInEllipsoid,
-    Multipliers,
-    Problem,
-    Status,
-    Symmetric,
-    TotalMass,
-    Within,
-    certify,
-    lower_bound,
-    solve_conic,
-)
+from dynident.nlp import Bound, Multipliers, Problem, Status, certify, lower_bound, solve_conic
 from dynident.nlp.certificate import OPTIMAL
 from dynident.nlp.problem import TOLERANCE
 

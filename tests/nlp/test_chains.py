@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 
 from chains import chain_case, least
-from dynident.fit.consistent import solve
-from dynident.nlp import (
-    Consistency,
-    Within,
-)
+from dynident.constraints import Consistency, Within
+from dynident.fitting.consistent.programs import solve
 from dynident.nlp.certificate import OPTIMAL
 
 # --- chains --------------------------------------------------------------------------------------

@@ -7,8 +7,9 @@ import pytest
 from scipy.optimize import minimize
 
 from chains import COUNTEREXAMPLE, SOLVERS, chain_case, clipped, least, one_body, pseudo, spatial
+from dynident.constraints import CentreInEllipsoid, TotalMass, Within
 from dynident.errors import FitError
-from dynident.fit.consistent import solve
+from dynident.fitting.consistent.programs import solve
 from dynident.inertia import (
     distance_rows,
     from_com,
@@ -18,16 +19,7 @@ from dynident.inertia import (
     margins,
     to_com,
 )
-from dynident.nlp import (
-    CentreInEllipsoid,
-    Entropy,
-    Problem,
-    TotalMass,
-    Within,
-    lower_bound,
-    pose_conic,
-    solve_conic,
-)
+from dynident.nlp import Entropy, Problem, lower_bound, pose_conic, solve_conic
 
 ROUND = from_pseudo_inertia(np.eye(4))  # a body whose metric is the Frobenius norm
 

@@ -7,15 +7,8 @@ import pytest
 
 from chains import clipped, least
 from dynident.errors import FitError
-from dynident.inertia import (
-    distance_rows,
-    frame_change,
-    from_com,
-    reference_body,
-)
-from dynident.nlp import (
-    nearest_body,
-)
+from dynident.inertia import distance_rows, frame_change, from_com, reference_body
+from dynident.nlp import nearest_body
 
 # --- nearest_body --------------------------------------------------------------------------------
 

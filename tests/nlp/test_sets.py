@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 from chains import SOLVERS, Case, chain_case, least
-from dynident.errors import FitError
-from dynident.fit.consistent import solve
-from dynident.nlp import (
+from dynident.constraints import (
     Bounds,
     CentreInBox,
     CentreInEllipsoid,
@@ -23,6 +21,8 @@ from dynident.nlp import (
     Vanishing,
     Within,
 )
+from dynident.errors import FitError
+from dynident.fitting.consistent.programs import solve
 from dynident.nlp.certificate import OPTIMAL
 
 CENTRE, SEMI = np.array([0.05, 0.02, 0.1]), np.array([0.03, 0.02, 0.04])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import dynident as di
-from dynident.fit.instrumental import Filtered
+from dynident.fitting.instrumental import Filtered
 from problem_scripts import script
 
 ROOT = Path(__file__).parents[2]

@@ -11,7 +11,7 @@ import pytest
 
 from dynident import LeastSquares, diagnose, load
 from dynident import fit as fit_model
-from dynident.fit import Estimate
+from dynident.fitting import Estimate
 from problem_scripts import script
 
 ROOT = Path(__file__).parents[2]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import dynident as di
-from dynident.fit.history import Ending
+from dynident.fitting.history import Ending
 from dynident.inertia import margins
 from problem_scripts import PROBLEMS, script
 
@@ -57,14 +57,16 @@ def test_the_arm_is_consistent_and_has_the_published_lengths() -> None:
 def test_gains_are_those_of_the_stated_poles() -> None:
     study = di.load(PROBLEM / "study.toml")
     assert study.controller is not None
-    assert study.controller == di.load_experiment(PROBLEM / "experiment.toml").controller
+    assert (
+        study.controller == di.closed_loop.load_experiment(PROBLEM / "experiment.toml").controller
+    )
     w = 2 * np.pi * np.array(PUBLISHED["natural_frequency_hz"])
     kp, kd = np.array(study.controller.kp), np.array(study.controller.kd)
     np.testing.assert_allclose(kd * w / (2 * kp), 1.0, rtol=0.05)  # damping 1
 
 
 def test_recordings_are_those_of_the_experiment() -> None:
-    experiment = di.load_experiment(PROBLEM / "experiment.toml")
+    experiment = di.closed_loop.load_experiment(PROBLEM / "experiment.toml")
     short = tuple(replace(run, duration=0.5) for run in experiment.runs)
     study = di.load(PROBLEM / "study.toml")
     kept = (*study.train.recordings, *study.test.recordings)

@@ -10,22 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynident import (
-    Constrained,
-    Dataset,
-    Estimate,
-    Experiment,
-    Prior,
-    Study,
-    Within,
-    compare,
-    load,
-    load_experiment,
-    project,
-)
+from dynident import Constrained, Dataset, Estimate, Prior, Study, compare, load, project
 from dynident import fit as fit_model
+from dynident.closed_loop import Experiment, load_experiment
+from dynident.constraints import Within
 from dynident.inertia import margins, to_com
-from dynident.recording import read
+from dynident.recording.formats import read
 
 PROBLEM = Path(__file__).parents[2] / "problems" / "inconsistent_estimate"
 PUBLISHED = tomllib.loads((PROBLEM / "published.toml").read_text())

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import dynident as di
-from dynident.fit.history import Ending
+from dynident.fitting.history import Ending
 from dynident.inertia import margins
 from problem_scripts import PROBLEMS, script
 
@@ -107,7 +107,7 @@ def test_half_the_bandwidth_is_enough() -> None:
 
 
 def test_the_recording_is_that_of_the_experiment() -> None:
-    experiment = di.load_experiment(PROBLEM / "experiment.toml")
+    experiment = di.closed_loop.load_experiment(PROBLEM / "experiment.toml")
     short = replace(experiment, runs=(replace(experiment.runs[0], duration=1.0),))
     (found,) = short.run()
     (kept,) = di.load(PROBLEM / "study.toml").train.recordings

@@ -10,7 +10,7 @@ import pytest
 
 import dynident as di
 from dynident.closed_loop import Mechanism
-from dynident.fit import Metric
+from dynident.fitting import Metric
 from dynident.inertia import margins
 from problem_scripts import PROBLEMS, script
 
@@ -21,8 +21,8 @@ SHORT = 3.0
 """s that a loop is followed for."""
 
 
-def experiment(problem: str) -> di.Experiment:
-    return di.load_experiment(PROBLEMS / problem / "experiment.toml")
+def experiment(problem: str) -> di.closed_loop.Experiment:
+    return di.closed_loop.load_experiment(PROBLEMS / problem / "experiment.toml")
 
 
 @pytest.fixture(scope="module")

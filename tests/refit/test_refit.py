@@ -11,7 +11,7 @@ from random_trees import mjcf, random_tree, sdf, urdf
 import dynident as di
 from dynident.errors import DynidentWarning, FileError, FitError, RobotError
 from dynident.inertia import from_com, margins
-from dynident.refit import read_subject
+from dynident.refitting import read_subject
 from dynident.robot import Robot
 from study_files import STUDY, edited, write_study
 from synthetic import ARM, arm
@@ -106,13 +106,13 @@ def test_the_weaker_notion_is_told(tmp_path):
     """Equation 5 allows what the triangle inequality forbids; the file says which one it is."""
     path = tmp_path / "arm.urdf"
     path.write_text(BROKEN)
-    found = di.refit(path, within=di.Within("semi"))
+    found = di.refit(path, within=di.constraints.Within("semi"))
     assert found.unchanged and found.sentence.endswith("is semi-consistent already.")
     told = found.write_robot(tmp_path / "out.urdf")
     assert told.notion == "semi" and told.semi_only == ("upper",)
     assert "triangle" in found.projection.certificate.notion
     with pytest.raises(FitError, match="choose full or semi"):
-        di.refit(path, within=di.Within("none"))
+        di.refit(path, within=di.constraints.Within("none"))
 
 
 @pytest.mark.parametrize("solver", ["conic", "nlp"])
@@ -194,7 +194,7 @@ def test_a_list_of_numbers(study, folder, tmp_path):
     rows = [f"{name},{','.join(map(repr, phi.tolist()))}" for name, phi in phis(arm()).items()]
     path = tmp_path / "mine.csv"
     path.write_text("\n".join(["link,m,mx,my,mz,Ixx,Ixy,Iyy,Ixz,Iyz,Izz", *rows[1:]]))
-    given = di.read_parameters(path, Robot.from_text(BROKEN))
+    given = di.fitting.read_parameters(path, Robot.from_text(BROKEN))
     assert di.refit(given).unchanged and di.refit(path, study).unchanged
     assert di.refit(path, prior=Robot.from_text(BROKEN)).unchanged
     assert consistent(di.refit(given).robot)
@@ -254,7 +254,7 @@ def test_bodies_beyond_the_shapes_of_their_links_are_told() -> None:
     # Semi-consistent is less than possible as a body.
     flat = text.replace('iyy="2e7"', 'iyy="1e6"')
     for one in (text, flat):
-        semi = di.refit(Robot.from_text(one), within=di.Within("semi"))
+        semi = di.refit(Robot.from_text(one), within=di.constraints.Within("semi"))
         assert semi.unchanged and not any("Possible" in note for note in semi.notes)
     # Shapes a little too small for the mass are nothing to mend, and nothing to tell.
     simplified = text.replace("2e6", "0.02").replace("2e7", "0.2")

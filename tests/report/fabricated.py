@@ -7,17 +7,10 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from dynident.diagnose.diagnosis import (
-    Candidate,
-    Diagnosis,
-    JointResult,
-    ResidualMap,
-    Step,
-    TestError,
-    Trace,
-)
+from dynident.diagnosis.result import Candidate, Diagnosis, JointResult, Step, TestError, Trace
 from dynident.effects import Effect, catalogue
-from dynident.fit.estimate import Estimate, Source
+from dynident.evidence.maps import ResidualMap
+from dynident.fitting.estimate import DataSource, Estimate
 from dynident.model import Model
 from dynident.robot import Robot, base_parameters
 
@@ -68,7 +61,7 @@ def fitted(model: Model, tau: np.ndarray, block) -> Estimate:
     residual = tau - (X @ x).reshape(tau.shape)
     covariance = np.zeros((model.size, model.size))
     covariance[np.ix_(kept, kept)] = residual.var() * np.linalg.inv(X.T @ X)
-    source = Source("data/run1.csv", "ab12" * 16, "position 40 Hz, all 18 Hz, at 50 Hz")
+    source = DataSource("data/run1.csv", "ab12" * 16, "position 40 Hz, all 18 Hz, at 50 Hz")
     return Estimate(
         model,
         values,

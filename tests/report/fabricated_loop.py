@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynident.diagnose.loop_run import LoopRun, Signals, Skipped
-from dynident.diagnose.validation import Validation
+from dynident.validation.loop_run import LoopRun, Signals, Skipped
+from dynident.validation.loop_validation import Validation
 
 
 def _signals(t: np.ndarray, q: np.ndarray, torque: np.ndarray) -> Signals:

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import sync_playwright
 
-from dynident.report import report
+from dynident.reporting import report
 from report.fabricated import diagnosis
 from report.fabricated_loop import validation
 

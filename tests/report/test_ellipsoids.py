@@ -14,8 +14,8 @@ from tests.synthetic import arm
 
 from dynident.errors import DynidentError
 from dynident.inertia import frame_change, from_com, to_com
-from dynident.report.ellipsoids import inertia_ellipsoids, inertia_sections
-from dynident.report.solids import poses, solid
+from dynident.reporting.pictures.ellipsoids import inertia_ellipsoids, inertia_sections
+from dynident.reporting.pictures.solids import poses, solid
 from dynident.robot import Robot
 from dynident.robot.rotations import from_rpy
 

@@ -10,10 +10,10 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from dynident.diagnose.diagnosis import Candidate, Diagnosis, Step
+from dynident.diagnosis.result import Candidate, Diagnosis, Step
 from dynident.errors import DynidentError
-from dynident.report import report
-from dynident.report.html import page
+from dynident.reporting import report
+from dynident.reporting.html import page
 from dynident.tables import percent
 from report.fabricated import diagnosis, effect
 

@@ -12,17 +12,17 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from dynident.diagnose.loop_run import QUANTITIES, Skipped
-from dynident.diagnose.validation import Unsimulated, Validation
 from dynident.errors import DynidentError
-from dynident.fit.history import Convergence, Ending, Round
-from dynident.report.convergence import convergence
-from dynident.report.html import page
-from dynident.report.loop_content import loop_trace
-from dynident.report.loop_page import loop_section
-from dynident.report.loop_pictures import simulated_loop as moving
-from dynident.report.loop_plots import simulated_loop as still
-from dynident.report.plots import save
+from dynident.fitting.history import Convergence, Ending, Round
+from dynident.reporting.html import page
+from dynident.reporting.loop_content import loop_trace
+from dynident.reporting.loop_page import loop_section
+from dynident.reporting.pictures.convergence import convergence
+from dynident.reporting.pictures.loop_pictures import simulated_loop as moving
+from dynident.reporting.pictures.loop_plots import simulated_loop as still
+from dynident.reporting.pictures.plots import save
+from dynident.validation.loop_run import QUANTITIES, Skipped
+from dynident.validation.loop_validation import Unsimulated, Validation
 from report.fabricated import diagnosis
 from report.fabricated_loop import validation
 

@@ -7,10 +7,11 @@ import pytest
 from IPython.core.formatters import PNGFormatter
 from matplotlib.figure import Figure
 
-from dynident.diagnose.diagnosis import Step
+from dynident.diagnosis.result import Step
 from dynident.errors import DynidentError
-from dynident.report import pictures, plots
-from dynident.report.content import bars, seen, thinned
+from dynident.reporting.content import bars, seen, thinned
+from dynident.reporting.pictures import diagnosis_pictures as pictures
+from dynident.reporting.pictures import plots
 from report.fabricated import RECORDINGS, diagnosis, effect
 
 

@@ -8,13 +8,13 @@ import plotly.graph_objects as go
 import pytest
 
 from dynident.effects import catalogue
-from dynident.effects.viscous_friction import ViscousFriction
-from dynident.report.content import left
-from dynident.report.glossary import meaning, use_of
-from dynident.report.intervals import parameter_table, widening_after, widening_before
-from dynident.report.joints import joint_errors, opened, states
-from dynident.report.next_steps import next_steps, summary
-from dynident.report.packing import packed
+from dynident.effects.friction.viscous_friction import ViscousFriction
+from dynident.reporting.content import left
+from dynident.reporting.glossary import meaning, use_of
+from dynident.reporting.intervals import parameter_table, widening_after, widening_before
+from dynident.reporting.joint_states import joint_errors, opened, states
+from dynident.reporting.next_steps import next_steps, summary
+from dynident.reporting.packing import packed
 from report.fabricated import diagnosis, effect
 
 

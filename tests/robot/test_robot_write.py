@@ -6,7 +6,7 @@ from random_trees import mjcf, random_tree, sdf, urdf
 
 from dynident.errors import FileError, RobotError
 from dynident.robot import Robot, structural_base
-from dynident.robot.write import patched, write
+from dynident.robot.patching import patched, write
 
 WRITERS = {"urdf": urdf, "sdf": sdf, "mjcf": mjcf}
 

@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynident.diagnose import compare_models
 from dynident.errors import DynidentError, DynidentWarning, FileError, StudyError
-from dynident.fit import fit
-from dynident.recording import Recording, write
+from dynident.evidence import compare_models
+from dynident.fitting import fit
+from dynident.recording import Recording
+from dynident.recording.formats import write
 from dynident.study import Study, load
 from study_files import CONTROLLER, RATE_HZ, STUDY, edited, recording, reordered, write_study
 

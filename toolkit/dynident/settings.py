@@ -14,13 +14,13 @@ from dynident import files
 from dynident.errors import StudyError
 
 
-class Table(BaseModel):
+class SettingsTable(BaseModel):
     """A table of a settings file: unknown keys and numbers that are not finite are refused."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
-T = TypeVar("T", bound=Table)
+T = TypeVar("T", bound=SettingsTable)
 _TRIED = re.compile(r"str|float|int|bool|list\[\w+\]|_\w+")
 
 

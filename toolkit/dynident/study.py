@@ -28,18 +28,18 @@ from dynident.recording import (
     Filter,
     Noise,
     Recording,
-    read,
     require_motion,
     require_torque,
     warn_of_missing_torque,
 )
+from dynident.recording.formats import read
 from dynident.robot import Robot
-from dynident.settings import Table, read_toml
+from dynident.settings import SettingsTable, read_toml
 
 Positive = Field(default=None, gt=0)
 
 
-class _RecordingEntry(Table):
+class _RecordingEntry(SettingsTable):
     file: str
     record: str | None = None
     use: Literal["train", "test"] = "train"
@@ -49,7 +49,7 @@ class _RecordingEntry(Table):
     payload: bool | None = None
 
 
-class _FilterEntry(Table):
+class _FilterEntry(SettingsTable):
     position_cutoff_hz: float | None = Positive
     cutoff_hz: float | None = Positive
     rate_hz: float | None = Positive
@@ -57,17 +57,17 @@ class _FilterEntry(Table):
     edge_s: tuple[float, float] = (0.0, 0.0)
 
 
-class _NoiseEntry(Table):
+class _NoiseEntry(SettingsTable):
     position_std: float | list[float]
     torque_std: float | list[float]
 
 
-class _ColumnEntry(Table):
+class _ColumnEntry(SettingsTable):
     name: str
     scale: float = 1.0
 
 
-class _StudyFile(Table):
+class _StudyFile(SettingsTable):
     robot: str
     joints: list[str] | None = None
     effects: list[str] = Field(default_factory=list)

@@ -118,3 +118,8 @@ def _print(console, table: Table) -> None:
 
 def _is_number(cell: str) -> bool:
     return not cell or cell[0] in "-+.0123456789"
+
+
+def finite(value: float) -> float | None:
+    """A number as JSON has it: None where it is not finite."""
+    return value if np.isfinite(value) else None

@@ -9,8 +9,8 @@ import pytest
 
 import dynident as di
 from dynident.errors import DynidentError, FitError
-from dynident.fit import IV, Filtered, LeastSquares, SwappedPeriods, rows
-from dynident.fit.instrumental.source import FixedInstruments
+from dynident.fitting import IV, Filtered, LeastSquares, SwappedPeriods, rows
+from dynident.fitting.instrumental.source import FixedInstruments
 from dynident.model import Model
 from dynident.recording import Dataset, Filter, Recording
 from synthetic import arm, synthetic

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from dynident.errors import SimulationError
-from dynident.fit import IV
-from dynident.fit.history import Ending
-from dynident.fit.instrumental.source import prepared
+from dynident.fitting import IV
+from dynident.fitting.history import Ending
+from dynident.fitting.instrumental.source import prepared
 from dynident.model import Model
 from dynident.recording import Dataset, Filter, Recording
 from synthetic import arm, synthetic

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import loops
-from dynident.fit import IV, LeastSquares
+from dynident.fitting import IV, LeastSquares
 from dynident.recording import Dataset, Filter, Noise
 
 SEEDS = 200

@@ -11,8 +11,8 @@ import dynident as di
 import loops
 from dynident.closed_loop import Controller
 from dynident.errors import DynidentError, FitError, SimulationError
-from dynident.fit import IV, LeastSquares, SimulatedLoop
-from dynident.fit.history import Ending
+from dynident.fitting import IV, LeastSquares, SimulatedLoop
+from dynident.fitting.history import Ending
 from dynident.model import Model
 from dynident.recording import Dataset, Filter
 
@@ -49,7 +49,7 @@ def test_without_noise_it_is_least_squares(coulomb, rate):
 
 def _window(dataset: Dataset, model: Model) -> tuple[float, float]:
     """What the loop's transient leaves."""
-    from dynident.fit.instrumental.source import Guess
+    from dynident.fitting.instrumental.source import Guess
 
     guess = Guess(loops.truth(model), (loops.truth(model),))
     (cut,) = SimulatedLoop(loops.LOOP).prepare(model, dataset, guess).measured.recordings
@@ -89,7 +89,7 @@ def test_half_of_the_bandwidth_will_do(noisy):
 
 
 def test_one_diagram_serves_all_iterations(noisy):
-    from dynident.fit.instrumental.source import Guess
+    from dynident.fitting.instrumental.source import Guess
 
     model = loops.model(coulomb=True)
     start = loops.truth(model)
@@ -242,7 +242,7 @@ def test_good_tracking_within_the_noise_is_not_doubted():
 
 
 def test_half_of_the_bandwidth_keeps_the_damping():
-    from dynident.fit.instrumental.gains import retuned
+    from dynident.fitting.instrumental.gains import retuned
 
     ratio = np.array([0.5, 2.0])
     for one in (loops.LOOP, Controller("cascade", 200.0, kp=(10.0, 20.0), kv=(3.0, 4.0))):

@@ -19,15 +19,15 @@ def test_the_package_goes_by_its_name() -> None:
 
 
 def test_statistics_of_other_processes_add_up() -> None:
-    def of_piece(seed: int) -> di.Statistics:
+    def of_piece(seed: int) -> di.regression.Statistics:
         rng = np.random.default_rng(seed)
         X = rng.standard_normal((200, 4)) + seed
-        return di.Statistics.of(X, X @ [1.0, 2.0, 0.0, -1.0] + rng.standard_normal(200))
+        return di.regression.Statistics.of(X, X @ [1.0, 2.0, 0.0, -1.0] + rng.standard_normal(200))
 
     each: list[Any] = list(Parallel(n_jobs=2)(delayed(of_piece)(seed) for seed in range(4)))
     here: list[Any] = [of_piece(seed) for seed in range(4)]
     total = reduce(add, each)
     np.testing.assert_allclose(total.scatter, reduce(add, here).scatter, rtol=1e-12, atol=1e-9)
     assert total.count == 800
-    found = di.BayesianFactorRegression().fit_statistics(total)
+    found = di.regression.BayesianFactorRegression().fit_statistics(total)
     np.testing.assert_allclose(found.coef_, [1.0, 2.0, 0.0, -1.0], atol=0.15)

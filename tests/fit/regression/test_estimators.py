@@ -15,13 +15,13 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from dynident.errors import DynidentWarning, FitError
-from dynident.fit.regression.base import StatisticsRegressor
-from dynident.fit.regression.corrected import CorrectedLeastSquares
-from dynident.fit.regression.joint_factors import BayesianFactorRegression, JointFactorRegression
-from dynident.fit.regression.statistics import Statistics
-from dynident.fit.regression.stepwise import StepwiseRegression
-from dynident.fit.regression.total import TotalLeastSquares
-from dynident.fit.regression.truncated import TruncatedLeastSquares
+from dynident.regression.corrected import CorrectedLeastSquares
+from dynident.regression.joint_factors import BayesianFactorRegression, JointFactorRegression
+from dynident.regression.statistics import Statistics
+from dynident.regression.statistics_regressor import StatisticsRegressor
+from dynident.regression.stepwise import StepwiseRegression
+from dynident.regression.total import TotalLeastSquares
+from dynident.regression.truncated import TruncatedLeastSquares
 
 EVERY = [
     TruncatedLeastSquares(),

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dynident.fit.regression.factor_analysis import Factors, Gamma, Posterior, begun, start_of
-from dynident.fit.regression.iterations import Analysis, Ending, _leap, analyse
-from dynident.fit.regression.statistics import Statistics
+from dynident.regression.factor_analysis import Gamma, Loadings, Posterior, begun, start_of
+from dynident.regression.iterations import Analysis, AnalysisEnding, _leap, analyse
+from dynident.regression.statistics import Statistics
 
 
 def standardised(X: np.ndarray, y: np.ndarray) -> Statistics:
@@ -48,7 +48,7 @@ def test_golden_case() -> None:
     statistics, prior = Statistics(100, np.zeros(4), scatter), Gamma(1e-8, 1e-8)
     wz = np.array([0.6241129877, 0.2125492585, -0.0408715201])
     same, none = np.ones(3), np.zeros(3)
-    weights = Factors(
+    weights = Loadings(
         wz, 0.894427191 * same, none, none, none, 0.1008179203 * same, 0.2 * same, 0.3024537609
     )
     start = begun(weights, statistics.count, prior)
@@ -86,7 +86,7 @@ def test_data_without_noise_end_in_rounding(prior: Gamma | None, known: bool) ->
     found = analysed(statistics, prior, 1.0 if known else 0.8, known, rounds=3000, tolerance=1e-3)
     falls = np.diff(found.bounds)
     assert np.all(falls[:-1] >= 0.0) and falls[-1] > -0.1
-    assert found.ending is not Ending.ROUNDS_EXHAUSTED
+    assert found.ending is not AnalysisEnding.ROUNDS_EXHAUSTED
     if known:
         least_squares = np.linalg.solve(statistics.gram, statistics.cross)
         np.testing.assert_allclose(found.coefficients, least_squares, atol=1e-5)
@@ -102,7 +102,7 @@ def test_badly_conditioned_inputs_are_not_left_half_way() -> None:
     variance = statistics.residual(least_squares) / statistics.count
     sigma = np.sqrt(variance * np.diag(np.linalg.inv(statistics.gram)))
     found = analysed(statistics, None, 1.0 - 1e-8, known=True, tolerance=1e-3)
-    assert found.ending is Ending.CONVERGED
+    assert found.ending is AnalysisEnding.CONVERGED
     off = np.abs(found.factors.wz / found.factors.wx - least_squares) / sigma
     assert off.max() < 0.1
 
@@ -135,7 +135,7 @@ def test_maximum_likelihood_predicts_as_least_squares_from_any_start() -> None:
     least_squares = np.linalg.solve(statistics.gram, statistics.cross)
     each = [analysed(statistics, None, rho) for rho in (0.85, 0.97)]
     for one in each:
-        assert one.ending is Ending.CONVERGED
+        assert one.ending is AnalysisEnding.CONVERGED
         np.testing.assert_allclose(one.coefficients, least_squares, atol=1e-4)
     first, second = (one.factors.wz / one.factors.wx for one in each)
     assert each[0].bound == pytest.approx(each[1].bound, abs=1e-3)
@@ -181,7 +181,7 @@ def test_leaps_end_where_plain_rounds_end(prior: Gamma | None) -> None:
     for _ in range(10_000):
         at = Posterior(at.updated(prior, known), statistics)
     found = analyse(statistics, start, prior, known, rounds=1000, tolerance=0.01)
-    assert found.ending is Ending.CONVERGED
+    assert found.ending is AnalysisEnding.CONVERGED
     assert found.bound == pytest.approx(at.bound(prior), abs=0.02)
     np.testing.assert_allclose(found.coefficients, at.b, atol=2e-3)
 
@@ -199,5 +199,5 @@ def test_leaps_out_of_the_numbers_have_no_bound() -> None:
 
 def test_rounds_that_do_not_suffice_are_told() -> None:
     found = analysed(random_problem(17), Gamma(), rounds=3, tolerance=1e-12)
-    assert found.ending is Ending.ROUNDS_EXHAUSTED and found.rounds == 3
+    assert found.ending is AnalysisEnding.ROUNDS_EXHAUSTED and found.rounds == 3
     assert isinstance(found, Analysis) and found.bound == found.bounds[-1]

@@ -7,15 +7,15 @@ import pytest
 from sklearn.exceptions import NotFittedError
 
 from dynident.errors import FitError
-from dynident.fit.regression.corrected import CorrectedLeastSquares
-from dynident.fit.regression.identifiability import (
+from dynident.regression.corrected import CorrectedLeastSquares
+from dynident.regression.identifiability import (
     StartSensitivity,
     reliability_profile,
     start_sensitivity,
 )
-from dynident.fit.regression.joint_factors import BayesianFactorRegression, JointFactorRegression
-from dynident.fit.regression.statistics import Statistics
-from dynident.fit.regression.truncated import TruncatedLeastSquares
+from dynident.regression.joint_factors import BayesianFactorRegression, JointFactorRegression
+from dynident.regression.statistics import Statistics
+from dynident.regression.truncated import TruncatedLeastSquares
 
 TRUE = np.array([1.0, -2.0, 0.5, 0.0])
 NOISE = 0.25

@@ -14,17 +14,20 @@ from sklearn.model_selection import PredefinedSplit
 
 import dynident as di
 from dynident.errors import FitError
-from dynident.fit import Factors, encoder_noise, factorise, input_noise, load_estimate, rows
-from dynident.fit.regression.compressed import compress
-from dynident.fit.regression.joint_factors import BayesianFactorRegression
-from dynident.fit.regression.named import NAMES
-from dynident.fit.regression.posed import pieces_of
+from dynident.fitting import load_estimate, rows
+from dynident.fitting.noisy_inputs import encoder_noise
+from dynident.fitting.noisy_inputs import measured as input_noise
+from dynident.fitting.noisy_inputs.compressed import compress
+from dynident.fitting.noisy_inputs.named import NAMES
+from dynident.fitting.noisy_inputs.posed import pieces_of
+from dynident.moments import TriangularFactors, factorise
+from dynident.regression.joint_factors import BayesianFactorRegression
 from synthetic import arm, synthetic, true_values
 
 STD = 2e-4
 ROUGH = di.Filter(80.0, 60.0, 250.0)
 """Lets much of the encoders' noise through."""
-KNOWN = di.Noise(np.full(2, STD), np.full(2, 0.1))
+KNOWN = di.recording.Noise(np.full(2, STD), np.full(2, 0.1))
 
 
 @cache
@@ -133,7 +136,7 @@ def test_input_noise_that_is_overstated_is_told_and_no_other() -> None:
         quiet = synthetic(
             model(), truth(), seed, duration=32.0, position_std=STD / 3, torque_std=0.001
         )
-        stated = di.Noise(np.full(2, STD / 3), np.full(2, 0.001))
+        stated = di.recording.Noise(np.full(2, STD / 3), np.full(2, 0.001))
         dataset = di.Dataset((quiet,), ROUGH, stated)
         noise = encoder_noise(model(), dataset)
         found = di.fit(model(), dataset, di.Regression("corrected", noise))
@@ -175,7 +178,7 @@ def test_few_rows_stand_for_many() -> None:
     X = rng.standard_normal((4000, 6)) @ rng.standard_normal((6, 6))
     y = X @ [1.0, 0.0, 2.0, 0.0, 0.0, -1.0] + 2.0 * rng.standard_normal(4000)
     piece = np.repeat(np.arange(4), 1000)
-    parts: list[Factors] = [
+    parts: list[TriangularFactors] = [
         factorise([(X[piece == k][:, None], y[piece == k][:, None])]) for k in range(4)
     ]
     few = compress(parts, np.ones(1))
@@ -228,7 +231,7 @@ def test_noise_of_another_model_is_refused() -> None:
 def test_the_estimator_itself_is_handed_out() -> None:
     method = di.Regression("factors", "encoders")
     found, estimate = method.regressor(model(), noisy()), di.fit(model(), noisy(), method)
-    assert isinstance(found, di.JointFactorRegression) and found.known_.all()
+    assert isinstance(found, di.regression.JointFactorRegression) and found.known_.all()
     kept = list(estimate.basis.independent)
     assert found.input_names() == [estimate.names[i] for i in kept]
     np.testing.assert_array_equal(found.coef_true_, estimate.values[kept])

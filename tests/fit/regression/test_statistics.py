@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dynident.errors import FitError
-from dynident.fit.regression.statistics import Statistics
+from dynident.regression.statistics import Statistics
 
 
 def data(seed: int = 0, rows: int = 500, inputs: int = 4) -> tuple[np.ndarray, np.ndarray]:

@@ -18,10 +18,10 @@ from dynident.errors import StudyError
 
 if TYPE_CHECKING:
     from dynident.closed_loop import Controller
-    from dynident.diagnose import Validation
-    from dynident.fit import Estimate
+    from dynident.fitting import Estimate
     from dynident.recording import Dataset
     from dynident.study import Study
+    from dynident.validation import Validation
 
 _PATH = click.Path(path_type=Path)
 _OF_EXPERIMENTS = {"nominal", "seed", "lead_in", "sensors"}
@@ -159,7 +159,7 @@ def _controller(study: Study, recordings: Dataset) -> Controller:
 
 
 def _estimate(study: Study, saved: Path | None, chosen: Chosen) -> Estimate:
-    from dynident.fit import fit, load_estimate
+    from dynident.fitting import fit, load_estimate
 
     if saved is None:
         with progress("fitting") as tell:
@@ -174,7 +174,7 @@ def _estimate(study: Study, saved: Path | None, chosen: Chosen) -> Estimate:
 
 
 def _validation(estimate: Estimate, recordings: Dataset, controller: Controller) -> Validation:
-    from dynident.diagnose import validate
+    from dynident.validation import validate
 
     with progress("simulating") as tell:
         return validate(
@@ -187,15 +187,15 @@ def _validation(estimate: Estimate, recordings: Dataset, controller: Controller)
 
 def _write(found: Validation, report: Path | None, plot: Path | None) -> None:
     if report is not None:
-        from dynident.report import report as write
+        from dynident.reporting import report as write
 
         write(found, to=report, command=command_line())
         click.echo(f"report: {report}", err=True)
     if plot is not None and not found.runs:
         click.echo(f"no picture {plot}: no loop could be simulated", err=True)
     elif plot is not None:
-        from dynident.report.loop_plots import simulated_loop
-        from dynident.report.plots import save
+        from dynident.reporting.pictures.loop_plots import simulated_loop
+        from dynident.reporting.pictures.plots import save
 
         save(simulated_loop(found), plot)
         click.echo(f"picture: {plot}", err=True)

@@ -13,8 +13,8 @@ from dynident.errors import DynidentError, StudyError
 
 if TYPE_CHECKING:
     from dynident.closed_loop import Controller
-    from dynident.fit import IV, Method
-    from dynident.fit.regression.identifiability import ReliabilityProfile, StartSensitivity
+    from dynident.fitting import IV, Method
+    from dynident.regression.identifiability import ReliabilityProfile, StartSensitivity
     from dynident.study import Study
 
 
@@ -70,7 +70,7 @@ class Chosen:
         self, study: Study, weighting: Literal["joint", "none"], tell: Callable[..., Any]
     ) -> Method:
         """Return the estimator of a study; raises what `iv` raises."""
-        from dynident.fit import LeastSquares, Regression
+        from dynident.fitting import LeastSquares, Regression
 
         if self.method == "iv":
             return self.iv(study, weighting, tell)
@@ -87,8 +87,8 @@ class Chosen:
 
     def identifiability(self, study: Study) -> tuple[StartSensitivity, ReliabilityProfile]:
         """Return what start and prior decide of the inputs' noise instead of the data."""
-        from dynident.fit import Regression
-        from dynident.fit.regression.identifiability import reliability_profile, start_sensitivity
+        from dynident.fitting import Regression
+        from dynident.regression.identifiability import reliability_profile, start_sensitivity
 
         found: Any = Regression(self.method).regressor(study.model, study.train)
         return start_sensitivity(found), reliability_profile(found)
@@ -102,7 +102,7 @@ class Chosen:
             If the loop is to be simulated, and the study does not know its controller, its rate
             or the reference of a training recording.
         """
-        from dynident.fit import IV, Filtered, SwappedPeriods
+        from dynident.fitting import IV, Filtered, SwappedPeriods
 
         start = self.start or "least_squares"
         if self.instruments == "periods":

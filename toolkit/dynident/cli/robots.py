@@ -28,7 +28,7 @@ def check(context: click.Context, robot: Path, every_rule: bool, as_json: bool) 
 
     Example: dynident check robot.urdf
     """
-    from dynident.check import check as check_robot
+    from dynident.consistency import check as check_robot
 
     with progress("checking"):
         found = check_robot(robot)
@@ -83,10 +83,10 @@ def refit(
 
     Example: dynident refit robot.urdf --out mended.urdf
     """
-    from dynident.fit import Prior
-    from dynident.nlp import Within
-    from dynident.refit import aligned, read_subject
-    from dynident.refit import refit as refit_robot
+    from dynident.constraints import Within
+    from dynident.fitting import Prior
+    from dynident.refitting import aligned, read_subject
+    from dynident.refitting import refit as refit_robot
     from dynident.robot import Robot
     from dynident.robot.verify import require_format
     from dynident.study import load

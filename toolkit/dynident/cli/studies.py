@@ -102,9 +102,10 @@ def fit(
 
     Example: dynident fit study.toml --out estimate.json --robot identified.urdf
     """
-    from dynident.fit import Constrained, essential_parameters, factorise, rows
-    from dynident.fit import fit as fit_model
-    from dynident.nlp import Within
+    from dynident.constraints import Within
+    from dynident.fitting import Constrained, essential_parameters, rows
+    from dynident.fitting import fit as fit_model
+    from dynident.moments import factorise
 
     if chosen.method != "least-squares" and consistency != "none":
         what = f"--consistency goes with least squares, not with --method {chosen.method}"
@@ -147,8 +148,8 @@ def fit(
                 stacklevel=1,
             )
     if plot is not None and estimate.history is not None:
-        from dynident.report.convergence import convergence
-        from dynident.report.plots import save
+        from dynident.reporting.pictures.convergence import convergence
+        from dynident.reporting.pictures.plots import save
 
         save(convergence(estimate.history), plot)
         click.echo(f"picture: {plot}", err=True)

@@ -13,7 +13,8 @@ from dynident.cli.output import progress
 from dynident.errors import FileError
 
 if TYPE_CHECKING:
-    from dynident.diagnose import Comparison, Diagnosis
+    from dynident.diagnosis import Diagnosis
+    from dynident.evidence import Comparison
     from dynident.study import Study
 
 _PICTURES = (".png", ".svg", ".pdf")
@@ -47,7 +48,7 @@ def load_study(path: Path) -> Study:
 
 def diagnosis_of(study: Study) -> Diagnosis:
     """Run the search for what the model lacks."""
-    from dynident.diagnose import diagnose as search
+    from dynident.diagnosis import diagnose as search
 
     with progress("diagnosing") as tell:
         controller = study.controller
@@ -56,7 +57,7 @@ def diagnosis_of(study: Study) -> Diagnosis:
 
 def comparison_of(study: Study, additions: tuple[str, ...]) -> Comparison:
     """Compare the study's model with those that have an effect more."""
-    from dynident.diagnose import compare_models
+    from dynident.evidence import compare_models
 
     models = {"study": study.model}
     for label in additions:
@@ -78,8 +79,8 @@ def write_report(study: Study, diagnosis: Diagnosis, to: Path | None) -> None:
     """Write the HTML report, with the final model's loop where the study knows its controller."""
     if to is None:
         return
-    from dynident.diagnose.replay import Judged, loop_of
-    from dynident.report import report as write
+    from dynident.reporting import report as write
+    from dynident.validation.replay import Judged, loop_of
 
     with progress("simulating"):
         recordings = study.test if len(study.test) else study.train

@@ -1,8 +1,9 @@
 """Closed loops in Drake, and virtual experiments. Drake is loaded when something is simulated."""
 
 from dynident.closed_loop.controllers import Controller, ControllerFile
-from dynident.closed_loop.experiment import Experiment, Run
-from dynident.closed_loop.experiment_file import load_experiment
+from dynident.closed_loop.experiments.experiment import Experiment, ExperimentRun
+from dynident.closed_loop.experiments.experiment_file import load_experiment
+from dynident.closed_loop.experiments.virtual_study import write_experiment
 from dynident.closed_loop.loop import ClosedLoop
 from dynident.closed_loop.mechanism import Mechanism, TrueEffect
 from dynident.closed_loop.references import Reference, SampledReference
@@ -11,19 +12,18 @@ from dynident.closed_loop.rollout import Rollout, Task
 from dynident.closed_loop.sensors import Sensors
 from dynident.closed_loop.simulator import simulate
 from dynident.closed_loop.trajectories import Fourier
-from dynident.closed_loop.virtual_study import write_experiment
 
 __all__ = [
     "ClosedLoop",
     "Controller",
     "ControllerFile",
     "Experiment",
+    "ExperimentRun",
     "Fourier",
     "Mechanism",
     "Reference",
     "Retraced",
     "Rollout",
-    "Run",
     "SampledReference",
     "Sensors",
     "Task",

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from dynident.closed_loop.laws import GAINS, LAWS, Feedback, Law
 from dynident.errors import DynidentError, SimulationError, StudyError
-from dynident.settings import Table
+from dynident.settings import SettingsTable
 
 if TYPE_CHECKING:
     from dynident.robot import Robot
@@ -147,7 +147,7 @@ class Controller:
             raise SimulationError(f"{name} = {list(value)}", where, mend)
 
 
-class ControllerFile(Table):
+class ControllerFile(SettingsTable):
     """The table [controller] of a study or an experiment file."""
 
     kind: str

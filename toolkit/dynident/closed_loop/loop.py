@@ -22,8 +22,8 @@ from dynident.closed_loop.sensors import Sensors, rounded
 from dynident.errors import SimulationError
 
 if TYPE_CHECKING:
-    from dynident.closed_loop.plant import Plant
-    from dynident.closed_loop.stepping import Motion
+    from dynident.closed_loop.plant.diagram import Plant
+    from dynident.closed_loop.plant.stepping import SteppedMotion
 
 ACCURACY = 1e-3
 """Drake's error per step.
@@ -143,8 +143,8 @@ class ClosedLoop:
         scale: np.ndarray,
         tell: Callable[[float], None],
     ) -> list[Rollout]:
-        from dynident.closed_loop.drive import Drive, ReferenceSamples
-        from dynident.closed_loop.stepping import Joint, Measurement, Stepper
+        from dynident.closed_loop.plant.drive import Drive, ReferenceSamples
+        from dynident.closed_loop.plant.stepping import JointLoop, Measurement, Stepper
 
         n, rate = controller.n, controller.simulated_rate()
         total = before + max(kept)
@@ -159,7 +159,7 @@ class ClosedLoop:
         plant = self._plant(tasks)
         plant.require_inertia(reference.q[:: max(1, total // _POSES)])
         joints = [
-            Joint(task.name, name, unit)
+            JointLoop(task.name, name, unit)
             for task in tasks
             for name, unit in zip(
                 task.mechanism.robot.names, task.mechanism.robot.units, strict=True
@@ -179,7 +179,7 @@ class ClosedLoop:
     def _plant(self, tasks: Sequence[Task]) -> Plant:
         """Return the diagram of some tasks, with their parameters."""
         # Drake is loaded when something is simulated.
-        from dynident.closed_loop.plant import Plant, structure
+        from dynident.closed_loop.plant.diagram import Plant, structure
 
         mechanisms = [task.mechanism for task in tasks]
         key = structure(mechanisms)
@@ -196,7 +196,7 @@ class ClosedLoop:
 
 
 def _rollout(
-    motion: Motion,
+    motion: SteppedMotion,
     reference,
     rows: slice,
     k: int,

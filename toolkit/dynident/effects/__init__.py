@@ -1,23 +1,16 @@
 """The catalogue of physical effects: one class, in one file, each.
 
-A new effect is a new file here and nothing else: every subclass of `Effect` found in this folder
-joins the catalogue, and with it the fits, the diagnosis, the simulator, the report and the tests.
+A new effect is a new file in one of the folders here and nothing else: every subclass of `Effect`
+found in them joins the catalogue, and with it the fits, the diagnosis, the simulator, the report
+and the tests. `friction`, `drives`, `transmissions` and `bodies` say where an effect sits.
 """
 
-from __future__ import annotations
-
-import difflib
-import importlib
-import pkgutil
-from functools import cache
-from types import MappingProxyType
-
-from dynident.effects.base import Effect, JointEffect
 from dynident.effects.block import FRICTION_WIDTH, Block
-from dynident.effects.parameters import Parameter, ShapeParameter
+from dynident.effects.effect import Effect, JointEffect
+from dynident.effects.parameter import Parameter, ShapeParameter
+from dynident.effects.registry import catalogue, effects_of
 from dynident.effects.terms import Term
 from dynident.effects.transmission import Transmission
-from dynident.errors import EffectError
 
 __all__ = [
     "FRICTION_WIDTH",
@@ -31,58 +24,3 @@ __all__ = [
     "catalogue",
     "effects_of",
 ]
-
-
-@cache
-def catalogue() -> MappingProxyType[str, type[Effect]]:
-    """Every effect by its name, in alphabetical order."""
-    found: dict[str, type[Effect]] = {}
-    for module in pkgutil.iter_modules(__path__):
-        if module.name == "base":
-            continue
-        content = importlib.import_module(f"{__name__}.{module.name}")
-        for value in vars(content).values():
-            if isinstance(value, type) and issubclass(value, Effect) and hasattr(value, "name"):
-                found[value.name] = value
-    return MappingProxyType(dict(sorted(found.items())))
-
-
-def effects_of(label: str, robot) -> tuple[Effect, ...]:
-    """Return the effects that a label stands for: `name@joint` one, `name` one per place.
-
-    Parameters
-    ----------
-    label : str
-        `name`, `name@joint` or `name@joint:source`.
-    robot : Robot
-        The robot on which they sit.
-
-    Raises
-    ------
-    EffectError
-        If the name or a joint is unknown; the message lists the valid choices.
-    """
-    name, _, place = label.partition("@")
-    known = catalogue()
-    if name not in known:
-        close = difflib.get_close_matches(name, known, n=1)
-        hint = f"did you mean '{close[0]}'?" if close else f"effects: {', '.join(known)}"
-        raise EffectError(f"no effect is named '{name}'", mend=hint)
-    effect = known[name]
-    if not place and effect.place == "joint or robot":
-        return (effect().on(robot),)
-    if not place:
-        return tuple(one.on(robot) for one in effect.candidates(robot))
-    joint, source = _joints(place, robot.names)
-    return (effect(joint, source).on(robot),)
-
-
-def _joints(place: str, names: tuple[str, ...]) -> tuple[str, str | None]:
-    """Split `joint` or `joint:source`; names of joints may hold colons of their own."""
-    if place in names:
-        return place, None
-    for joint in names:
-        if place.startswith(f"{joint}:") and place[len(joint) + 1 :] in names:
-            return joint, place[len(joint) + 1 :]
-    joint, _, source = place.partition(":")
-    return joint, source or None

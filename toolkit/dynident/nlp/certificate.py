@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from dynident.constraints.sets import Within
 from dynident.inertia import distance_rows
 from dynident.nlp.conic import Multipliers, cone_rows, cone_values
 from dynident.nlp.problem import TOLERANCE, Problem
-from dynident.nlp.sets import Within
 from dynident.nlp.status import Status
 from dynident.tables import Table, number
 

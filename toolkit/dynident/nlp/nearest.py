@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynident.constraints.sets import Consistency, Within
+from dynident.constraints.space import ParameterSpace, body_scale
 from dynident.errors import FitError
 from dynident.inertia import PARAMETERS, UNITS, distance_rows, reference_body
 from dynident.nlp.conic import solve_conic
 from dynident.nlp.problem import Problem
-from dynident.nlp.sets import Consistency, Within
-from dynident.nlp.space import ParameterSpace, body_scale
 
 
 def nearest_body(

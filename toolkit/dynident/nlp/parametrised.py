@@ -90,7 +90,7 @@ PARAMETRISATIONS = {"semi": VIRTUAL, "full": LOG_CHOLESKY}
 
 
 @dataclass(frozen=True, eq=False)
-class Posed:
+class PosedProgram:
     """A problem posed as a nonlinear program.
 
     Attributes
@@ -127,7 +127,7 @@ class Posed:
         return found
 
 
-def pose(problem: Problem) -> Posed:
+def pose(problem: Problem) -> PosedProgram:
     """Pose a problem as a nonlinear program.
 
     Raises
@@ -179,7 +179,7 @@ def pose(problem: Problem) -> Posed:
     )
     if problem.entropy is not None:
         program = program + Cost("entropic prior", _entropy(problem, x))
-    return Posed(_constrained(program, problem, x), x, problem, chosen)
+    return PosedProgram(_constrained(program, problem, x), x, problem, chosen)
 
 
 def _constrained(program: Program, problem: Problem, x: Any) -> Program:

@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import eigh
 
+from dynident.constraints.sets import Linear, SecondOrder, Within
+from dynident.constraints.space import ParameterSpace
 from dynident.errors import FitError
 from dynident.inertia import distance_rows, pseudo_inertia, spatial_inertia_matrix
-from dynident.nlp.sets import Linear, SecondOrder, Within
-from dynident.nlp.space import ParameterSpace
 
 _FREE = 1e-9  # of the largest: a singular value below it leaves a direction free
 _ROUNDING = 1e-12  # of a body's size: what rounding takes from the eigenvalues of a flat body

@@ -8,7 +8,6 @@ torque through one low-pass and decimation, in blocks if asked; both follow a `F
 `require_motion` and `require_torque` refuse recordings that show nothing.
 """
 
-from dynident.recording.columns import Column
 from dynident.recording.dataset import Dataset, Noise, numbered
 from dynident.recording.filters import (
     Filter,
@@ -18,19 +17,16 @@ from dynident.recording.filters import (
     differentiate,
     lowpass,
 )
+from dynident.recording.formats.columns import Column
+from dynident.recording.formats.read import SUFFIXES, read
+from dynident.recording.formats.write import write
 from dynident.recording.masks import away_from_edges, moving, within
-from dynident.recording.motion_check import (
-    require_motion,
-    require_torque,
-    warn_of_missing_torque,
-)
+from dynident.recording.motion_check import require_motion, require_torque, warn_of_missing_torque
 from dynident.recording.parallel import FilterBlock, ParallelFilter, choose_factor
 from dynident.recording.periods import Periods, mismatch, periods, require_repetition
-from dynident.recording.read import SUFFIXES, read
 from dynident.recording.recording import SIGNALS, Provenance, Recording
 from dynident.recording.resolution import resolution
 from dynident.recording.uniform import uniform
-from dynident.recording.write import write
 
 __all__ = [
     "SIGNALS",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynident.robot.base import BaseParameters
+from dynident.robot.base_parameters import BaseParameters
 from dynident.robot.tree import Array
 
 _MASS_STAYS = 1e-3

@@ -29,10 +29,10 @@ def read(document: Document, where: str) -> Contents:
     RobotError
         Naming the body or joint that is broken or not supported.
     """
-    return _Reader(document.root, where).read()
+    return _MjcfReader(document.root, where).read()
 
 
-class _Reader:
+class _MjcfReader:
     def __init__(self, root: Element, where: str) -> None:
         self.root, self.where = root, where
         self.compiler: dict[str, str] = {}

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from numpy.typing import ArrayLike
 
 from dynident.errors import RobotError
-from dynident.robot import assemble, kinematics, mjcf, sdf, urdf
+from dynident.robot import kinematics, mjcf, sdf, urdf
+from dynident.robot import tree_assembly as assemble
 from dynident.robot.contents import Contents
 from dynident.robot.robot import GRAVITY, Robot
 from dynident.robot.tree import Description

@@ -9,15 +9,7 @@ from dynident.robot.chains import Chains
 from dynident.robot.contents import Contents, Inertial, absent, keep, stated, symmetric, to_text
 from dynident.robot.rotations import from_rpy
 from dynident.robot.tree import Array
-from dynident.robot.xmltree import (
-    Document,
-    Element,
-    attribute,
-    finite,
-    only,
-    reals,
-    require_unique,
-)
+from dynident.robot.xmltree import Document, Element, attribute, finite, only, reals, require_unique
 
 _MOVING = ("revolute", "continuous", "prismatic")
 _MENDS = {

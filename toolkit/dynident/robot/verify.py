@@ -17,9 +17,9 @@ from dynident import files
 from dynident.errors import DynidentError, FileError, RobotError
 from dynident.inertia import margins
 from dynident.robot.other_parsers import passive_motion, require_pinocchio, simulate_in_drake
+from dynident.robot.patching import patched
 from dynident.robot.robot import Robot
 from dynident.robot.tree import Link
-from dynident.robot.write import patched
 
 _SAMPLES = 50
 _TOLERANCE = 1e-10  # of the largest torque

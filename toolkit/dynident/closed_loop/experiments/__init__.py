@@ -1,0 +1,1 @@
+"""Virtual measurements: experiments, their files, and the studies that they write."""

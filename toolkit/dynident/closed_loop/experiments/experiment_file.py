@@ -1,0 +1,143 @@
+"""`experiment.toml`: an experiment as a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field
+
+from dynident.closed_loop.controllers import ControllerFile
+from dynident.closed_loop.experiments.experiment import Experiment, ExperimentRun
+from dynident.closed_loop.mechanism import TrueEffect
+from dynident.closed_loop.rollout import LEAD_IN
+from dynident.closed_loop.sensors import Sensors
+from dynident.closed_loop.trajectories import Fourier
+from dynident.effects import FRICTION_WIDTH
+from dynident.errors import DynidentError, StudyError
+from dynident.robot import Robot
+from dynident.settings import SettingsTable, read_toml
+
+
+class _EffectEntry(SettingsTable):
+    effect: str
+    values: dict[str, float] = Field(default_factory=dict)
+    shape: dict[str, float] = Field(default_factory=dict)
+    hidden: bool = False
+
+
+class _SensorsEntry(SettingsTable):
+    position_std: float | list[float] = 0.0
+    position_resolution: float | list[float] = 0.0
+    torque_std: float | list[float] = 0.0
+    torque_resolution: float | list[float] = 0.0
+    temperature_std: float | list[float] | None = None
+
+
+class _TrajectoryEntry(SettingsTable):
+    harmonics: int = Field(default=5, ge=1)
+    seed: int | None = Field(default=None, ge=0)
+    amplitude: float | list[float] | None = None
+    speed: float | list[float] | None = None
+    acceleration: float | list[float] | None = None
+    centre: float | list[float] | None = None
+
+
+class _ExperimentRecordingEntry(SettingsTable):
+    file: str
+    use: Literal["train", "test"] = "train"
+    duration: float = Field(gt=0)
+    period: float = Field(gt=0)
+    start: float = 0.0
+    payload: bool = False
+    trajectory: _TrajectoryEntry = _TrajectoryEntry()
+
+
+class _ExperimentFile(SettingsTable):
+    robot: str
+    nominal: str | None = None
+    joints: list[str] | None = None
+    gravity: tuple[float, float, float] | None = None
+    seed: int = Field(default=0, ge=0)
+    friction_width: float = Field(default=FRICTION_WIDTH, gt=0)
+    torque: Literal["held_command", "measured"] = "held_command"
+    lead_in: float = Field(default=LEAD_IN, ge=0)
+    effects: list[_EffectEntry] = Field(default_factory=list)
+    controller: ControllerFile
+    sensors: _SensorsEntry = _SensorsEntry()
+    recordings: list[_ExperimentRecordingEntry]
+
+
+def load_experiment(path: str | Path) -> Experiment:
+    """Read an experiment file and the robots that it names.
+
+    Keys: `robot` (the true one; paths are relative to the file), `nominal` (given to the user;
+    default the true one), `joints`, `gravity`, `seed`, `friction_width`, `torque`, `lead_in`;
+    [[effects]] `effect`, `values`, `shape`, `hidden`; [controller] as in a study; [sensors]
+    `position_std`, `position_resolution`, `torque_std`, `torque_resolution`, `temperature_std` (a
+    number, or one per joint; without the last there are no temperatures); [[recordings]] `file`,
+    `use`, `duration`, `period`, `start`, `payload`, `trajectory` with `harmonics`, `seed`,
+    `amplitude`, `speed`, `acceleration`, `centre`.
+
+    Raises
+    ------
+    StudyError
+        If a key is unknown, missing or out of range: it names the key, and the mend.
+    DynidentError
+        If a robot description is unusable.
+    """
+    path = Path(path)
+    said = read_toml(path, _ExperimentFile)
+    robot = _robot(said, path, said.robot)
+    nominal = None if said.nominal is None else _robot(said, path, said.nominal)
+    controller = said.controller.controller(robot, f"{path}: controller")
+    effects = []
+    for number, entry in enumerate(said.effects):
+        try:
+            effects += TrueEffect.of(
+                entry.effect, robot, entry.values, entry.shape, hidden=entry.hidden
+            )
+        except DynidentError as error:
+            raise _at(error, path, f"effects.{number}") from None
+    runs = [_run(entry, said, path, robot, k) for k, entry in enumerate(said.recordings)]
+    try:
+        return Experiment(
+            robot,
+            controller,
+            tuple(runs),
+            tuple(effects),
+            Sensors(**said.sensors.model_dump()),
+            said.seed,
+            said.friction_width,
+            nominal,
+            said.torque,
+            said.lead_in,
+        )
+    except DynidentError as error:
+        raise _at(error, path) from None
+
+
+def _robot(said: _ExperimentFile, path: Path, file: str) -> Robot:
+    return Robot.from_file(path.parent / file, said.joints, said.gravity)
+
+
+def _run(
+    entry: _ExperimentRecordingEntry, said: _ExperimentFile, path: Path, robot: Robot, number: int
+) -> ExperimentRun:
+    settings = entry.trajectory.model_dump()
+    seed = settings.pop("seed")
+    # Recordings that name no seed differ from each other all the same.
+    seeds = (said.seed, number) if seed is None else seed
+    try:
+        trajectory = Fourier.random(robot, entry.period, seeds, **settings)
+        return ExperimentRun(
+            trajectory, entry.duration, entry.file, entry.use, entry.start, entry.payload
+        )
+    except DynidentError as error:
+        raise _at(error, path, f"recordings.{number}") from None
+
+
+def _at(error: DynidentError, path: Path, key: str = "") -> StudyError:
+    """Return the complaint with the file, and the key in it, in front."""
+    where = ": ".join(part for part in (str(path), key, error.where or "") if part)
+    return StudyError(error.what, where, error.mend)

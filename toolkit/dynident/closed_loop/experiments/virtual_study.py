@@ -1,0 +1,137 @@
+"""An experiment's recordings as files, with a study that is silent about what is hidden."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path, PurePath
+
+import tomlkit
+
+from dynident import files
+from dynident.closed_loop.experiments.experiment import Experiment, Progress
+from dynident.effects import FRICTION_WIDTH, catalogue
+from dynident.errors import FileError, SimulationError
+from dynident.recording.formats import write as write_recording
+from dynident.robot import Robot
+
+STUDY = "study.toml"
+
+
+def write_experiment(
+    experiment: Experiment, folder: str | Path, progress: Progress | None = None
+) -> list[Path]:
+    """Simulate an experiment and write what its user gets.
+
+    That is the recordings, the nominal robot description, and last `study.toml`, which names both
+    and the effects that are not hidden. Each file is written whole or not at all.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        Its robots must have been read from a description.
+    folder : made if it is missing; files of these names in it are replaced.
+    progress : see `Progress`.
+
+    Returns
+    -------
+    The files written.
+
+    Raises
+    ------
+    SimulationError
+        If it cannot be simulated; nothing is then written.
+    FileError
+        If a file cannot be written.
+    """
+    folder = Path(folder)
+    nominal = experiment.nominal or experiment.robot
+    if nominal.description is None:
+        mend = "start from Robot.from_file or Robot.from_text"
+        raise SimulationError("has no description that could be written", nominal.name, mend)
+    files.require_folder(folder)
+    recordings = experiment.run(progress)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"cannot be made ({error.strerror or error})", str(folder)) from None
+    written = [write_recording(one, folder / one.name) for one in recordings]
+    description = folder / _description_name(nominal)
+    written.append(files.write_text(description, _description_text(nominal)))
+    text = tomlkit.dumps(_study(experiment, nominal, description.name))
+    written.append(files.write_text(folder / STUDY, text))
+    return written
+
+
+def _description_text(robot: Robot) -> str:
+    from dynident.robot.patching import patched
+
+    return patched(robot)
+
+
+def _description_name(robot: Robot) -> str:
+    assert robot.description is not None
+    suffix = {"urdf": ".urdf", "sdf": ".sdf", "mjcf": ".xml"}[robot.description.format]
+    name = PurePath(robot.description.path).name
+    # A robot from a text has no file; its own name may not be one.
+    return name if name.lower().endswith((suffix, ".xml")) else f"robot{suffix}"
+
+
+def _study(experiment: Experiment, nominal: Robot, description: str) -> tomlkit.TOMLDocument:
+    document = tomlkit.document()
+    document["robot"] = description
+    document["joints"] = list(nominal.names)
+    document["effects"] = _multiline(_labels(experiment))
+    document["torque"] = experiment.torque
+    if experiment.friction_width != FRICTION_WIDTH:
+        document["friction_width"] = experiment.friction_width
+    stated = Robot.from_text(_description_text(nominal), description, nominal.names)
+    if (stated.gravity != nominal.gravity).any():
+        document["gravity"] = [float(g) for g in nominal.gravity]
+    entries = tomlkit.aot()
+    for run in experiment.runs:
+        entry = tomlkit.table()
+        entry["file"] = run.file
+        entry["use"] = run.use
+        entry["period"] = run.trajectory.period
+        if run.start:
+            entry["start"] = run.start
+        if experiment.tells_payload:
+            entry["payload"] = run.payload
+        entries.append(entry)
+    document["recordings"] = entries
+    document["controller"] = _controller(experiment)
+    return document
+
+
+def _labels(experiment: Experiment) -> list[str]:
+    """Labels of the known effects; one that sits at every place is named once."""
+    known = [one.effect for one in experiment.known_effects]
+    by_name: dict[str, list[str]] = {}
+    for effect in known:
+        by_name.setdefault(effect.name, []).append(effect.label)
+    found = []
+    for name, labels in by_name.items():
+        everywhere = [one.label for one in catalogue()[name].candidates(experiment.robot)]
+        found += [name] if sorted(labels) == sorted(everywhere) else labels
+    return found
+
+
+def _multiline(labels: list[str]):
+    array = tomlkit.array()
+    array.extend(labels)
+    return array.multiline(len(labels) > 3)
+
+
+def _controller(experiment: Experiment):
+    """The table of a controller; what has its default is left out."""
+    controller = experiment.controller
+    table = tomlkit.table()
+    for part in fields(controller):
+        value = getattr(controller, part.name)
+        if isinstance(value, tuple):
+            value = list(value)
+        if part.name == "velocity_reference" and controller.kind == "cascade":
+            continue
+        if value != part.default and value not in ([], None):
+            table[part.name] = value
+    return table

@@ -1,0 +1,199 @@
+"""What is to be checked: links and moving bodies, each with its extent and its geometry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dynident.consistency.rules import Array, Body
+from dynident.inertia import LARGEST, to_com
+from dynident.robot import Description, Link, Robot
+from dynident.robot.broken_numbers import broken_numbers
+from dynident.robot.geometry import LinkGeometry, link_geometry
+from dynident.robot.hull import Hull
+from dynident.robot.joint_dynamics import carries_rotor, joint_dynamics
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedBody:
+    """One thing to check.
+
+    Attributes
+    ----------
+    body : Body
+    kind : str
+        "link" or "moving body".
+    carrier : str
+        Of a link: the moving body that it belongs to; empty where it is fixed to the world.
+    links : tuple of str
+        Of a moving body: the links that it is made of.
+    source : str
+        Where its parameters come from, as in `Link`.
+    not_checked : tuple of str
+        Geometry that was not read.
+    """
+
+    body: Body
+    kind: str
+    carrier: str
+    links: tuple[str, ...]
+    source: str
+    not_checked: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Scale:
+    """What is typical of a robot: the mass of a link, kg, and its extent, m."""
+
+    mass: float
+    length: float
+
+
+def of_links(
+    links: tuple[Link, ...],
+    description: Description | None,
+    robot: Robot | None,
+    rotors: frozenset[str] = frozenset(),
+) -> tuple[tuple[CheckedBody, ...], Scale]:
+    """Return every link that has inertial parameters, then every moving body of several links.
+
+    Parameters
+    ----------
+    links : tuple of Link
+    description : Description or None
+        For the geometry.
+    robot : Robot or None
+        The tree that carries the links, if it is known.
+    rotors : joints with a rotor inertia of their own, which can do without mass.
+    """
+    geometry: dict[str, LinkGeometry] = {}
+    broken: dict[str, tuple[str, ...]] = {}
+    if description is not None:
+        geometry, broken = link_geometry(description), broken_numbers(description)
+        rotors = rotors | carries_rotor(joint_dynamics(description))
+    reaches = _reaches(robot) if robot is not None else {}
+    hulls = {name: Hull(one.points) for name, one in geometry.items() if len(one.points)}
+    known = [hull.extent for hull in hulls.values()] or [x for x in reaches.values() if x > 0.0]
+    masses = [float(link.phi[0]) for link in links if 0.0 < link.phi[0] < LARGEST]
+    scale = Scale(
+        float(np.quantile(masses, 0.5, method="lower")) if masses else 1.0,
+        float(np.median(known)) if known else 0.0,
+    )
+    subjects = []
+    for link in links:
+        if link.source == "absent":
+            continue
+        shapes = geometry.get(link.name, LinkGeometry())
+        hull = hulls.get(link.name)
+        length, length_from = _length(
+            link.phi, hull, reaches.get(link.joint, 0.0), scale.length, not shapes.not_read
+        )
+        body = Body(
+            link.name,
+            link.phi,
+            length,
+            length_from,
+            scale.mass,
+            hull,
+            not shapes.not_read,
+            broken.get(link.name, ()) if link.source != "set" else (),
+            onward=_onward(link, robot) if robot is not None else None,
+        )
+        carrier = robot.bodies[link.joint] if robot is not None and link.joint >= 0 else ""
+        subjects.append(CheckedBody(body, "link", carrier, (), link.source, shapes.not_read))
+    if robot is not None:
+        subjects += _moving(robot, reaches, scale, rotors, subjects)
+    # Lengths are made of the extents that are known, here of none.
+    if scale.length == 0.0:
+        scale = replace(scale, length=float(np.median([s.body.length for s in subjects] or [1.0])))
+    return tuple(subjects), scale
+
+
+def _length(
+    phi: Array, hull: Hull | None, reach: float, typical: float, whole: bool
+) -> tuple[float, str]:
+    """Return the extent of a body and what it was taken from."""
+    if hull is not None and hull.extent > 0.0 and whole:
+        return hull.extent, "geometry"
+    reach = max(reach, hull.extent if hull is not None else 0.0)
+    if reach > 0.0:
+        return (reach, "joints") if reach >= typical else (typical, "robot")
+    if typical > 0.0:
+        return typical, "robot"
+    # Nothing but the inertia itself tells: the extent of a box that has it.
+    if np.all(np.abs(phi) < LARGEST) and phi[0] != 0.0:
+        properties = to_com(phi)
+        size = float(np.sqrt(6.0 * abs(np.trace(properties.inertia_com) / phi[0])))
+        size = max(size, 2.0 * float(np.linalg.norm(properties.com)))
+        if np.isfinite(size) and size > 0.0:
+            return size, "inertia"
+    return 1.0, "inertia"
+
+
+def _reaches(robot: Robot) -> dict[int, float]:
+    """Return by joint (-1: the world) how far the joints on its moving body are from its origin."""
+    reaches: dict[int, float] = {}
+    for joint in robot.joints:
+        far = float(np.linalg.norm(joint.p))
+        reaches[joint.parent] = max(reaches.get(joint.parent, 0.0), far)
+    for link in robot.links:
+        if link.joint >= 0:
+            far = float(np.linalg.norm(link.p))
+            reaches[link.joint] = max(reaches.get(link.joint, 0.0), far)
+    # From the world's origin to the first joint is no link.
+    reaches.pop(-1, None)
+    return reaches
+
+
+def _onward(link: Link, robot: Robot) -> Array | None:
+    """Return where the next joint is on a link that is a moving body by itself."""
+    alone = [one.name for one in robot.links if one.joint == link.joint] == [link.name]
+    ahead = [link.R.T @ (j.p - link.p) for j in robot.joints if j.parent == link.joint]
+    if not alone or not ahead or link.joint < 0:
+        return None
+    return max(ahead, key=lambda p: float(np.linalg.norm(p)))
+
+
+def _moving(
+    robot: Robot,
+    reaches: dict[int, float],
+    scale: Scale,
+    rotors: frozenset[str],
+    links: list[CheckedBody],
+) -> list[CheckedBody]:
+    """Return the moving bodies of several links, and those that nothing gives mass."""
+    theta = robot.theta.reshape(-1, 10)
+    extents: dict[str, float] = {}
+    for one in links:
+        extents[one.carrier] = max(extents.get(one.carrier, 0.0), one.body.length)
+    found = []
+    for number, (name, joint, phi) in enumerate(
+        zip(robot.bodies, robot.joints, theta, strict=True)
+    ):
+        weightless = joint.name not in rotors and not np.any(theta[list(_carried(robot, number))])
+        parts = tuple(
+            link.name
+            for link in robot.links
+            if link.joint == number and link.source != "absent" and np.any(link.phi)
+        )
+        if len(parts) < 2 and not weightless:
+            continue
+        length, length_from = _length(
+            phi,
+            None,
+            max(reaches.get(number, 0.0), extents.get(name, 0.0)),
+            scale.length,
+            True,
+        )
+        body = Body(name, phi, length, length_from, scale.mass, weightless=weightless)
+        found.append(CheckedBody(body, "moving body", name, parts, "sum", ()))
+    return found
+
+
+def _carried(robot: Robot, number: int) -> list[int]:
+    """Return a joint and all that it carries."""
+    found = [number]
+    for one in found:
+        found += [i for i, joint in enumerate(robot.joints) if joint.parent == one]
+    return found

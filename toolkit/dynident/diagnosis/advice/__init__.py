@@ -1,0 +1,1 @@
+"""Which experiment would show an effect, or tell effects apart."""

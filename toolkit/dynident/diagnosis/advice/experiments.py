@@ -1,0 +1,258 @@
+"""Which experiment would show an effect, or tell effects apart: in words, with numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynident.diagnosis.advice.candidate_experiments import SLOW, Recorded, Trial, Trials
+from dynident.diagnosis.search.scoring import ABSORBED
+from dynident.effects import Effect
+from dynident.errors import DynidentError
+from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.evidence_fit import Present
+from dynident.model import Model
+
+_CLEARLY = 0.05
+"""Share of an effect's torque that another must leave, for an experiment to be advised."""
+_MORE = 1.1  # times what was recorded is worth saying
+_TINY = {"revolute": "0.01 rad", "prismatic": "1 mm"}
+_NEARLY = 0.8  # of the best: a simpler experiment as good as this is advised instead
+
+
+@dataclass(frozen=True, eq=False)
+class Adviser:
+    """Advice for one robot and what has been recorded of it.
+
+    Attributes
+    ----------
+    trials : experiments that could be made.
+    """
+
+    trials: Trials
+
+    @classmethod
+    def of(cls, store: ColumnStore, present: Present) -> Adviser:
+        """Return the adviser for a model as it fits the recordings of a store."""
+        return cls(Trials(present.model, present.values, Recorded.of(store)))
+
+    def revealing(self, effect: Effect) -> str:
+        """Say which experiment would show an effect that the recordings do not show.
+
+        One sentence without a full stop. Where the effect's torque is a part of the model's at
+        every motion, it says that no experiment does.
+        """
+        if effect.shown_by == "repetition" or "whole" in effect.needs:
+            # What depends on the past is no part of a model that sees the instant only.
+            return self._by_kind(effect)
+        try:
+            absorbed = self.trials.left(effect) < ABSORBED
+        except DynidentError:
+            return effect.advice
+        if not absorbed:
+            return self._by_kind(effect)
+        part = " and ".join(self.trials.absorbing(effect))
+        why = f"its torque cannot be told from that of {part}" if part else "it makes no torque"
+        return f"no motion of this robot shows {effect.title}: {why}"
+
+    def separating(self, effects: Sequence[Effect], values: Sequence[float]) -> str:
+        """Say which experiment would tell effects apart.
+
+        The one in which the torque of the first is furthest from what any other, together with the
+        model, can make of it.
+
+        Parameters
+        ----------
+        effects : the one that was added, and those that explain the recordings as well.
+        values : parameters of the first.
+
+        Returns
+        -------
+        One sentence without a full stop; empty for fewer than two effects.
+        """
+        first, *others = effects
+        others = [one for one in others if one.label != first.label]
+        trials = self.trials.without((first, *others))
+        same, apart = [], []
+        for other in others:
+            best = self._best_trial(trials, first, values, [other])
+            (same if best is None else apart).append(other)
+        sentences = []
+        if apart:
+            best = self._best_trial(trials, first, values, apart)
+            # Where no one experiment is good for all, the first pair has its own.
+            best = best or self._best_trial(trials, first, values, apart[:1])
+            assert best is not None
+            sentences.append(self._in_words(first, best))
+        if same:
+            names = " or ".join(one.title for one in same)
+            sentences.append(f"no motion of this robot tells {first.title} from {names}")
+        return "; ".join(sentences)
+
+    # --- telling apart -------------------------------------------------------------------------
+
+    def _best_trial(
+        self, trials: Trials, first: Effect, values: Sequence[float], others: Sequence[Effect]
+    ) -> _Separation | None:
+        found = []
+        for trial in self._candidates((first, *others)):
+            try:
+                pairs = [trials.difference(first, values, one, trial) for one in others]
+            except DynidentError:
+                continue
+            torque, rest = min(pairs, key=lambda pair: float(np.linalg.norm(pair[1])))
+            size, left = float(np.linalg.norm(torque)), float(np.linalg.norm(rest))
+            if left > _CLEARLY * size > 0:
+                found.append(_Separation(trial, left, int(np.argmax(rest)), float(rest.max())))
+        most = max((one.size for one in found), default=0.0)
+        return next((one for one in found if one.size >= _NEARLY * most), None)
+
+    def _candidates(self, effects: Sequence[Effect]) -> list[Trial]:
+        """Experiments in which effects may differ, the simpler ones first."""
+        kinds = {effect.shown_by for effect in effects}
+        alone = {name for effect in effects for name in (effect.joint, effect.source) if name}
+        if len(self.trials.model.robot.names) == 1:
+            alone = set()
+        return [
+            *(Trial("alone", name) for name in sorted(alone)),
+            *(Trial(kind) for kind in ("slow", "wide", "fast")),
+            *(Trial(kind) for kind in ("session", "payload") if kind in kinds),
+        ]
+
+    def _in_words(self, first: Effect, best: _Separation) -> str:
+        robot = self.trials.model.robot
+        j = self._index(first.joint) if first.joint else best.joint
+        unit = robot.torque_units[best.joint]
+        there = f": there they differ by {best.rms:.2g} {unit} (rms) at {robot.names[best.joint]}"
+        return self._trial_in_words(best.trial, j, first) + there
+
+    def _trial_in_words(self, trial: Trial, j: int, first: Effect) -> str:
+        names, unit = self.trials.model.robot.names, self._unit(j)
+        if trial.kind == "alone":
+            k = self._index(trial.joint)
+            still = "the other joints" if k == j else names[j]
+            return f"move {names[k]} with {still} still, {self._up_to(k)}"
+        if trial.kind == "fast":
+            accelerate = f"beyond {1.5 * self.trials.recorded.acceleration[j]:.2g} {unit}/s^2"
+            return f"move all joints with {names[j]} {self._up_to(j)} and accelerating {accelerate}"
+        if trial.kind == "slow":
+            slow = SLOW[self.trials.model.robot.kinds[j]]
+            return f"move all joints slowly, {names[j]} below {slow:g} {unit}/s, to and fro"
+        if trial.kind in ("session", "payload"):
+            return self._by_kind(first, trial.kind)
+        return f"move all joints at once, {names[j]} {self._from_to(j)}, {self._up_to(j)}"
+
+    # --- what shows one ------------------------------------------------------------------------
+
+    def _by_kind(self, effect: Effect, kind: str | None = None) -> str:
+        trials, kind = self.trials, kind or effect.shown_by
+        if kind == "payload":
+            return "record the same motion with the payload and without, and say which is which"
+        if kind == "session":
+            later, before = trials.recorded.longer / 60, trials.recorded.span / 60
+            return (
+                f"repeat one recording at the start of a session and {later:.0f} min later "
+                f"(recorded: {before:.2g} min)"
+            )
+        if kind == "repetition":
+            return f"record several periods of one motion of {effect.joint or 'all joints'}"
+        if effect.joint is None:
+            return self._of_all(kind, effect)
+        j = self._index(effect.joint)
+        name, unit, recorded = effect.joint, self._unit(j), trials.recorded
+        if kind == "source alone" and effect.source:
+            k = self._index(effect.source)
+            return f"move {effect.source} with {name} still, {self._up_to(k)}"
+        if kind == "slow":
+            slow = SLOW[trials.model.robot.kinds[j]]
+            return f"sweep {name} slowly, below {slow:g} {unit}/s, {self._from_to(j)} and back"
+        if kind == "reversals":
+            return f"let {name} change direction many times, {self._up_to(j)}"
+        if kind == "tiny reversals":
+            return f"move {name} to and fro by less than {_TINY[trials.model.robot.kinds[j]]}"
+        if kind == "position range":
+            return f"move {name} slowly {self._from_to(j)}, the other joints in several poses"
+        if kind == "acceleration":
+            beyond = 1.5 * recorded.acceleration[j]
+            return (
+                f"accelerate {name} beyond {beyond:.2g} {unit}/s^2 (recorded: up to "
+                f"{recorded.acceleration[j]:.2g}), the other joints moving too"
+            )
+        if kind == "load":
+            most = recorded.torque[j]
+            return (
+                f"move {name} slowly in both directions under loads of either sign beyond "
+                f"{most:.2g} {trials.model.robot.torque_units[j]} (recorded: up to that), the "
+                "other joints in several poses"
+            )
+        return f"move {name} in both directions {self._up_to(j)}"
+
+    def _of_all(self, kind: str, effect: Effect) -> str:
+        robot, recorded = self.trials.model.robot, self.trials.recorded
+        if kind == "position range":
+            gains = [
+                (self.trials.reach(j)[1] - self.trials.reach(j)[0])
+                / max(recorded.upper[j] - recorded.lower[j], 1e-9)
+                for j in range(robot.n)
+            ]
+            j = int(np.argmax(gains))
+            return f"move all joints slowly through many poses, {robot.names[j]} {self._from_to(j)}"
+        if kind == "acceleration":
+            most = 1.5 * recorded.acceleration
+            each = ", ".join(
+                f"{name} {a:.2g} {self._unit(j)}/s^2"
+                for j, (name, a) in enumerate(zip(robot.names, most, strict=True))
+            )
+            return f"move all joints faster, accelerating beyond: {each}"
+        return effect.advice
+
+    def _up_to(self, j: int) -> str:
+        """A speed above the recorded one where the joint can go faster."""
+        pace, before = self.trials.pace(j), float(self.trials.recorded.speed[j])
+        unit = self._unit(j)
+        if pace > _MORE * before:
+            return f"at speeds up to {pace:.2g} {unit}/s (recorded: up to {before:.2g})"
+        return f"at speeds from very slow up to {before:.2g} {unit}/s"
+
+    def _from_to(self, j: int) -> str:
+        recorded, unit = self.trials.recorded, self._unit(j)
+        low, high = self.trials.reach(j)
+        before = recorded.upper[j] - recorded.lower[j]
+        if high - low > _MORE * before:
+            was = f"{recorded.lower[j]:.2g} to {recorded.upper[j]:.2g}"
+            return f"from {low:.2g} to {high:.2g} {unit} (recorded: {was})"
+        return f"from {recorded.lower[j]:.2g} to {recorded.upper[j]:.2g} {unit}"
+
+    def _index(self, joint: str | None) -> int:
+        return self.trials.model.robot.names.index(str(joint))
+
+    def _unit(self, j: int) -> str:
+        return "m" if self.trials.model.robot.kinds[j] == "prismatic" else "rad"
+
+
+@dataclass(frozen=True)
+class _Separation:
+    """An experiment that tells effects apart: how far, and where most, N m or N."""
+
+    trial: Trial
+    size: float
+    joint: int
+    rms: float
+
+
+def revealing(effect: Effect, model: Model, values: np.ndarray, recorded: Recorded) -> str:
+    """Say which experiment would show an effect; see `Adviser.revealing`."""
+    return Adviser(Trials(model, values, recorded)).revealing(effect)
+
+
+def separating(
+    effects: Sequence[Effect],
+    own: Sequence[float],
+    model: Model,
+    values: np.ndarray,
+    recorded: Recorded,
+) -> str:
+    """Say which experiment would tell effects apart; see `Adviser.separating`."""
+    return Adviser(Trials(model, values, recorded)).separating(effects, own)

@@ -1,0 +1,260 @@
+"""A search put into words and numbers: the `Diagnosis`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dynident.diagnosis.advice.experiments import Adviser
+from dynident.diagnosis.nuisances.contacts import Disturbance, contact_candidates
+from dynident.diagnosis.nuisances.quantisation import rounding_notes, with_rounding
+from dynident.diagnosis.result import (
+    Candidate,
+    Diagnosis,
+    JointResult,
+    Status,
+    Step,
+    TestError,
+    Trace,
+)
+from dynident.diagnosis.search.ranking import Ranking
+from dynident.diagnosis.search.scoring import Score
+from dynident.diagnosis.verdict import noise_source, notes_on, verdict_of
+from dynident.effects import Effect
+from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.evidence_fit import Present, fit_present
+from dynident.evidence.held_out import HeldOut, on_blocks, on_recordings, with_noise_of
+from dynident.evidence.maps import residual_maps
+from dynident.fitting.estimate import Estimate
+from dynident.fitting.least_squares import sources_of
+from dynident.model import Model
+from dynident.recording import Dataset
+from dynident.recording.dataset import NoiseSource
+from dynident.robot import base_parameters
+
+_RANK_TOLERANCE = 1e-6  # of what comes from squares, in which half of the digits are gone
+
+_METHODS: dict[NoiseSource, str] = {
+    "replicates": "instrumental variables from the repeated periods, noise whitened",
+    "given": "least squares corrected for the stated noise, noise whitened",
+    "unknown": "least squares, weighted per joint",
+}
+
+
+@dataclass(frozen=True)
+class Found:
+    """An effect that the search has added, with what was said of it then."""
+
+    score: Score
+    p_value: float
+    indistinguishable: tuple[Effect, ...]
+
+
+@dataclass(frozen=True)
+class Search:
+    """What a search did: the evidence, the fits, the effects added, the ranking of each round.
+
+    Attributes
+    ----------
+    disturbances : contacts, left out of the evidence.
+    notes : on its instruments, where they come from a simulation or could not.
+    """
+
+    store: ColumnStore
+    start: Present
+    final: Present
+    found: tuple[Found, ...]
+    rounds: tuple[Ranking, ...]
+    disturbances: tuple[Disturbance, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def told(
+    search: Search, train: Dataset, test: Dataset | None, held: ColumnStore | None
+) -> Diagnosis:
+    """Put what a search found into words and numbers.
+
+    Parameters
+    ----------
+    search : the search.
+    train, test : the recordings, for their provenance.
+    held : evidence of the test recordings; None where blocks of time are held out.
+    """
+    store, start, present = search.store, search.start, search.final
+    found, rounds, given = search.found, search.rounds, search.start.model
+    by_label = {e.label: e for e in present.model.effects}
+    stages = [start]
+    for one in found[:-1]:
+        wider = stages[-1].model + by_label[one.score.effect.label]
+        stages.append(fit_present(store, wider.with_shapes(present.model.effects), stages[-1]))
+    if found:
+        # With its dry friction blunted where that was called for later.
+        stages.append(present)
+    judged = [
+        with_noise_of(on_recordings(held, s), on_recordings(store, s))
+        if held
+        else on_blocks(store, s)
+        for s in stages
+    ]
+    rounded = test if test is not None and held is not None else train
+    before = with_rounding(judged[0], start, rounded)
+    after = with_rounding(judged[-1], stages[-1], rounded) if found else before
+    steps = tuple(
+        Step(
+            by_label[one.score.effect.label],
+            tuple(stage.values[stage.model.slices[one.score.effect.label]]),
+            old.error,
+            new.error,
+            one.indistinguishable,
+            one.p_value,
+        )
+        for one, stage, old, new in zip(found, stages[1:], judged[:-1], judged[1:], strict=True)
+    )
+    contacts = tuple(one.step(given) for one in search.disturbances)
+    first_error = contacts[0].test_error_before if contacts else before.error
+    steps = (*contacts, *_advised(steps, Adviser.of(store, stages[-1])))
+    source = noise_source(store, held)
+    verdict = verdict_of(before, after, steps, rounds[-1])
+    pushed = contact_candidates(given, store, search.disturbances)
+    return Diagnosis(
+        verdict,
+        source,
+        _joint_results(given, before, after),
+        TestError(first_error, after.error, after.floor),
+        steps,
+        _revealed(_merged(_candidates(rounds[0], before.error, start), pushed), store, start),
+        _candidates(rounds[-1], after.error, stages[-1]),
+        _estimate(store, start, train),
+        _estimate(store, stages[-1], train),
+        residual_maps(given, before, after),
+        _traces(given, before, after),
+        (
+            *notes_on(store, held, stages[-1], source),
+            *rounding_notes(after, given.robot.names),
+            *search.notes,
+        ),
+        sources_of(test) if test is not None else (),
+    )
+
+
+def _advised(steps: tuple[Step, ...], adviser: Adviser) -> tuple[Step, ...]:
+    """Say which experiment would tell an effect from those that cannot be told from it."""
+    return tuple(
+        replace(one, advice=adviser.separating((one.effect, *one.indistinguishable), one.values))
+        if one.indistinguishable
+        else one
+        for one in steps
+    )
+
+
+def _revealed(
+    candidates: tuple[Candidate, ...], store: ColumnStore, present: Present
+) -> tuple[Candidate, ...]:
+    """Say which experiment would show what is absorbed."""
+    if not any(one.status == "absorbed" for one in candidates):
+        return candidates
+    adviser = Adviser.of(store, present)
+    return tuple(
+        replace(one, remark=adviser.revealing(one.effect)) if one.status == "absorbed" else one
+        for one in candidates
+    )
+
+
+def _merged(found: tuple[Candidate, ...], pushed: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
+    """Contacts that were found first, those that were not after everything else."""
+    first = tuple(one for one in pushed if one.status == "material")
+    return (*first, *found, *(one for one in pushed if one.status != "material"))
+
+
+def _joint_results(given: Model, before: HeldOut, after: HeldOut) -> tuple[JointResult, ...]:
+    def at(values: np.ndarray | None, j: int) -> float | None:
+        return None if values is None else float(values[j])
+
+    return tuple(
+        JointResult(
+            name,
+            unit,
+            float(before.joint_errors[j]),
+            float(after.joint_errors[j]),
+            float(before.torque_rms[j]),
+            at(after.noise_std, j),
+            at(before.ratio, j),
+            at(after.ratio, j),
+        )
+        for j, (name, unit) in enumerate(
+            zip(given.robot.names, given.robot.torque_units, strict=True)
+        )
+    )
+
+
+def _candidates(ranking: Ranking, error: float, present: Present) -> tuple[Candidate, ...]:
+    total = present.error_total
+    found = []
+    for score, refusal in zip(ranking.scores, ranking.refusals, strict=True):
+        status: Status = "absorbed" if score.absorbed else "not_material" if refusal else "material"
+        # Held out where it was cross-validated, else the drop less its price.
+        gain = score.gains.sum() if score.gains is not None else score.penalised
+        share = min(max(float(gain) / total, -1.0), 1.0) if np.isfinite(gain) else 0.0
+        found.append(
+            Candidate(
+                score.effect,
+                status,
+                None if score.absorbed else ranking.corrected(score),
+                error * (1.0 - float(np.sqrt(1.0 - share))),
+                score.values,
+                refusal,
+            )
+        )
+    return tuple(found)
+
+
+def _estimate(store: ColumnStore, present: Present, train: Dataset) -> Estimate:
+    """The fit of the diagnosis as an `Estimate`."""
+    fitted = on_recordings(store, present)
+    model = present.model
+    # Rows that span what the data tell: directions in which the columns are noise are not told.
+    told = present.solution.basis.T @ present.moments.sums()[1][:-1, :-1]
+    basis = base_parameters(told, model.names, _RANK_TOLERANCE)
+    kept, combination = list(basis.independent), basis.combination
+    covariance = np.zeros((model.size, model.size))
+    covariance[np.ix_(kept, kept)] = combination @ present.covariance @ combination.T
+    return Estimate(
+        model,
+        basis.lift(basis.coordinates(present.values), model.given_values()),
+        covariance,
+        basis,
+        fitted.residual_rms,
+        fitted.joint_errors,
+        fitted.error,
+        float(np.linalg.cond(told[:, kept])),
+        present.rows,
+        _method(store),
+        "solved",
+        (),
+        sources_of(train),
+    )
+
+
+def _method(store: ColumnStore) -> str:
+    """How the model was fitted, in words."""
+    if store.runs[0].columns_from == "simulation":
+        return "instrumental variables from the simulated closed loop"
+    return _METHODS[noise_source(store, None)]
+
+
+def _traces(given: Model, before: HeldOut, after: HeldOut) -> tuple[Trace, ...]:
+    robot = given.robot
+    return tuple(
+        Trace(
+            old.name,
+            name,
+            unit,
+            old.t,
+            old.measured[:, j],
+            old.predicted[:, j],
+            new.predicted[:, j],
+        )
+        for old, new in zip(before.runs, after.runs, strict=True)
+        for j, (name, unit) in enumerate(zip(robot.names, robot.torque_units, strict=True))
+    )

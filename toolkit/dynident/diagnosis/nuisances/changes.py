@@ -1,0 +1,230 @@
+"""What one repetition does not share with the others, whitened, and bumps fitted to it.
+
+What changes slowly, a level or friction that falls as a drive warms up, is taken out of every
+repetition before. Bursts are to have no say in the noise model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter, oaconvolve
+
+from dynident.effects import FRICTION_WIDTH
+from dynident.evidence.noise_model import ORDER, measure_noise
+
+REACH = 4.0
+"""Widths on either side beyond which a bump is nothing."""
+
+_QUANTILES = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0)  # of speeds: noise is worst at rest
+_FEWEST = 40  # samples that show a scale
+_WHITE = 0.3  # of the noise's size, white: where filters leave nothing, nothing is to be found
+_CLIP = 3.0  # standard deviations beyond which a sample tells nothing of the noise
+
+
+@dataclass(frozen=True, eq=False)
+class Repeated:
+    """The residual of one joint in the repetitions of one recording.
+
+    Attributes
+    ----------
+    run, number, joint : as in `Bump`.
+    t : (P, S) s, in the session.
+    residual : (P, S) N m or N.
+    speed : (P, S) rad/s or m/s.
+    """
+
+    run: int
+    number: int
+    joint: str
+    t: np.ndarray
+    residual: np.ndarray
+    speed: np.ndarray
+
+    @property
+    def step(self) -> float:
+        """Time from one instant to the next, s."""
+        return float(np.median(np.diff(self.t, axis=1)))
+
+
+@dataclass(frozen=True, eq=False)
+class Changes:
+    """Differences of one series, in the order of time, with their noise.
+
+    Attributes
+    ----------
+    of : the series.
+    change : (P S,) what each repetition does not share with the others.
+    still : (P S,) one over the noise's local standard deviation.
+    colour : (ORDER + 1,) whitening filter.
+    kept : (S,) instants to which the slow changes were fitted.
+    """
+
+    of: Repeated
+    change: np.ndarray
+    still: np.ndarray
+    colour: np.ndarray
+    kept: np.ndarray
+
+    def certainty(self, row: float, width: float) -> float:
+        """Share of a bump's z value that is left for two doubts.
+
+        The slow changes are not known exactly. And one sample that is far out is no bump: what is
+        left of z without the sample that speaks for it most.
+
+        Parameters
+        ----------
+        row, width : of the bump, in rows.
+        """
+        instants = len(self.kept)
+        p = int(row // instants)
+        own = slice(p * instants, (p + 1) * instants)
+        bump = np.exp(-(((np.arange(own.start, own.stop) - row) / width) ** 2) / 2)
+        columns = np.column_stack([self.change[own], bump, *_slow(self.of.speed[p]).T])
+        columns = columns * self.still[own, None]
+        white = np.asarray(lfilter(self.colour, [1.0], columns, axis=0))
+        change, bump, slow = white[:, 0], white[:, 1], white[:, 2:]
+        power = max(float(bump @ bump), 1e-300)
+        along = slow.T @ bump
+        unknown = along @ np.linalg.pinv(slow[self.kept].T @ slow[self.kept], 1e-10) @ along
+        parts = bump * change
+        total = float(parts.sum())
+        largest = int(np.argmax(parts * np.sign(total)))
+        rest = max(power - float(bump[largest] ** 2), 1e-300)
+        alone = (total - float(parts[largest])) / total * np.sqrt(power / rest) if total else 1.0
+        return float(np.clip(alone, 0.0, 1.0) / np.sqrt(1.0 + unknown / power))
+
+    def match(self, signal: np.ndarray, rows: np.ndarray, width: float) -> np.ndarray:
+        """Fit bumps of a width (in rows) at rows (M,), any real numbers, to a signal (P S,).
+
+        Returns
+        -------
+        (2, M) z value under Gaussian noise, and amplitude.
+        """
+        length = len(signal)
+        half = int(np.ceil(REACH * width))
+        around = np.round(rows).astype(int)[:, None] + np.arange(-half, half + 1 + ORDER)
+        inside = (around >= 0) & (around < length)
+        at = np.clip(around, 0, length - 1)
+        bump = np.exp(-(((around - rows[:, None]) / width) ** 2) / 2) * inside
+        template = lfilter(self.colour, [1.0], bump * self.still[at], axis=1) * inside
+        white = lfilter(self.colour, [1.0], signal * self.still)
+        product = np.sum(template * white[at], axis=1)
+        power = np.maximum(np.sum(template**2, axis=1), 1e-300)
+        return np.stack([product / np.sqrt(power), product / power])
+
+
+def scanned(one: Changes, width: float) -> np.ndarray:
+    """The z value of `Changes.match` at every row, (P S,), by convolutions."""
+    half = int(np.ceil(REACH * width))
+    bump = np.exp(-((np.arange(-half, half + 1) / width) ** 2) / 2)
+    white = np.asarray(lfilter(one.colour, [1.0], one.change * one.still))
+    back = np.asarray(lfilter(one.colour, [1.0], white[::-1]))[::-1] * one.still
+    product = _convolved(back, bump)
+    # The whitened bump's square: over the lags that the filter mixes.
+    power = np.zeros(len(back))
+    for lag in range(min(len(one.colour), len(bump))):
+        both = float(one.colour[: len(one.colour) - lag] @ one.colour[lag:])
+        pairs = one.still[: len(back) - lag] * one.still[lag:]
+        kernel = bump[: len(bump) - lag] * bump[lag:]
+        full = np.pad(oaconvolve(pairs, kernel[::-1]), len(one.colour))
+        start = len(one.colour) + half - lag
+        power += (1.0 if lag == 0 else 2.0) * both * full[start : start + len(back)]
+    return product / np.sqrt(np.maximum(power, 1e-300))
+
+
+def _convolved(signal: np.ndarray, bump: np.ndarray) -> np.ndarray:
+    half = len(bump) // 2
+    return oaconvolve(signal, bump)[half : half + len(signal)]
+
+
+def changes_of(series: Sequence[Repeated], left_out: Sequence[np.ndarray]) -> list[Changes]:
+    """Differences of all series of one joint, with the noise that they have in common.
+
+    `left_out` are the instants (S,) of each series that are no witnesses of the noise.
+    """
+    kept = [~np.tile(out, len(s.t)) for s, out in zip(series, left_out, strict=True)]
+    changes = [_changes(s, ~out) for s, out in zip(series, left_out, strict=True)]
+    still = [np.ones(len(change)) for change in changes]
+    # Noise follows the speed itself, or, once filtered, the least speed near by.
+    for measure in (np.abs, _slowness):
+        speeds = [measure(one.speed).ravel() for one in series]
+        sizes = [np.abs(c * i) for c, i in zip(changes, still, strict=True)]
+        # All rows: those left out may be the only ones that turn round, say.
+        at, scales = _scales(np.concatenate(sizes), np.concatenate(speeds))
+        still = [i / np.interp(s, at, scales) for i, s in zip(still, speeds, strict=True)]
+    stretches = []
+    for change, own, keep in zip(changes, still, kept, strict=True):
+        clipped = np.clip(change * own, -_CLIP, _CLIP)
+        borders = np.flatnonzero(np.diff(keep)) + 1
+        parts = zip(np.split(clipped, borders), np.split(keep, borders), strict=True)
+        stretches += [part for part, inside in parts if inside[0] and len(part) > 2 * ORDER]
+    # The scale is in `still` already: of this model only the colour is used.
+    size = float(np.sqrt(np.mean(np.concatenate(stretches) ** 2)))
+    no_speed = [np.zeros(len(part)) for part in stretches]
+    noise = measure_noise(stretches, no_speed, _WHITE * size)
+    colour = noise.colour / (noise.std * noise.scales[0])
+    return [
+        Changes(one, change, own, colour, ~out)
+        for one, change, own, out in zip(series, changes, still, left_out, strict=True)
+    ]
+
+
+def _changes(one: Repeated, kept: np.ndarray) -> np.ndarray:
+    """What each repetition does not share with the others' mean, (P S,).
+
+    Less a level and friction of its own, fitted to the instants `kept` (S,) so that bursts have
+    little say.
+    """
+    count = len(one.residual)
+    others = (one.residual.sum(axis=0) - one.residual) / (count - 1)
+    found = one.residual - others
+    for change, v in zip(found, one.speed, strict=True):
+        columns = _slow(v)
+        weight, rest = kept.astype(float), change
+        for step in range(10):
+            root = np.sqrt(weight)
+            x = np.linalg.lstsq(columns * root[:, None], change * root, rcond=1e-8)[0]
+            rest = change - columns @ x
+            usual = 1.4826 * float(np.median(np.abs(rest[kept])))
+            size = np.abs(rest) / max(usual, 1e-300)
+            # Huber's weights find the bulk; Tukey's then forget what is far from it.
+            huber = np.minimum(1.0, 1.345 / np.maximum(size, 1e-9))
+            tukey = np.maximum(1.0 - (size / 4.685) ** 2, 0.0) ** 2
+            weight = kept * (huber if step < 4 else tukey)
+        change[:] = rest
+    return found.ravel()
+
+
+def _slow(speed: np.ndarray) -> np.ndarray:
+    """Columns of what may change from repetition to repetition: a level and friction, (S, 3)."""
+    return np.column_stack([np.ones_like(speed), speed, np.tanh(speed / FRICTION_WIDTH)])
+
+
+def _slowness(speed: np.ndarray) -> np.ndarray:
+    """Least absolute speed within two rows, (P, S); zero where the motion turns round."""
+    padded = np.pad(speed, ((0, 0), (2, 2)), mode="edge")
+    near = np.stack([padded[:, k : k + speed.shape[1]] for k in range(5)])
+    turns = (near.min(axis=0) < 0) & (near.max(axis=0) > 0)
+    return np.where(turns, 0.0, np.abs(near).min(axis=0))
+
+
+def _scales(sizes: np.ndarray, slowness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Speeds and the noise's standard deviation there, from the 90 % quantile of its size."""
+    order = np.argsort(slowness, kind="stable")
+    edges = np.unique((np.array(_QUANTILES) * len(order)).astype(int))
+    # Turning points are a kind of their own, be they many or few.
+    turning = int(np.sum(slowness == 0.0))
+    edges = np.unique([0, turning, *edges[edges > turning], len(order)])
+    at, scales, start = [], [], 0
+    for stop in edges[1:]:
+        if stop - start < _FEWEST and stop < len(order):
+            continue
+        rows = order[start:stop]
+        at.append(float(slowness[rows].mean()))
+        scales.append(float(np.quantile(sizes[rows], 0.9)) / 1.645)
+        start = stop
+    least = 1e-3 * max(max(scales), 1e-300)
+    return np.array(at), np.maximum(scales, least)

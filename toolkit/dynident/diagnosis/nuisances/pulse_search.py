@@ -1,0 +1,300 @@
+"""Contacts: bursts in one repetition of a period only, found in what repetitions do not share.
+
+What a model lacks is the same in every repetition and cancels in their differences; so does not a
+push. What changes slowly, a level or friction that falls as a drive warms up, is taken out of
+every repetition before. The rest is whitened by a noise model that a burst cannot inflate, and
+searched by matched filters: Gaussian bumps of many widths at all times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.optimize import minimize
+
+from dynident.diagnosis.nuisances.changes import REACH, Changes, Repeated, changes_of, scanned
+from dynident.diagnosis.nuisances.tails import QUARTER, chance_of, degrees_of_freedom
+from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.evidence_fit import Present, residuals
+from dynident.evidence.runs import Run
+
+LEVEL = 1e-6
+"""p value below which a bump is a contact.
+
+The noise is measured without the place that stands out most: p values of healthy data come out too
+small, up to a hundred times. Those of pushes that matter are smaller by many powers of ten.
+"""
+WIDTHS = tuple(float(w) for w in np.geomspace(0.025, 0.6, 6))
+"""s, of the bumps that are searched."""
+
+_MOST = 8  # bumps in one diagnosis: beyond that it is no contact but noise of another kind
+_WORTH_A_LOOK = 2e-3  # probability at the one place that stands out most
+_SHARE = 1 / 12  # of a repetition, the widest bump: it must not be most of what is compared
+_STRIDE = 0.25  # of a width, from one position to the next
+_PEAKS = 5  # positions, with what surrounds them, that are no witnesses of the noise
+
+
+@dataclass(frozen=True)
+class Bump:
+    """A burst in one repetition: amplitude exp(-((t - time) / width)^2 / 2).
+
+    Attributes
+    ----------
+    run : its place among the runs.
+    number : of the recording, see `Recording.number`.
+    repetition : from 0.
+    joint : name.
+    time : s, in the session.
+    width : s.
+    amplitude : N m or N.
+    p_value : that noise alone shows its like anywhere in the data, see `LEVEL`.
+    """
+
+    run: int
+    number: int
+    repetition: int
+    joint: str
+    time: float
+    width: float
+    amplitude: float
+    p_value: float
+
+
+def find_contacts(store: ColumnStore, present: Present) -> tuple[Bump, ...]:
+    """Find bursts in single repetitions; the most significant first.
+
+    Parameters
+    ----------
+    store, present : the runs, and the model whose residual is compared; a poor model will do.
+
+    Returns
+    -------
+    None at all where nothing repeats.
+    """
+    found = []
+    folded = residuals(store, present.model, present.values)
+    for r, (run, residual) in enumerate(zip(store.runs, folded, strict=True)):
+        if run.kind != "repeated" or len(run.index) < 2:
+            continue
+        first, recording = run.versions[0], run.recording
+        for j, joint in enumerate(recording.joints):
+            found.append(
+                Repeated(
+                    r,
+                    recording.number,
+                    joint,
+                    first.t[run.index] + recording.start,
+                    residual[:, :, j],
+                    first.v[:, j][run.index],
+                )
+            )
+    return bumps_in(found)
+
+
+def bumps_in(data: Sequence[Repeated]) -> tuple[Bump, ...]:
+    """Find bumps in residuals of any joints and recordings; the most significant first."""
+    left, found = list(data), []
+    while len(found) < _MOST:
+        best = _best(left)
+        if best is None or best.p_value >= LEVEL:
+            break
+        found.append(best)
+        left = [_cleared(one, best) for one in left]
+    return tuple(sorted(found, key=lambda bump: bump.p_value))
+
+
+def without(run: Run, bumps: Sequence[Bump]) -> Run:
+    """Return a run without the instants of bumps, in all repetitions.
+
+    That is four widths on either side, or a quarter of the repetition where that is less.
+
+    Parameters
+    ----------
+    run : Run
+    bumps : of this run; others must not be among them.
+    """
+    if not bumps:
+        return run
+    t = run.versions[0].t[run.index] + run.recording.start
+    kept = np.ones(t.shape[1], dtype=bool)
+    for bump in bumps:
+        reach = min(REACH * bump.width, float(t[0, -1] - t[0, 0]) / 4)
+        kept &= ~np.any(np.abs(t - bump.time) < reach, axis=0)
+    before = np.concatenate([[0], np.cumsum(kept)])
+    left_out = ~run.kept
+    left_out[run.index[:, ~kept].ravel()] = True
+    return replace(
+        run, index=run.index[:, kept], edges=np.unique(before[run.edges]), left_out=left_out
+    )
+
+
+# --- one search ---------------------------------------------------------------------------------
+
+
+def _best(data: Sequence[Repeated]) -> Bump | None:
+    """The most significant bump, whether it is or not."""
+    by_joint = {one.joint: [s for s in data if s.joint == one.joint] for one in data}
+    found, positions = [], 0
+    for series in by_joint.values():
+        places = _places(changes_of(series, [np.zeros(s.t.shape[1], dtype=bool) for s in series]))
+        if not places:
+            continue
+        peak = min(places)
+        positions += sum(place.tried for place in places)
+        # A burst hides behind itself at first: in the slow changes and in the noise's scale.
+        if peak.chance > _WORTH_A_LOOK:
+            found.append(peak)
+            continue
+        # Once more, by noise measured without what stands out most.
+        places = _places(changes_of(series, [_about(peak, k, s) for k, s in enumerate(series)]))
+        found += places
+    if not found:
+        return None
+    best = min(found)
+    return _refined(best, min(1.0, best.chance * positions))
+
+
+@dataclass(frozen=True, order=True)
+class _PulsePlace:
+    """The place at which a bump of one width stands out most.
+
+    Attributes
+    ----------
+    chance : probability of its like there under noise alone.
+    series : whose it is, among those of its joint.
+    row, width : in rows.
+    tried : number of places of that width.
+    of : the series.
+    """
+
+    chance: float
+    series: int
+    row: float
+    width: float
+    tried: int
+    of: Changes = field(compare=False)
+
+
+def _places(prepared: Sequence[Changes]) -> list[_PulsePlace]:
+    """The best place of each width, for the series of one joint."""
+    found, degrees = [], 0.0
+    for width in WIDTHS:
+        tried = _tried(prepared, width)
+        if tried is None:
+            continue
+        # Single samples, of which there are most, show how heavy the tails are.
+        degrees = degrees or degrees_of_freedom(tried.z[tried.witnesses(width)])
+        best = int(np.argmax(tried.z))
+        k = int(tried.series[best])
+        rows = width / prepared[k].of.step
+        row = float(tried.rows[best])
+        z = float(tried.z[best]) * prepared[k].certainty(row, rows)
+        chance = chance_of(z, degrees, rows)
+        found.append(_PulsePlace(chance, k, row, rows, len(tried.z), prepared[k]))
+    return found
+
+
+def _about(peak: _PulsePlace, k: int, one: Repeated) -> np.ndarray:
+    """Instants (S,) of a series about a peak, in whichever repetition it is."""
+    instants = one.t.shape[1]
+    away = np.abs(np.arange(instants) - peak.row % instants)
+    return (k == peak.series) & (away < min(3 * peak.width, instants / 8))
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """Bumps of one width at M places.
+
+    Attributes
+    ----------
+    z : (M,) absolute z values.
+    series : (M,) whose they are.
+    rows : (M,) where they are in it.
+    instants : (M,) s, where they are in the period.
+    """
+
+    z: np.ndarray
+    series: np.ndarray
+    rows: np.ndarray
+    instants: np.ndarray
+
+    def witnesses(self, width: float) -> np.ndarray:
+        """Which places tell the noise: not those about the peaks, in any repetition of these."""
+        kept = np.ones(len(self.z), dtype=bool)
+        for _ in range(_PEAKS):
+            peak = np.argmax(np.where(kept, self.z, -1.0))
+            near = np.abs(self.instants - self.instants[peak]) < REACH * width
+            fewer = kept & ~(near & (self.series == self.series[peak]))
+            if fewer.sum() < len(kept) / 2:
+                break
+            kept = fewer
+        return kept
+
+
+def _tried(prepared: Sequence[Changes], width: float) -> _Tried | None:
+    """Try bumps of a width (s) everywhere; None where it is too wide for every series."""
+    parts = []
+    for k, one in enumerate(prepared):
+        repetitions, instants = one.of.residual.shape
+        rows_wide = width / one.of.step
+        if rows_wide > _SHARE * instants:
+            continue
+        rows = np.arange(0, repetitions * instants, max(1, int(_STRIDE * rows_wide)))
+        z = np.abs(scanned(one, rows_wide)[rows])
+        # Where a whole repetition is unlike the others, no place in it stands out.
+        of = rows // instants
+        usual = [_usual(z[of == p], rows[of == p], rows_wide) for p in range(repetitions)]
+        z = z / np.maximum(usual, 1.0)[of]
+        parts.append((z, np.full(len(rows), k), rows, rows % instants * one.of.step))
+    return _Tried(*(np.concatenate(part) for part in zip(*parts, strict=True))) if parts else None
+
+
+def _usual(z: np.ndarray, rows: np.ndarray, width: float) -> float:
+    """Standard deviation of z values (M,) as their median says it, but for those at the largest."""
+    away = np.abs(rows - rows[np.argmax(z)]) > 3 * width
+    return float(np.median(z[away] if away.any() else z)) / QUARTER
+
+
+def _refined(place: _PulsePlace, p_value: float) -> Bump:
+    """The bump with its best time and width, in the repetition where it is."""
+    one, row, width = place.of, place.row, place.width
+    least, most = WIDTHS[0] / one.of.step, _SHARE * one.of.residual.shape[1]
+
+    def misfit(x: np.ndarray) -> float:
+        wide = width * np.exp(np.clip(x[1], -0.7, 0.7))
+        return -abs(float(one.match(one.change, row + width * x[:1], wide)[0, 0]))
+
+    start = np.array([[0.0, 0.0], [0.3, 0.0], [0.0, 0.3]])
+    options = {"initial_simplex": start, "maxfev": 60, "xatol": 1e-3, "fatol": 1e-6}
+    x = minimize(misfit, start[0], method="Nelder-Mead", options=options).x
+    row = float(np.clip(row + width * x[0], 0, one.change.size - 1))
+    width = float(np.clip(width * np.exp(np.clip(x[1], -0.7, 0.7)), least, max(most, least)))
+    repetitions, instants = one.of.residual.shape
+    amplitude = float(one.match(one.change, np.array([row]), width)[1, 0])
+    if repetitions == 2:
+        # The difference of two is the same in both: the burst is where the residual is larger.
+        twin = row + instants if row < instants else row - instants
+        sizes = one.match(one.of.residual.ravel(), np.array([row, twin]), width)[1]
+        if abs(sizes[1]) > abs(sizes[0]):
+            row, amplitude = twin, -amplitude
+    time = float(np.interp(row, np.arange(one.change.size), one.of.t.ravel()))
+    return Bump(
+        one.of.run,
+        one.of.number,
+        int(row // instants),
+        one.of.joint,
+        time,
+        width * one.of.step,
+        amplitude,
+        p_value,
+    )
+
+
+def _cleared(one: Repeated, bump: Bump) -> Repeated:
+    """Return a series without a bump that was found in it."""
+    if (one.run, one.joint) != (bump.run, bump.joint):
+        return one
+    shape = np.exp(-(((one.t - bump.time) / bump.width) ** 2) / 2)
+    return replace(one, residual=one.residual - bump.amplitude * shape)

@@ -1,0 +1,105 @@
+"""What the steps of encoders do to a prediction: a residual that repeats, and lacks no physics.
+
+Where a motion repeats, so do its rounding errors. They are no noise, as the repetitions agree on
+them, and nothing of the robot's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from dynident.diagnosis.verdict import WITHIN_NOISE, within_noise
+from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.evidence_fit import Present, model_columns
+from dynident.evidence.held_out import HeldOut
+from dynident.evidence.runs import gather
+from dynident.fitting.sampling import sample
+from dynident.recording import Dataset, Recording, resolution, uniform
+
+_RECORDINGS = 2  # of each dataset, that are looked at
+_DRAWS = 2
+
+
+def with_rounding(judged: HeldOut, present: Present, dataset: Dataset) -> HeldOut:
+    """Return a judgement that knows what the encoders' steps do, where anything is left at all."""
+    if judged.least_ratio is None or within_noise(judged):
+        return judged
+    return replace(judged, rounding=rounding_power(present, dataset))
+
+
+def nothing_but_rounding(judged: HeldOut, present: Present, dataset: Dataset) -> bool:
+    """Whether a residual beyond the noise is no more than encoders' steps leave."""
+    rounded = with_rounding(judged, present, dataset)
+    return rounded.rounding is not None and within_noise(rounded)
+
+
+def rounding_power(present: Present, dataset: Dataset) -> np.ndarray:
+    """Mean square of the torque error that repeats because positions are rounded, (n,).
+
+    The filtered motion is rounded again, on a lattice that is moved, with two draws of the noise
+    that the recording has: what both do to the prediction is what repeats.
+
+    Parameters
+    ----------
+    present : the fitted model.
+    dataset : recordings; positions that lie on no lattice count as not rounded.
+    """
+    n = present.model.robot.n
+    found = []
+    for recording in dataset.recordings[:_RECORDINGS]:
+        steps = resolution(recording.q)
+        if not steps.any():
+            found.append(np.zeros(n))
+            continue
+        smooth, *rounded = _predicted(present, dataset, _again(recording, dataset, steps))
+        first, second = (one - smooth for one in rounded)
+        found.append(np.clip(np.mean(first * second, axis=0), 0.0, None))
+    return np.mean(found, axis=0)
+
+
+def _again(recording: Recording, dataset: Dataset, steps: np.ndarray) -> list[Recording]:
+    """Return the recording with its filtered positions, and these rounded with draws of noise."""
+    recording = uniform(recording)
+    motion = sample(recording, dataset.filter).motion
+    rows = slice(motion.first, motion.first + motion.samples)
+    smooth = np.array(recording.q)
+    smooth[rows] = motion.q
+    # What the filter took away is noise, and the rounding itself.
+    power = np.mean((recording.q[rows] - motion.q) ** 2, axis=0) - steps**2 / 12.0
+    std = np.sqrt(np.clip(power, 0.0, None))
+    rng, safe = np.random.default_rng(0), np.where(steps > 0, steps, 1.0)
+    # Another place of the lattice: what the filter left of the first rounding is in `smooth`.
+    shift = steps * rng.uniform(0.0, 1.0, len(steps))
+    found = [recording.replace(q=smooth)]
+    for _ in range(_DRAWS):
+        noisy = smooth + shift + std * rng.standard_normal(smooth.shape)
+        rounded = np.where(steps > 0, np.round(noisy / safe) * safe - shift, smooth)
+        found.append(recording.replace(q=rounded))
+    return found
+
+
+def _predicted(present: Present, dataset: Dataset, recordings: list[Recording]) -> list[np.ndarray]:
+    """Torque that the model predicts along each recording, (T, n)."""
+    store = ColumnStore(present.model, gather(Dataset(tuple(recordings), dataset.filter)))
+    store.prepare(present.model.effects)
+    joints = range(present.model.robot.n)
+    each = []
+    for r in range(len(recordings)):
+        columns = [model_columns(store, present.model, r, j, present.values)[0] for j in joints]
+        each.append(np.stack([c[:, :-1] @ present.values for c in columns], axis=1))
+    return each
+
+
+def rounding_notes(judged: HeldOut, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Say where the steps of an encoder leave a part of the residual, in plain words."""
+    if judged.rounding is None or judged.noise_std is None:
+        return ()
+    share = np.sqrt(judged.rounding) / np.where(judged.noise_std > 0, judged.noise_std, np.inf)
+    return tuple(
+        f"The steps of the encoder at {name} leave a residual of {part:.2g} times the noise, the "
+        "same in every repetition: what is smaller than that cannot be told from them."
+        for name, part in zip(names, share, strict=True)
+        if part > WITHIN_NOISE
+    )

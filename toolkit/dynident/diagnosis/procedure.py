@@ -1,0 +1,183 @@
+"""The loop: compare, find what is missing, add it, fit again, compare."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dynident.closed_loop import Controller
+from dynident.diagnosis.assembly import Found, Search, told
+from dynident.diagnosis.nuisances.contacts import Contacts
+from dynident.diagnosis.nuisances.friction_width import blunted
+from dynident.diagnosis.nuisances.quantisation import nothing_but_rounding
+from dynident.diagnosis.result import Diagnosis
+from dynident.diagnosis.search.global_search import Asked, second_look
+from dynident.diagnosis.search.payload_recordings import carry, decide_payload
+from dynident.diagnosis.search.pruning import without_superfluous
+from dynident.diagnosis.search.ranking import Ranking, candidates, rank
+from dynident.diagnosis.search.selection import alternatives_only, breaks_its_promise, choose
+from dynident.diagnosis.search.shaped_fit import refitted, shaped
+from dynident.diagnosis.verdict import RESOLUTION
+from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.evidence_fit import Present, fit_present
+from dynident.evidence.held_out import on_recordings
+from dynident.evidence.runs import gather
+from dynident.evidence.simulated_motion import SimulatedMotion, motion_of_loop
+from dynident.fitting.estimate import Estimate
+from dynident.model import Model
+from dynident.recording import Dataset, numbered
+from dynident.threads import single_threaded
+
+MOST_EFFECTS = 8
+"""Effects that are added at most; two for each joint where there are more joints."""
+
+_ANOTHER = 0.1  # of the torque that must be explained for a model to be another one
+
+
+@single_threaded
+def diagnose(
+    model: Model | Estimate,
+    train: Dataset,
+    test: Dataset | None = None,
+    *,
+    controller: Controller | None = None,
+    most: int | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> Diagnosis:
+    """Find where a model fails and which physical effects it lacks.
+
+    Parameters
+    ----------
+    model : the model as given (or an estimate of it: it is fitted anew, with instruments where
+        the motion repeats).
+    train : recordings to fit.
+    test : recordings to judge by; without any, blocks of the training recordings are held out.
+    controller : of the closed loop behind the recordings; where nothing repeats, the simulated
+        loop gives the instruments.
+    most : effects that are added at most; see `MOST_EFFECTS`.
+    tell : told what is being done, for a progress display.
+
+    Raises
+    ------
+    RecordingError
+        If a recording is too short, or does not repeat with its period.
+    """
+    given = model.model if isinstance(model, Estimate) else model
+    most = max(MOST_EFFECTS, 2 * given.robot.n) if most is None else most
+    train, *others = numbered(train, *([] if test is None else [test]))
+    test = others[0] if others else None
+    tell("reading the motion")
+    loop = motion_of_loop(given, train, controller, tell)
+    store = ColumnStore(given, loop.runs or gather(train))
+    held = ColumnStore(given, gather(test)) if test is not None and len(test) else None
+    tell("evaluating every effect")
+    everything = [v for effect in candidates(given) for v in effect.variants(given.robot)]
+    store.prepare([*given.effects, *everything])
+    start = blunted(store, shaped(store, given))
+    tell("looking for contacts")
+    if held is not None:
+        held.prepare(start.model.effects)
+    contacts = Contacts.leave_out(store, held, start)
+    if contacts.bumps:
+        start = blunted(store, shaped(store, given))
+    grown = _Growth(store, loop, train, start, most, tell).run()
+    present, found, rounds = grown.present, grown.found, grown.rounds
+    if held is not None:
+        decide_payload(held, present)
+    kept = without_superfluous(store, held, present, found, tell)
+    if len(kept.found) < len(found):
+        rounds.append(rank(store, kept.final, len(kept.found), tell))
+    sure = contacts.confirmed(kept.final)
+    if sure.bumps != contacts.bumps:
+        start = fit_present(store, start.model, start)
+        kept = replace(kept, final=fit_present(store, kept.final.model, kept.final))
+    disturbances = sure.told(start)
+    search = Search(
+        store, start, kept.final, tuple(kept.found), tuple(rounds), disturbances, loop.notes
+    )
+    return told(search, train, test, held)
+
+
+@dataclass(frozen=True)
+class _Grown:
+    """A model with the effects that were added, and the ranking of each round."""
+
+    present: Present
+    found: list[Found]
+    rounds: list[Ranking]
+
+    @property
+    def asked(self) -> Asked:
+        return Asked(self.present, self.rounds[-1])
+
+
+@dataclass(frozen=True)
+class _Growth:
+    """What the addition of effects works on; see `diagnose`."""
+
+    store: ColumnStore
+    loop: SimulatedMotion
+    train: Dataset
+    start: Present
+    most: int
+    tell: Callable[[str], None]
+
+    def run(self) -> _Grown:
+        """Grow a model from the first one, and again if a second look finds what was missed."""
+        before = self.store.runs
+        nothing = _Grown(self.start, [], [rank(self.store, self.start, 0, self.tell)])
+        grown = self.grown(nothing)
+        if not self.most or self.loop.runs:
+            return grown  # simulated motions are renewed as the model grows: there is no way back
+        again = second_look(self.store, nothing.asked, grown.asked, self.tell)
+        if again is None:
+            return grown
+        runs = self.store.runs
+        base = grown
+        if again.present is not grown.present:
+            # Who carries a payload, and what was kept for a first look, belong to the other branch.
+            base, self.store.runs = nothing, before
+            self.store.look_again()
+        other = self.grown(replace(base, rounds=[*base.rounds[:-1], again.ranking]))
+        if other.present.misfit(self.start) < grown.present.misfit(self.start):
+            return other
+        self.store.runs = runs
+        return grown
+
+    def grown(self, one: _Grown) -> _Grown:
+        """Add the best effect and ask again, until nothing is material any more."""
+        store, present = self.store, one.present
+        found, rounds = list(one.found), list(one.rounds)
+        while len(found) < self.most and not _resolved(store, present, self.train):
+            chosen = choose(store, present, rounds[-1])
+            if chosen is None:
+                break
+            self.tell(f"adding {chosen.score.effect.label}")
+            carry(store, chosen.score)
+            wider = blunted(store, refitted(store, present.model + chosen.score.effect, present))
+            if breaks_its_promise(present, wider, chosen.score):
+                break
+            found.append(chosen)
+            present = wider
+            if _has_changed(store, self.start, present):
+                store.look_again()
+            if self.loop.renew(store, present):
+                present = blunted(store, refitted(store, present.model, present))
+            rounds.append(rank(store, present, len(found), self.tell))
+            found[-1] = alternatives_only(chosen, rounds[-1])
+        return _Grown(present, found, rounds)
+
+
+def _has_changed(store: ColumnStore, start: Present, present: Present) -> bool:
+    """Whether effects have changed the predicted torque enough to look at candidates again."""
+    before, now = (on_recordings(store, one) for one in (start, present))
+    return now.error < before.error - _ANOTHER
+
+
+def _resolved(store: ColumnStore, present: Present, train: Dataset) -> bool:
+    """Whether what is left is what the processing cannot resolve, or what encoders' steps leave."""
+    judged = on_recordings(store, present)
+    small = np.all(judged.residual_rms <= RESOLUTION * judged.torque_rms)
+    return bool(small) or nothing_but_rounding(judged, present, train)

@@ -1,0 +1,350 @@
+"""What a diagnosis says: where the model fails, what is missing, and how sure that is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from dynident.diagnosis.track_record import TrackRecord, track_record
+from dynident.effects import Effect
+from dynident.evidence.maps import ResidualMap
+from dynident.fitting.estimate import DataSource, Estimate
+from dynident.recording.dataset import NoiseSource
+from dynident.tables import Table, finite, number, percent, print_tables
+
+Verdict = Literal["nothing_missing", "explained", "unexplained"]
+Status = Literal["material", "not_material", "absorbed"]
+
+_VERDICTS: dict[Verdict, str] = {
+    "nothing_missing": "Nothing is missing: what remains is within the noise.",
+    "explained": "Explained: {effects} added, and what remains is within the noise.",
+    "unexplained": "None of these explains it: a residual beyond the noise remains, and no effect "
+    "in the catalogue takes it away.",
+}
+
+_VERDICTS_WITHOUT_NOISE: dict[Verdict, str] = {
+    "nothing_missing": "No effect in the catalogue is material; the noise is unknown, so whether "
+    "something else is missing cannot be said.",
+    "explained": "Added: {effects}. No further effect is material; the noise is unknown, so "
+    "whether something else is missing cannot be said.",
+    "unexplained": "Added: {effects}. More effects are material; the noise is unknown.",
+}
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect that was tried on the model as it was given.
+
+    Attributes
+    ----------
+    effect : with the shape at which it does best.
+    status : "material" (it passes every gate), "not_material", or "absorbed" (this data cannot
+        show it, because the model's own parameters take its place).
+    p_value : of the hypothesis that it has no part, corrected for the number of candidates;
+        None where it is absorbed.
+    test_gain : cross-validated drop of the relative torque error if it were added.
+    values : its parameters if it were added.
+    remark : why it is not material, or the experiment that would show it.
+    """
+
+    effect: Effect
+    status: Status
+    p_value: float | None
+    test_gain: float
+    values: tuple[float, ...] = ()
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One effect added, and what the test recordings say of it.
+
+    Attributes
+    ----------
+    effect : the effect with its refined shape.
+    values : its parameters in the joint fit that follows, (k,).
+    test_error_before, test_error_after : relative torque error on the test recordings.
+    indistinguishable : effects that this data cannot tell from it.
+    p_value : as in `Candidate`.
+    advice : the experiment that would tell it from those; empty where there are none.
+    """
+
+    effect: Effect
+    values: tuple[float, ...]
+    test_error_before: float
+    test_error_after: float
+    indistinguishable: tuple[Effect, ...]
+    p_value: float
+    advice: str = ""
+
+
+@dataclass(frozen=True)
+class JointResult:
+    """Errors at one joint, on the test recordings.
+
+    Attributes
+    ----------
+    name, torque_unit : the joint, and N m or N.
+    error_before, error_after : norm of the residual over norm of the torque; NaN without torque.
+    torque_rms : N m or N.
+    noise_rms : N m or N; None where the noise is unknown.
+    ratio_before, ratio_after : systematic residual over noise (RNR); None likewise.
+    """
+
+    name: str
+    torque_unit: str
+    error_before: float
+    error_after: float
+    torque_rms: float
+    noise_rms: float | None
+    ratio_before: float | None
+    ratio_after: float | None
+
+    @property
+    def noise_share(self) -> float | None:
+        """The noise over the torque; None where either is unknown or there is no torque."""
+        if self.noise_rms is None or not self.torque_rms > 0:
+            return None
+        return self.noise_rms / self.torque_rms
+
+
+@dataclass(frozen=True)
+class TestError:
+    """Relative torque error over all joints of the test recordings."""
+
+    before: float
+    after: float
+    noise_floor: float | None
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Measured and predicted torque of one joint in one test recording, (T,) each, SI units."""
+
+    recording: str
+    joint: str
+    torque_unit: str
+    t: np.ndarray
+    measured: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The answer of `diagnose`.
+
+    Attributes
+    ----------
+    verdict : "nothing_missing", "explained" or "unexplained".
+    noise_source : where the noise floor comes from.
+    joints, test_error : errors before and after, with the floor.
+    steps : effects in the order in which they were added.
+    candidates : every effect tried on the model as given, best first.
+    remaining : every effect tried on the final model, best first.
+    before, after : the estimates of the model as given and of the final one.
+    maps, traces : for pictures.
+    notes : caveats that belong to the verdict, in plain words.
+    test_sources : the test recordings; empty where blocks of time were held out.
+    """
+
+    verdict: Verdict
+    noise_source: NoiseSource
+    joints: tuple[JointResult, ...]
+    test_error: TestError
+    steps: tuple[Step, ...]
+    candidates: tuple[Candidate, ...]
+    remaining: tuple[Candidate, ...]
+    before: Estimate
+    after: Estimate
+    maps: tuple[ResidualMap, ...] = ()
+    traces: tuple[Trace, ...] = ()
+    notes: tuple[str, ...] = ()
+    test_sources: tuple[DataSource, ...] = ()
+
+    @property
+    def best(self) -> Step | None:
+        """The first effect to add; None where nothing is to be added."""
+        return self.steps[0] if self.steps else None
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in plain words."""
+        effects = ", ".join(self._named(step) for step in self.steps)
+        if self.noise_source == "unknown":
+            return _VERDICTS_WITHOUT_NOISE[self.verdict].format(effects=effects)
+        left = max((j.ratio_after or 0.0 for j in self.joints), default=0.0)
+        if self.verdict == "explained" and left > 0.5:
+            return (
+                f"Explained: {effects} added, and what remains is smaller than the noise "
+                f"({left:.2g} of it), though not nothing."
+            )
+        if self.verdict == "unexplained" and effects:
+            before, after = percent(self.test_error.before), percent(self.test_error.after)
+            return (
+                f"Explained in part: adding {effects} brings the error from {before} to {after}. A "
+                "residual beyond the noise remains, and none of the effects in the catalogue "
+                "explains it."
+            )
+        return _VERDICTS[self.verdict].format(effects=effects)
+
+    @property
+    def track_record(self) -> TrackRecord | None:
+        """How often answers like this one were right; None where the noise was not measured."""
+        floor = self.test_error.noise_floor
+        if self.noise_source != "replicates" or not floor:
+            return None
+        over = self.test_error.before / floor
+        return track_record(self.verdict, named=bool(self.steps), over_floor=over)
+
+    @property
+    def confidence(self) -> str:
+        """The same in plain words; empty where nothing can be said."""
+        return str(self.track_record or "")
+
+    def _confidence_lines(self) -> tuple[str, ...]:
+        return (self.confidence,) if self.confidence else ()
+
+    def _named(self, step: Step) -> str:
+        """A step with everything that the data cannot tell it from: never one alone."""
+        added = {one.effect.label for one in self.steps}
+        others = [e.title for e in step.indistinguishable if e.label not in added]
+        return step.effect.title + (f" (or {' or '.join(others)})" if others else "")
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON of `diagnose --json` and `explain --json`."""
+        return {
+            "verdict": self.verdict,
+            "noise": {"source": self.noise_source},
+            "joints": [
+                {
+                    "name": j.name,
+                    "error_before": finite(j.error_before),
+                    "error_after": finite(j.error_after),
+                    "noise_rms": j.noise_rms,
+                }
+                for j in self.joints
+            ],
+            "steps": [
+                {
+                    **place(step.effect),
+                    "test_error_before": step.test_error_before,
+                    "test_error_after": step.test_error_after,
+                    "indistinguishable": [place(effect) for effect in step.indistinguishable],
+                }
+                for step in self.steps
+            ],
+            "candidates": [
+                {
+                    **place(c.effect),
+                    "status": c.status,
+                    "p_value": c.p_value,
+                    "test_gain": c.test_gain,
+                }
+                for c in self.candidates
+            ],
+            "test_error": {
+                "before": self.test_error.before,
+                "after": self.test_error.after,
+                "noise_floor": self.test_error.noise_floor,
+            },
+            "notes": [*self._confidence_lines(), *self.notes],
+        }
+
+    def tables(self) -> tuple[Table | str, ...]:
+        """Everything that `show` prints, in its order."""
+        return (
+            self.joint_table(),
+            self.map_table(),
+            self.candidate_table(),
+            self.step_table(),
+            self.sentence,
+            *self._confidence_lines(),
+            *self.notes,
+        )
+
+    def show(self) -> None:
+        """Print where the model fails, what is missing, and the verdict."""
+        print_tables(*self.tables())
+
+    def joint_table(self) -> Table:
+        """Errors per joint."""
+        rows = tuple(
+            (
+                j.name,
+                percent(j.error_before),
+                percent(j.error_after),
+                percent(j.noise_share),
+                number(j.ratio_before, 3),
+                number(j.ratio_after, 3),
+            )
+            for j in self.joints
+        )
+        overall = self.test_error
+        floor = percent(overall.noise_floor)
+        total = ("all", percent(overall.before), percent(overall.after), floor, "", "")
+        return Table(
+            "Relative torque error on held-out data",
+            ("joint", "before", "after", "noise floor", "systematic / noise", "and after"),
+            (*rows, total),
+            (f"Noise floor: {self._noise_in_words()}.",),
+        )
+
+    def map_table(self) -> Table:
+        """Where the model fails, one sentence for each thing seen."""
+        seen = tuple((m.joint, m.against, m.sentence) for m in self.maps if m.sentence)
+        return Table("Where the given model fails", ("joint", "against", "what is seen"), seen)
+
+    def candidate_table(self, most: int = 10) -> Table:
+        """The ranking on the model as given."""
+        shown = [c for c in self.candidates if c.status != "absorbed"][:most]
+        absorbed = [c for c in self.candidates if c.status == "absorbed"]
+        rows = tuple(
+            (
+                c.effect.label,
+                c.status.replace("_", " "),
+                number(c.p_value, 2),
+                f"{round(100 * c.test_gain, 2) + 0.0:.2f}",
+                c.remark,
+            )
+            for c in shown
+        )
+        notes = tuple(f"Absorbed: {c.effect.title}. {c.remark}" for c in absorbed)
+        columns = ("effect", "status", "p", "gain, points", "remark")
+        return Table("Candidates, tried on the model as given", columns, rows, notes)
+
+    def step_table(self) -> Table:
+        """The effects added, in order."""
+        rows = tuple(
+            (
+                step.effect.label,
+                percent(step.test_error_before),
+                percent(step.test_error_after),
+                ", ".join(self._alternatives(step)) or "none",
+            )
+            for step in self.steps
+        )
+        columns = ("effect added", "held-out error before", "after", "cannot be told from")
+        return Table("Effects added", columns, rows)
+
+    def _alternatives(self, step: Step) -> list[str]:
+        # Two effects that share a column may both be added: then only that column is in doubt.
+        added = {one.effect.label for one in self.steps}
+        return [
+            e.label + (" (its constant)" if e.label in added else "")
+            for e in step.indistinguishable
+        ]
+
+    def _noise_in_words(self) -> str:
+        return {
+            "replicates": "measured, from the repeated periods",
+            "given": "as the study states it, not measured",
+            "unknown": "unknown (nothing repeats and no noise is stated), so the verdict is weaker",
+        }[self.noise_source]
+
+
+def place(effect: Effect) -> dict[str, str | None]:
+    """An effect as JSON names it."""
+    return {"effect": effect.name, "joint": effect.joint, "source": effect.source}

@@ -1,0 +1,1 @@
+"""The search for missing effects: score, confirm, refine, select, prune."""

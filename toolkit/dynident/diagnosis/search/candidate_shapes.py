@@ -1,0 +1,192 @@
+"""Shape parameters and points of secants at which a candidate explains most."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import fminbound, minimize, minimize_scalar
+
+from dynident.diagnosis.search.gradient import by_gradient, grid_of
+from dynident.diagnosis.search.scoring import (
+    Columns,
+    Score,
+    candidate_moments,
+    carried,
+    impossible,
+    score,
+)
+from dynident.effects import Effect
+from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.evidence_fit import Present
+from dynident.evidence.runs import Signals
+from dynident.model import Model
+
+_SECANTS = 3  # times that columns are taken at the values just found
+_SETTLED = 0.02  # relative change of values at which secants count as settled
+_VALUES_TRIED = 10  # of a column that is taken at a value
+_VALUE_RANGE = 0.5  # of the logarithm of that value, to each side
+_PRECISION = 1e-3  # of the logarithm of a shape parameter
+
+
+@dataclass(frozen=True)
+class Beside:
+    """Columns of an effect, for a model that has it, to be judged beside the model without it.
+
+    What depends on the bodies or on the predicted torque is that of the model with the effect: the
+    parameters that were fitted without it have taken on a part of it.
+    """
+
+    store: ColumnStore
+    whole: Present
+
+    def columns(self, effect: Effect, run: int, model: Model, values: np.ndarray) -> Signals:
+        """As `ColumnStore.of`."""
+        return self.store.of(effect, run, self.whole.model, self.whole.values)
+
+
+def score_at(
+    store: ColumnStore,
+    present: Present,
+    effect: Effect,
+    like: Score,
+    grid: int,
+    columns_of: Columns | None = None,
+) -> Score:
+    """Score an effect with other columns; carriers of a payload as in `like`."""
+    (parts,) = candidate_moments(store, present, [effect], columns_of)
+    if like.carriers is not None:
+        parts = tuple(carried(part, store, like.carriers) for part in parts)
+    return score(present, effect, *parts, grid=grid, carriers=like.carriers)
+
+
+def refined(
+    store: ColumnStore, present: Present, one: Score, columns_of: Columns | None = None
+) -> Score:
+    """Return a score at the shape parameters and secants that fit best."""
+    if not one.drop > 0:
+        return one
+    if not one.effect.shape_parameters(present.model.robot):
+        return _at_its_values(store, present, one, columns_of) if one.effect.secant else one
+    has_slopes = type(one.effect).sensitivities is not Effect.sensitivities
+    search = by_gradient if has_slopes else _by_trial
+    if one.effect.point:
+        one = _at_best_value(store, present, one, columns_of)
+    return _better(one, search(store, present, one, columns_of))
+
+
+def _better(one: Score, other: Score) -> Score:
+    return other if other.settled_drop > one.settled_drop else one
+
+
+def _at_its_values(
+    store: ColumnStore, present: Present, one: Score, columns_of: Columns | None
+) -> Score:
+    """Take secants through the values found, until they settle."""
+    for _ in range(_SECANTS):
+        if not one.values or not np.any(one.values):
+            return one
+        effect = one.effect.at(_within_bounds(one, present))
+        old = one.effect.point or (0.0,) * len(effect.point)
+        change = np.linalg.norm(np.subtract(effect.point, old))
+        if change <= _SETTLED * np.linalg.norm(effect.point):
+            break
+        better = score_at(store, present, effect, one, grid_of(effect, present), columns_of)
+        store.forget(effect)
+        if not better.drop > 0.5 * one.drop:
+            break  # the secant has left the range in which the law is what it is
+        one = better
+    return one
+
+
+def _at_best_value(
+    store: ColumnStore, present: Present, one: Score, columns_of: Columns | None
+) -> Score:
+    """Seek the value at which the column that is taken there fits best.
+
+    Columns that change with the value as those of bursts do cannot be iterated on.
+    """
+    best = one
+
+    def loss(logarithm: float) -> float:
+        nonlocal best
+        effect = one.effect.at([float(np.exp(logarithm))])
+        found = score_at(store, present, effect, one, grid_of(effect, present), columns_of)
+        store.forget(effect)
+        if found.settled_drop > best.settled_drop and not impossible(found, present.model):
+            best = found
+        return -found.settled_drop
+
+    (start,) = np.log(one.effect.point)
+    span = (start - _VALUE_RANGE, start + _VALUE_RANGE)
+    minimize_scalar(loss, bounds=span, method="bounded", options={"maxiter": _VALUES_TRIED})
+    return best
+
+
+def _within_bounds(one: Score, present: Present) -> list[float]:
+    limits = one.effect.parameters(present.model.robot)
+    return np.clip(one.values, [p.lower for p in limits], [p.upper for p in limits]).tolist()
+
+
+def _by_trial(
+    store: ColumnStore, present: Present, one: Score, columns_of: Columns | None
+) -> Score:
+    shapes = one.effect.shape_parameters(present.model.robot)
+    grid = grid_of(one.effect, present)
+
+    def at(shape: np.ndarray) -> Score:
+        effect = one.effect.shaped(*np.exp(np.atleast_1d(shape)))
+        result = score_at(store, present, effect, one, grid, columns_of)
+        store.forget(effect)
+        return result
+
+    def loss(shape: np.ndarray) -> float:
+        return -at(shape).drop
+
+    return at(_minimum(loss, shapes, one.effect.shape))
+
+
+def _minimum(loss: Callable[[np.ndarray], float], shapes, start) -> np.ndarray:
+    if len(shapes) == 1:
+        low, high = _neighbours(shapes[0], start[0])
+        span = (float(np.log(low)), float(np.log(high)))
+        return np.atleast_1d(np.asarray(fminbound(loss, *span, xtol=2 * _PRECISION)))
+    bounds = [(np.log(s.lower), np.log(s.upper)) for s in shapes]
+    return minimize(loss, np.log(start), bounds=bounds, method="Nelder-Mead").x
+
+
+def reshaped(store: ColumnStore, others: Present, whole: Present, effect: Effect) -> Score:
+    """Return an effect's score at the shape that fits best near its own.
+
+    Parameters
+    ----------
+    others, whole : the model without the effect, and with it.
+    effect : as it is in the model.
+    """
+    beside = Beside(store, whole).columns
+    blank = Score(effect, None, absorbed=False)
+    now = score_at(store, others, effect, blank, grid_of(effect, others), beside)
+    return refined(store, others, now, beside)
+
+
+def best_shape(store: ColumnStore, present: Present, effect: Effect) -> Effect:
+    """Return an effect at the shape at which it explains most; as it is where it explains nothing.
+
+    `present` is the model without it.
+    """
+    tried = [effect, *effect.variants(present.model.robot)]
+    found = candidate_moments(store, present, tried)
+    scores = (score(present, one, *parts, 1) for one, parts in zip(tried, found, strict=True))
+    best = max(scores, key=lambda one: one.settled_drop)
+    return refined(store, present, best).effect if best.settled_drop > 0 else effect
+
+
+def _neighbours(shape, value: float) -> tuple[float, float]:
+    grid = np.array(shape.grid)
+    if len(grid) < 2:
+        return shape.lower, shape.upper
+    i = int(np.argmin(np.abs(grid - value)))
+    low = grid[i - 1] if i > 0 else max(shape.lower, grid[0] ** 2 / grid[1])
+    high = grid[i + 1] if i + 1 < len(grid) else min(shape.upper, grid[-1] ** 2 / grid[-2])
+    return float(low), float(high)

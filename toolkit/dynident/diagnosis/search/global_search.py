@@ -1,0 +1,204 @@
+"""A second look, at every shape there may be, where the first one leaves a residual unexplained.
+
+A response in a gap fits where its shape is nearly the true one and nowhere else: the few shapes of
+the first look may all miss it. Differential evolution (Storn and Price 1997) seeks it on one
+recording, all shapes of a generation in the same steps of time; all recordings are asked about the
+best that it finds. What tells a true one is that the value found is the one at which its column was
+taken, which no accident brings about.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import OptimizeResult, differential_evolution
+
+from dynident.diagnosis.search.ranking import ALIKE, Ranking, candidates, judged, quiet_joints
+from dynident.diagnosis.search.scoring import Score, candidate_moments, impossible, score
+from dynident.diagnosis.verdict import within_noise
+from dynident.effects import Effect
+from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.evidence_fit import Present, fit_present, residuals
+from dynident.evidence.held_out import on_recordings
+from dynident.evidence.noise_model import systematic_square
+from dynident.model import Model
+
+_LEAST = 0.1  # of the systematic square that the best of all shapes must explain, to be refined
+_ENOUGH = 0.9  # of it that ends the search: the gradient does the rest
+_POPULATION = 12  # shapes of a generation, per unknown
+_GENERATIONS = 25
+_FINALISTS = 24
+_PATIENCE = 6  # generations after which a search that explains nothing is given up
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A model, and what is missing from it by a first or a second look."""
+
+    present: Present
+    ranking: Ranking
+
+
+def second_look(
+    store: ColumnStore,
+    start: Asked,
+    last: Asked,
+    tell: Callable[[str], None] = lambda _: None,
+) -> Asked | None:
+    """Return one of two models with an effect that was missed at the head of its ranking.
+
+    What explains more or less waits until that is in the model, and comes up again if needed.
+
+    Parameters
+    ----------
+    store : the evidence.
+    start, last : the model before anything was added, and with all that was added.
+    tell : told what is being done, for a progress display.
+
+    Returns
+    -------
+    That of the two of whose residual it explains the larger share; None for none, or no need.
+    """
+    if not last.present.noise_known or within_noise(on_recordings(store, last.present)):
+        return None
+    sought = _sought(store, start.present.model, last.present)
+    if not sought:
+        return None
+    # An effect that is in the last model with a wrong shape is missing from the first one.
+    wrong = sought[0] in last.present.model or last.present is start.present
+    bases = (start,) if wrong else (last, start)
+    part, searches = _worst_recording(store, bases[0].present), []
+    if not part[1].error_signal > 0:
+        return None
+    for effect in sought:
+        tell(f"{effect.label}, a second look")
+        searches.append(_GlobalSearch.run(*part, effect))
+    finals = [
+        _final(store, one.present, searches) if one.present.error_signal > 0 else None
+        for one in bases
+    ]
+    found = [(one, base) for one, base in zip(finals, bases, strict=True) if one is not None]
+    if not found:
+        return None
+    one, base = max(found, key=lambda pair: pair[0].fall / pair[1].present.error_signal)
+    tests = base.ranking.tests + sum(search.tried for search in searches)
+    best, refusal = judged(store, base.present, one, tests)
+    return None if refusal else Asked(base.present, _headed(base.ranking, best, tests))
+
+
+def _sought(store: ColumnStore, model: Model, last: Present) -> list[Effect]:
+    """Effects of many shapes: those that were added with one that may be wrong, or else all."""
+    quiet = quiet_joints(store, last)
+    every = [one for one in candidates(model) if one.sought_in(model.robot)]
+    added = [one for one in every if one in last.model]
+    return added or [one for one in every if one.joint not in quiet]
+
+
+def _final(store: ColumnStore, present: Present, searches: list[_GlobalSearch]) -> Score | None:
+    """The best of what was found on one recording, by all of them; None if it explains little."""
+    scores = [
+        score
+        for search in searches
+        if search.finalists
+        for score in _scores(store, present, search.finalists)
+        if not impossible(score, present.model)
+        and score.settled_drop > _LEAST * present.error_signal
+    ]
+    return max(scores, key=lambda one: one.fall, default=None)
+
+
+def _headed(ranking: Ranking, best: Score, tests: int) -> Ranking:
+    """A ranking with another effect at its head."""
+    waits = f"asked again beside {best.effect.label}"
+    others = [
+        (one, why or ("" if abs(one.drop - best.drop) <= ALIKE * best.drop else waits))
+        for one, why in zip(ranking.scores, ranking.refusals, strict=True)
+        if one.effect.label != best.effect.label
+    ]
+    return Ranking((best, *(one for one, _ in others)), tests, ("", *(why for _, why in others)))
+
+
+def _worst_recording(store: ColumnStore, present: Present) -> tuple[ColumnStore, Present]:
+    """The recording with most systematic residual over noise, and the model as it alone fits it."""
+    left = residuals(store, present.model, present.values)
+    sizes = [
+        -1.0
+        if run.kind == "single"
+        else sum(
+            systematic_square(e[..., j], run.kind) / present.variances[j]
+            for j in range(e.shape[-1])
+        )
+        for run, e in zip(store.runs, left, strict=True)
+    ]
+    alone = ColumnStore(store.model, (store.runs[int(np.argmax(sizes))],))
+    alone.prepare(present.model.effects)
+    return alone, fit_present(alone, present.model, present)
+
+
+@dataclass
+class _GlobalSearch:
+    """A search over the shapes of one effect, and over the values at which its column is taken."""
+
+    store: ColumnStore
+    present: Present
+    effect: Effect
+    best: list[Score] = field(default_factory=list)
+    tried: int = 0
+    generations: int = 0
+
+    @classmethod
+    def run(cls, store: ColumnStore, present: Present, effect: Effect) -> _GlobalSearch:
+        """Search through all shapes, until enough is explained or no more is to be hoped for."""
+        search = cls(store, present, effect)
+        differential_evolution(
+            search.loss,
+            np.log(effect.sought_in(present.model.robot)),
+            popsize=_POPULATION,
+            maxiter=_GENERATIONS,
+            init="sobol",
+            rng=0,
+            polish=False,
+            updating="deferred",
+            vectorized=True,
+            callback=search.ends,
+        )
+        return search
+
+    @property
+    def explained(self) -> float:
+        """Share of the systematic square that the best shape takes away."""
+        return self.best[0].fall / self.present.error_signal if self.best else 0.0
+
+    @property
+    def finalists(self) -> list[Effect]:
+        """The best shapes, about which the other recordings are asked."""
+        return [one.effect for one in self.best]
+
+    def loss(self, logs: np.ndarray) -> np.ndarray:
+        """What the shapes in the columns of `logs` (unknowns, V) leave, (V,)."""
+        shapes = len(self.effect.shape_parameters(self.present.model.robot))
+        tried = [self.effect.shaped(*x[:shapes]).at(x[shapes:]) for x in np.exp(logs.T)]
+        scores = _scores(self.store, self.present, tried)
+        self.tried += len(tried)
+        possible = [one for one in scores if not impossible(one, self.present.model)]
+        self.best = sorted([*self.best, *possible], key=lambda s: -s.fall)[:_FINALISTS]
+        # How wrong a wrong one is does not matter, and may be beyond all numbers.
+        worst = -self.present.error_signal
+        return np.array([-max(one.fall, worst) for one in scores])
+
+    def ends(self, intermediate_result: OptimizeResult) -> bool:
+        """Whether enough is explained, or nothing after so long."""
+        self.generations += 1
+        hopeless = self.generations >= _PATIENCE and self.explained < _LEAST
+        return hopeless or self.explained > _ENOUGH
+
+
+def _scores(store: ColumnStore, present: Present, tried: list[Effect]) -> list[Score]:
+    parts = candidate_moments(store, present, tried)
+    for one in tried:
+        store.forget(one)
+    return [
+        score(present, one, *part, grid=len(tried)) for one, part in zip(tried, parts, strict=True)
+    ]

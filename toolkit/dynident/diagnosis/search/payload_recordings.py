@@ -1,0 +1,38 @@
+"""Which recordings carry the payload, where the study does not say."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.diagnosis.search.scoring import Score
+from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.evidence_fit import Present, residuals
+from dynident.evidence.runs import flagged_run
+
+
+def carry(store: ColumnStore, score: Score) -> None:
+    """Mark the runs that carry the payload, once that is known."""
+    if score.carriers is not None:
+        store.runs = tuple(
+            flagged_run(run, carries)
+            for run, carries in zip(store.runs, score.carriers, strict=True)
+        )
+
+
+def decide_payload(held: ColumnStore, present: Present) -> None:
+    """Decide which test recordings carry a payload of known inertia, where the study is silent."""
+    if not any("payload" in effect.needs for effect in present.model.effects):
+        return
+    stated = [run.recording.payload is not None for run in held.runs]
+    sums = []
+    for carries in (False, True):
+        held.runs = tuple(
+            run if said else flagged_run(run, carries)
+            for run, said in zip(held.runs, stated, strict=True)
+        )
+        misfits = residuals(held, present.model, present.values)
+        sums.append([float(np.sum(e**2)) for e in misfits])
+    held.runs = tuple(
+        run if said else flagged_run(run, with_load < without)
+        for run, said, without, with_load in zip(held.runs, stated, *sums, strict=True)
+    )

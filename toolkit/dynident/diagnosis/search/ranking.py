@@ -1,0 +1,266 @@
+"""The search for missing effects: score, confirm, gate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from dynident.diagnosis.search.candidate_shapes import refined
+from dynident.diagnosis.search.confidence_set import confidence_set
+from dynident.diagnosis.search.scoring import (
+    Score,
+    candidate_moments,
+    carried,
+    cross_validate,
+    impossible,
+    score,
+)
+from dynident.effects import Block, Effect, catalogue
+from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.evidence_fit import Present, residuals
+from dynident.evidence.noise_model import differences, systematic_square
+from dynident.evidence.runs import Run
+from dynident.model import Model
+from dynident.moments.replicated import Kind
+
+CONTENDERS = 6
+"""Effects that are refined and cross-validated in each round."""
+
+LEVEL = 0.01
+"""Level of the test, corrected for the number of effects and shapes tried (Bonferroni)."""
+
+LEAST_SHARE = (0.006, 0.02)
+"""Least share of the squared residual that the first effect, and later ones, must explain."""
+
+_CONFIDENT = 1.5  # standard errors of the held-out gain
+_MOST_BLOCKS = 0.65  # share of blocks in which the held-out residual must fall otherwise
+_HOPELESS = 0.2  # corrected p value above which no better shape makes an effect significant
+_NOISY = "plain least squares takes it for the noise in accelerations: record a repeated motion"
+_QUIET = 0.15  # systematic residual over noise below which driven responses are not evaluated
+ALIKE = 0.015  # two drops within this share of the larger are alike
+_MOST_CARRIERS = 6  # recordings up to which every choice of payload carriers is tried
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """Every candidate's best score, best first, and what the gate says of it.
+
+    Attributes
+    ----------
+    scores : one for each effect and place.
+    tests : number of effects and shapes tried.
+    refusals : why a score is not material; empty where it is.
+    """
+
+    scores: tuple[Score, ...]
+    tests: int
+    refusals: tuple[str, ...]
+
+    @property
+    def material(self) -> tuple[Score, ...]:
+        """Scores that pass every gate, best first."""
+        pairs = zip(self.scores, self.refusals, strict=True)
+        return tuple(s for s, refusal in pairs if not refusal and not s.absorbed)
+
+    def corrected(self, one: Score) -> float:
+        """The p value of a score, corrected for all tests of this round."""
+        return float(min(1.0, one.p_value * self.tests))
+
+
+def candidates(model: Model) -> list[Effect]:
+    """Every effect that shows in residuals, wherever the model has none of its label."""
+    found = []
+    for effect in catalogue().values():
+        if effect.found_by == "residual":
+            found += [e.on(model.robot) for e in effect.candidates(model.robot) if e not in model]
+    return found
+
+
+def rank(
+    store: ColumnStore,
+    present: Present,
+    added: int,
+    tell: Callable[[str], None] = lambda _: None,
+    only: tuple[Effect, ...] = (),
+    least: float | None = None,
+) -> Ranking:
+    """Score every candidate on a model.
+
+    Parameters
+    ----------
+    store, present : the evidence, and the model as it fits it.
+    added : number of effects added so far; later ones must explain more.
+    tell : told what is being done, for a progress display.
+    only : candidates, where not the whole catalogue is meant.
+    least : share of the squared residual that they must explain; None for `LEAST_SHARE`.
+    """
+    model, best, tests = present.model, [], 0
+    quiet = quiet_joints(store, present)
+    noisy = all(run.kind == "single" and run.columns_from == "recording" for run in store.runs)
+    for effect in only or candidates(model):
+        driven = {"body", "whole"} <= effect.needs
+        if driven and (noisy or effect.joint in quiet):
+            best.append(Score(effect, None, absorbed=False))
+            continue
+        tell(effect.label)
+        tried = list(_score_variants(store, present, effect))
+        tests += len(tried)
+        best.append(max(tried, key=lambda s: s.penalised))
+    best.sort(key=lambda s: -s.penalised)
+    for i in range(len(only) or min(CONTENDERS, len(best))):
+        if best[i].absorbed:
+            break
+        if best[i].p_value * tests > _HOPELESS or best[i].penalised == -np.inf:
+            continue
+        tell(f"{best[i].effect.label}, cross-validated")
+        best[i] = _confirm(store, present, best[i])
+    best.sort(key=lambda s: -s.penalised)
+    least = LEAST_SHARE[min(added, 1)] if least is None else least
+    scores = tuple(best)
+    refusals = tuple(_unseen(s, noisy) or _refusal(s, store, model, tests, least) for s in scores)
+    return Ranking(scores, tests, refusals)
+
+
+def _unseen(one: Score, noisy: bool) -> str:
+    """Why a driven response was not evaluated; empty where it was."""
+    if one.drop != 0 or one.absorbed or not {"body", "whole"} <= one.effect.needs:
+        return ""
+    return _NOISY if noisy else f"nothing is left to explain at {one.effect.joint}"
+
+
+def quiet_joints(store: ColumnStore, present: Present) -> frozenset[str]:
+    """Joints at which no residual worth a costly search is left; none where noise is unknown."""
+    if not present.noise_known:
+        return frozenset()
+    left = zip(store.runs, residuals(store, present.model, present.values), strict=True)
+    judged: list[tuple[Kind, np.ndarray]] = [(r.kind, e) for r, e in left if r.kind != "single"]
+    found = []
+    for j, name in enumerate(present.model.robot.names):
+        systematic = np.mean([systematic_square(e[..., j], kind) for kind, e in judged])
+        each = [differences(e[..., j], kind).ravel() for kind, e in judged]
+        noise = np.mean(np.concatenate(each) ** 2)
+        if systematic < _QUIET**2 * noise:
+            found.append(name)
+    return frozenset(found)
+
+
+def indistinguishable(ranking: Ranking, winner: Score) -> tuple[Effect, ...]:
+    """Effects that the data cannot tell from the winner.
+
+    Those of the model confidence set of all material effects, and those that explain the same. An
+    effect that contains the winner and adds nothing to it is not named.
+    """
+    rivals = [
+        other
+        for other in ranking.material
+        if other.losses is not None
+        and other.effect != winner.effect
+        and not (
+            other.effect.joint == winner.effect.joint
+            and winner.effect.name in other.effect.contains
+        )
+    ]
+    if not rivals:
+        return ()
+    losses = np.column_stack([one.losses for one in (winner, *rivals) if one.losses is not None])
+    kept = confidence_set(losses)
+    return tuple(
+        other.effect
+        for k, other in enumerate(rivals, 1)
+        if k in kept or abs(winner.drop - other.drop) <= ALIKE * winner.drop
+    )
+
+
+def carrier_choices(runs: tuple[Run, ...]) -> list[tuple[bool, ...]]:
+    """Which runs may carry the payload: as the study says, or every choice where it is silent."""
+    stated = [run.recording.payload for run in runs]
+    if any(flag is not None for flag in stated):
+        return [tuple(bool(flag) for flag in stated)]
+    if len(runs) > _MOST_CARRIERS:
+        singles = np.eye(len(runs), dtype=bool)
+        return [tuple(bool(c) for c in row) for row in (*singles, *~singles)]
+    every = product((False, True), repeat=len(runs))
+    return [c for c in every if any(c) and not all(c)] or [(True,) * len(runs)]
+
+
+def _score_variants(store: ColumnStore, present: Present, effect: Effect) -> Iterator[Score]:
+    if "payload" in effect.needs:
+        choices = carrier_choices(store.runs)
+        (whole,) = candidate_moments(store, present, [effect])
+        for choice in choices:
+            parts = (carried(part, store, choice) for part in whole)
+            one = score(present, effect, *parts, grid=len(choices), carriers=choice)
+            # A load has mass: of two complementary choices only one can be meant.
+            yield _possible(one, present.model)
+        return
+    seen = _seen(present, effect)
+    shapes = [variant.suited(seen) for variant in effect.variants(present.model.robot)]
+    if effect.point:
+        # Found before, where no variant may be near enough.
+        shapes = list(dict.fromkeys([*shapes, effect]))
+    found = candidate_moments(store, present, shapes, store.screening)
+    for shaped, parts in zip(shapes, found, strict=True):
+        yield _possible(score(present, shaped, *parts, grid=len(shapes)), present.model)
+
+
+def _possible(one: Score, model: Model) -> Score:
+    """Return a score that counts for nothing where its values are impossible."""
+    return replace(one, penalised=-np.inf) if impossible(one, model) else one
+
+
+def _seen(present: Present, effect: Effect) -> Block:
+    """One sample with what an effect needs of the present model."""
+    still = np.zeros((1, present.model.robot.n))
+    block = present.model.block(np.zeros(1), still, still, still, rigid=False)
+    return present.model.ready(effect, block, present.values)
+
+
+def judged(store: ColumnStore, present: Present, one: Score, tests: int) -> tuple[Score, str]:
+    """Return a score refined and cross-validated, and why it is not material; empty if it is."""
+    one = _confirm(store, present, one)
+    return one, _refusal(one, store, present.model, tests, LEAST_SHARE[0])
+
+
+def _confirm(store: ColumnStore, present: Present, one: Score) -> Score:
+    one = refined(store, present, one)
+    (parts,) = candidate_moments(store, present, [one.effect])
+    if one.carriers is not None:
+        parts = tuple(carried(part, store, one.carriers) for part in parts)
+    without, with_effect = cross_validate(present, *parts)
+    # Columns taken at a value count as far as that is the value found.
+    settled = one.penalised - (one.drop - one.settled_drop)
+    return replace(one, penalised=settled, losses=with_effect, gains=without - with_effect)
+
+
+def _refusal(one: Score, store: ColumnStore, model: Model, tests: int, least: float) -> str:
+    """Why an effect is not material; empty where it is."""
+    if one.absorbed:
+        return one.effect.advice
+    if beyond := impossible(one, model):
+        return beyond
+    if one.rank == 0:
+        return "its columns are noise in this data"
+    if min(1.0, one.p_value * tests) >= LEVEL:
+        return "not significant"
+    if not one.penalised > 0:
+        return "explains less than its parameters cost"
+    if one.share < least:
+        return f"explains only {100 * one.share:.2g} % of the squared residual"
+    unresolved = one.effect.unresolved(one.values, _step(store))
+    if unresolved:
+        return unresolved
+    if one.gains is None:
+        return "other effects explain more"
+    spread = one.gains.std(ddof=1) * np.sqrt(len(one.gains))
+    confident = one.gains.sum() > _CONFIDENT * spread
+    if not (one.gains.sum() > 0 and (confident or np.mean(one.gains > 0) >= _MOST_BLOCKS)):
+        return "does not help on held-out blocks"
+    return ""
+
+
+def _step(store: ColumnStore) -> float:
+    """The longest time between two samples, s."""
+    return max(1.0 / run.recording.rate_hz for run in store.runs)

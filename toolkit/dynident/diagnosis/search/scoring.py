@@ -1,0 +1,308 @@
+"""What an effect would bring: tests, penalties and cross-validation on the moments."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from dynident.effects import Effect
+from dynident.evidence.column_store import ColumnStore, joints_of
+from dynident.evidence.evidence_fit import Present, timed_columns, with_clock
+from dynident.evidence.runs import Signals
+from dynident.model import Model
+from dynident.moments.replicated import Clocked, Moments, clocked, solve
+
+ABSORBED = 2e-3
+"""Share of an effect's columns (in norm) left beside the model, below which it is absorbed."""
+
+_UNSEEN = 1e-3
+"""Part of the noise below which a column is not seen."""
+
+Columns = Callable[[Effect, int, Model, np.ndarray], Signals]
+"""Columns of an effect in a run, for a model and its values, as `ColumnStore.of`."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """What one effect, with one shape, would bring if it were added.
+
+    Attributes
+    ----------
+    effect : with its shape.
+    carriers : which runs carry the payload; None for effects to which that does not matter.
+    absorbed : whether nothing of its columns is left beside the model's.
+    rank : number of its parameters that the data can tell.
+    drop : of the squared, whitened, noise-free residual.
+    share : drop over the squared residual with its noise.
+    p_value : before correction for the number of tests; blocks of time are the sampling units.
+    penalised : drop less the price of its parameters and of its grid.
+    values, sigma : (k,) its parameters and their standard deviations.
+    fall : of the squared residual with its noise, at the value at which the column is taken. A
+        column that noise drives is other in every repetition: that counts against it.
+    losses : (B,) held-out squared residual of each block with the effect in the model.
+    gains : (B,) held-out squared residual of each block without it less that with it.
+    """
+
+    effect: Effect
+    carriers: tuple[bool, ...] | None
+    absorbed: bool
+    rank: int = 0
+    drop: float = 0.0
+    share: float = 0.0
+    p_value: float = 1.0
+    penalised: float = -np.inf
+    values: tuple[float, ...] = ()
+    sigma: tuple[float, ...] = ()
+    fall: float = 0.0
+    losses: np.ndarray | None = None
+    gains: np.ndarray | None = None
+
+    @property
+    def settled_drop(self) -> float:
+        """The drop if its value is the one at which its column was taken.
+
+        A column that is not linear in the value says nothing of another value.
+        """
+        if len(self.values) != 1 or len(self.effect.point) != 1 or self.values[0] == 0:
+            return self.drop
+        return self.drop * (1.0 - (1.0 - self.effect.point[0] / self.values[0]) ** 2)
+
+
+def candidate_moments(
+    store: ColumnStore,
+    present: Present,
+    variants: Sequence[Effect],
+    columns_of: Columns | None = None,
+) -> list[tuple[Moments, Moments]]:
+    """Moments of columns with the model's and the torque, and with themselves.
+
+    A payload counts as carried in every run; see `carried`.
+
+    Parameters
+    ----------
+    variants : one effect at one place, with any number of shapes.
+    columns_of : where columns come from; `ColumnStore.of` by default.
+
+    Returns
+    -------
+    (B, p + 1, k) and (B, k, k) for each variant
+    """
+    joints = joints_of(variants[0], present.model)
+    look = columns_of or store.of
+    timed = timed_columns(present.model)
+    mixed = variants[0].timed or timed.any()
+    with_model, with_self = None, None
+    width = 0
+    if columns_of is None or columns_of == store.screening:
+        store.together(variants, present.model, present.values)
+    for r, run in enumerate(store.runs):
+        each = [look(effect, r, present.model, present.values) for effect in variants]
+        width = each[0][0].shape[2]
+        signals = [np.concatenate(shapes, axis=2) for shapes in zip(*each, strict=True)]
+        one, two = [], []
+        for position, joint in enumerate(joints):
+            white = run.whitened([s[:, position] for s in signals], joint, present.noise[joint])
+            known = present.white[r][joint]
+            one.append(run.moments(known, white))
+            two.append(run.moments(white, white))
+            if run.kind == "repeated" and mixed:
+                new = Clocked(white, _clock(store, variants, r), np.zeros(white.shape[2], bool))
+                old = with_clock(store, present.model, r, known)
+                chosen = timed[:, None] | np.full(white.shape[2], variants[0].timed)
+                one[-1] = one[-1].where(chosen, clocked(old, new, run.edges))
+                if variants[0].timed:
+                    two[-1] = two[-1].where(np.array(True), clocked(new, new, run.edges))
+        sums = [
+            Moments(np.sum([m.signal for m in part], 0), np.sum([m.total for m in part], 0))
+            for part in (one, two)
+        ]
+        with_model = sums[0] if with_model is None else with_model + sums[0]
+        with_self = sums[1] if with_self is None else with_self + sums[1]
+    assert with_model is not None and with_self is not None
+    starts = range(0, width * len(variants), width)
+    return [
+        (_columns(with_model, slice(i, i + width)), _block(with_self, slice(i, i + width)))
+        for i in starts
+    ]
+
+
+def _clock(store: ColumnStore, variants: Sequence[Effect], run: int) -> np.ndarray:
+    """What the time of the session does to the columns of effects, (P, S, k) over all of them."""
+    factors = []
+    for effect in variants:
+        count = len(effect.parameters(store.model.robot))
+        factors += [store.clock(effect, run)] * count
+    return np.stack(factors, axis=2)
+
+
+def _columns(part: Moments, columns: slice) -> Moments:
+    return Moments(part.signal[:, :, columns], part.total[:, :, columns])
+
+
+def _block(part: Moments, columns: slice) -> Moments:
+    return Moments(part.signal[:, columns, columns], part.total[:, columns, columns])
+
+
+def carried(part: Moments, store: ColumnStore, carriers: tuple[bool, ...]) -> Moments:
+    """Moments of columns that are zero in the runs which do not carry the payload."""
+    blocks = [np.full(len(run.edges) - 1, c) for run, c in zip(store.runs, carriers, strict=True)]
+    mask = np.concatenate(blocks).astype(float)[:, None, None]
+    return Moments(part.signal * mask, part.total * mask)
+
+
+def score(
+    present: Present,
+    effect: Effect,
+    with_model: Moments,
+    with_self: Moments,
+    grid: int,
+    carriers: tuple[bool, ...] | None = None,
+) -> Score:
+    """Score an effect from its moments; `grid` is the number of shapes that were tried."""
+    p = len(present.values)
+    solution = present.solution
+    signal, total = with_model.sums()
+    own_signal, own_total = with_self.sums()
+    back = solution.project(signal[:p])  # the model's share of the columns
+    left_signal = own_signal - signal[:p].T @ back
+    model_total = present.moments.sums()[1][:p, :p]
+    cross = back.T @ total[:p]
+    left_total = own_total - cross - cross.T + back.T @ model_total @ back
+    scale = np.sqrt(np.clip(np.diag(own_signal), 0.0, None))
+    seen = _seen(effect, present, scale)
+    if not np.any(seen):
+        return Score(effect, carriers, absorbed=True)
+    scale = np.where(seen, scale, 1.0)
+    # Directions of the columns, by what is left of them beside the model.
+    size, directions = np.linalg.eigh(own_signal * np.outer(seen, seen) / np.outer(scale, scale))
+    keep = size > 1e-9 * size[-1]
+    white = directions[:, keep] / np.sqrt(size[keep]) / scale[:, None]
+    left, turn = np.linalg.eigh(white.T @ left_signal @ white)
+    visible = left > ABSORBED**2
+    if not np.any(visible):
+        return Score(effect, carriers, absorbed=True)
+    directions = white @ turn[:, visible]
+    part = solve(
+        directions.T @ left_signal @ directions,
+        directions.T @ left_total @ directions,
+        directions.T @ (signal[p] - back.T @ present.moments.sums()[0][:p, p]),
+    )
+    if part.rank == 0:
+        return Score(effect, carriers, absorbed=False)
+    values = directions @ part.values
+    moment = directions.T @ (signal[p] - back.T @ present.moments.sums()[0][:p, p])
+    drop = float(part.values @ moment)
+    covariance = directions @ part.covariance @ directions.T
+    at = np.array(effect.point) if len(effect.point) == len(values) else values
+    combination = np.append(-present.values, 1.0)
+    with_model_columns = (combination @ present.moments.sums()[1])[:p]
+    with_noise = combination @ total - with_model_columns @ back
+    shapes = len(effect.shape_parameters(present.model.robot))
+    price = (part.rank + shapes) * np.log(present.rows) + 2.0 * np.log(grid)
+    penalised = drop - price
+    blocks = _block_scores(present, with_model, with_self, back, values) @ directions @ part.basis
+    return Score(
+        effect,
+        carriers,
+        absorbed=False,
+        rank=part.rank,
+        drop=drop,
+        share=drop / present.error_total,
+        p_value=_block_p_value(part.basis.T @ moment, blocks),
+        penalised=float(penalised),
+        values=tuple(float(v) for v in values),
+        sigma=tuple(float(s) for s in np.sqrt(np.clip(np.diag(covariance), 0.0, None))),
+        fall=float(2.0 * at @ with_noise - at @ left_total @ at),
+    )
+
+
+def _seen(effect: Effect, present: Present, scale: np.ndarray) -> np.ndarray:
+    """Which columns, of these norms, could be told from rounding errors at any possible value."""
+    bounds = [(p.lower, p.upper) for p in effect.parameters(present.model.robot)]
+    reach = np.array([max(abs(low), abs(high)) for low, high in bounds])
+    return scale > _UNSEEN * np.sqrt(present.rows) / reach
+
+
+def impossible(one: Score, model: Model) -> str:
+    """What is physically impossible in a score's values; empty where nothing is.
+
+    Of several values some may leave their bounds by their uncertainty. A single one that is out of
+    them says that at its bound, where there is no effect, the data are explained better.
+    """
+    if one.absorbed:
+        return ""
+    parameters = one.effect.parameters(model.robot)
+    for parameter, value, sigma in zip(parameters, one.values, one.sigma, strict=False):
+        slack = 3.0 * sigma if len(one.values) > 1 else 0.0
+        if value < parameter.lower - slack or value > parameter.upper + slack:
+            return f"would need {parameter.name} = {value:.3g} {parameter.unit}"
+    return ""
+
+
+def cross_validate(
+    present: Present, with_model: Moments, with_self: Moments
+) -> tuple[np.ndarray, np.ndarray]:
+    """Held-out squared residuals per block, without and with an effect, (B,) each."""
+    signal = _joined(present.moments.signal, with_model.signal, with_self.signal)
+    total = _joined(present.moments.total, with_model.total, with_self.total)
+    p = len(present.values)
+    both = Moments(signal, total)
+    without = np.r_[0:p, signal.shape[1] - 1]
+    return (
+        held_out_losses(
+            Moments(signal[:, without][:, :, without], total[:, without][:, :, without])
+        ),
+        held_out_losses(both),
+    )
+
+
+def held_out_losses(summed: Moments) -> np.ndarray:
+    """Squared residual of each block under the fit to all others, free of noise in the mean."""
+    found = []
+    for block in range(len(summed.signal)):
+        signal, total = summed.without(block)
+        values = solve(signal[:-1, :-1], total[:-1, :-1], signal[:-1, -1]).values
+        combination = np.append(-values, 1.0)
+        found.append(combination @ summed.signal[block] @ combination)
+    return np.array(found)
+
+
+def _joined(model: np.ndarray, cross: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Moments of [model columns, effect columns, torque], from their parts."""
+    p = model.shape[1] - 1
+    top = np.concatenate([model[:, :p, :p], cross[:, :p], model[:, :p, p:]], axis=2)
+    turned = cross.transpose(0, 2, 1)
+    middle = np.concatenate([turned[:, :, :p], own, turned[:, :, p:]], axis=2)
+    bottom = np.concatenate([model[:, p:, :p], cross[:, p:], model[:, p:, p:]], axis=2)
+    return np.concatenate([top, middle, bottom], axis=1)
+
+
+def _block_scores(
+    present: Present, with_model: Moments, with_self: Moments, back: np.ndarray, values: np.ndarray
+) -> np.ndarray:
+    """Each block's moment of cleared columns and the residual with the effect in, (B, k)."""
+    p = len(present.values)
+    combination = np.append(-present.values + back @ values, 1.0)
+    plain = np.einsum("i,bik->bk", combination, with_model.signal) - with_self.signal @ values
+    model = np.einsum("i,bij->bj", combination, present.moments.signal)[:, :p]
+    model -= np.einsum("bik,k->bi", with_model.signal[:, :p], values)
+    return plain - model @ back
+
+
+def _block_p_value(moment: np.ndarray, scores: np.ndarray) -> float:
+    """Wald test that an effect has no part, with blocks of time as the sampling units.
+
+    Parameters
+    ----------
+    moment : (k,) of residual without the effect and cleared columns, over all blocks.
+    scores : (B, k) the same of each block with the effect in; they sum to zero.
+    """
+    blocks, k = scores.shape
+    if blocks <= k + 1:
+        return 1.0
+    spread = scores.T @ scores * blocks / (blocks - 1)
+    statistic = float(moment @ np.linalg.lstsq(spread, moment, rcond=1e-12)[0])
+    return float(stats.f.sf(statistic * (blocks - k) / (k * (blocks - 1)), k, blocks - k))

@@ -1,0 +1,95 @@
+"""Which effect is added next, and what is named with it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from dynident.diagnosis.assembly import Found
+from dynident.diagnosis.search.ranking import ALIKE, Ranking, indistinguishable
+from dynident.diagnosis.search.scoring import Score
+from dynident.effects import Effect
+from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.evidence_fit import Present, fit_present
+
+_FIRST_SHARE = 0.75  # of the largest drop that a simpler effect must reach, to be named first
+_NEARLY = 0.85  # of the largest drop, from which a rival that is not linear is fitted to compare
+_LEAST_KEPT = 0.1  # of the drop that an effect promises, that is left when all is fitted with it
+
+
+def choose(store: ColumnStore, present: Present, ranking: Ranking) -> Found | None:
+    """The best material effect; or the simpler one in it, where that does most of the work."""
+    material = ranking.material
+    if not material:
+        return None
+    best = material[0]
+    simpler = [
+        s
+        for s in material
+        if s.effect.name in best.effect.stands_in_for
+        and s.effect.joint == best.effect.joint
+        and s.drop >= _FIRST_SHARE * best.drop
+    ]
+    if simpler:
+        # The column that they share is the same whoever it belongs to: both are named.
+        return Found(simpler[0], ranking.corrected(simpler[0]), (best.effect,))
+    alike = {*indistinguishable(ranking, best), *_alike_once_fitted(store, present, ranking)}
+    among = [s for s in material if s is best or s.effect in alike]
+    as_good = [s for s in among if s.drop >= _FIRST_SHARE * best.drop]
+    chosen = min(as_good, key=_size)  # the first of the simplest: they stand in order
+    others = tuple(s.effect for s in among if s is not chosen)
+    return Found(chosen, ranking.corrected(chosen), others)
+
+
+def _alike_once_fitted(
+    store: ColumnStore, present: Present, ranking: Ranking
+) -> tuple[Effect, ...]:
+    """Rivals of the best effect that explain the same once each is fitted together with the model.
+
+    Before, columns that are not linear in their values are those of a first guess.
+    """
+    best, *others = ranking.material
+    rivals = [
+        s
+        for s in others
+        if s.effect.secant
+        and "whole" not in s.effect.needs
+        and s.losses is not None
+        and s.drop >= _NEARLY * best.drop
+    ]
+    if not (best.effect.secant and "whole" not in best.effect.needs and rivals):
+        return ()
+
+    def explained(effect: Effect) -> float:
+        wider = fit_present(store, present.model + effect, present)
+        return present.misfit(present) - wider.misfit(present)
+
+    most = explained(best.effect)
+    return tuple(s.effect for s in rivals if explained(s.effect) >= (1.0 - ALIKE) * most)
+
+
+def breaks_its_promise(present: Present, wider: Present, one: Score) -> bool:
+    """Whether a driven response does not explain in a model what it explained beside it.
+
+    With it the bodies change, and with them the response, which may not follow.
+    """
+    if not ({"body", "whole"} <= one.effect.needs and present.noise_known):
+        return False
+    promised = min(one.drop / present.error_signal, 1.0) if present.error_signal > 0 else 1.0
+    before, after = present.misfit(present), wider.misfit(present)
+    return before - after < _LEAST_KEPT * promised * before
+
+
+def _size(one: Score) -> int:
+    """Number of parameters that an effect brings: of what is alike, the simplest is added."""
+    return len(one.values) + len(one.effect.shape)
+
+
+def alternatives_only(one: Found, following: Ranking) -> Found:
+    """Leave out effects that stay material beside the one added: they are more, not instead."""
+    still = {s.effect.label for s in following.material}
+    alternatives = tuple(
+        e
+        for e in one.indistinguishable
+        if e.label not in still or one.score.effect.name in e.contains
+    )
+    return replace(one, indistinguishable=alternatives)

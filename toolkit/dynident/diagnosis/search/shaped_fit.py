@@ -1,0 +1,48 @@
+"""A model fitted with the shapes of its effects."""
+
+from __future__ import annotations
+
+from dynident.diagnosis.search.candidate_shapes import best_shape, reshaped
+from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.evidence_fit import Present, fit_present
+from dynident.model import Model
+
+_REFITS = 12  # of shapes whose columns depend on the bodies
+_GAINED = 0.02  # share of the systematic square that another refit must take away
+_NEGLIGIBLE = 0.005  # of the square of the noise, that no refit is worth
+
+
+def shaped(store: ColumnStore, model: Model) -> Present:
+    """Fit a model as it was given, each shape parameter sought on its grid."""
+    present = fit_present(store, model)
+    for effect in present.model.effects:
+        if effect.shape_parameters(model.robot):
+            others = fit_present(store, present.model - effect, present)
+            better = best_shape(store, others, effect)
+            present = fit_present(store, present.model.with_shapes((better,)), present)
+    return refitted(store, present.model, present)
+
+
+def refitted(store: ColumnStore, model: Model, near: Present | None = None) -> Present:
+    """Fit a model, each shape parameter refined with the others as they are.
+
+    Responses that depend on the bodies are refined again with the bodies that come out, which were
+    others while the effect was missing, until nothing is gained.
+    """
+    present = fit_present(store, model, near)
+    with_shapes = [e.label for e in model.effects if e.shape_parameters(model.robot)]
+    driven = [e.label for e in model.effects if {"body", "whole"} <= e.needs]
+    for again in range(_REFITS if driven else 1):
+        labels = with_shapes if again == 0 and len(with_shapes) > 1 else driven
+        before = present
+        for label in labels:
+            effect = next(e for e in present.model.effects if e.label == label)
+            others = fit_present(store, present.model - effect, present)
+            better = reshaped(store, others, present, effect).effect
+            trial = fit_present(store, present.model.with_shapes((better,)), present)
+            if trial.misfit(present) < present.misfit(present):
+                present = trial
+        had, has = before.misfit(before), present.misfit(before)
+        if had - has < _GAINED * had + _NEGLIGIBLE * before.noise_known:
+            break
+    return present

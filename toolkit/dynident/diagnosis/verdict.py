@@ -1,0 +1,86 @@
+"""When a model is said to be complete, and when not; and the caveats of either."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.diagnosis.nuisances.friction_width import blunting_notes
+from dynident.diagnosis.result import Verdict
+from dynident.diagnosis.search.ranking import Ranking
+from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.evidence_fit import Present
+from dynident.evidence.held_out import HeldOut
+from dynident.recording.dataset import NoiseSource
+
+WITHIN_NOISE = 0.3
+"""Systematic residual over noise that must be surpassed, with 99 % confidence, before anything is
+said to be missing."""
+
+RESOLUTION = 1e-4
+"""Share of a joint's torque below which a residual is that of differentiation and filters."""
+
+MOST_EXPLAINED = 0.8
+"""Share of the systematic square that the effects added must take away for the residual to count
+as explained although a part smaller than the noise is left of it."""
+
+
+def verdict_of(before: HeldOut, after: HeldOut, steps, last: Ranking) -> Verdict:
+    """Return the verdict on a search, from held-out data before and after and its last ranking."""
+    if after.least_ratio is None or after.ratio is None or before.ratio is None:
+        if last.material:
+            return "unexplained"
+        return "explained" if steps else "nothing_missing"
+    if within_noise(after):
+        return "explained" if steps else "nothing_missing"
+    explained = 1.0 - float(np.sum(after.ratio**2) / np.sum(before.ratio**2))
+    if steps and explained >= MOST_EXPLAINED and float(after.ratio.max()) <= 1.0:
+        return "explained"
+    return "unexplained"
+
+
+def within_noise(judged: HeldOut) -> bool:
+    """Whether nothing remains at any joint but noise, and what nothing can resolve."""
+    assert judged.least_ratio is not None and judged.noise_std is not None
+    power = (judged.least_ratio * judged.noise_std) ** 2
+    if judged.rounding is not None:
+        power = power - judged.rounding
+    systematic = np.sqrt(np.clip(power, 0.0, None))
+    matters = systematic > RESOLUTION * judged.torque_rms
+    return not np.any(matters & (systematic > WITHIN_NOISE * judged.noise_std))
+
+
+def noise_source(store: ColumnStore, held: ColumnStore | None) -> NoiseSource:
+    """Where the noise floor that is reported comes from."""
+    kinds = {run.kind for run in (*store.runs, *(held.runs if held else ()))}
+    if "repeated" in kinds:
+        return "replicates"
+    return "given" if "perturbed" in kinds else "unknown"
+
+
+def notes_on(store, held, present: Present, source: NoiseSource) -> tuple[str, ...]:
+    """Return the caveats that belong to a verdict, in plain words."""
+    notes = []
+    if held is None:
+        notes.append("No test recordings: errors are those of held-out blocks of time.")
+    elif source != "unknown" and all(run.kind == "single" for run in held.runs):
+        notes.append("The test recordings do not repeat: the noise is that of the training ones.")
+    if source == "given":
+        notes.append("The noise is the study's word, not measured: record a repeated motion.")
+    simulated = store.runs[0].columns_from == "simulation"
+    if noise_source(store, None) == "unknown" and simulated:
+        notes.append(
+            "Nothing repeats in the training recordings and no noise is stated: the instruments "
+            "are simulated, and there is no noise floor."
+        )
+    elif noise_source(store, None) == "unknown":
+        floor = ", and no noise floor" if source == "unknown" else ""
+        notes.append(
+            "Nothing repeats in the training recordings and no noise is stated: plain least "
+            f"squares, whose columns carry noise{floor}. Small effects may be false; record a "
+            "repeated motion."
+        )
+    if any("payload" in effect.needs for effect in present.model.effects):
+        carriers = [r.recording.name for r in store.runs if r.recording.payload]
+        carriers += [r.recording.name for r in (held.runs if held else ()) if r.recording.payload]
+        notes.append(f"Payload carried in: {', '.join(carriers)}.")
+    return (*notes, *blunting_notes(present))

@@ -1,0 +1,1 @@
+"""What is other about the bodies: payload, zeros, base, springs, contacts."""

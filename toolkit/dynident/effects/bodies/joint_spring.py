@@ -1,0 +1,32 @@
+"""A spring across a joint: a cable, a hose, a gas spring, a balancer."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.effects.effect import Block, JointEffect, Parameter, force_unit, motion_unit
+from dynident.effects.terms import Term
+
+
+class JointSpring(JointEffect):
+    """Torque k q + c, which is zero at the rest position -c/k."""
+
+    name = "joint_spring"
+    law = "k q + c"
+    sign_of = "a ramp against position"
+    confounded_with = ("torque_ripple", "torque_offset")
+    shown_by = "position range"
+    experiment = "move {joint} slowly over its whole range"
+    contains = ("torque_offset",)
+
+    def parameters(self, robot):
+        force, motion = force_unit(robot, self.joint), motion_unit(robot, self.joint)
+        return (Parameter("k", f"{force}/{motion}", 0.0), Parameter("c", force))
+
+    def at_joint(self, block: Block) -> np.ndarray:
+        q = block.q[:, [block.index(self.joint)]]
+        return np.hstack([q, np.ones_like(q)])
+
+    def simulated_terms(self, values, robot):
+        j = robot.names.index(str(self.joint))
+        return (Term(j, "position", (j,), values[0]), Term(j, "constant", (), values[1]))

@@ -1,0 +1,1 @@
+"""What drives do to the torque: gains, delays, offsets, ripple, rotors, shared transmissions."""

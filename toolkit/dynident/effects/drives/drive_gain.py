@@ -1,0 +1,38 @@
+"""A torque constant or gear efficiency that is not what the recording assumed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.effects.effect import Block, Forceless, JointEffect, Parameter
+from dynident.errors import EffectError
+
+
+class DriveGain(Forceless, JointEffect):
+    """Recorded torque = (1 + e) times the torque that acts.
+
+    The column is the torque which the model predicts, never the measured one: the measured torque
+    would bring its noise along. All joints at once cannot be told from scaling every parameter.
+    """
+
+    name = "drive_gain"
+    law = "e tau"
+    sign_of = "a tilted line against load"
+    confounded_with = ("payload", "rotor_inertia")
+    shown_by = "load"
+    experiment = "move {joint} through loads that the other joints feel too, or weigh a known mass"
+    needs = frozenset({"torque"})
+    linear_in_torque = True
+
+    def parameters(self, robot):
+        return (Parameter("e", "1", -0.9, 9.0),)
+
+    def at_joint(self, block: Block) -> np.ndarray:
+        if block.torque is None:
+            raise EffectError("needs the predicted torque in the block", self.label)
+        return block.torque[:, [block.index(self.joint)]]
+
+    def simulated_gain(self, values, robot):
+        gain = np.ones(robot.n)
+        gain[robot.names.index(str(self.joint))] += values[0]
+        return gain

@@ -1,0 +1,60 @@
+"""Another joint's motion felt through a shared transmission."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.effects.effect import Block, JointEffect, Parameter, force_unit, motion_unit
+from dynident.effects.terms import Term
+
+
+class JointCoupling(JointEffect):
+    """Torque at `joint` from the motion of `source`.
+
+    cv v_i + cc tanh(v_i / w) + ca a_i + cs tanh((v_i + v_j) / w), j the joint and i its source:
+    viscous and dry friction and motor inertia that the transmission carries over, and dry friction
+    of a part which turns with the sum of both.
+    """
+
+    name = "joint_coupling"
+    place = "pair"
+    law = "cv v_i + cc sign(v_i) + ca a_i + cs sign(v_i + v_j)"
+    sign_of = "a residual that follows another joint's motion"
+    confounded_with = ("rotor_inertia", "viscous_friction", "coulomb_friction")
+    shown_by = "source alone"
+    experiment = "move {source} with {joint} still, slowly and fast"
+
+    def parameters(self, robot):
+        force, motion = force_unit(robot, self.joint), motion_unit(robot, self.source)
+        return (
+            Parameter("cv", f"{force} s/{motion}"),
+            Parameter("cc", force),
+            Parameter("ca", f"{force} s^2/{motion}"),
+            Parameter("cs", force),
+        )
+
+    def at_joint(self, block: Block) -> np.ndarray:
+        i, j = block.index(self.source), block.index(self.joint)
+        v_i, v_j, a_i = block.v[:, i], block.v[:, j], block.a[:, i]
+        return np.column_stack([v_i, block.sign(v_i), a_i, block.sign(v_i + v_j)])
+
+    def simulated_force(self, values, block):
+        # The acceleration term acts through the inertia matrix below.
+        without_acceleration = np.array(values, dtype=float)
+        without_acceleration[2] = 0.0
+        return self.columns(block) @ without_acceleration
+
+    def simulated_terms(self, values, robot):
+        j, i = robot.names.index(str(self.joint)), robot.names.index(str(self.source))
+        viscous, dry, _, both = values
+        return (
+            Term(j, "speed", (i,), viscous),
+            Term(j, "sign", (i,), dry),
+            Term(j, "sign", (i, j), both),
+        )
+
+    def simulated_inertia(self, values, robot):
+        inertia = np.zeros((robot.n, robot.n))
+        j, i = robot.names.index(str(self.joint)), robot.names.index(str(self.source))
+        inertia[j, i] = values[2]
+        return inertia

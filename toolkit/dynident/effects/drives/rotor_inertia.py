@@ -1,0 +1,33 @@
+"""Inertia of the rotor and gears, as felt at the joint."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.effects.effect import Block, Forceless, JointEffect, Parameter, motion_unit
+
+
+class RotorInertia(Forceless, JointEffect):
+    """Torque proportional to the joint's own acceleration: Ia a."""
+
+    name = "rotor_inertia"
+    law = "Ia a"
+    sign_of = "a slope against the joint's own acceleration"
+    shown_by = "acceleration"
+    experiment = (
+        "accelerate {joint} hard together with the other joints (at the first joint of an arm it "
+        "cannot be told from the inertia of the links)"
+    )
+
+    def parameters(self, robot):
+        unit = "kg" if motion_unit(robot, self.joint) == "m" else "kg m^2"
+        return (Parameter("Ia", unit, 0.0),)
+
+    def at_joint(self, block: Block) -> np.ndarray:
+        return block.a[:, [block.index(self.joint)]]
+
+    def simulated_inertia(self, values, robot):
+        inertia = np.zeros((robot.n, robot.n))
+        j = robot.names.index(str(self.joint))
+        inertia[j, j] = values[0]
+        return inertia

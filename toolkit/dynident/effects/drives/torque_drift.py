@@ -1,0 +1,28 @@
+"""A torque that grows with time: a drifting sensor or amplifier."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.effects.effect import Block, JointEffect, Parameter, force_unit
+
+
+class TorqueDrift(JointEffect):
+    """Torque in proportion to the time since the session began: rate t."""
+
+    name = "torque_drift"
+    timed = True
+    law = "rate t"
+    sign_of = "a ramp against the time of the session, whatever the joint does"
+    confounded_with = ("torque_offset", "thermal_friction")
+    shown_by = "session"
+    experiment = "repeat one recording of {joint} early and late in a long session"
+
+    def parameters(self, robot):
+        return (Parameter("rate", f"{force_unit(robot, self.joint)}/s"),)
+
+    def at_joint(self, block: Block) -> np.ndarray:
+        return block.t[:, None]
+
+    def clock(self, block: Block) -> np.ndarray:
+        return block.t

@@ -1,0 +1,29 @@
+"""A constant torque, of a current amplifier's offset for instance."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.effects.effect import Block, JointEffect, Parameter, force_unit
+from dynident.effects.terms import Term
+
+
+class TorqueOffset(JointEffect):
+    """The same torque whatever the robot does."""
+
+    name = "torque_offset"
+    law = "offset"
+    sign_of = "a constant, whatever the joint does"
+    confounded_with = ("asymmetric_friction", "joint_spring")
+    shown_by = "position range"
+    experiment = "move {joint} over a wide range in both directions, so that gravity changes"
+
+    def parameters(self, robot):
+        return (Parameter("offset", force_unit(robot, self.joint)),)
+
+    def at_joint(self, block: Block) -> np.ndarray:
+        return np.ones((len(block.t), 1))
+
+    def simulated_terms(self, values, robot):
+        j = robot.names.index(str(self.joint))
+        return (Term(j, "constant", (), values[0]),)

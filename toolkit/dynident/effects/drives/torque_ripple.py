@@ -1,0 +1,43 @@
+"""Torque that varies with the position of the motor or of a gear: cogging, ripple."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.effects.effect import (
+    Block,
+    JointEffect,
+    Parameter,
+    ShapeParameter,
+    force_unit,
+    motion_unit,
+)
+
+
+class TorqueRipple(JointEffect):
+    """One harmonic of the position: As sin(k q) + Ac cos(k q).
+
+    k is in cycles per revolution, or in cycles per 2 pi metres for a prismatic joint (rad/m).
+    """
+
+    name = "torque_ripple"
+    law = "As sin(k q) + Ac cos(k q)"
+    sign_of = "a comb against position, one line in cycles per revolution"
+    confounded_with = ("joint_spring",)
+    shown_by = "slow"
+    experiment = "sweep {joint} slowly over its whole range"
+
+    def parameters(self, robot):
+        unit = force_unit(robot, self.joint)
+        return (Parameter("As", unit), Parameter("Ac", unit))
+
+    def shape_parameters(self, robot):
+        if motion_unit(robot, self.joint) == "m":
+            grid = tuple(float(k) for k in np.geomspace(30.0, 3000.0, 40).round())
+            return (ShapeParameter("k", "rad/m", grid, 10.0, 1e5),)
+        grid = tuple(float(k) for k in (*range(2, 33), *range(34, 62, 2)))
+        return (ShapeParameter("k", "1/rev", grid, 1.0, 500.0),)
+
+    def at_joint(self, block: Block) -> np.ndarray:
+        phase = self.shape[0] * block.q[:, [block.index(self.joint)]]
+        return np.hstack([np.sin(phase), np.cos(phase)])

@@ -1,0 +1,331 @@
+"""What every physical effect says about itself.
+
+An effect contributes a torque that the drives must supply on top of the rigid body's. Its columns
+are linear in its parameters once its shape parameters are fixed, so that
+
+    tau = Y(q, v, a) theta + sum over effects of columns(block) @ values.
+
+One class in one file holds everything that the rest of the package needs to know of an effect:
+columns, parameters, units, bounds, how it is simulated, what it is confounded with, and which
+experiment shows it.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import numpy as np
+
+from dynident.effects.block import Block
+from dynident.effects.parameter import Parameter, ShapeParameter
+from dynident.effects.terms import Term
+from dynident.effects.transmission import Transmission
+from dynident.errors import EffectError
+
+if TYPE_CHECKING:
+    from typing import Self
+
+    from dynident.robot import Robot
+
+Motion = Literal[
+    "speed",
+    "slow",
+    "reversals",
+    "tiny reversals",
+    "position range",
+    "acceleration",
+    "load",
+    "session",
+    "source alone",
+    "payload",
+    "repetition",
+]
+"""What shows an effect: a wide range of speeds; slow motion; many changes of direction; those of
+less than 0.01 rad; a wide range of positions; high accelerations; a wide range of loads; a long
+session; its source moving alone; recordings with and without the payload; a repeated period."""
+
+
+@dataclass(frozen=True)
+class Effect(ABC):
+    """A physical effect at a joint (`joint`), between two (`source`), or of the whole robot.
+
+    Attributes
+    ----------
+    joint : the joint whose torque changes (first); None for an effect of the whole robot.
+    source : the other joint of a coupling.
+    shape : values of `shape_parameters`, in their order.
+    point : values of `parameters` at which columns are taken that are not linear in them: secants
+        through this point, so that there they are exact; empty for derivatives at zero.
+    """
+
+    joint: str | None = None
+    source: str | None = None
+    shape: tuple[float, ...] = ()
+    point: tuple[float, ...] = ()
+
+    name: ClassVar[str]
+    place: ClassVar[Literal["joint", "pair", "robot", "joint or robot"]] = "joint"
+    """Where it sits; "joint or robot" is common to all joints where no joint is named."""
+    law: ClassVar[str]
+    """The torque as a formula, for tables."""
+    sign_of: ClassVar[str]
+    """What it looks like in the residual, one clause."""
+    confounded_with: ClassVar[tuple[str, ...]] = ()
+    experiment: ClassVar[str]
+    """The experiment that shows it: a sentence in which {joint} and {source} are filled in."""
+    shown_by: ClassVar[Motion] = "speed"
+    """The kind of motion or experiment that shows it, for advice with a robot's numbers."""
+    contains: ClassVar[tuple[str, ...]] = ()
+    """Simpler effects whose columns are among this one's."""
+    stands_in_for: ClassVar[tuple[str, ...]] = ()
+    """Simpler effects whose columns it has, or may seem to have: they are named first where they do
+    most of the work."""
+    needs: ClassVar[frozenset[str]] = frozenset()
+    """What `Block` must carry: "rigid", "torque", "body"; "whole" where it must be the whole
+    recording at its full rate; "payload" where runs with and without differ."""
+    linear_in_torque: ClassVar[bool] = False
+    """Whether its columns are linear in the predicted torque and depend on nothing else: then it
+    does not matter whether they are filtered or made of filtered torque, which is quicker."""
+    secant: ClassVar[bool] = False
+    """Whether its torque is not linear in its parameters, so that columns are taken at `point`."""
+    timed: ClassVar[bool] = False
+    """Whether its columns depend on the time in the session: they do not repeat with the motion."""
+    found_by: ClassVar[Literal["residual", "repetition"]] = "residual"
+    """Where it shows: in what repetitions have in common, or in what differs between them."""
+    memory: ClassVar[int] = 0
+    """Number of internal states that a simulation of it keeps."""
+
+    # --- what it is ---------------------------------------------------------------------------
+
+    @classmethod
+    def candidates(cls, robot: Robot) -> Iterator[Self]:
+        """Every place of a robot where the effect may sit."""
+        names = robot.names
+        if cls.place in ("robot", "joint or robot"):
+            yield cls()
+        if cls.place in ("joint", "joint or robot"):
+            for joint in names:
+                yield cls(joint)
+        if cls.place == "pair":
+            for joint in names:
+                for source in names:
+                    if source != joint:
+                        yield cls(joint, source)
+
+    @abstractmethod
+    def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
+        """Linear parameters with units and bounds, in the order of the columns."""
+
+    def shape_parameters(self, robot: Robot) -> tuple[ShapeParameter, ...]:
+        """Parameters of the columns' shape; none by default."""
+        return ()
+
+    def on(self, robot: Robot) -> Self:
+        """Return this effect checked against a robot, with its shape filled in.
+
+        Raises
+        ------
+        EffectError
+            If the joint or the source is missing, unknown or out of place, or a shape parameter
+            is outside its bounds.
+        """
+        with_joint = self.place != "robot"
+        if self.place == "joint or robot":
+            with_joint = self.joint is not None
+        for role, value, expected in (
+            ("joint", self.joint, with_joint),
+            ("source", self.source, self.place == "pair"),
+        ):
+            if (value is not None) != expected:
+                verb = "needs" if expected else "takes no"
+                raise EffectError(f"{self.name} {verb} {role}", self.label, _form(type(self)))
+            if value is not None and value not in robot.names:
+                valid = f"joints: {', '.join(robot.names)}"
+                raise EffectError(f"the robot has no joint '{value}'", self.label, valid)
+        if self.source is not None and self.source == self.joint:
+            raise EffectError("a joint is not coupled to itself", self.label, _form(type(self)))
+        wanted = self.shape_parameters(robot)
+        shape = self.shape or tuple(s.grid[len(s.grid) // 2] for s in wanted)
+        if len(shape) != len(wanted):
+            raise EffectError(f"{len(wanted)} shape parameters, got {len(shape)}", self.label)
+        for value, s in zip(shape, wanted, strict=True):
+            if not s.lower <= value <= s.upper:
+                limits = f"between {s.lower:g} and {s.upper:g} {s.unit}"
+                raise EffectError(f"{s.name} = {value:g}", self.label, f"choose it {limits}")
+        return replace(self, shape=tuple(float(value) for value in shape))
+
+    def shaped(self, *shape: float) -> Self:
+        """Return the effect with other shape parameters."""
+        return replace(self, shape=tuple(float(value) for value in shape))
+
+    def variants(self, robot: Robot) -> Iterator[Self]:
+        """With every combination of its shape grids, to be screened."""
+        for shape in product(*(one.grid for one in self.shape_parameters(robot))):
+            yield self.shaped(*shape)
+
+    def sought_in(self, robot: Robot) -> tuple[tuple[float, float], ...]:
+        """Limits of shapes, then of values, to search through where a few shapes may miss the true.
+
+        Empty, the default, for effects whose variants are near enough to any shape.
+        """
+        return ()
+
+    def unresolved(self, values: Sequence[float], step: float) -> str:
+        """Why such values say nothing at a time of `step` s between samples; empty if they do."""
+        return ""
+
+    def suited(self, block: Block) -> Self:
+        """Return the effect with those shapes that the present model in a block suggests."""
+        return self
+
+    def at(self, values: Sequence[float]) -> Self:
+        """Return the effect with its columns taken at other values; itself where it is linear."""
+        return replace(self, point=tuple(float(x) for x in values)) if self.secant else self
+
+    @property
+    def label(self) -> str:
+        """`name@joint`, `name@joint:source` or `name`."""
+        if self.joint is None:
+            return self.name
+        return f"{self.name}@{self.joint}" + (f":{self.source}" if self.source else "")
+
+    @property
+    def title(self) -> str:
+        """The label as words."""
+        words = self.name.replace("_", " ")
+        if self.joint is None:
+            return words
+        return f"{words} at {self.joint}" + (f" from {self.source}" if self.source else "")
+
+    @property
+    def advice(self) -> str:
+        """The experiment that shows this effect at its place."""
+        return self.experiment.format(joint=self.joint, source=self.source)
+
+    # --- its torque ----------------------------------------------------------------------------
+
+    @abstractmethod
+    def columns(self, block: Block) -> np.ndarray:
+        """Torque per unit of each linear parameter, (T, n, k) in N m or N."""
+
+    def family(self, variants: Sequence[Any], blocks: Sequence[Block]) -> list[list[np.ndarray]]:
+        """Columns of `variants`, this effect with several shapes, in each of several blocks.
+
+        For less than one after the other, where that can be.
+        """
+        return [[one.columns(block) for one in variants] for block in blocks]
+
+    def clock(self, block: Block) -> np.ndarray:
+        """The factor of its columns that depends on the time of the session, (T,)."""
+        return np.ones(len(block.t))
+
+    def sensitivities(self, block: Block) -> np.ndarray | None:
+        """Derivatives of the columns by the logarithm of each of s shape parameters.
+
+        Returns
+        -------
+        (T, n, k, s) exact derivatives; None where none are known, and shapes are sought without.
+        """
+        return None
+
+    def point_slope(self, block: Block) -> np.ndarray | None:
+        """Derivative of the torque by the value, at the value where the column is taken.
+
+        Of an effect whose column is the response to one value (`point`), per unit of it.
+
+        Returns
+        -------
+        (T, n, 1) where `sensitivities` are known as well; None where a value is not a point.
+        """
+        return None
+
+    # --- how it is simulated: the ways in which an effect can act on a plant -------------------
+
+    def simulated_force(self, values: Sequence[float], block: Block) -> np.ndarray:
+        """Torque that it takes from the drives, (T, n), from t, q and v alone."""
+        return self.columns(block) @ np.asarray(values, dtype=float)
+
+    def simulated_terms(self, values: Sequence[float], robot: Robot) -> tuple[Term, ...] | None:
+        """The same force as terms that a simulator evaluates natively; None if it has others.
+
+        Such a force is evaluated in Python, which takes longer. Empty where there is no force.
+        """
+        return None
+
+    def simulated_inertia(self, values: Sequence[float], robot: Robot) -> np.ndarray:
+        """Addition to the joint-space inertia matrix, (n, n)."""
+        return np.zeros((robot.n, robot.n))
+
+    def simulated_robot(self, values: Sequence[float], robot: Robot) -> Robot:
+        """The robot with the effect on board, where the effect is a change of its bodies."""
+        return robot
+
+    def simulated_gain(self, values: Sequence[float], robot: Robot) -> np.ndarray:
+        """Recorded torque per torque that acts, (n,)."""
+        return np.ones(robot.n)
+
+    def simulated_rate(self, values: Sequence[float], block: Block) -> np.ndarray:
+        """Rate of its internal states, (T, memory) per s, from t, q, v and `block.memory`."""
+        return np.zeros((len(block.t), self.memory))
+
+    def simulated_transmission(self, values: Sequence[float], robot: Robot) -> Transmission | None:
+        """What it puts between a motor and its link; None for nothing."""
+        return None
+
+    def simulated_loss(self, values: Sequence[float], robot: Robot) -> np.ndarray:
+        """Dry friction per transmitted torque, (n,): torque needed + loss abs(torque) sign(v)."""
+        return np.zeros(robot.n)
+
+    def simulated_delay(self, values: Sequence[float], robot: Robot) -> np.ndarray:
+        """Time by which the recorded torque is late, (n,) s: it is that which acted then."""
+        return np.zeros(robot.n)
+
+
+class Forceless(Effect):
+    """An effect that is simulated by a change of the plant, not by a force on it."""
+
+    def simulated_force(self, values: Sequence[float], block: Block) -> np.ndarray:
+        return np.zeros(block.q.shape)
+
+    def simulated_terms(self, values: Sequence[float], robot: Robot) -> tuple[Term, ...]:
+        return ()
+
+
+class JointEffect(Effect):
+    """An effect whose torque acts at one joint only."""
+
+    @abstractmethod
+    def at_joint(self, block: Block) -> np.ndarray:
+        """Columns at `joint`, (T, k)."""
+
+    def columns(self, block: Block) -> np.ndarray:
+        here = self.at_joint(block)
+        # Of the same type, so that the columns can also be taken of symbols (see closed_loop).
+        full = np.zeros((len(block.t), len(block.names), here.shape[1]), dtype=here.dtype)
+        full[:, block.index(self.joint)] = here
+        return full
+
+
+def motion_unit(robot: Robot, joint: str | None) -> str:
+    """Unit of a joint's position: rad or m."""
+    return "m" if robot.kinds[robot.names.index(str(joint))] == "prismatic" else "rad"
+
+
+def force_unit(robot: Robot, joint: str | None) -> str:
+    """Unit of a joint's torque or force: N m or N."""
+    return "N" if motion_unit(robot, joint) == "m" else "N m"
+
+
+def _form(effect: type[Effect]) -> str:
+    forms = {
+        "joint": "@JOINT",
+        "pair": "@JOINT:SOURCE",
+        "robot": "",
+        "joint or robot": " or, at one joint, @JOINT",
+    }
+    form = forms[effect.place]
+    return f"write it {effect.name}{form}"

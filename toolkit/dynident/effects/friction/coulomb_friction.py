@@ -1,0 +1,29 @@
+"""Dry (Coulomb) friction."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.effects.effect import Block, JointEffect, Parameter, force_unit
+from dynident.effects.terms import Term
+
+
+class CoulombFriction(JointEffect):
+    """Constant torque against the motion: Fc tanh(v / w), with the package's one width w."""
+
+    name = "coulomb_friction"
+    law = "Fc sign(v)"
+    sign_of = "a step at zero velocity"
+    confounded_with = ("viscous_friction", "stribeck_friction")
+    shown_by = "reversals"
+    experiment = "reverse {joint} many times and move it at several speeds"
+
+    def parameters(self, robot):
+        return (Parameter("Fc", force_unit(robot, self.joint), 0.0),)
+
+    def at_joint(self, block: Block) -> np.ndarray:
+        return block.sign(block.v[:, [block.index(self.joint)]])
+
+    def simulated_terms(self, values, robot):
+        j = robot.names.index(str(self.joint))
+        return (Term(j, "sign", (j,), values[0]),)

@@ -1,0 +1,26 @@
+"""Drag that grows with the square of speed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.effects.effect import Block, JointEffect, Parameter, force_unit, motion_unit
+
+
+class QuadraticDrag(JointEffect):
+    """Torque of air, grease or a fan: Fq v abs(v)."""
+
+    name = "quadratic_drag"
+    law = "Fq v |v|"
+    sign_of = "a curve against velocity, steeper at speed"
+    confounded_with = ("viscous_friction", "coulomb_friction")
+    shown_by = "speed"
+    experiment = "move {joint} from slow to its highest speed in both directions"
+
+    def parameters(self, robot):
+        force, motion = force_unit(robot, self.joint), motion_unit(robot, self.joint)
+        return (Parameter("Fq", f"{force} s^2/{motion}^2", 0.0),)
+
+    def at_joint(self, block: Block) -> np.ndarray:
+        v = block.v[:, [block.index(self.joint)]]
+        return v * np.abs(v)

@@ -1,0 +1,38 @@
+"""Friction that falls as motion starts (Stribeck)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.effects.effect import (
+    Block,
+    JointEffect,
+    Parameter,
+    ShapeParameter,
+    force_unit,
+    motion_unit,
+)
+
+
+class StribeckFriction(JointEffect):
+    """Extra dry friction at low speed: Fs tanh(v / w) exp(-(v / vs)^2)."""
+
+    name = "stribeck_friction"
+    law = "Fs sign(v) exp(-(v/vs)^2)"
+    sign_of = "spikes on both sides of zero velocity"
+    confounded_with = ("coulomb_friction", "viscous_friction")
+    shown_by = "slow"
+    experiment = "move {joint} slowly, at speeds below 0.1 rad/s (or 0.01 m/s), in both directions"
+
+    def parameters(self, robot):
+        return (Parameter("Fs", force_unit(robot, self.joint), 0.0),)
+
+    def shape_parameters(self, robot):
+        unit = motion_unit(robot, self.joint)
+        scale = 0.1 if unit == "m" else 1.0
+        grid = tuple(scale * speed for speed in (0.02, 0.04, 0.08, 0.16, 0.32, 0.64))
+        return (ShapeParameter("vs", f"{unit}/s", grid, 0.005 * scale, 2.0 * scale),)
+
+    def at_joint(self, block: Block) -> np.ndarray:
+        v = block.v[:, [block.index(self.joint)]]
+        return block.sign(v) * np.exp(-((v / self.shape[0]) ** 2))

@@ -1,0 +1,30 @@
+"""Viscous friction."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.effects.effect import Block, JointEffect, Parameter, force_unit, motion_unit
+from dynident.effects.terms import Term
+
+
+class ViscousFriction(JointEffect):
+    """Torque proportional to speed: Fv v."""
+
+    name = "viscous_friction"
+    law = "Fv v"
+    sign_of = "a slope against velocity"
+    confounded_with = ("coulomb_friction", "quadratic_drag")
+    shown_by = "speed"
+    experiment = "move {joint} at several constant speeds in both directions"
+
+    def parameters(self, robot):
+        unit = f"{force_unit(robot, self.joint)} s/{motion_unit(robot, self.joint)}"
+        return (Parameter("Fv", unit, 0.0),)
+
+    def at_joint(self, block: Block) -> np.ndarray:
+        return block.v[:, [block.index(self.joint)]]
+
+    def simulated_terms(self, values, robot):
+        j = robot.names.index(str(self.joint))
+        return (Term(j, "speed", (j,), values[0]),)

@@ -1,0 +1,1 @@
+"""Transmissions that give way: springs and gaps between a motor and its link."""

@@ -1,0 +1,90 @@
+"""Play between the teeth of a transmission."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import product
+
+import numpy as np
+
+from dynident.effects.effect import Block, Parameter, ShapeParameter, motion_unit
+from dynident.effects.transmissions.along import mean_inertia
+from dynident.effects.transmissions.driven import DrivenLink, responses
+from dynident.effects.transmissions.flexible import DAMPING, RESONANCE, ROTOR_SHARE, FlexibleJoint
+from dynident.effects.transmissions.gaps import Transmitting
+
+_GAPS = (0.0015, 0.004, 0.01, 0.025)
+"""rad (a tenth of it in m): gaps that are screened."""
+_SOUGHT = ((8.0, 60.0), (0.02, 0.5), (0.05, 0.7))
+"""Hz, 1 and 1: shapes that are searched through."""
+_SOUGHT_GAPS = (8e-4, 6e-2)
+"""rad (a tenth of it in m)."""
+
+
+class Backlash(FlexibleJoint):
+    """A gap between two compliant sides: the link is free inside.
+
+    Its torque is not linear in the gap: the column is the driven response with the gap at which it
+    is taken (`point`), per unit of it.
+    """
+
+    name = "backlash"
+    law = "driven response of the link in a gap"
+    sign_of = "bursts where the load reverses"
+    confounded_with = ("joint_elasticity", "presliding", "coulomb_friction")
+    shown_by = "load"
+    experiment = "move {joint} so that its load changes sign slowly, many times"
+    secant = True
+
+    def parameters(self, robot):
+        return (Parameter("gap", motion_unit(robot, self.joint), 0.0),)
+
+    def shape_parameters(self, robot):
+        sides = ShapeParameter("resonance", "Hz", (15.0, 30.0), RESONANCE.lower, RESONANCE.upper)
+        return (sides, DAMPING, ROTOR_SHARE)
+
+    def variants(self, robot) -> Iterator[Backlash]:
+        scale = 0.1 if motion_unit(robot, self.joint) == "m" else 1.0
+        for one, gap in product(super().variants(robot), _GAPS):
+            yield one.at([scale * gap])
+
+    def sought_in(self, robot):
+        scale = 0.1 if motion_unit(robot, self.joint) == "m" else 1.0
+        low, high = _SOUGHT_GAPS
+        return (*_SOUGHT, (scale * low, scale * high))
+
+    @property
+    def gap(self) -> float:
+        """The gap at which the column is taken."""
+        given = self.point[0] if self.point else 0.0
+        return max(given, _GAPS[0] / 100.0) if given > 0 else _GAPS[1]
+
+    def family(
+        self, variants: Sequence[Backlash], blocks: Sequence[Block]
+    ) -> list[list[np.ndarray]]:
+        links = [DrivenLink(block, block.index(self.joint)) for block in blocks]
+        gears = [
+            [Transmitting.of(link.inertia, one.shape, one.gap) for one in variants]
+            for link in links
+        ]
+        return [
+            [
+                (one.per_unit(0.0) * response.torque)[:, :, None]
+                for one, response in zip(variants, each, strict=True)
+            ]
+            for each in responses(links, gears)
+        ]
+
+    def point_slope(self, block):
+        _, response = self._response(block)
+        return response.by(0.0, 0.0, 0.0, half_gap=0.5)[:, :, None]
+
+    def per_unit(self, stiffness):
+        return 1.0 / self.gap
+
+    def simulated_transmission(self, values, robot):
+        (gap,) = values
+        # The sides are as stiff as the shape says.
+        joint = robot.names.index(str(self.joint))
+        stiffness = mean_inertia(robot, joint) * (2.0 * np.pi * self.shape[0]) ** 2
+        return self.transmission(robot, stiffness, gap) if gap > 0 else None

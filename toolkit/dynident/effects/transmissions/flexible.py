@@ -1,0 +1,82 @@
+"""What a spring and a gap between a motor and its link have in common."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+import numpy as np
+
+from dynident.effects.effect import Block, Forceless, ShapeParameter
+from dynident.effects.transmission import Transmission
+from dynident.effects.transmissions.along import mean_inertia, share_of_rotor
+from dynident.effects.transmissions.driven import (
+    DrivenLink,
+    Response,
+    Transmitting,
+    responses,
+    stacked,
+)
+from dynident.robot import Robot
+
+_SCREENED = (3.0, 4.0, 5.4, 7.3, 9.8, 13.2, 18.0, 25.0, 40.0, 80.0)  # Hz: a peak is narrow
+RESONANCE = ShapeParameter("resonance", "Hz", _SCREENED, 2.0, 200.0)
+"""Of the link against the locked motor, at the mean of its inertia."""
+DAMPING = ShapeParameter("damping", "1", (0.1,), 0.002, 2.0)
+ROTOR_SHARE = ShapeParameter("rotor_share", "1", (0.3,), 0.005, 0.95)
+"""Share of the motor in the inertia that moves with the joint."""
+
+
+class FlexibleJoint(Forceless):
+    """A compliant transmission between the motor and the link of a joint, perhaps with a gap.
+
+    Its column is the link's driven response behind it. The torque of every joint changes, as all
+    feel the link's acceleration. See `dynident.effects.transmissions.driven`.
+    """
+
+    needs = frozenset({"body", "whole"})
+
+    @property
+    def gap(self) -> float:
+        """The gap at which the response is taken, rad or m."""
+        return 0.0
+
+    @abstractmethod
+    def per_unit(self, stiffness: float) -> float:
+        """What takes the response to a column: linear in the stiffness, or independent of it."""
+
+    def suited(self, block: Block) -> FlexibleJoint:
+        share = share_of_rotor(block, block.index(self.joint))
+        return self if share is None else self.shaped(*self.shape[:2], share)
+
+    def columns(self, block: Block) -> np.ndarray:
+        gear, response = self._response(block)
+        return (self.per_unit(gear.stiffness) * response.torque)[:, :, None]
+
+    def sensitivities(self, block: Block) -> np.ndarray:
+        gear, response = self._response(block)
+        K, D, B = gear.stiffness, gear.damping, gear.rotor
+        # The shares of motor and link sum to one: what the motor gains, the link has not.
+        other = -self.shape[2] / (1.0 - self.shape[2])
+        found = []
+        for stiffness, damping, rotor in (
+            (2 * K, D, 0.0),
+            (0.0, D, 0.0),
+            (other * K, other * D, B),
+        ):
+            change = self.per_unit(K + stiffness) - self.per_unit(K)
+            by = response.by(stiffness, damping, rotor)
+            found.append(self.per_unit(K) * by + change * response.torque)
+        return stacked(found)
+
+    def _response(self, block: Block) -> tuple[Transmitting, Response]:
+        link = DrivenLink(block, block.index(self.joint))
+        gear = Transmitting.of(link.inertia, self.shape, self.gap)
+        ((response,),) = responses([link], [[gear]])
+        return gear, response
+
+    def transmission(self, robot: Robot, stiffness: float, gap: float) -> Transmission:
+        """Return it as a simulator has it, for the motor and the damping of this shape."""
+        joint = robot.names.index(str(self.joint))
+        resonance, damping, share = self.shape
+        rotor = share / (1.0 - share) * mean_inertia(robot, joint)
+        return Transmission(joint, stiffness, damping * stiffness / (np.pi * resonance), gap, rotor)

@@ -1,0 +1,192 @@
+"""Models side by side on held-out data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from dynident.closed_loop import Controller
+from dynident.errors import FitError
+from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.evidence_fit import fit_present
+from dynident.evidence.held_out import HeldOut, on_blocks, on_recordings
+from dynident.evidence.maps import residual_maps
+from dynident.evidence.runs import gather
+from dynident.fitting.estimate import Estimate
+from dynident.fitting.shape_search import refine_shapes, shaped_effects
+from dynident.model import Model
+from dynident.recording import Dataset
+from dynident.tables import Table, finite, percent, print_tables
+from dynident.threads import single_threaded
+from dynident.validation.loop_columns import loop_columns
+from dynident.validation.loop_json import loop_json
+from dynident.validation.loop_validation import Unsimulated, Validation
+from dynident.validation.replay import Judged, loop_of
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Errors of several estimates on the same recordings.
+
+    Attributes
+    ----------
+    names : of the estimates.
+    models : theirs.
+    results : what each misses.
+    loops : each in the closed loop of the recordings, see `dynident.validate`; None where the
+        controller or the reference is not known.
+    """
+
+    names: tuple[str, ...]
+    models: tuple[Model, ...]
+    results: tuple[HeldOut, ...]
+    loops: tuple[Validation | Unsimulated | None, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON of `compare --json`."""
+        robot, last = self.models[0].robot, self.results[-1]
+        return {
+            "noise": {"floor": last.floor},
+            "models": [
+                {
+                    "name": name,
+                    "effects": [effect.label for effect in model.effects],
+                    "error": result.error,
+                    "joints": [
+                        {"name": joint, "error": finite(float(error))}
+                        for joint, error in zip(robot.names, result.joint_errors, strict=True)
+                    ],
+                    **({} if loop is None else {"closed_loop": loop_json(loop)}),
+                }
+                for name, model, result, loop in zip(
+                    self.names, self.models, self.results, self._loops, strict=True
+                )
+            ],
+            "joints": [
+                {
+                    "name": joint,
+                    "noise_rms": None if last.noise_std is None else float(last.noise_std[j]),
+                    "torque_rms": float(last.torque_rms[j]),
+                }
+                for j, joint in enumerate(robot.names)
+            ],
+        }
+
+    @property
+    def _loops(self) -> tuple[Validation | Unsimulated | None, ...]:
+        return self.loops or (None,) * len(self.names)
+
+    def tables(self) -> tuple[Table | str, ...]:
+        """Everything that `show` prints, in its order."""
+        # Noise of the positions comes through a model's columns: the floor is the last one's.
+        robot, last = self.models[0].robot, self.results[-1]
+        rows = []
+        for j, joint in enumerate(robot.names):
+            noise = None
+            if last.noise_std is not None and last.torque_rms[j] > 0:
+                noise = float(last.noise_std[j] / last.torque_rms[j])
+            errors = (percent(float(r.joint_errors[j])) for r in self.results)
+            rows.append((joint, *errors, percent(noise)))
+        rows.append(("all", *(percent(r.error) for r in self.results), percent(last.floor)))
+        notes = () if last.floor is not None else ("The noise floor is unknown.",)
+        columns = ("joint", *self.names, "noise floor")
+        errors = Table("Relative torque error on held-out recordings", columns, tuple(rows), notes)
+        loops = loop_columns(self.names, self._loops, robot.names)
+        if loops and len(self.names) == 1:
+            # One table: the simulated loop beside what the regression leaves.
+            pairs = zip(errors.rows, loops.rows, strict=True)
+            errors = replace(
+                errors,
+                columns=(*columns, *loops.columns[1:]),
+                rows=tuple((*row, *more[1:]) for row, more in pairs),
+                notes=(*notes, *loops.notes),
+            )
+            loops = None
+        seen = residual_maps(self.models[-1], last, last)
+        where = tuple((m.joint, m.against, m.sentence) for m in seen if m.sentence)
+        first = (errors, loops) if loops else (errors,)
+        if not where:
+            return (*first, f"Where '{self.names[-1]}' fails: no simple shape stands out.")
+        title = f"Where '{self.names[-1]}' fails"
+        return (*first, Table(title, ("joint", "against", "what is seen"), where))
+
+    def show(self) -> None:
+        """Print the errors side by side, and where the last estimate fails."""
+        print_tables(*self.tables())
+
+
+@single_threaded
+def compare(
+    estimates: Estimate | Mapping[str, Estimate],
+    dataset: Dataset,
+    controller: Controller | None = None,
+) -> Comparison:
+    """Compare estimates with measurements that they were not fitted to.
+
+    Parameters
+    ----------
+    estimates : one, or several by name.
+    dataset : recordings, with their filter and, where nothing repeats, their noise.
+    controller : of the loop in which they were made: each estimate is simulated in it, too, where
+        recordings have their reference.
+
+    Raises
+    ------
+    FitError
+        If there is no estimate or no recording.
+    """
+    named = {"model": estimates} if isinstance(estimates, Estimate) else dict(estimates)
+    if not named or not dataset.recordings:
+        what = "no estimate" if not named else "no recording to compare with"
+        raise FitError(what, mend='mark some recordings use = "test"')
+    runs = gather(dataset)
+    results = []
+    for estimate in named.values():
+        store = ColumnStore(estimate.model, runs)
+        store.prepare(estimate.model.effects)
+        results.append(on_recordings(store, estimate))
+    return Comparison(
+        tuple(named),
+        tuple(e.model for e in named.values()),
+        tuple(results),
+        tuple(loop_of(Judged.of(e), dataset, controller) for e in named.values()),
+    )
+
+
+@single_threaded
+def compare_models(
+    models: Mapping[str, Model],
+    train: Dataset,
+    test: Dataset,
+    controller: Controller | None = None,
+) -> Comparison:
+    """Fit models as the diagnosis does, and compare them on data that they have not seen.
+
+    Parameters
+    ----------
+    models : by name.
+    train : recordings to fit.
+    test : recordings to judge by; where it is empty, blocks of time of the training recordings
+        are held out.
+    controller : as in `compare`; the loops are those of the test recordings, or of the training
+        recordings where there are none.
+    """
+    runs = gather(train)
+    held = gather(test) if len(test) else None
+    results, fitted, loops = [], [], []
+    for model in models.values():
+        if shaped_effects(model):
+            model = refine_shapes(model, train).model
+        store = ColumnStore(model, runs)
+        store.prepare(model.effects)
+        present = fit_present(store, model)
+        if held is None:
+            results.append(on_blocks(store, present))
+        else:
+            judge = ColumnStore(model, held)
+            judge.prepare(model.effects)
+            results.append(on_recordings(judge, present))
+        fitted.append(model)
+        loops.append(loop_of(Judged(model, present.values), test if held else train, controller))
+    return Comparison(tuple(models), tuple(fitted), tuple(results), tuple(loops))

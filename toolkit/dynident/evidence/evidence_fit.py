@@ -1,0 +1,306 @@
+"""A model fitted to the evidence: instrumental variables on whitened rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynident.evidence.column_store import ColumnStore, joints_of
+from dynident.evidence.noise_model import (
+    NoiseModel,
+    differences,
+    flat_noise,
+    measure_noise,
+    systematic_square,
+)
+from dynident.evidence.runs import Signals
+from dynident.fitting.settling import Settling
+from dynident.model import Model
+from dynident.moments.replicated import Clocked, Moments, MomentSolution, clocked, solve
+
+_ROUNDS = 3  # fit, measure the noise, fit again: the noise model settles at once
+_PRESENT_ROUNDS = 30  # at most, until columns that depend on the model's values settle as well
+_PRESENT_TOLERANCE = 1e-4
+
+
+@dataclass(frozen=True)
+class Present:
+    """A model as it fits the training data.
+
+    Attributes
+    ----------
+    model : with its effects and their shapes.
+    values : (p,) in the order of `model.names`.
+    covariance : (p, p).
+    solution : of the regression behind the values.
+    noise : per joint.
+    noise_known : whether `noise` was measured or given; otherwise it is the residual.
+    white : per run and joint, whitened columns and torque, (P, S, p + 1).
+    moments : (B, p + 1, p + 1) of columns and torque, over all joints.
+    rows : number of whitened rows, over all repetitions and joints; noisy copies do not count.
+    error_signal : squared systematic residual, whitened: what no noise explains, in this metric.
+    squares : (n,) mean systematic square of the residual, (N m)^2 or N^2.
+    variances : (n,) of the noise; of the torque, where the noise is unknown or zero.
+    """
+
+    model: Model
+    values: np.ndarray
+    covariance: np.ndarray
+    solution: MomentSolution
+    noise: tuple[NoiseModel, ...]
+    noise_known: bool
+    white: tuple[tuple[np.ndarray, ...], ...]
+    moments: Moments
+    rows: int
+    error_signal: float
+    squares: np.ndarray
+    variances: np.ndarray
+
+    def misfit(self, over: Present) -> float:
+        """Systematic square over the variances of another fit, summed over joints.
+
+        By it fits are compared: `error_signal` depends on the metric, which is another one when
+        less is missing, and noise in a fit's own columns would speak for it.
+        """
+        return float(np.sum(self.squares / over.variances))
+
+    @property
+    def error_total(self) -> float:
+        """Squared residual, whitened, with its noise."""
+        combination = np.append(-self.values, 1.0)
+        return float(combination @ self.moments.sums()[1] @ combination)
+
+
+def fit_present(store: ColumnStore, model: Model, near: Present | None = None) -> Present:
+    """Fit a model to the runs of a store.
+
+    Parameters
+    ----------
+    near : the fit of a like model, from which columns that depend on the values start.
+
+    Raises
+    ------
+    FitError
+        If the columns are not finite.
+    """
+    n = model.robot.n
+    at = _held(model, _beginning(model, near))
+    torque_std = [
+        float(np.sqrt(np.mean(np.concatenate([r.versions[0].tau[:, j] for r in store.runs]) ** 2)))
+        for j in range(n)
+    ]
+    noise = tuple(flat_noise(std or 1.0) for std in torque_std) if near is None else near.noise
+    known = any(run.kind != "single" for run in store.runs)
+    columns, values, settling = [], at, Settling()
+    for round in range(_PRESENT_ROUNDS if model.needs_values else _ROUNDS):
+        if not columns or model.needs_values:
+            model = model.at(at)
+            columns = [
+                [model_columns(store, model, r, j, at) for j in range(n)]
+                for r in range(len(store.runs))
+            ]
+        values, _ = _solve(_moments(store, model, _whiten(store, columns, noise, values)))
+        if round == 0 and near is None:
+            # Along a robot without bodies their columns are rounding errors, and any value fits.
+            values = _waiting(model, at, values)
+        noise = tuple(_Left.of(store, columns, values, j).noise for j in range(n))
+        change = float(np.linalg.norm(_held(model, values) - at))
+        if round >= _ROUNDS - (near is not None) and change <= _PRESENT_TOLERANCE * np.linalg.norm(
+            values
+        ):
+            break
+        at = _held(model, settling.following(model, at, values))
+    white = _whiten(store, columns, noise, values)
+    summed = _moments(store, model, white)
+    values, solution = _solve(summed)
+    rows = sum(
+        part.shape[1] * (1 if run.kind == "perturbed" else part.shape[0])
+        for run, joints in zip(store.runs, white, strict=True)
+        for part in joints
+    )
+    left = [_Left.of(store, columns, values, j) for j in range(n)]
+    return Present(
+        model.at(_held(model, values)),
+        values,
+        solution.covariance,
+        solution,
+        noise,
+        known,
+        white,
+        summed,
+        rows,
+        _signal(store, white, values),
+        np.array([one.square for one in left]),
+        np.array([one.variance or s**2 or 1.0 for one, s in zip(left, torque_std, strict=True)]),
+    )
+
+
+def _beginning(model: Model, near: Present | None) -> np.ndarray:
+    """Values at which columns that depend on them are taken first, (p,)."""
+    if near is None:
+        return model.points()
+    known = dict(zip(near.model.names, near.values, strict=True))
+    return np.array(
+        [known.get(name, x) for name, x in zip(model.names, model.points(), strict=True)]
+    )
+
+
+def _held(model: Model, values: np.ndarray) -> np.ndarray:
+    """Values, but where a column is that of a whole response at a value: that value.
+
+    Another gap is another motion of the link: it is sought as shapes are, not iterated on.
+    """
+    held = np.array(values)
+    for effect in model.effects:
+        if effect.point and {"body", "whole"} <= effect.needs:
+            held[model.slices[effect.label]] = effect.point
+    return held
+
+
+def _waiting(model: Model, at: np.ndarray, found: np.ndarray) -> np.ndarray:
+    """Values found, but those of effects that depend on the present model as they were."""
+    values = np.array(found)
+    for effect in model.effects:
+        if effect.needs & {"torque", "body"}:
+            values[model.slices[effect.label]] = at[model.slices[effect.label]]
+    return values
+
+
+def model_columns(
+    store: ColumnStore, model: Model, run: int, joint: int, values: np.ndarray | None
+) -> Signals:
+    """Columns of a model and the torque at one joint, (T, p + 1) for each version of a run."""
+    recording = store.runs[run].recording
+    parts = [[rigid[:, joint] for rigid in store.rigid(run)]]
+    for effect in model.effects:
+        columns, joints = store.of(effect, run, model, values), joints_of(effect, model)
+        if joint in joints:
+            at = [c[:, joints.index(joint)] for c in columns]
+        else:
+            at = [np.zeros_like(c[:, 0]) for c in columns]
+        if "payload" in effect.needs:
+            at = [c * float(bool(recording.payload)) for c in at]
+        parts.append(at)
+    torque = [version.tau[:, [joint]] for version in store.runs[run].versions]
+    return [np.hstack(pieces) for pieces in zip(*parts, torque, strict=True)]
+
+
+def residuals(store: ColumnStore, model: Model, values: np.ndarray) -> list[np.ndarray]:
+    """Torque minus prediction of each run, folded, (P, S, n) in N m or N."""
+    combination = np.append(-values, 1.0)
+    found = []
+    for r, run in enumerate(store.runs):
+        joints = [
+            run.fold([c @ combination for c in model_columns(store, model, r, j, values)])
+            for j in range(model.robot.n)
+        ]
+        found.append(np.stack(joints, axis=-1))
+    return found
+
+
+def _whiten(store: ColumnStore, columns, noise, values) -> tuple[tuple[np.ndarray, ...], ...]:
+    return tuple(
+        tuple(run.whitened(run.moved(c, values), j, noise[j]) for j, c in enumerate(joints))
+        for run, joints in zip(store.runs, columns, strict=True)
+    )
+
+
+def _moments(store: ColumnStore, model: Model, white) -> Moments:
+    found, timed = None, timed_columns(model)
+    for r, (run, joints) in enumerate(zip(store.runs, white, strict=True)):
+        parts = [run.moments(w, w) for w in joints]
+        here = Moments(np.sum([p.signal for p in parts], 0), np.sum([p.total for p in parts], 0))
+        if run.kind == "repeated" and timed.any():
+            own = [with_clock(store, model, r, w) for w in joints]
+            other = np.sum([clocked(one, one, run.edges) for one in own], axis=0)
+            here = here.where(timed[:, None] | timed[None, :], other)
+        found = here if found is None else found + here
+    assert found is not None
+    return found
+
+
+def _signal(store: ColumnStore, white, values: np.ndarray) -> float:
+    """Squared whitened residual, of what the versions have in common."""
+    combination = np.append(-values, 1.0)[:, None]
+    return sum(
+        float(run.moments(w @ combination, w @ combination).signal.sum())
+        for run, joints in zip(store.runs, white, strict=True)
+        for w in joints
+    )
+
+
+def with_clock(store: ColumnStore, model: Model, run: int, white: np.ndarray) -> Clocked:
+    """Whitened columns of a model and the torque, (P, S, p + 1), with what time does to them."""
+    clock = np.ones_like(white)
+    for effect in model.effects:
+        if effect.timed:
+            clock[:, :, model.slices[effect.label]] = store.clock(effect, run)[:, :, None]
+    return Clocked(white, clock, np.arange(white.shape[2]) == model.size)
+
+
+def timed_columns(model: Model) -> np.ndarray:
+    """Which of a model's columns, and the torque after them, depend on the time, (p + 1,)."""
+    mask = np.zeros(model.size + 1, dtype=bool)
+    for effect in model.effects:
+        mask[model.slices[effect.label]] = effect.timed
+    return mask
+
+
+def _solve(summed: Moments) -> tuple[np.ndarray, MomentSolution]:
+    signal, total = summed.sums()
+    solution = solve(signal[:-1, :-1], total[:-1, :-1], signal[:-1, -1])
+    return solution.values, solution
+
+
+@dataclass(frozen=True)
+class _Left:
+    """What a fit leaves at one joint.
+
+    Attributes
+    ----------
+    stretches, speeds : of noise in the order of time, and the joint's velocity in them.
+    plain : residuals of which nothing tells the noise.
+    systematic : mean square of what the versions of a run have in common, for each.
+    """
+
+    stretches: list[np.ndarray]
+    speeds: list[np.ndarray]
+    plain: list[np.ndarray]
+    systematic: list[float]
+
+    @classmethod
+    def of(cls, store: ColumnStore, columns, values: np.ndarray, joint: int) -> _Left:
+        combination = np.append(-values, 1.0)
+        left = cls([], [], [], [])
+        for run, joints in zip(store.runs, columns, strict=True):
+            residual = run.fold([c @ combination for c in joints[joint]])
+            if run.kind == "single":
+                left.plain.append(residual[0])
+                continue
+            left.systematic.append(systematic_square(residual, run.kind))
+            speed = run.versions[0].v[:, joint][run.index]
+            for stretch, v in zip(differences(residual, run.kind), speed, strict=False):
+                left.stretches.append(stretch)
+                left.speeds.append(v)
+        return left
+
+    @property
+    def square(self) -> float:
+        """Mean square of what is systematic; of everything, where nothing tells it from noise."""
+        if self.systematic:
+            return max(float(np.mean(self.systematic)), 0.0)
+        return float(np.mean(np.concatenate(self.plain) ** 2))
+
+    @property
+    def variance(self) -> float:
+        """Of the noise; zero where there is none, or nothing tells it."""
+        return float(np.mean(np.concatenate(self.stretches) ** 2)) if self.stretches else 0.0
+
+    @property
+    def noise(self) -> NoiseModel:
+        """The noise; the residual itself, where nothing tells them from each other."""
+        root = float(np.sqrt(self.square))
+        if self.stretches:
+            return measure_noise(self.stretches, self.speeds, root)
+        return flat_noise(root or 1.0)

@@ -1,0 +1,223 @@
+"""Errors where the model was not fitted: on test recordings, or on held-out blocks of time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import stats
+
+from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.evidence_fit import Present, model_columns
+from dynident.evidence.noise_model import differences, inflation, systematic_square
+from dynident.fitting.estimate import Estimate
+from dynident.moments.replicated import Kind, solve
+
+_QUANTILE = float(stats.norm.ppf(0.99))
+_LARGEST = float(stats.chi2.ppf(0.99, 1))  # of a square over its mean, in the worst of cases
+
+
+@dataclass(frozen=True)
+class HeldOutRun:
+    """One recording with its prediction, (T, n) each, SI units."""
+
+    name: str
+    t: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    measured: np.ndarray
+    predicted: np.ndarray
+
+    @property
+    def residual(self) -> np.ndarray:
+        """Measured minus predicted torque."""
+        return self.measured - self.predicted
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """What a model misses on held-out data.
+
+    Attributes
+    ----------
+    runs : with predictions.
+    noise_std : (n,) N m or N; None where the noise is unknown.
+    ratio : (n,) systematic residual over noise (root mean squares); None likewise.
+    least_ratio : (n,) what that ratio is at least, with 99 % confidence, the uncertainty of the
+        parameters accounted for; None likewise.
+    inflation : (n,) variance of a mean of consecutive noise over that of white noise.
+    rounding : (n,) mean square of the residual that encoders' steps leave; None where that was not
+        looked at.
+    """
+
+    runs: tuple[HeldOutRun, ...]
+    noise_std: np.ndarray | None
+    ratio: np.ndarray | None
+    least_ratio: np.ndarray | None
+    inflation: np.ndarray
+    rounding: np.ndarray | None = None
+
+    @property
+    def torque_rms(self) -> np.ndarray:
+        """Root mean square of the measured torque, (n,)."""
+        return np.sqrt(np.mean(np.concatenate([r.measured for r in self.runs]) ** 2, axis=0))
+
+    @property
+    def residual_rms(self) -> np.ndarray:
+        """Root mean square of the residual, (n,)."""
+        return np.sqrt(np.mean(np.concatenate([r.residual for r in self.runs]) ** 2, axis=0))
+
+    @property
+    def joint_errors(self) -> np.ndarray:
+        """Norm of the residual over norm of the torque, (n,)."""
+        return self.residual_rms / np.where(self.torque_rms > 0, self.torque_rms, np.nan)
+
+    @property
+    def error(self) -> float:
+        """The same over all joints."""
+        return float(np.linalg.norm(self.residual_rms) / np.linalg.norm(self.torque_rms))
+
+    @property
+    def floor(self) -> float | None:
+        """Error of a model from which nothing is missing."""
+        if self.noise_std is None:
+            return None
+        return float(np.linalg.norm(self.noise_std) / np.linalg.norm(self.torque_rms))
+
+
+def on_recordings(store: ColumnStore, present: Present | Estimate) -> HeldOut:
+    """Judge a fitted model on the recordings of a store, which it has not seen."""
+    combination = np.append(-present.values, 1.0)
+    n = present.model.robot.n
+    runs, folded, doubt = [], [], []
+    for r, run in enumerate(store.runs):
+        first = run.versions[0]
+        joints = [model_columns(store, present.model, r, j, present.values) for j in range(n)]
+        residual = np.stack([c[0] @ combination for c in joints], axis=-1)
+        kept, predicted = run.kept, first.tau - residual
+        signals = (first.t, first.q, first.v, first.a, first.tau, predicted)
+        runs.append(HeldOutRun(run.recording.name, *(x[kept] for x in signals)))
+        folded.append(np.stack([run.fold([v @ combination for v in c]) for c in joints], axis=-1))
+        doubt.append(np.array([_doubt(c[0], present) for c in joints]))
+    return _judged(store, tuple(runs), folded, doubt)
+
+
+def on_blocks(store: ColumnStore, present: Present) -> HeldOut:
+    """Judge a model on blocks of time, each predicted by the fit to all others."""
+    n = present.model.robot.n
+    runs, folded, doubt, block = [], [], [], 0
+    for r, run in enumerate(store.runs):
+        joints = [model_columns(store, present.model, r, j, present.values) for j in range(n)]
+        columns = np.stack([run.fold(c) for c in joints], axis=2)  # (P, S, n, p + 1)
+        residual = np.empty(columns.shape[:3])
+        for start, stop in zip(run.edges[:-1], run.edges[1:], strict=True):
+            signal, total = present.moments.without(block)
+            values = solve(signal[:-1, :-1], total[:-1, :-1], signal[:-1, -1]).values
+            residual[:, start:stop] = columns[:, start:stop] @ np.append(-values, 1.0)
+            block += 1
+        measured = 1 if run.kind == "perturbed" else len(residual)
+        rows = run.index[:measured].ravel()
+        order = np.argsort(rows)
+        rows, misfit = rows[order], residual[:measured].reshape(-1, n)[order]
+        first = run.versions[0]
+        tau = first.tau[rows]
+        runs.append(
+            HeldOutRun(
+                run.recording.name,
+                first.t[rows],
+                first.q[rows],
+                first.v[rows],
+                first.a[rows],
+                tau,
+                tau - misfit,
+            )
+        )
+        folded.append(residual)
+        doubt.append(np.array([_doubt(c[0], present) for c in joints]))
+    return _judged(store, tuple(runs), folded, doubt)
+
+
+def with_noise_of(judged: HeldOut, noise: HeldOut) -> HeldOut:
+    """Judge recordings that do not tell their own noise by the noise measured on others.
+
+    What exceeds that noise is systematic. The mean square of noise alone varies by 2 s^4 over the
+    number of rows, times what its colour costs.
+    """
+    if judged.noise_std is not None or noise.noise_std is None:
+        return judged
+    power = noise.noise_std**2
+    safe = np.where(power > 0, power, 1.0)
+    rows = sum(len(run.t) for run in judged.runs)
+    excess = judged.residual_rms**2 - power
+    error = power * np.sqrt(2.0 * noise.inflation / rows)
+    ratio, least = (
+        np.sqrt(np.clip(x, 0.0, None) / safe) for x in (excess, excess - _QUANTILE * error)
+    )
+    return replace(
+        judged,
+        noise_std=noise.noise_std,
+        ratio=ratio,
+        least_ratio=least,
+        inflation=noise.inflation,
+    )
+
+
+def _doubt(columns: np.ndarray, present: Present | Estimate) -> float:
+    """Mean square of the torque that the covariance of the parameters makes uncertain."""
+    used = columns[:, :-1]
+    return float(np.mean(np.sum((used @ present.covariance) * used, axis=1)))
+
+
+def _variance(residual: np.ndarray, kind: Kind) -> float:
+    """Variance of `systematic_square` (P, S), by the noise alone: what is missing is no chance.
+
+    With noise of variance s^2, which may change in time, and what the versions have in common
+    being m: mean (2 s^4 / (P (P - 1)) + 4 m^2 s^2 / P) / S, times what the colour of the noise
+    costs.
+    """
+    noise = differences(residual, kind)
+    count = len(residual) if kind == "repeated" else 1
+    common = residual.mean(axis=0) if kind == "repeated" else residual[0]
+    freedom = len(residual) - 1
+    local = np.mean(noise**2, axis=0)
+    fourth = float(np.mean(local**2)) / (1.0 + 2.0 / freedom)
+    mixed = max(float(np.mean(common**2 * local)) - fourth / count, 0.0)
+    per_instant = 2.0 * fourth / max(count * (count - 1), 1) + 4.0 * mixed / count
+    rows = list(noise)
+    return per_instant * max(inflation(rows), inflation(rows, power=2)) / residual.shape[1]
+
+
+def _judged(
+    store: ColumnStore,
+    runs: tuple[HeldOutRun, ...],
+    folded: list[np.ndarray],
+    doubt: list[np.ndarray],
+) -> HeldOut:
+    """Split the residual into what repeats and what does not.
+
+    Parameters
+    ----------
+    folded : residual of each run, (P, S, n).
+    doubt : mean square of the prediction's error that the parameters' covariance stands for, of
+        each run, (n,).
+    """
+    n = runs[0].measured.shape[1]
+    pairs: list[tuple[Kind, np.ndarray]] = [
+        (run.kind, e) for run, e in zip(store.runs, folded, strict=True) if run.kind != "single"
+    ]
+    if not pairs:
+        return HeldOut(runs, None, None, None, np.ones(n))
+    noise = [[differences(e[..., j], kind) for kind, e in pairs] for j in range(n)]
+    power = np.array([np.mean(np.concatenate([d.ravel() for d in ds]) ** 2) for ds in noise])
+    sizes = np.array([e.shape[1] for _, e in pairs])
+    squares = [[systematic_square(e[..., j], kind) for j in range(n)] for kind, e in pairs]
+    excess = np.average(squares, axis=0, weights=sizes)
+    spread = np.array([[_variance(e[..., j], kind) for j in range(n)] for kind, e in pairs])
+    error = np.sqrt((sizes**2 @ spread) / sizes.sum() ** 2)
+    fitted = _LARGEST * np.average(doubt, axis=0, weights=[e.shape[1] for e in folded])
+    least = excess - _QUANTILE * error - fitted
+    safe = np.where(power > 0, power, 1.0)
+    ratio, at_least = (np.sqrt(np.clip(x, 0.0, None) / safe) for x in (excess, least))
+    grown = np.array([inflation([row for d in ds for row in d]) for ds in noise])
+    return HeldOut(runs, np.sqrt(power), ratio, at_least, grown)

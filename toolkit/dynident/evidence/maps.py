@@ -1,0 +1,237 @@
+"""Where the model fails: mean residuals against motion, load, time and position harmonics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from dynident.evidence.held_out import HeldOut
+from dynident.model import Model
+from dynident.robot import Robot
+
+BINS = 24
+HARMONICS = np.arange(1, 61)
+"""Cycles per revolution (or per 2 pi metres) at which the residual is looked at."""
+
+_LEVEL = 1e-3  # of the tests behind a sentence
+_SHARE = 0.5  # of a map's variance that a shape must explain to be named
+
+
+@dataclass(frozen=True)
+class ResidualMap:
+    """Mean residual of one joint in bins of a quantity, on the test recordings.
+
+    Attributes
+    ----------
+    joint, torque_unit : the joint, and N m or N.
+    against : "velocity", "position", "acceleration", "load", "time" or "cycles per revolution".
+    unit : of that quantity.
+    at : (B,) centres of the bins (or frequencies).
+    before, after : (B,) mean residual (amplitude for a spectrum) of the model as given, and of
+        the model with the effects added.
+    band : (B,) half width of the interval in which noise alone would lie (2 standard errors);
+        NaN where the noise is unknown.
+    sentence : what the picture shows, in plain words.
+    """
+
+    joint: str
+    torque_unit: str
+    against: str
+    unit: str
+    at: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    band: np.ndarray
+    sentence: str
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """What an effect looks like in a map: `of(x, largest x)`."""
+
+    effect: str
+    words: str
+    of: Callable[[np.ndarray, float], np.ndarray]
+
+
+def _spikes(width: float) -> _Shape:
+    words = "spikes beside zero velocity: Stribeck friction, or presliding"
+    return _Shape(
+        "stribeck_friction", words, lambda x, s: np.sign(x) * np.exp(-((x / (width * s)) ** 2))
+    )
+
+
+_SHAPES: dict[str, tuple[_Shape, ...]] = {
+    "velocity": (
+        _Shape(
+            "coulomb_friction",
+            "a step at zero velocity: dry (Coulomb) friction",
+            lambda x, s: np.tanh(x / (0.02 * s)),
+        ),
+        _Shape("viscous_friction", "a slope against velocity: viscous friction", lambda x, s: x),
+        _spikes(0.05),
+        _spikes(0.15),
+        _Shape("quadratic_drag", "a curve, steeper at speed: drag", lambda x, s: x * np.abs(x)),
+        _Shape(
+            "asymmetric_friction",
+            "slopes that differ between the directions: asymmetric friction",
+            lambda x, s: np.abs(x),
+        ),
+        _Shape(
+            "torque_offset", "a constant at all velocities: an offset", lambda x, s: np.ones_like(x)
+        ),
+    ),
+    "position": (_Shape("joint_spring", "a ramp against position: a spring", lambda x, s: x),),
+    "acceleration": (
+        _Shape(
+            "rotor_inertia",
+            "a slope against acceleration: an inertia (of a rotor, say)",
+            lambda x, s: x,
+        ),
+    ),
+    "load": (_Shape("drive_gain", "a tilted line against load: a drive gain", lambda x, s: x),),
+    "time": (_Shape("torque_drift", "a ramp over time: a drift", lambda x, s: x),),
+}
+
+
+def residual_maps(model: Model, before: HeldOut, after: HeldOut) -> tuple[ResidualMap, ...]:
+    """Residual maps of every joint on held-out data.
+
+    Parameters
+    ----------
+    model : as given: what its effects can fit is cleared away before a shape is named.
+    before, after : of the model as given and of the final one, on the same recordings.
+    """
+    joints = range(model.robot.n)
+    return tuple(one for joint in joints for one in _of_joint(model, joint, before, after))
+
+
+def _of_joint(model: Model, j: int, before: HeldOut, after: HeldOut) -> Iterator[ResidualMap]:
+    robot = model.robot
+    fitted = {e.name for e in model.effects if e.joint == robot.names[j]}
+    old = np.concatenate([run.residual[:, j] for run in before.runs])
+    new = np.concatenate([run.residual[:, j] for run in after.runs])
+    motion = robot.units[j]
+    noise = None if before.noise_std is None else float(before.noise_std[j])
+    quantities = {
+        "velocity": (f"{motion}/s", [run.v[:, j] for run in before.runs]),
+        "position": (motion, [run.q[:, j] for run in before.runs]),
+        "acceleration": (f"{motion}/s^2", [run.a[:, j] for run in before.runs]),
+        "load": (robot.torque_units[j], [run.predicted[:, j] for run in before.runs]),
+        "time": ("s", [run.t for run in before.runs]),
+    }
+    for against, (unit, parts) in quantities.items():
+        x = np.concatenate(parts)
+        at, means, count = _binned(x, np.column_stack([old, new]), fine=against == "velocity")
+        if len(at) < 4:
+            continue
+        spread = np.sqrt(before.inflation[j] / count)
+        band = np.full(len(at), np.nan) if noise is None else 2.0 * noise * spread
+        sigma = (noise if noise is not None else float(np.std(old))) * spread
+        sentence = _sentence(against, at, means[:, 0], sigma, fitted)
+        yield ResidualMap(
+            robot.names[j],
+            robot.torque_units[j],
+            against,
+            unit,
+            at,
+            means[:, 0],
+            means[:, 1],
+            band,
+            sentence,
+        )
+    yield _spectrum(robot, j, before, old, new, noise)
+
+
+def _binned(
+    x: np.ndarray, y: np.ndarray, *, fine: bool
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Centres, means and counts in bins that hold at least ten samples.
+
+    Of equal width; or, if `fine`, of equal width in the root of abs(x), finer towards zero, where
+    friction does what tells one kind from another.
+    """
+    low, high = np.quantile(x, [0.002, 0.998])
+    if not high > low:
+        return np.zeros(0), np.zeros((0, y.shape[1])), np.zeros(0)
+    if fine:
+        start, stop = np.sign(low) * np.sqrt(abs(low)), np.sign(high) * np.sqrt(abs(high))
+        roots = np.linspace(start, stop, BINS + 1)
+        edges = np.sign(roots) * roots**2
+    else:
+        edges = np.linspace(low, high, BINS + 1)
+    bins = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, BINS - 1)
+    counts = np.bincount(bins, minlength=BINS)
+    kept = counts >= 10
+    safe = np.maximum(counts, 1)
+    at = np.bincount(bins, weights=x, minlength=BINS) / safe
+    means = np.column_stack([np.bincount(bins, weights=c, minlength=BINS) / safe for c in y.T])
+    return at[kept], means[kept], counts[kept]
+
+
+def _sentence(
+    against: str, at: np.ndarray, mean: np.ndarray, sigma: np.ndarray, fitted: set[str]
+) -> str:
+    """The shape that a map shows, if it shows one beyond the noise."""
+    if not np.all(sigma > 0):
+        return ""
+    weight = 1.0 / sigma
+    power = float(np.sum((mean * weight) ** 2))
+    if stats.chi2.sf(power, len(at)) > _LEVEL:
+        return ""
+    scale = float(np.abs(at).max()) or 1.0
+    shapes = _SHAPES[against]
+    # The fit has taken out of the map what its own columns can explain: out of the shapes too.
+    known = [shape.of(at, scale) * weight for shape in shapes if shape.effect in fitted]
+    clear = _clearing(np.array(known).T) if known else np.eye(len(at))
+    seen = clear @ (mean * weight)
+    best, share = "", 0.0
+    for shape in shapes:
+        if shape.effect in fitted:
+            continue
+        column = clear @ (shape.of(at, scale) * weight)
+        norm = float(column @ column)
+        explained = float(column @ seen) ** 2 / (norm * power) if norm > 0 else 0.0
+        if explained > share:
+            best, share = shape.words, explained
+    return f"{best} ({100 * share:.0f} % of what is seen here)" if share >= _SHARE else ""
+
+
+def _clearing(columns: np.ndarray) -> np.ndarray:
+    """Projection onto what columns (B, k) cannot explain, (B, B)."""
+    basis = np.linalg.qr(columns)[0]
+    return np.eye(len(columns)) - basis @ basis.T
+
+
+def _spectrum(
+    robot: Robot, j: int, before: HeldOut, old: np.ndarray, new: np.ndarray, noise: float | None
+) -> ResidualMap:
+    q = np.concatenate([run.q[:, j] for run in before.runs])
+    waves = np.exp(-1j * np.outer(HARMONICS, q))
+    amplitudes = [2.0 * np.abs(waves @ (e - e.mean())) / len(q) for e in (old, new)]
+    size = len(HARMONICS)
+    level = np.full(size, np.nan)
+    sentence = ""
+    if noise is not None:
+        # Each amplitude is Rayleigh: one in a thousand of all lines exceeds this by chance.
+        level[:] = noise * np.sqrt(4.0 * np.log(size / _LEVEL) * before.inflation[j] / len(q))
+        peak = int(np.argmax(amplitudes[0]))
+        others = np.delete(amplitudes[0], [i for i in (peak - 1, peak, peak + 1) if 0 <= i < size])
+        stands_out = amplitudes[0][peak] > max(level[peak], 3.0 * float(np.median(others)))
+        if stands_out and HARMONICS[peak] > 2:
+            sentence = f"a line at {HARMONICS[peak]} cycles per revolution: ripple"
+    unit = "cycles per revolution" if robot.kinds[j] == "revolute" else "cycles per 2 pi m"
+    return ResidualMap(
+        robot.names[j],
+        robot.torque_units[j],
+        "cycles per revolution",
+        unit,
+        HARMONICS.astype(float),
+        amplitudes[0],
+        amplitudes[1],
+        level,
+        sentence,
+    )

@@ -1,0 +1,162 @@
+"""The noise of a torque residual: its size, how it grows at low speed, and its colour.
+
+Everything is measured on differences between versions of the same motion, in which what the model
+lacks cancels; never on the residual itself, which would explain the missing effect away as noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_toeplitz
+
+from dynident.moments.replicated import Kind
+
+ORDER = 8
+"""Order of the autoregression that describes the colour of the noise."""
+
+_BINS = 10
+_RIDGE = 1e-3  # share of white noise assumed, so that a band without power is not blown up
+_SCALE_LIMITS = (0.3, 4.0)  # of the local standard deviation over the overall one
+
+
+def differences(residual: np.ndarray, kind: Kind) -> np.ndarray:
+    """Noise of one version, from the differences between versions.
+
+    Parameters
+    ----------
+    residual : (P, S)
+        Residual of one joint in P versions of the same motion.
+    kind : Kind
+        What the versions are; not "single", in which there is nothing to compare.
+
+    Returns
+    -------
+    (P, S) or (P - 1, S), with the variance of the noise in one version.
+    """
+    if kind == "perturbed":
+        return residual[1:] - residual[0]
+    versions = len(residual)
+    return (residual - residual.mean(axis=0)) * np.sqrt(versions / (versions - 1))
+
+
+def systematic_square(residual: np.ndarray, kind: Kind) -> float:
+    """Mean square of what the versions of a residual (P, S) have in common, noise taken out."""
+    if kind == "perturbed":
+        return float(np.mean(residual[0] ** 2) - np.mean((residual[1:] - residual[0]) ** 2))
+    versions = len(residual)
+    products = residual.sum(axis=0) ** 2 - (residual**2).sum(axis=0)
+    return float(np.mean(products)) / (versions * (versions - 1))
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """Noise of one joint's torque residual.
+
+    Attributes
+    ----------
+    std : N m or N, over all speeds.
+    speeds : (B,) rad/s or m/s, absolute, at which `scales` are given.
+    scales : (B,) local standard deviation over `std`.
+    colour : (ORDER + 1,) whitening filter, for noise divided by its local standard deviation.
+    """
+
+    std: float
+    speeds: np.ndarray
+    scales: np.ndarray
+    colour: np.ndarray
+
+    def whiten(self, signals: np.ndarray, speed: np.ndarray) -> np.ndarray:
+        """Give the noise in signals (T, k) of one recording unit variance and no colour.
+
+        Parameters
+        ----------
+        signals : (T, k)
+            In the order of time; the first `ORDER` rows come out unreliable.
+        speed : (T,)
+            Velocity of the joint, rad/s or m/s.
+        """
+        local = np.interp(np.abs(speed), self.speeds, self.scales) * self.std
+        scaled = signals / local[:, None]
+        # Few coefficients and many short columns: quicker than a general filter.
+        white = self.colour[0] * scaled
+        for lag, coefficient in enumerate(self.colour[1:], start=1):
+            white[lag:] += coefficient * scaled[:-lag]
+        return white
+
+
+def flat_noise(std: float) -> NoiseModel:
+    """White noise of the same size at all speeds: what is assumed where noise is unknown."""
+    return NoiseModel(std, np.zeros(1), np.ones(1), np.array([1.0]))
+
+
+def measure_noise(
+    noise: list[np.ndarray], speed: list[np.ndarray], misfit: float = 0.0
+) -> NoiseModel:
+    """Describe the noise of one joint.
+
+    While the model still misses much, a metric made for the noise alone would ask it to fit best
+    where the noise is least. So what is missing counts as white noise on top, of no colour and
+    the same at all speeds, until it is found.
+
+    Parameters
+    ----------
+    noise, speed : lists of (T,)
+        Stretches of noise in the order of time, and the joint's velocity in them.
+    misfit : N m or N
+        Root mean square of the systematic residual.
+    """
+    everything, speeds = np.concatenate(noise), np.abs(np.concatenate(speed))
+    std = float(np.sqrt(np.mean(everything**2)))
+    if not std > 0:
+        return flat_noise(misfit or 1.0)
+    edges = np.quantile(speeds, np.linspace(0.0, 1.0, _BINS + 1))
+    bins = np.clip(np.searchsorted(edges, speeds, side="right") - 1, 0, _BINS - 1)
+    centres, scales = [], []
+    for b in range(_BINS):
+        inside = bins == b
+        if inside.sum() >= 30:
+            centres.append(speeds[inside].mean())
+            scales.append(np.sqrt(np.mean(everything[inside] ** 2)) / std)
+    if not centres:
+        centres, scales = [0.0], [1.0]
+    more = (misfit / std) ** 2
+    at, limited = np.array(centres), np.sqrt(np.clip(scales, *_SCALE_LIMITS) ** 2 + more)
+    scaled = [
+        stretch / (np.interp(np.abs(v), at, limited) * std)
+        for stretch, v in zip(noise, speed, strict=True)
+    ]
+    return NoiseModel(std, at, limited, _whitening_filter(scaled, more / (1.0 + more)))
+
+
+def _whitening_filter(stretches: list[np.ndarray], white: float) -> np.ndarray:
+    """Yule-Walker autoregression over several stretches, scaled to innovations of variance one.
+
+    `white` is the share of the variance that is added as white noise.
+    """
+    longest = max(len(stretch) for stretch in stretches)
+    order = min(ORDER, max(longest // 20, 0))
+    total = sum(len(stretch) for stretch in stretches)
+    correlation = np.array(
+        [sum(float(x[: len(x) - k] @ x[k:]) for x in stretches) / total for k in range(order + 1)]
+    )
+    correlation[0] = correlation[0] * (1.0 + _RIDGE) + white
+    if order == 0:
+        return np.array([1.0]) / np.sqrt(correlation[0])
+    coefficients = solve_toeplitz(correlation[:-1], correlation[1:])
+    innovation = correlation[0] - coefficients @ correlation[1:]
+    return np.concatenate([[1.0], -coefficients]) / np.sqrt(max(innovation, 1e-12))
+
+
+def inflation(noise: list[np.ndarray], power: int = 1) -> float:
+    """Variance of a mean of consecutive noise over that of independent noise, at least one.
+
+    With `power` 2, of a mean of products of two such noises.
+    """
+    total = sum(float(x @ x) for x in noise)
+    if not total > 0:
+        return 1.0
+    lags = range(1, 11)
+    correlations = [sum(float(x[:-k] @ x[k:]) for x in noise if len(x) > k) / total for k in lags]
+    return max(1.0, 1.0 + 2.0 * sum(c**power for c in correlations))

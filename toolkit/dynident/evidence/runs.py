@@ -1,0 +1,197 @@
+"""Recordings in versions that can be compared.
+
+The repetitions of a period; or the record and copies with more of the stated noise; or the bare
+record where neither is known. To these comes the same motion simulated, where nothing repeats and
+the control loop is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from dynident.evidence.noise_model import ORDER, NoiseModel
+from dynident.fitting.sampling import Sampled, flagged, sample
+from dynident.moments.replicated import Kind, Moments, moments
+from dynident.recording import (
+    Dataset,
+    Noise,
+    Recording,
+    periods,
+    require_repetition,
+    require_torque,
+    uniform,
+)
+
+COPIES = 4
+"""Noisy copies of each recording where the noise is stated and nothing repeats."""
+
+_COPIES_BESIDE = 2  # of them, beside a simulated motion
+
+BLOCKS = 20
+"""Blocks of time for cross-validation, over all recordings, at least three in each."""
+
+Signals = list[np.ndarray]
+"""One array per version of a recording, (T, J, k): rows, joints of the effect, columns."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One recording and its versions.
+
+    Attributes
+    ----------
+    kind : how the versions come about, which tells the noise.
+    versions : the measured record, its noisy copies where there are any, and last the simulated
+        motion where there is one.
+    index : (P, S) rows that belong together: repetition p, instant s. For copies, P counts the
+        versions but for the simulated one and every row of `index` is the same.
+    edges : (B + 1,) blocks of instants.
+    columns_from : whose motion the columns of the regression are taken along.
+    left_out : (T,) rows that are not to be judged, a contact in them; None for none.
+    """
+
+    kind: Kind
+    versions: tuple[Sampled, ...]
+    index: np.ndarray
+    edges: np.ndarray
+    columns_from: Literal["recording", "simulation"] = "recording"
+    left_out: np.ndarray | None = None
+
+    @property
+    def kept(self) -> np.ndarray:
+        """Rows of the recording that are judged, (T,) mask."""
+        whole = np.ones(len(self.versions[0].t), dtype=bool)
+        return whole if self.left_out is None else ~self.left_out
+
+    @property
+    def recording(self) -> Recording:
+        """The recording itself."""
+        return self.versions[0].recording
+
+    def fold(self, signals: Sequence[np.ndarray]) -> np.ndarray:
+        """Arrange measured signals, (T, ...) for each version, as (P, S, ...)."""
+        if self.kind == "repeated":
+            return signals[0][self.index]
+        return np.stack([one[rows] for one, rows in zip(signals, self.index, strict=False)])
+
+    def moved(self, signals: Sequence[np.ndarray], values: np.ndarray) -> list[np.ndarray]:
+        """Move the torque from the measured to the simulated motion, where there is one.
+
+        Instrumental variables V' (y - W x) = 0, with columns W along the measured motion and V
+        along the simulated one, are not symmetric. They are the least squares of y - (W - V) x on
+        V, taken at the x that they find. So the simulated version's torque becomes that at the
+        latest x, and everything that follows is plain regression on columns without noise. What
+        another column would bring is then its instrumental moment with the residual y - W x: zero
+        in the mean if nothing is missing, wherever the simulated motion may lie.
+
+        Parameters
+        ----------
+        signals : columns of the model and the torque at a joint, (T, p + 1) for each version.
+        values : (p,) the latest parameters.
+        """
+        if self.columns_from == "recording":
+            return list(signals)
+        measured, simulated = signals[0], np.array(signals[-1])
+        simulated[:, -1] = measured @ np.append(-values, 1.0) + simulated[:, :-1] @ values
+        return [*signals[:-1], simulated]
+
+    def whitened(self, signals: Sequence[np.ndarray], joint: int, noise: NoiseModel) -> np.ndarray:
+        """Whiten columns, (T, k) for each version, of a joint, and fold them into (P, S, k).
+
+        Of a simulated motion there is one version, without noise.
+        """
+        if self.columns_from == "simulation":
+            speed = self.versions[-1].v[:, joint]
+            return noise.whiten(signals[-1], speed)[self.index[:1]]
+        speed = self.versions[0].v[:, joint]
+        return self.fold([noise.whiten(one, speed) for one in signals])
+
+    def moments(self, left: np.ndarray, right: np.ndarray) -> Moments:
+        """Second moments of whitened columns, (P, S, a) and (P, S, b)."""
+        plain = self.columns_from == "simulation"
+        return moments(left, right, self.edges, "single" if plain else self.kind)
+
+
+def gather(dataset: Dataset, seed: int = 0, *, simulated: Dataset | None = None) -> tuple[Run, ...]:
+    """Arrange the recordings of a dataset in versions; see the module.
+
+    Parameters
+    ----------
+    dataset : the recordings.
+    seed : of the noise on the copies.
+    simulated : the motion of each recording, simulated, on the same time stamps.
+
+    Raises
+    ------
+    RecordingError
+        If a recording is too short for its filter, or for two of its periods, or there is no
+        torque at all.
+    """
+    require_torque(dataset.recordings)
+    per_run = max(3, -(-BLOCKS // len(dataset.recordings)))
+    runs = []
+    streams = np.random.default_rng(seed).spawn(len(dataset.recordings))
+    repeats = any(r.period for r in dataset.recordings)
+    for recording, stream in zip(dataset.recordings, streams, strict=True):
+        # Noise on top would hide the signs of a jittered clock: straighten it before.
+        recording = uniform(recording)
+        first = sample(recording, dataset.filter)
+        usable = np.arange(ORDER, len(first.t))
+        if recording.period:
+            where = recording.where
+            found = periods(len(usable), first.rate_hz, recording.period, where)
+            require_repetition(first.q[ORDER:], found, where)
+            index = ORDER + found.index
+            kind: Kind = "repeated"
+            versions: tuple[Sampled, ...] = (first,)
+        elif dataset.noise and not repeats:
+            # Where columns come from elsewhere, the copies tell the size of the noise only.
+            count = COPIES if simulated is None else _COPIES_BESIDE
+            copies = (noisy(recording, dataset.noise, stream) for _ in range(count))
+            versions = (first, *(sample(copy, dataset.filter) for copy in copies))
+            index, kind = np.tile(usable, (len(versions), 1)), "perturbed"
+        else:
+            versions, index, kind = (first,), usable[None, :], "single"
+        edges = np.linspace(0, index.shape[1], per_run + 1).round().astype(int)
+        runs.append(Run(kind, versions, index, edges))
+    if simulated is None:
+        return tuple(runs)
+    return tuple(
+        replace(run, versions=(*run.versions, motion), columns_from="simulation")
+        for run, motion in zip(runs, simulated_versions(runs, simulated), strict=True)
+    )
+
+
+def simulated_versions(runs: Sequence[Run], simulated: Dataset) -> tuple[Sampled, ...]:
+    """Simulated motions, filtered and cut as the recordings of these runs are."""
+    return tuple(
+        sample(
+            one.replace(window=run.recording.window, payload=run.recording.payload),
+            simulated.filter,
+        )
+        for run, one in zip(runs, simulated.recordings, strict=True)
+    )
+
+
+def resimulated(runs: Sequence[Run], simulated: Dataset) -> tuple[Run, ...]:
+    """Return runs with other simulated motions in place of theirs."""
+    return tuple(
+        replace(run, versions=(*run.versions[:-1], motion))
+        for run, motion in zip(runs, simulated_versions(runs, simulated), strict=True)
+    )
+
+
+def noisy(recording: Recording, noise: Noise, stream: np.random.Generator) -> Recording:
+    """Return a copy of a recording with one more draw of the stated noise on it."""
+    q = recording.q + noise.position_std * stream.standard_normal(recording.q.shape)
+    tau = recording.tau + noise.torque_std * stream.standard_normal(recording.tau.shape)
+    return recording.replace(q=q, tau=tau)
+
+
+def flagged_run(run: Run, carries: bool) -> Run:
+    """Return a run marked as carrying the payload, or not."""
+    return replace(run, versions=tuple(flagged(v, carries) for v in run.versions))

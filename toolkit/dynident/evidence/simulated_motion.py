@@ -1,0 +1,157 @@
+"""Motion without noise, from the closed loop simulated: instruments where nothing repeats.
+
+The columns of a noisy motion are biased. Where a motion repeats, each repetition is an instrument
+for the others. Where it does not, but the controller and its references are known, the present
+model is simulated in the same loop, with ideal sensors: its motion is near the true one and knows
+nothing of the noise. How the two enter the regression is said in `Run.moved`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dynident.closed_loop import Controller
+from dynident.effects import Effect
+from dynident.errors import DynidentError
+from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.evidence_fit import Present
+from dynident.evidence.runs import Run, gather, resimulated
+from dynident.fitting.history import Ending
+from dynident.fitting.instrumental import IV, SimulatedLoop
+from dynident.fitting.instrumental.source import Guess
+from dynident.model import Model
+from dynident.recording import Dataset
+
+_ROUNDS, _TOLERANCE = 6, 0.03  # of the first fit: instruments need not be those of the best fit
+
+
+@dataclass(eq=False)
+class SimulatedMotion:
+    """The recordings' references in the simulated loop of the present model.
+
+    Attributes
+    ----------
+    runs : the recordings with the simulated motion as their last version; empty where none could
+        be simulated, or none is needed.
+    notes : caveats, for the reader of the diagnosis.
+    controller : of the loop.
+    measured : the recordings behind `runs`.
+    left_out : effects of the present model that are not in its simulation.
+    """
+
+    runs: tuple[Run, ...] = ()
+    notes: tuple[str, ...] = ()
+    controller: Controller | None = None
+    measured: Dataset | None = None
+    left_out: tuple[Effect, ...] = ()
+
+    def renew(self, store: ColumnStore, present: Present) -> bool:
+        """Simulate another model and give its motion to a store.
+
+        What cannot be simulated is left out, with a note; where nothing can, the motion stays.
+
+        Returns
+        -------
+        Whether the store has new motions.
+        """
+        if self.controller is None or self.measured is None:
+            return False
+        model, values = present.model, present.values
+        carriers = [run.recording.payload for run in store.runs]
+        recordings = (
+            one.replace(payload=carries)
+            for one, carries in zip(self.measured.recordings, carriers, strict=True)
+        )
+        measured = replace(self.measured, recordings=tuple(recordings))
+        problem = ""
+        for effects in _ever_fewer(model.effects, self.left_out):
+            part, own = _without(model, values, effects)
+            try:
+                simulated = _simulated(self.controller, part, own, measured)
+                runs = resimulated(store.runs, simulated)
+            except DynidentError as error:
+                problem = problem or str(error)
+                continue
+            if effects and effects != self.left_out:
+                names = ", ".join(effect.title for effect in effects)
+                self._note(f"Instruments: simulated without {names} ({problem}).")
+            self.left_out = effects
+            self.runs = runs
+            store.renew(runs)
+            return True
+        self._note(f"Instruments: the motion of an earlier model, as {problem}.")
+        return False
+
+    def _note(self, note: str) -> None:
+        self.notes = (*self.notes, note)
+
+
+def motion_of_loop(
+    model: Model,
+    dataset: Dataset,
+    controller: Controller | None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> SimulatedMotion:
+    """Simulate a model, fitted with the simulation's instruments, in its recorded loop.
+
+    Parameters
+    ----------
+    model : as given.
+    dataset : recordings to fit.
+    controller : of their loop; None where it is not known.
+    tell : told what is being done, for a progress display.
+
+    Returns
+    -------
+    Without runs where a motion repeats (it is its own instrument), where the controller or a
+    reference is missing, or where the loop cannot be simulated.
+    """
+    if controller is None or any(recording.period for recording in dataset.recordings):
+        return SimulatedMotion()
+    if not all(recording.q_ref is not None for recording in dataset.recordings):
+        note = "The loop is not simulated for instruments: not every recording has q_ref."
+        return SimulatedMotion(notes=(note,))
+
+    def told(what: str, done: float, total: float) -> None:
+        tell(f"{what}, {100 * done / total:.0f} %" if total else what)
+
+    method = IV(SimulatedLoop(controller), rounds=_ROUNDS, tolerance=_TOLERANCE, tell=told)
+    try:
+        found = method.iterated(model, dataset)
+        runs = gather(found.source.measured, simulated=found.instruments)
+    except DynidentError as error:
+        return SimulatedMotion(notes=(f"The loop cannot be simulated for instruments: {error}",))
+    notes = found.source.notes
+    if found.ending is Ending.DOUBTFUL_LOOP:
+        notes = (*notes, found.message[0].upper() + found.message[1:])
+    return SimulatedMotion(runs, notes, controller, found.source.measured)
+
+
+def _simulated(
+    controller: Controller, model: Model, values: np.ndarray, measured: Dataset
+) -> Dataset:
+    # Believed are the inertias of these very values: the gains are the real loop's, as stated.
+    source = SimulatedLoop(controller).prepare(model, measured, Guess(values, (values,)))
+    return source.at(values)
+
+
+def _ever_fewer(effects: tuple[Effect, ...], known: tuple[Effect, ...]):
+    """What to leave out of a simulation: what had to be before, then one more from the end."""
+    labels = {effect.label for effect in known}
+    yield tuple(effect for effect in effects if effect.label in labels)
+    for count in range(1, len(effects) + 1):
+        yield effects[-count:]
+
+
+def _without(
+    model: Model, values: np.ndarray, effects: tuple[Effect, ...]
+) -> tuple[Model, np.ndarray]:
+    keep = np.ones(model.size, dtype=bool)
+    for effect in effects:
+        keep[model.slices[effect.label]] = False
+    labels = {effect.label for effect in effects}
+    kept = tuple(effect for effect in model.effects if effect.label not in labels)
+    return replace(model, effects=kept), values[keep]

@@ -1,0 +1,58 @@
+"""Estimators: from a model and recordings to an `Estimate`."""
+
+from __future__ import annotations
+
+from dynident.fitting.consistent.constrained import Constrained
+from dynident.fitting.consistent.metric import Metric
+from dynident.fitting.consistent.prior import Prior
+from dynident.fitting.consistent.projection import Projection, project
+from dynident.fitting.essential import EssentialParameters, essential_parameters
+from dynident.fitting.estimate import DataSource, Estimate
+from dynident.fitting.estimate_file import load_estimate
+from dynident.fitting.fit_model import Method, fit
+from dynident.fitting.given import given_estimate
+from dynident.fitting.history import Convergence
+from dynident.fitting.instrumental import IV, Filtered, SimulatedLoop, SwappedPeriods
+from dynident.fitting.least_squares import LeastSquares, LinearSolution, solve_factors
+from dynident.fitting.noisy_inputs import Regression
+from dynident.fitting.noisy_inputs.encoder_noise import encoder_noise
+from dynident.fitting.noisy_inputs.measured import InputNoise, input_noise
+from dynident.fitting.parameter_file import GivenParameters, read_parameters
+from dynident.fitting.sampling import Sampled, rows, sample
+from dynident.fitting.shape_search import refine_shapes, shaped_effects
+
+__all__ = [
+    "IV",
+    "Constrained",
+    "Convergence",
+    "EssentialParameters",
+    "Estimate",
+    "Filtered",
+    "GivenParameters",
+    "InputNoise",
+    "LeastSquares",
+    "LinearSolution",
+    "Method",
+    "Metric",
+    "Prior",
+    "Projection",
+    "Regression",
+    "Sampled",
+    "SimulatedLoop",
+    "Source",
+    "SwappedPeriods",
+    "TriangularFactors",
+    "encoder_noise",
+    "essential_parameters",
+    "fit",
+    "given_estimate",
+    "input_noise",
+    "load_estimate",
+    "project",
+    "read_parameters",
+    "refine_shapes",
+    "rows",
+    "sample",
+    "shaped_effects",
+    "solve_factors",
+]

@@ -1,0 +1,1 @@
+"""Estimates under constraints: metric, prior, projection, constrained least squares."""

@@ -1,0 +1,261 @@
+"""What a fit returns: values with units, uncertainties, and what they rest on."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dynident import files
+from dynident.errors import FitError
+from dynident.fitting.history import Convergence
+from dynident.inertia import margins
+from dynident.model import Model
+from dynident.nlp import Certificate
+from dynident.robot import BaseParameters, Robot
+from dynident.robot.patching import write
+from dynident.tables import Table, number, percent, print_tables
+
+
+@dataclass(frozen=True)
+class DataSource:
+    """A recording that an estimate rests on: its file and the SHA-256 of the file's content."""
+
+    file: str
+    sha256: str
+    filter: str
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Identified parameters of a model.
+
+    Attributes
+    ----------
+    model : the model that was fitted, with its shape parameters as refined.
+    values : (p,) in the order of `model.names`. Combinations that the data do not excite keep
+        the values of the robot description.
+    covariance : (p, p); rows of parameters that are not identified on their own are zero.
+    basis : which combinations of `model.names` the data identify, and the rank decision.
+    torque_std : (n,) standard deviation of the torque residual, N m or N.
+    joint_errors : (n,) norm of the residual over norm of the torque, on the data of the fit.
+    error : the same over all joints.
+    condition_number : of the columns identified, as they were weighted.
+    rows : number of equations.
+    method : how it was estimated.
+    status : the solver's word.
+    notes : caveats in plain words.
+    sources : the recordings.
+    links : inertial parameters (10,) of each link in its own frame, by name, where the fit chose
+        them (constrained fits do); None where only the base parameters are known.
+    certificate : how far a constrained fit is from the optimum of its problem.
+    history : the iterations of an instrumental variable estimate.
+    details : tables of what else the method has to say.
+    sigma_words : what the standard deviations hold, where the method has its own.
+    """
+
+    model: Model
+    values: np.ndarray
+    covariance: np.ndarray
+    basis: BaseParameters
+    torque_std: np.ndarray
+    joint_errors: np.ndarray
+    error: float
+    condition_number: float
+    rows: int
+    method: str
+    status: str
+    notes: tuple[str, ...] = ()
+    sources: tuple[DataSource, ...] = ()
+    links: dict[str, np.ndarray] | None = None
+    certificate: Certificate | None = None
+    history: Convergence | None = None
+    details: tuple[Table, ...] = ()
+    sigma_words: str = ""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return self.model.names
+
+    @cached_property
+    def identified(self) -> np.ndarray:
+        """Which parameters are identified, alone or as the head of a combination, (p,) bool."""
+        found = np.zeros(self.model.size, dtype=bool)
+        found[list(self.basis.independent)] = True
+        return found
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """Standard deviations, (p,); NaN where a parameter is not identified.
+
+        All of them NaN where the method has no covariance to give (a matrix of zeros).
+        """
+        sigma = np.sqrt(np.clip(np.diag(self.covariance), 0.0, None))
+        return np.where(self.identified & np.any(self.covariance), sigma, np.nan)
+
+    @property
+    def relative_sigma(self) -> np.ndarray:
+        """Standard deviations over absolute values, (p,)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return self.sigma / np.abs(self.values)
+
+    @cached_property
+    def robot(self) -> Robot:
+        """The robot with the identified base parameters.
+
+        What the data cannot tell (how a base parameter is shared among the links) stays as near to
+        the given description as it can, unless the fit chose it (`links`); without that the links
+        need not be physically consistent.
+        """
+        robot = self.model.robot
+        if self.links is not None:
+            return robot.with_links(self.links)
+        rigid = self.values[: len(self.model.base.independent)]
+        return robot.with_theta(self.model.base.lift(rigid, robot.theta))
+
+    def effect_values(self, label: str) -> np.ndarray:
+        """Parameters of one effect, by its label."""
+        return self.values[self.model.slices[label]]
+
+    def value(self, name: str) -> float:
+        """One parameter by its name.
+
+        Raises
+        ------
+        FitError
+            If there is no such parameter.
+        """
+        if name not in self.names:
+            raise FitError(f"no parameter '{name}'", mend=f"parameters: {', '.join(self.names)}")
+        return float(self.values[self.names.index(name)])
+
+    # --- in words ------------------------------------------------------------------------------
+
+    def parameter_table(self) -> Table:
+        """Values, standard deviations and what each parameter is a combination of."""
+        heads = dict(zip(self.basis.independent, self.basis.expressions, strict=True))
+        # What is identified is the combination: its value and sigma, not those of its head.
+        values, sigma = np.array(self.values), self.sigma
+        values[list(self.basis.independent)] = self.basis.coordinates(self.values)
+        values[~self.identified] = np.nan
+        rows = []
+        for i, name in enumerate(self.names):
+            expression = heads.get(i, "not told on its own, only in combinations")
+            if expression == name:
+                expression = self.model.expressions[i]
+            rows.append(
+                (
+                    name,
+                    number(values[i], 6),
+                    number(sigma[i], 3),
+                    percent(float(sigma[i] / abs(values[i])) if values[i] else None, 1),
+                    self.model.units[i],
+                    "" if expression == name else expression,
+                )
+            )
+        columns = ("parameter", "value", "sigma", "relative", "unit", "stands for")
+        return Table("Parameters", columns, tuple(rows), self._parameter_notes())
+
+    def error_table(self) -> Table:
+        """Torque errors on the data of the fit."""
+        robot = self.model.robot
+        rows = tuple(
+            (name, percent(error), number(std, 3), unit)
+            for name, error, std, unit in zip(
+                robot.names, self.joint_errors, self.torque_std, robot.torque_units, strict=True
+            )
+        )
+        columns = ("joint", "relative error", "residual std", "unit")
+        title = f"Torque error on the data of the fit: {percent(self.error, 4)}"
+        return Table(title, columns, rows)
+
+    def tables(self) -> tuple[Table | str, ...]:
+        """Everything that `show` prints, in its order."""
+        proved = (self.certificate.table(),) if self.certificate else ()
+        iterated = self.history.tables() if self.history else ()
+        own = (*iterated, *self.details)
+        return (self.parameter_table(), *own, self.error_table(), *proved, *self.notes)
+
+    def summary(self) -> str:
+        """The tables as text."""
+        return "\n".join(str(part) for part in self.tables())
+
+    def show(self) -> None:
+        """Print parameters, errors and caveats."""
+        print_tables(*self.tables())
+
+    def _parameter_notes(self) -> tuple[str, ...]:
+        return (
+            f"{self.method}; {self.rows} equations, {len(self.basis.independent)} of "
+            f"{self.model.size} parameters identified ({_decision(self.basis)}), "
+            f"condition number {self.condition_number:.6g}; {self.status}.",
+            self.words_of_sigma,
+        )
+
+    @property
+    def words_of_sigma(self) -> str:
+        """What the standard deviations hold, and what they do not."""
+        if self.sigma_words:
+            return self.sigma_words
+        if not np.any(self.covariance):
+            return "No sigma: the method has none to give."
+        if self.history:
+            return (
+                "sigma carries the noise of encoders and torque; what the model lacks is not in it."
+            )
+        return (
+            "sigma takes the errors of the equations as independent: what the model lacks is not "
+            "in it."
+        )
+
+    # --- files ---------------------------------------------------------------------------------
+
+    def to_dict(self) -> dict[str, Any]:
+        """The estimate as JSON holds it."""
+        # Imported where it is used: the file's module knows the estimate.
+        from dynident.fitting.estimate_file import to_dict
+
+        return to_dict(self)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the estimate as JSON, with the robot description in it.
+
+        Raises
+        ------
+        FileError
+            If the file cannot be written; an old one is then untouched.
+        """
+        return files.write_text(path, json.dumps(self.to_dict(), indent=1, allow_nan=True) + "\n")
+
+    def write_robot(self, path: str | Path) -> Path:
+        """Write the robot description with the identified inertial parameters.
+
+        A patched copy of the given description; see `robot` for what the data cannot tell.
+
+        Raises
+        ------
+        RobotError
+            If the format cannot hold the parameters (a massless link with a first moment, say).
+        """
+        return write(self.robot, path)
+
+    def inconsistent_links(self) -> tuple[str, ...]:
+        """Moving links of `robot` whose inertial parameters no rigid body can have."""
+        return tuple(
+            link.name
+            for link in self.robot.links
+            if link.joint >= 0 and not margins(link.phi).consistent
+        )
+
+
+def _decision(basis: BaseParameters) -> str:
+    """How the rank was decided, in words."""
+    if basis.rank == len(basis.names):
+        least = float(basis.diagonal[-1] / basis.diagonal[0])
+        return f"full rank, smallest direction {least:.2g} of the largest"
+    return f"rank gap {basis.gap:.2g} at tolerance {basis.tolerance:.0e}"

@@ -1,0 +1,252 @@
+"""Estimates as JSON: written, and read back only if every number can be what it stands for."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from dynident import files
+from dynident.effects import catalogue
+from dynident.errors import DynidentError, FitError
+from dynident.fitting.estimate import DataSource, Estimate
+from dynident.fitting.estimate_schema import BasisPart, EstimateFile, ModelPart
+from dynident.inertia import PARAMETERS
+from dynident.model import Model
+from dynident.robot import BaseParameters, Robot
+
+FORMAT = "dynident-estimate-1"
+
+_MEND = "save one with Estimate.save"
+# Of the standard deviations: what rounding makes of a symmetric matrix is far less.
+_SKEW = 1e-6
+
+
+def to_dict(estimate: Estimate) -> dict[str, Any]:
+    """Return an estimate as JSON holds it, with the robot description in it."""
+    model, basis = estimate.model, estimate.basis
+    description = model.robot.description
+    sigma, links, certificate = estimate.sigma, estimate.links, estimate.certificate
+    return {
+        "format": FORMAT,
+        "method": estimate.method,
+        "status": estimate.status,
+        "parameters": [
+            {
+                "name": name,
+                "value": float(estimate.values[i]),
+                "sigma": float(sigma[i]) if np.isfinite(sigma[i]) else None,
+                "unit": model.units[i],
+                "expression": model.expressions[i],
+            }
+            for i, name in enumerate(estimate.names)
+        ],
+        "covariance": estimate.covariance.tolist(),
+        "basis": {
+            "names": list(basis.names),
+            "independent": list(basis.independent),
+            "dependent": list(basis.dependent),
+            "expressions": list(basis.expressions),
+            "K": basis.K.tolist(),
+            "scale": basis.scale.tolist(),
+            "diagonal": basis.diagonal.tolist(),
+            "tolerance": basis.tolerance,
+        },
+        "torque_std": estimate.torque_std.tolist(),
+        "joint_errors": estimate.joint_errors.tolist(),
+        "error": estimate.error,
+        "condition_number": estimate.condition_number,
+        "rows": estimate.rows,
+        "notes": list(estimate.notes),
+        "sigma_words": estimate.words_of_sigma,
+        "recordings": [vars(source) for source in estimate.sources],
+        "links": links and {name: phi.tolist() for name, phi in links.items()},
+        "certificate": certificate and certificate.to_dict(),
+        "iterations": estimate.history and estimate.history.to_dict(),
+        "model": {
+            "robot": description.text if description else None,
+            "joints": list(model.robot.names),
+            "gravity": [float(g) for g in model.robot.gravity],
+            "friction_width": model.friction_width,
+            "effects": [
+                {
+                    "effect": effect.name,
+                    "joint": effect.joint,
+                    "source": effect.source,
+                    "shape": list(effect.shape),
+                    "point": list(effect.point),
+                }
+                for effect in model.effects
+            ],
+        },
+    }
+
+
+def load_estimate(path: str | Path) -> Estimate:
+    """Read an estimate that `Estimate.save` wrote.
+
+    Its certificate and its iterations are not read back: a proof holds for whoever has computed
+    it.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read.
+    FitError
+        If it is not an estimate of this version: a key is missing or of the wrong kind, a number
+        is not finite or beyond `LARGEST`, an array has not the size that the model needs, or the
+        model in it is none. The first such key is named.
+    """
+    where = str(path)
+    text = files.read_text(path)
+    if not text.strip():
+        raise FitError("is empty: not a dynident estimate", where, _MEND)
+    try:
+        read = json.loads(text)
+        # Half a surrogate pair is text to JSON, and to nothing that would print it.
+        json.dumps(read, ensure_ascii=False).encode("utf-8")
+        content = EstimateFile.model_validate(read)
+    except ValidationError as error:
+        raise _refusal(*_first(error), where) from None
+    except (ValueError, RecursionError) as error:
+        reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+        raise _refusal("not JSON", reason, where) from None
+    # Numbers of any size may be in the description: they are judged, not warned of.
+    with np.errstate(all="ignore"):
+        model = _model(content.model, where)
+        return _estimate(content, model, where)
+
+
+def _estimate(content: EstimateFile, model: Model, where: str) -> Estimate:
+    p, n = model.size, model.robot.n
+    names = [parameter.name for parameter in content.parameters]
+    _require_same(names, list(model.names), "parameters", where)
+    square = _matrix(content.covariance, (p, p), "covariance", where)
+    std = np.sqrt(np.clip(np.diag(square), 0.0, None))
+    skew = np.abs(square - square.T) > _SKEW * np.outer(std, std)
+    if np.any(np.diag(square) < 0.0) or np.any(skew):
+        raise _refusal("covariance", "is not symmetric with a diagonal of squares", where)
+    known = {link.name for link in model.robot.links}
+    for name, phi in (content.links or {}).items():
+        if name not in known:
+            raise _refusal(f"links.{name[:40]}", "the robot has no such link", where)
+        _require_count(phi, len(PARAMETERS), f"links.{name}", where)
+    for key in ("torque_std", "joint_errors"):
+        _require_count(getattr(content, key), n, key, where)
+    links = None
+    if content.links is not None:
+        links = {name: np.array(phi, dtype=float) for name, phi in content.links.items()}
+    return Estimate(
+        model,
+        np.array([parameter.value for parameter in content.parameters]),
+        square,
+        _basis(content.basis, model, where),
+        np.array(content.torque_std),
+        np.array(content.joint_errors),
+        content.error,
+        content.condition_number,
+        content.rows,
+        content.method,
+        content.status,
+        tuple(content.notes),
+        tuple(DataSource(one.file, one.sha256, one.filter) for one in content.recordings),
+        links,
+        sigma_words=content.sigma_words,
+    )
+
+
+def _model(given: ModelPart, where: str) -> Model:
+    _require_count(given.gravity, 3, "model.gravity", where)
+    known = catalogue()
+    for number, one in enumerate(given.effects):
+        if one.effect not in known:
+            what = f"no effect is named '{one.effect[:40]}'"
+            raise _refusal(f"model.effects.{number}.effect", what, where)
+    try:
+        robot = Robot.from_text(given.robot, where, given.joints, given.gravity)
+        effects = tuple(
+            known[one.effect](one.joint, one.source, tuple(one.shape), tuple(one.point))
+            for one in given.effects
+        )
+        model = Model(robot, effects, given.friction_width)
+        # The names are found from the dynamics: some descriptions fail only there.
+        assert model.names
+    except DynidentError as error:
+        raise _refusal("model", str(error).removeprefix(f"{where}: "), where) from None
+    return model
+
+
+def _basis(given: BasisPart, model: Model, where: str) -> BaseParameters:
+    p, rank = model.size, len(given.independent)
+    _require_same(given.names, list(model.names), "basis.names", where)
+    for key in ("independent", "dependent"):
+        indices = getattr(given, key)
+        if indices != sorted(set(indices)) or any(index >= p for index in indices):
+            raise _refusal(f"basis.{key}", f"needs ascending indices below {p}", where)
+    if sorted(given.independent + given.dependent) != list(range(p)):
+        what = "every parameter belongs to one of independent and dependent"
+        raise _refusal("basis.independent", what, where)
+    _require_count(given.expressions, rank, "basis.expressions", where)
+    _require_count(given.scale, p, "basis.scale", where)
+    diagonal = np.array(given.diagonal, dtype=float)
+    kept, dropped = diagonal[:rank], diagonal[rank:]
+    if not rank <= len(diagonal) <= p:
+        what = f"{len(diagonal)} numbers where {rank} to {p} are needed"
+        raise _refusal("basis.diagonal", what, where)
+    if not np.all(kept > 0.0) or (np.any(dropped) and not dropped[0] > 0.0):
+        raise _refusal("basis.diagonal", "is zero where a parameter was kept", where)
+    return BaseParameters(
+        tuple(given.names),
+        tuple(given.independent),
+        tuple(given.dependent),
+        _matrix(given.K, (rank, p - rank), "basis.K", where),
+        tuple(given.expressions),
+        np.array(given.scale, dtype=float),
+        diagonal,
+        given.tolerance,
+    )
+
+
+# --- refusals -----------------------------------------------------------------------------------
+
+
+def _refusal(key: str, what: str, where: str) -> FitError:
+    line = " ".join(f"{key}: {what}".split())
+    return FitError(f"is not a dynident estimate ({line})", where, _MEND)
+
+
+def _first(error: ValidationError) -> tuple[str, str]:
+    """The first key that is wrong, and what is wrong with it."""
+    first = error.errors(include_url=False, include_input=False)[0]
+    key = ".".join(str(part)[:40] for part in first["loc"]) or "content"
+    said = {
+        "missing": "is missing",
+        "model_type": "a table of keys and values is needed",
+        # pydantic would cite an integer of any length.
+        "int_from_float": "should be a whole number",
+    }
+    message = said.get(first["type"], first["msg"])
+    return key, message[:1].lower() + message[1:]
+
+
+def _require_count(given: list[Any], needed: int, key: str, where: str) -> None:
+    if len(given) != needed:
+        raise _refusal(key, f"{len(given)} values where {needed} are needed", where)
+
+
+def _require_same(given: list[str], needed: list[str], key: str, where: str) -> None:
+    _require_count(given, len(needed), key, where)
+    for i, (name, wanted) in enumerate(zip(given, needed, strict=True)):
+        if name != wanted:
+            what = f"'{name[:40]}' where the model has '{wanted}'"
+            raise _refusal(f"{key}.{i}", what, where)
+
+
+def _matrix(given: list[list[float]], shape: tuple[int, int], key: str, where: str) -> np.ndarray:
+    _require_count(given, shape[0], key, where)
+    for i, row in enumerate(given):
+        _require_count(row, shape[1], f"{key}.{i}", where)
+    return np.array(given, dtype=float).reshape(shape)

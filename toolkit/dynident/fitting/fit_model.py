@@ -1,0 +1,50 @@
+"""The verb `fit`: from a model and recordings to an `Estimate`, by whichever estimator."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Protocol
+
+from dynident.fitting.estimate import Estimate
+from dynident.fitting.least_squares import LeastSquares
+from dynident.fitting.shape_search import refine_shapes, shaped_effects
+from dynident.model import Model
+from dynident.recording import Dataset, Recording
+from dynident.threads import single_threaded
+
+
+class Method(Protocol):
+    """An estimator: it fits a model whose shape parameters are fixed."""
+
+    def fit(self, model: Model, dataset: Dataset) -> Estimate:
+        """Fit the model to the recordings."""
+        ...
+
+
+@single_threaded
+def fit(model: Model, data: Dataset | Recording, method: Method | None = None) -> Estimate:
+    """Identify the parameters of a model.
+
+    Shape parameters of effects are refined first, by variable projection; the linear parameters
+    follow from the method.
+
+    Parameters
+    ----------
+    model : the robot and its effects.
+    data : recordings with their filter; a single recording takes the default filter.
+    method : default: least squares, weighted per joint.
+
+    Raises
+    ------
+    FitError
+        If the data cannot carry the model.
+    RecordingError
+        If a recording does not suit its filter.
+    """
+    dataset = Dataset((data,)) if isinstance(data, Recording) else data
+    method = method or LeastSquares()
+    if not shaped_effects(model):
+        return method.fit(model, dataset)
+    shaped = refine_shapes(model, dataset)
+    estimate = method.fit(shaped.model, dataset)
+    return replace(estimate, status=f"{estimate.status}, {shaped.status}")

@@ -1,0 +1,19 @@
+"""Instrumental variables: estimates that are right although the positions are noisy."""
+
+from dynident.fitting.history import Convergence, Ending, Round
+from dynident.fitting.instrumental.estimator import IV
+from dynident.fitting.instrumental.filtered import Filtered
+from dynident.fitting.instrumental.simulated_loop import SimulatedLoop
+from dynident.fitting.instrumental.source import Instruments
+from dynident.fitting.instrumental.swapped_periods import SwappedPeriods
+
+__all__ = [
+    "IV",
+    "Convergence",
+    "Ending",
+    "Filtered",
+    "Instruments",
+    "Round",
+    "SimulatedLoop",
+    "SwappedPeriods",
+]

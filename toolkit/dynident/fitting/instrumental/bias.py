@@ -1,0 +1,126 @@
+"""The bias that instruments leave: what encoder noise does to columns that bend within it.
+
+E[tanh(v + n)] is not tanh(v): the regressor of dry friction is wrong in the mean, not only in the
+single sample, and no instrument mends that. How much it makes is found by adding noise of the
+measured size to the instruments' own motion, whose parameters are known, and estimating again.
+
+Sampling leaves a bias of its own: held torques and central differences do not match to the last
+digit. Where the instruments come with the torque of their simulation, it is known too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynident.fitting.instrumental.normal_equations import InstrumentalSolution
+from dynident.fitting.sampling import sample
+from dynident.model import Model
+from dynident.recording import Dataset, Recording
+
+_PAIRS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class ExpectedBias:
+    """What noise of the encoders does to an estimate in the mean.
+
+    Attributes
+    ----------
+    values : (p,) mean error of the draws.
+    uncertainty : (p,) standard error of that mean.
+    sampling : (p,) error of an estimate from the simulated torque and motion, without any noise;
+        NaN where the instruments' torque is not simulated.
+    residual_variance : (n,) that the noise makes in a row of each joint.
+    """
+
+    values: np.ndarray
+    uncertainty: np.ndarray
+    sampling: np.ndarray
+    residual_variance: np.ndarray
+
+
+def expected_bias(
+    model: Model,
+    values: np.ndarray,
+    instruments: Dataset,
+    solution: InstrumentalSolution,
+    position_std: np.ndarray,
+    simulated: np.ndarray | None = None,
+    seed: int = 0,
+) -> ExpectedBias:
+    """Estimate from the instruments' own motion under encoder noise.
+
+    Parameters
+    ----------
+    model : Model
+    values : (p,) the estimate.
+    instruments : recordings behind V.
+    solution : the estimate's weights.
+    position_std : (n,) encoder noise, rad or m.
+    simulated : (p,) values whose simulation the instruments are; None where they are none.
+    seed : of the noise.
+    """
+    kept = list(solution.basis.independent)
+    truth = values if simulated is None else simulated
+    sums = _Sums(model, solution, 2 * _PAIRS)
+    for recording in instruments.recordings:
+        sums.add(recording, instruments, truth, _motions(recording, position_std, seed))
+    # With the torque V values, the error is -(V' O^-1 W)^-1 V' O^-1 (W - V) values.
+    errors = -np.linalg.solve(sums.crossed, sums.shifted[:, :, None])[:, :, 0]
+    pairs = errors.reshape(_PAIRS, 2, -1).mean(axis=1)
+    bias, uncertainty, sampling = (np.zeros(model.size) for _ in range(3))
+    bias[kept] = pairs.mean(axis=0)
+    uncertainty[kept] = np.std(pairs, axis=0, ddof=1) / np.sqrt(_PAIRS)
+    if simulated is None:
+        sampling[:] = np.nan
+    else:
+        sampling[kept] = np.linalg.solve(sums.crossed.mean(axis=0), sums.sampled)
+    variance = sums.squares / sums.count / (2 * _PAIRS)
+    return ExpectedBias(bias, uncertainty, sampling, variance)
+
+
+def _motions(recording: Recording, position_std: np.ndarray, seed: int) -> list[Recording]:
+    """The recording with noise and with its mirror image: what is odd in it cancels."""
+    found = []
+    for draw in range(_PAIRS):
+        rng = np.random.default_rng((seed, draw))
+        noise = position_std * rng.standard_normal(recording.q.shape)
+        found += [recording.replace(q=recording.q + sign * noise) for sign in (1.0, -1.0)]
+    return found
+
+
+class _Sums:
+    """Products of instruments and noisy regressors, over all rows."""
+
+    def __init__(self, model: Model, solution: InstrumentalSolution, draws: int) -> None:
+        rank = solution.rank
+        self._model, self._kept = model, list(solution.basis.independent)
+        self._weights = solution.weights
+        self.crossed = np.zeros((draws, rank, rank))
+        self.shifted = np.zeros((draws, rank))
+        self.sampled = np.zeros(rank)
+        self.squares, self.count = np.zeros(model.robot.n), 0
+
+    def add(
+        self, clean: Recording, dataset: Dataset, values: np.ndarray, noisy: list[Recording]
+    ) -> None:
+        """Add the rows of a recording, clean and under each draw of noise."""
+        prepared = [sample(one, dataset.filter) for one in (clean, *noisy)]
+        torque, start = prepared[0].tau, 0
+        blocks = (one.columns(self._model, values) for one in prepared)
+        for V, *drawn in zip(*blocks, strict=True):
+            stop = start + len(V)
+            left = torque[start:stop] - V @ values
+            start = stop
+            instruments = V[:, :, self._kept] * (self._weights**2)[:, None]
+            self.count += len(V)
+            self.sampled += np.einsum("tij,ti->j", instruments, left)
+            for draw, W in enumerate(drawn):
+                self.crossed[draw] += np.einsum(
+                    "tij,tik->jk", instruments, W[:, :, self._kept], optimize=True
+                )
+                error = (W - V) @ values
+                self.shifted[draw] += np.einsum("tij,ti->j", instruments, error)
+                self.squares += np.sum(error**2, axis=0)

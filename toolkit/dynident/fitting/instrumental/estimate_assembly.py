@@ -1,0 +1,167 @@
+"""From the last iteration to an `Estimate`, with its uncertainties and caveats."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dynident.fitting.estimate import Estimate
+from dynident.fitting.history import Convergence
+from dynident.fitting.instrumental.bias import ExpectedBias, expected_bias
+from dynident.fitting.instrumental.covariance import carried_covariance, textbook_covariance
+from dynident.fitting.instrumental.noise_level import NoiseLevel, position_noise, torque_noise
+from dynident.fitting.instrumental.normal_equations import residual_std
+from dynident.fitting.instrumental.source import InstrumentSource
+from dynident.fitting.least_squares import sources_of
+from dynident.model import Model
+from dynident.tables import number
+
+if TYPE_CHECKING:
+    from dynident.fitting.instrumental.estimator import IV, Iterations
+
+_SURE = 10.0
+"""Standard errors from which an expected bias is told: the 99.5 % quantile of Student's t with the
+two degrees of freedom of three pairs."""
+_TOLD = 0.2
+"""Standard deviations of the estimate below which an expected bias is not worth a word."""
+_WEAK = 0.02
+"""Canonical correlation below which instruments and regressor hardly have to do with each other."""
+
+
+def assemble(
+    method: IV, source: InstrumentSource, iterations: Iterations, start_name: str
+) -> Estimate:
+    """Return the estimate of finished iterations; `start_name` is in words."""
+    model = iterations.model
+    found, solution, values = iterations.found, iterations.solution, iterations.values
+    noise, bias = _noise(model, source, iterations)
+    covariance = carried_covariance(model, values, iterations.instruments, solution, noise)
+    norms = found.residual_norms(values)
+    freedom = found.factors.rows - solution.rank
+    variance = float(np.sum((norms * solution.weights) ** 2)) / freedom
+    textbook = textbook_covariance(model, solution, variance)
+    torques = found.factors.torque_norms
+    history = Convergence(
+        names=model.names,
+        units=model.units,
+        start=iterations.start,
+        start_name=start_name,
+        rounds=tuple(iterations.rounds),
+        ending=iterations.ending,
+        message=iterations.message,
+        sigma=np.sqrt(np.diag(covariance)),
+        textbook_sigma=np.sqrt(np.diag(textbook)),
+        expected_bias=np.where(_sure(bias), bias.values, np.nan),
+        sampling_bias=bias.sampling,
+        position_std=noise.position_std,
+        torque_std=noise.torque_std,
+        noise_source=noise.source,
+    )
+    return Estimate(
+        model,
+        values,
+        covariance,
+        solution.basis,
+        residual_std(found, solution),
+        norms / np.where(torques > 0, torques, np.nan),
+        found.relative(norms),
+        solution.condition_number,
+        found.factors.rows,
+        f"{method.name}, {method.chosen.name}",
+        history.sentence,
+        (*_notes(model, solution, history, bias), *source.notes),
+        sources_of(source.measured),
+        history=history,
+    )
+
+
+def _noise(
+    model: Model, source: InstrumentSource, iterations: Iterations
+) -> tuple[NoiseLevel, ExpectedBias]:
+    given, measured = source.measured.noise, source.measured
+    position = given.position_std if given else position_noise(source, iterations.instruments)
+    position = np.asarray(position, dtype=float)
+    bias = expected_bias(
+        model,
+        iterations.values,
+        iterations.instruments,
+        iterations.solution,
+        position,
+        iterations.simulated,
+    )
+    if given:
+        torque = np.asarray(given.torque_std, dtype=float)
+        return NoiseLevel(position, torque, "given"), bias
+    counts = iterations.found.factors.counts
+    variance = iterations.found.residual_norms(iterations.values) ** 2 / counts
+    torque = torque_noise(measured, variance, bias.residual_variance, counts)
+    return NoiseLevel(position, torque, "measured"), bias
+
+
+def _notes(model: Model, solution, history: Convergence, bias: ExpectedBias) -> tuple[str, ...]:
+    notes = []
+    if solution.basis.dependent:
+        lost = ", ".join(model.names[i] for i in solution.basis.dependent)
+        notes.append(
+            f"The data do not excite every parameter: rank {solution.rank} of {model.size}. Not "
+            f"identified on their own, only in combination: {lost}."
+        )
+    if history.message:
+        notes.append(f"{history.ending.value.capitalize()}: {history.message}.".replace("?.", "?"))
+    if any(one.way.projected for one in history.rounds):
+        last = "the last" if history.rounds[-1].way.projected else "some"
+        notes.append(
+            f"The estimate before {last} of the iterations has no motion (its inertia matrix is "
+            "not positive definite, say): the nearest possible robot was simulated in its place."
+        )
+    if history.rounds and history.rounds[-1].correlation < _WEAK:
+        notes.append(
+            "Weak instruments: in one direction they have next to nothing in common with the "
+            f"regressor (canonical correlation {history.rounds[-1].correlation:.2g}); "
+            "its standard deviation says what is left."
+        )
+    dry = [label for label in (e.label for e in model.effects) if _is_dry(model, label)]
+    told = np.flatnonzero(_sure(bias) & (np.abs(bias.values) > _TOLD * history.sigma))
+    if dry:
+        notes.append(
+            "Instruments do not mend the columns of dry friction: the mean of tanh((v + noise)/w) "
+            "is not tanh(v/w), however long the recording. See the expected bias."
+        )
+    if told.size:
+        listed = ", ".join(
+            f"{model.names[i]} {number(float(bias.values[i]), 2)} {model.units[i]}" for i in told
+        )
+        notes.append(
+            "Expected bias, from adding encoder noise of this size to the instruments' own "
+            f"motion (not subtracted): {listed}."
+        )
+    clock = np.flatnonzero(np.abs(bias.sampling) > history.sigma)
+    if clock.size:
+        listed = ", ".join(
+            f"{model.names[i]} {number(float(bias.sampling[i]), 2)} {model.units[i]}" for i in clock
+        )
+        notes.append(
+            "Sampling (central differences, held torques, filters) shifts some parameters by more "
+            f"than their noise, which the intervals do not hold (not subtracted): {listed}."
+        )
+    return tuple(notes)
+
+
+def _sure(bias: ExpectedBias) -> np.ndarray:
+    return np.abs(bias.values) > _SURE * bias.uncertainty
+
+
+def _is_dry(model: Model, label: str) -> bool:
+    """Whether an effect's columns depend on the width of the friction law."""
+    from dataclasses import replace
+
+    effect = next(e for e in model.effects if e.label == label)
+    if "whole" in effect.needs:
+        return False
+    n = model.robot.n
+    speed = np.full((1, n), model.friction_width)
+    block = model.block(np.zeros(1), np.zeros((1, n)), speed, np.zeros((1, n)))
+    block = replace(model.ready(effect, block, None), torque=np.ones((1, n)))
+    wider = replace(block, friction_width=2.0 * model.friction_width)
+    return bool(np.any(effect.columns(block) != effect.columns(wider)))

@@ -1,0 +1,202 @@
+"""Triangular factors of instruments, regressor and torque side by side, and their solution.
+
+Everything that an instrumental variable estimate needs (the estimate, the ranks, both residuals)
+is in the R of a QR factorisation of [V, W, y], so that neither matrix is ever kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from dynident.errors import FitError
+from dynident.fitting.least_squares import RANK_TOLERANCE
+from dynident.fitting.sampling import sample
+from dynident.model import Model
+from dynident.moments.factors import TriangularFactors, factorise
+from dynident.recording import Dataset
+from dynident.robot import BaseParameters, base_parameters
+
+
+@dataclass(frozen=True, eq=False)
+class InstrumentalFactors:
+    """The factor of [V, W, y], joint by joint.
+
+    Attributes
+    ----------
+    factors : of 2 p + 1 columns: p instruments, p columns of the regressor, the torque.
+    size : p.
+    """
+
+    factors: TriangularFactors
+    size: int
+
+    def residual_norms(self, values: np.ndarray) -> np.ndarray:
+        """Norm of y - W values per joint, (n,): the regressor as it was measured."""
+        return self.factors.residual_norms(np.concatenate([np.zeros(self.size), values]))
+
+    def simulated_norms(self, values: np.ndarray) -> np.ndarray:
+        """Norm of y - V values per joint, (n,): the instruments in place of the regressor."""
+        return self.factors.residual_norms(np.concatenate([values, np.zeros(self.size)]))
+
+    def relative(self, norms: np.ndarray) -> float:
+        """A residual over all joints, relative to the torque."""
+        return float(np.linalg.norm(norms) / np.linalg.norm(self.factors.torque_norms))
+
+
+def moments(
+    model: Model, measured: Dataset, instruments: Dataset, values: np.ndarray | None = None
+) -> InstrumentalFactors:
+    """Factorise the rows of measured recordings beside those of their instruments.
+
+    Parameters
+    ----------
+    model : whose columns both are.
+    measured : T samples in each recording.
+    instruments : the same recordings with other positions, on the same time stamps.
+    values : (p,) at which columns that depend on the predicted torque are taken.
+    """
+    return InstrumentalFactors(factorise(_rows(model, measured, instruments, values)), model.size)
+
+
+def _rows(
+    model: Model, measured: Dataset, instruments: Dataset, values: np.ndarray | None
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    for one, other in zip(measured.recordings, instruments.recordings, strict=True):
+        own, instrument = sample(one, measured.filter), sample(other, instruments.filter)
+        start = 0
+        for V, W in zip(instrument.columns(model, values), own.columns(model, values), strict=True):
+            stop = start + len(W)
+            yield np.concatenate([V, W], axis=2), own.tau[start:stop]
+            start = stop
+
+
+@dataclass(frozen=True, eq=False)
+class InstrumentalSolution:
+    """What the factors give.
+
+    Attributes
+    ----------
+    values : (p,) what the data do not tell stays as it was given.
+    basis : combinations that the instruments identify.
+    gain : (r, r) inverse of V' O^-1 W on the independent columns; O holds each joint's variance.
+    crossed : (r, r) V' O^-1 V on them.
+    weights : (n,) 1 / standard deviation of each joint's residual.
+    condition_number : of V' O^-1 W with columns of unit norm.
+    correlation : smallest canonical correlation of instruments and regressor.
+    """
+
+    values: np.ndarray
+    basis: BaseParameters
+    gain: np.ndarray
+    crossed: np.ndarray
+    weights: np.ndarray
+    condition_number: float
+    correlation: float
+
+    @property
+    def rank(self) -> int:
+        """Number of combinations identified."""
+        return self.basis.rank
+
+
+def solve(
+    found: InstrumentalFactors, names: tuple[str, ...], given: np.ndarray, weighting: str
+) -> InstrumentalSolution:
+    """Solve V' O^-1 W x = V' O^-1 y through two QR factorisations.
+
+    With V = Qv Rv and W = Qw Rw it is Qv' W x = Qv' y, in which no condition number is squared
+    (Janot et al. 2010, equation 34).
+
+    Parameters
+    ----------
+    found : factors of [V, W, y].
+    names : of the p parameters.
+    given : (p,) values of what the data do not tell.
+    weighting : "joint": O holds the variance of each joint's residual in the ordinary solution;
+        "none": O = E.
+
+    Raises
+    ------
+    FitError
+        If there are too few rows, the torque is zero, or the instruments do not reach every
+        direction of the regressor that they excite.
+    """
+    factors = found.factors
+    if factors.rows <= found.size:
+        what = f"{factors.rows} equations for {found.size} parameters"
+        raise FitError(what, mend="record longer, or raise rate_hz in [filter]")
+    if not np.any(factors.torque_norms > 0):
+        raise FitError("the torque is zero throughout", mend="is it the right column?")
+    ordinary = _solve(found, names, given, np.ones(len(factors.counts)))
+    if weighting == "none" or len(factors.counts) == 1:
+        return ordinary
+    return _solve(found, names, given, 1.0 / residual_std(found, ordinary))
+
+
+def residual_std(found: InstrumentalFactors, solution: InstrumentalSolution) -> np.ndarray:
+    """Standard deviation of y - W x of each joint, (n,)."""
+    counts = found.factors.counts
+    share = solution.rank / len(counts)
+    std = found.residual_norms(solution.values) / np.sqrt(np.maximum(counts - share, 1.0))
+    least = 1e-12 * np.max(found.factors.torque_norms / np.sqrt(counts))
+    return np.maximum(std, least)
+
+
+def _solve(
+    found: InstrumentalFactors, names: tuple[str, ...], given: np.ndarray, weights: np.ndarray
+) -> InstrumentalSolution:
+    p = found.size
+    R = found.factors.pooled(weights)
+    # Noise gives the measured regressor full rank whatever the motion: the instruments decide.
+    basis = base_parameters(R[:p, :p], names, RANK_TOLERANCE)
+    kept = list(basis.independent)
+    Q, Rv = np.linalg.qr(R[:p, kept])
+    Rw = np.linalg.qr(R[: 2 * p, [p + i for i in kept]])[1]
+    across = Q.T @ R[:p, [p + i for i in kept]]
+    _require_rank(across, Rw, names, kept)
+    values = np.linalg.solve(across, Q.T @ R[:p, 2 * p])
+    inverse = np.linalg.inv(across)
+    return InstrumentalSolution(
+        basis.lift(values, given),
+        basis,
+        inverse @ solve_triangular(Rv.T, np.eye(len(kept)), lower=True),
+        Rv.T @ Rv,
+        weights,
+        _condition(Rv.T @ across),
+        _least_correlation(across, Rw),
+    )
+
+
+def _condition(matrix: np.ndarray) -> float:
+    """Condition number with rows and columns of unit norm, so that units do not decide."""
+    matrix = matrix / np.linalg.norm(matrix, axis=1)[:, None]
+    return float(np.linalg.cond(matrix / np.linalg.norm(matrix, axis=0)))
+
+
+def _least_correlation(across: np.ndarray, Rw: np.ndarray) -> float:
+    """Smallest singular value of Qv' Qw."""
+    correlation = solve_triangular(Rw.T, across.T, lower=True).T
+    return float(np.linalg.svd(correlation, compute_uv=False)[-1])
+
+
+def _require_rank(
+    across: np.ndarray, Rw: np.ndarray, names: tuple[str, ...], kept: list[int]
+) -> None:
+    """Refuse instruments and a regressor of different rank: rank V = rank W = rank V'W."""
+    for matrix, what in ((Rw, "the measured regressor"), (across, "V' W")):
+        norms = np.linalg.norm(matrix, axis=0)
+        scaled = matrix / np.where(norms > 0, norms, 1.0)
+        singular = np.linalg.svd(scaled, compute_uv=False)
+        rank = int(np.count_nonzero(singular > RANK_TOLERANCE * singular[0]))
+        if rank < len(kept) or not np.all(norms > 0):
+            weakest = np.linalg.svd(scaled)[2][-1]
+            blamed = names[kept[int(np.argmax(np.abs(weakest)))]]
+            raise FitError(
+                f"the rank of {what} is {rank}, that of the instruments {len(kept)}",
+                f"instruments, at {blamed}",
+                "record a motion that excites it, or choose other instruments",
+            )

@@ -1,0 +1,149 @@
+"""What instruments are to the estimator, wherever they come from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+
+from dynident.errors import RecordingError
+from dynident.fitting.sampling import LEAST_ROWS
+from dynident.model import Model
+from dynident.recording import Dataset, Filter, ParallelFilter, Recording, default_filter, uniform
+
+Tell = Callable[[str, float, float], None]
+"""(what is being done, how much is done, how much there is to do)."""
+
+_PERIODS = 3.0
+"""Of the position's cut-off, after which its filter no longer shows an end (to 1 %)."""
+
+
+def silent(what: str, done: float, total: float) -> None:
+    """Tell nobody."""
+
+
+@dataclass(frozen=True, eq=False)
+class Guess:
+    """What is believed before the first iteration.
+
+    Attributes
+    ----------
+    start : (p,) where the iterations begin.
+    others : (p,) values that may be nearer to the truth where the start is none, best first.
+    tell : of progress.
+    """
+
+    start: np.ndarray
+    others: tuple[np.ndarray, ...] = ()
+    tell: Tell = field(default=silent)
+
+
+class InstrumentSource(Protocol):
+    """Instruments of some recordings, made anew at each estimate if they depend on it.
+
+    Attributes
+    ----------
+    measured : recordings on a uniform clock, their windows without what is transient.
+    notes : caveats.
+    noise_share : variance of (measured - instrument) position over that of the encoder's noise.
+    iterates : whether the instruments depend on the estimate.
+    """
+
+    @property
+    def measured(self) -> Dataset: ...
+
+    @property
+    def notes(self) -> tuple[str, ...]: ...
+
+    @property
+    def noise_share(self) -> float: ...
+
+    @property
+    def iterates(self) -> bool: ...
+
+    def at(self, values: np.ndarray) -> Dataset:
+        """Return the instruments of an estimate: `measured` with other positions.
+
+        Raises
+        ------
+        SimulationError
+            If the estimate cannot be simulated.
+        """
+        ...
+
+    def verdict(self) -> str:
+        """Return what speaks against the last instruments, in words; empty if nothing does."""
+        ...
+
+
+class Instruments(Protocol):
+    """A choice of instruments."""
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        ...
+
+    def prepare(self, model: Model, dataset: Dataset, guess: Guess) -> InstrumentSource:
+        """Return the instruments of recordings.
+
+        Raises
+        ------
+        FitError, RecordingError, SimulationError
+            If the recordings cannot have such instruments.
+        """
+        ...
+
+
+def prepared(dataset: Dataset) -> Dataset:
+    """Return the recordings on uniform clocks, their windows away from the ends.
+
+    Instruments then have the same time stamps. At the very ends differences are one-sided and pass
+    several times the noise of central ones, and filters make up what they do not see; measured and
+    simulated motion end differently.
+    """
+    recordings = (uniform(recording) for recording in dataset.recordings)
+    return replace(
+        dataset, recordings=tuple(_away_from_ends(one, dataset.filter) for one in recordings)
+    )
+
+
+def _away_from_ends(recording: Recording, settings: Filter | None) -> Recording:
+    rate = recording.rate_hz
+    settings = settings or default_filter(rate)
+    parallel = ParallelFilter(settings, rate, recording.period, recording.where)
+    cutoff = settings.position_cutoff_hz
+    margin = parallel.transient + (_PERIODS / cutoff if cutoff else 0.0)
+    # Half a sample more: a window's end is no matter of rounding.
+    margin = max(margin, 1.5 / rate)
+    first, last = recording.window or (-np.inf, np.inf)
+    first = max(first, float(recording.t[0]) + margin)
+    last = min(last, float(recording.t[-1]) - margin)
+    if last - first < LEAST_ROWS / rate:
+        what = f"{recording.duration:.4g} s are next to nothing between the filter's ends"
+        mend = (
+            f"it needs {margin:.3g} s at each: record longer, raise the cut-offs, or leave it out"
+        )
+        raise RecordingError(what, recording.where, mend)
+    return recording.replace(window=(first, last))
+
+
+@dataclass(frozen=True, eq=False)
+class FixedInstruments:
+    """Instruments that do not depend on the estimate; see `Source`."""
+
+    measured: Dataset
+    instruments: Dataset
+    notes: tuple[str, ...]
+    noise_share: float
+    iterates: bool = False
+
+    def at(self, values: np.ndarray) -> Dataset:
+        """Return the instruments."""
+        return self.instruments
+
+    def verdict(self) -> str:
+        """Return nothing: there is no loop to doubt."""
+        return ""

@@ -1,0 +1,188 @@
+"""Linear least squares on the triangular factors, ordinary or weighted per joint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Literal
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from dynident.errors import FitError
+from dynident.fitting.estimate import DataSource, Estimate
+from dynident.fitting.sampling import rows
+from dynident.fitting.settling import Settling, unsettled
+from dynident.model import Model
+from dynident.moments.factors import TriangularFactors, factorise
+from dynident.recording import Dataset, default_filter
+from dynident.robot import BaseParameters, base_parameters
+from dynident.threads import single_threaded
+
+RANK_TOLERANCE = 1e-8
+"""Share of the largest diagonal of R (unit columns) below which data do not excite a direction."""
+
+_ROUNDS = 30  # of columns that depend on the model's own values, until they settle
+_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class LeastSquares:
+    """Least squares for models that are linear in their parameters.
+
+    Attributes
+    ----------
+    weighting : "joint" divides each joint's rows by the standard deviation of its residual in the
+        ordinary fit (weighted least squares of the identification literature); "none" is ordinary
+        least squares.
+    """
+
+    weighting: Literal["joint", "none"] = "joint"
+    name: ClassVar[str] = "least squares"
+
+    @single_threaded
+    def fit(self, model: Model, dataset: Dataset) -> Estimate:
+        """Fit a model whose shape parameters are what they are.
+
+        Raises
+        ------
+        FitError
+            If there are fewer equations than parameters, or the torque is zero throughout.
+        """
+        if not dataset.recordings:
+            raise FitError("no recording to fit", mend='mark some recordings use = "train"')
+        factors = factorise(rows(model, dataset))
+        solution = solve_factors(model, factors, self.weighting)
+        if model.needs_values:
+            model, factors, solution = self._settle(model, dataset, solution.values)
+        return estimate_of(self.name, self.weighting, model, dataset, factors, solution)
+
+    def _settle(
+        self, model: Model, dataset: Dataset, values: np.ndarray
+    ) -> tuple[Model, TriangularFactors, LinearSolution]:
+        """Fit with columns at the values fitted before, until both agree."""
+        settling = Settling()
+        for _ in range(_ROUNDS):
+            model = model.at(values)
+            factors = factorise(rows(model, dataset, values))
+            solution = solve_factors(model, factors, self.weighting)
+            change = np.linalg.norm(solution.values - values) / np.linalg.norm(values)
+            if change <= _TOLERANCE:
+                break
+            values = settling.following(model, values, solution.values)
+        else:
+            solution = replace(solution, notes=(*solution.notes, unsettled(float(change))))
+        return model.at(solution.values), factors, solution
+
+
+@dataclass(frozen=True, eq=False)
+class LinearSolution:
+    """Weighted least squares on factors; see `Estimate` for the attributes."""
+
+    values: np.ndarray
+    covariance: np.ndarray
+    basis: BaseParameters
+    torque_std: np.ndarray
+    condition_number: float
+    notes: tuple[str, ...] = field(default=())
+
+
+def solve_factors(
+    model: Model, factors: TriangularFactors, weighting: Literal["joint", "none"] = "joint"
+) -> LinearSolution:
+    """Solve for the parameters that the data identify; the rest stays as given.
+
+    Raises
+    ------
+    FitError
+        If there are fewer equations than parameters, or the torque is zero throughout.
+    """
+    if factors.rows <= model.size:
+        what = f"{factors.rows} equations for {model.size} parameters"
+        raise FitError(what, mend="record longer, or raise rate_hz in [filter]")
+    if not np.any(factors.torque_norms > 0):
+        raise FitError("the torque is zero throughout", mend="is it the right column?")
+    ordinary = _solve(model, factors, np.ones(len(factors.counts)))
+    std = residual_std(factors, ordinary)
+    if weighting == "none" or len(std) == 1:
+        return replace(ordinary, torque_std=std)
+    weighted = _solve(model, factors, 1.0 / std)
+    return replace(weighted, torque_std=residual_std(factors, weighted))
+
+
+def _solve(model: Model, factors: TriangularFactors, weights: np.ndarray) -> LinearSolution:
+    p = model.size
+    R = factors.pooled(weights)
+    basis = base_parameters(R[:p, :p], model.names, RANK_TOLERANCE)
+    kept = list(basis.independent)
+    # The kept columns of a triangle are no triangle: factorise once more.
+    Q, triangle = np.linalg.qr(R[:, kept])
+    rank = len(kept)
+    found = solve_triangular(triangle, Q.T @ R[:, p])
+    residual = R[:, p] - R[:, kept] @ found
+    variance = float(residual @ residual) / (factors.rows - rank)
+    inverse = solve_triangular(triangle, np.eye(rank))
+    covariance = np.zeros((p, p))
+    covariance[np.ix_(kept, kept)] = variance * inverse @ inverse.T
+    values = basis.lift(found, model.given_values())
+    notes = ()
+    if basis.dependent:
+        lost = ", ".join(model.names[i] for i in basis.dependent)
+        notes = (
+            f"The data do not excite every parameter: rank {rank} of {p}. Not identified on their "
+            f"own, only in combination: {lost}.",
+        )
+    return LinearSolution(
+        values,
+        covariance,
+        basis,
+        np.zeros(len(factors.counts)),
+        float(np.linalg.cond(triangle)),
+        notes,
+    )
+
+
+def residual_std(factors: TriangularFactors, solution: LinearSolution) -> np.ndarray:
+    """Standard deviation of each joint's residual, its share of the parameters accounted for."""
+    share = solution.basis.rank / len(factors.counts)
+    std = factors.residual_norms(solution.values) / np.sqrt(np.maximum(factors.counts - share, 1.0))
+    least = 1e-12 * np.max(factors.torque_norms / np.sqrt(factors.counts))
+    return np.maximum(std, least)
+
+
+def estimate_of(
+    name: str,
+    weighting: str,
+    model: Model,
+    dataset: Dataset,
+    factors: TriangularFactors,
+    solution: LinearSolution,
+) -> Estimate:
+    """Assemble an `Estimate` from a solution."""
+    norms = factors.torque_norms
+    residuals = factors.residual_norms(solution.values)
+    words = "ordinary" if weighting == "none" else "weighted per joint"
+    return Estimate(
+        model,
+        solution.values,
+        solution.covariance,
+        solution.basis,
+        solution.torque_std,
+        residuals / np.where(norms > 0, norms, np.nan),
+        float(np.linalg.norm(residuals) / np.linalg.norm(norms)),
+        solution.condition_number,
+        factors.rows,
+        f"{name}, {words}",
+        "solved",
+        solution.notes,
+        sources_of(dataset),
+    )
+
+
+def sources_of(dataset: Dataset) -> tuple[DataSource, ...]:
+    """The files behind a dataset."""
+    found = []
+    for recording in dataset.recordings:
+        settings = dataset.filter or default_filter(recording.rate_hz)
+        file, digest = recording.provenance.file, recording.provenance.sha256
+        found.append(DataSource(recording.name or file, digest, settings.description))
+    return tuple(found)

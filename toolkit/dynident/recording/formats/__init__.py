@@ -1,0 +1,1 @@
+"""Files of recordings: CSV, NPZ, MAT and Parquet, read and written."""

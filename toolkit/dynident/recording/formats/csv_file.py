@@ -1,0 +1,172 @@
+"""CSV files in: a header line, then one line of numbers a sample."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+import warnings
+from collections.abc import Sequence
+
+import numpy as np
+
+from dynident.errors import FileError, RecordingError
+from dynident.recording.formats.columns import ColumnTable
+
+
+def open_csv(data: bytes, file: str) -> ColumnTable:
+    """Return the table that the bytes of a CSV file hold.
+
+    Commas, semicolons or tabs separate the columns; numbers have a decimal point.
+
+    Raises
+    ------
+    FileError
+        If the bytes are not UTF-8 text.
+    RecordingError
+        If there is no header, or a name is in it twice. `Table.load` raises it for a line with
+        too few or too many columns, and for a cell that is not a finite number.
+    """
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        what = f"is not UTF-8 text (byte {error.start})"
+        raise FileError(what, file, "is it the right file?") from None
+    if "\0" in text:
+        raise FileError("is not text (it holds NUL bytes)", file, "is it the right file?")
+    text = text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n ")
+    if not text:
+        raise RecordingError("is empty", file, "the first line names the columns: t, q.<joint> ...")
+    first, _, body = text.partition("\n")
+    separator = _separator(first, body.partition("\n")[0])
+    names = _header(first, separator, file)
+
+    def load(wanted: Sequence[str]) -> dict[str, np.ndarray]:
+        if not body.strip():
+            mend = "is the file complete?"
+            raise RecordingError("holds a header but no samples", file, mend)
+        places = [names.index(name) for name in wanted]
+        values = _fast(body, separator, len(names), places)
+        if values is None:
+            values = _careful(body, separator, names, places, file)
+        return {name: values[:, i] for i, name in enumerate(wanted)}
+
+    return ColumnTable(file, names, load)
+
+
+def _separator(header: str, row: str) -> str:
+    """What separates the columns; names may hold other separators, which no row of numbers has."""
+    bare = re.sub('"[^"]*"', "", header)
+    both = [mark for mark in ",;\t" if 0 < bare.count(mark) == row.count(mark)]
+    return max(both or ",;\t", key=bare.count)
+
+
+def _header(line: str, separator: str, file: str) -> tuple[str, ...]:
+    try:
+        names = tuple(
+            name.strip()
+            for name in next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+        )
+    except (csv.Error, StopIteration) as error:
+        raise RecordingError(f"the header cannot be read ({error})", f"{file}, line 1") from None
+    if all(is_number(name) for name in names):
+        raise RecordingError(
+            "the first line holds numbers, not the names of columns",
+            f"{file}, line 1",
+            "write a header line: t, q.<joint>, tau.<joint> ...",
+        )
+    for name in names:
+        if name and names.count(name) > 1:
+            raise RecordingError(
+                f"the column '{name}' is there {names.count(name)} times",
+                f"{file}, line 1",
+                "name each column once",
+            )
+    return names
+
+
+def _fast(body: str, separator: str, width: int, places: list[int]) -> np.ndarray | None:
+    """Values (T, k), or None if anything is odd: then the careful reader has to say what."""
+    if '"' in body or not _is_regular(body, separator, width):
+        return None
+    import pandas as pd
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            frame = pd.read_csv(
+                io.StringIO(body),
+                sep=separator,
+                header=None,
+                names=list(range(width)),
+                usecols=sorted(set(places)),
+                index_col=False,
+                dtype=np.float64,
+                engine="c",
+                float_precision="round_trip",
+                keep_default_na=False,
+                skip_blank_lines=False,
+                skipinitialspace=True,
+            )
+    except Exception:  # whatever pandas makes of it, the careful reader has the last word
+        return None
+    values = frame[places].to_numpy(dtype=np.float64)
+    return values if np.isfinite(values).all() else None
+
+
+def _is_regular(body: str, separator: str, width: int) -> bool:
+    """Whether every line has as many columns as the header."""
+    bytes_ = np.frombuffer(body.encode() + b"\n", dtype=np.uint8)
+    ends = np.flatnonzero(bytes_ == ord("\n"))
+    before = np.searchsorted(np.flatnonzero(bytes_ == ord(separator)), ends)
+    return bool(np.all(np.diff(before, prepend=0) == width - 1))
+
+
+def _careful(
+    body: str, separator: str, names: tuple[str, ...], places: list[int], file: str
+) -> np.ndarray:
+    """Values (T, k), line by line, with an error that names the line and the column."""
+    rows: list[list[float]] = []
+    reader = csv.reader(io.StringIO(body, newline=""), delimiter=separator, skipinitialspace=True)
+    line = 1
+    try:
+        for cells in reader:
+            line = reader.line_num + 1
+            where = f"{file}, line {line}"
+            if not any(cell.strip() for cell in cells):
+                raise RecordingError("the line is empty", where, "remove it")
+            if len(cells) != len(names):
+                raise RecordingError(
+                    f"{len(cells)} column{'s' * (len(cells) != 1)} where the header has "
+                    f"{len(names)}",
+                    where,
+                    "is the file complete?" if len(cells) < len(names) else "name every column",
+                )
+            rows.append([_cell(cells[i], f"{where}, column {names[i]}") for i in places])
+    except csv.Error as error:
+        raise RecordingError(f"cannot be read ({error})", f"{file}, after line {line}") from None
+    return np.array(rows, dtype=np.float64)
+
+
+def _cell(text: str, where: str) -> float:
+    text = text.strip()
+    if not text:
+        raise RecordingError("the cell is empty", where, "every cell holds a number")
+    if not is_number(text):
+        comma = text.count(",") == 1 and is_number(text.replace(",", "."))
+        shown = text if len(text) <= 30 else text[:27] + "..."
+        mend = "write a decimal point" if comma else "every cell holds a number"
+        raise RecordingError(f"'{shown}' is not a number", where, mend)
+    if not np.isfinite(value := float(text)):
+        raise RecordingError(f"'{text}' is not a finite number", where, "repair or cut the gap")
+    return value
+
+
+def is_number(text: str) -> bool:
+    """Whether a cell of a file is a number."""
+    # float() takes 1_000 for a number; no other program does.
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return "_" not in text and text.isascii()

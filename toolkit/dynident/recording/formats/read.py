@@ -1,0 +1,112 @@
+"""Recordings in, from CSV, NPZ, MAT and Parquet files."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dynident import files
+from dynident.errors import RecordingError
+from dynident.recording.formats.binary_files import open_mat, open_npz, open_parquet
+from dynident.recording.formats.columns import (
+    OPTIONAL,
+    PARTIAL,
+    REQUIRED,
+    Column,
+    joints_in,
+    load,
+    resolve,
+)
+from dynident.recording.formats.csv_file import open_csv
+from dynident.recording.formats.records import pick
+from dynident.recording.recording import Provenance, Recording, _joint_names
+from dynident.recording.units_check import warn_of_units
+
+_OPENERS = {".csv": open_csv, ".npz": open_npz, ".mat": open_mat, ".parquet": open_parquet}
+SUFFIXES = tuple(_OPENERS)
+
+
+def read(
+    path: str | Path,
+    joints: Sequence[str] | None = None,
+    columns: Mapping[str, Column | str] | None = None,
+    kinds: Sequence[str] | None = None,
+    record: str | None = None,
+) -> Recording:
+    """Read a recording; the file's suffix says its format.
+
+    Parameters
+    ----------
+    path : file with `t` (s) and, for each joint, `q.<joint>` and `tau.<joint>`; optionally
+        `v.<joint>`, `a.<joint>`, `q_ref.<joint>`, and `temperature.<joint>` (degrees Celsius) at
+        any of the joints; SI units. In MAT files `q_<joint>` and so on,
+        since names of variables hold no dots. Whatever else it holds is ignored.
+    joints : names, the order of the columns; by default every joint of the file, in its order.
+    columns : ours -> theirs for files with other names or units, as
+        `{"tau.slider": Column("vir", 35.15)}`; names that it leaves out are ours.
+    kinds : "revolute" or "prismatic" for each joint, for warnings of units.
+    record : which one of an NPZ or MAT file that holds several: a two-dimensional array each, a row
+        a sample, and one array of text, `columns`, that names the columns of all.
+
+    Returns
+    -------
+    Recording
+        Named after the record, else the file; period, use and so on are set with
+        `Recording.replace`.
+
+    Raises
+    ------
+    FileError
+        If the file is not there or cannot be read.
+    RecordingError
+        If its content is not a recording: see `Recording` and the readers of each format.
+
+    Warns
+    -----
+    DynidentWarning
+        If time stamps, positions or velocities do not look like SI units.
+    """
+    path = Path(path)
+    where = str(path)
+    opener = _OPENERS.get(path.suffix.lower())
+    if opener is None:
+        raise unknown_suffix(path)
+    data = files.read_bytes(path)
+    if not data:
+        raise RecordingError("is empty", where, "is the file complete?")
+    table = opener(data, where)
+    if record is not None:
+        table = pick(table, record)
+    names = joints_in(table) if joints is None else _joint_names(joints, where)
+    if kinds is not None and len(kinds) != len(names):
+        raise RecordingError(f"{len(kinds)} kinds for {len(names)} joints", where)
+    found = load(table, resolve(table, names, columns))
+    signals: dict[str, Any] = {
+        signal: np.column_stack([found[f"{signal}.{joint}"] for joint in names])
+        for signal in (*REQUIRED, *OPTIONAL)
+        if f"{signal}.{names[0]}" in found
+    }
+    missing = np.full(len(found["t"]), np.nan)
+    for signal in PARTIAL:
+        parts = [found.get(f"{signal}.{joint}", missing) for joint in names]
+        if any(part is not missing for part in parts):
+            signals[signal] = np.column_stack(parts)
+    recording = Recording(
+        t=found["t"],
+        joints=names,
+        name=record or path.stem,
+        provenance=Provenance(where, hashlib.sha256(data).hexdigest(), record=record or ""),
+        **signals,
+    )
+    warn_of_units(recording, kinds)
+    return recording
+
+
+def unknown_suffix(path: Path) -> RecordingError:
+    """Return the error for a file whose suffix names no format."""
+    what = f"the suffix '{path.suffix}' names no format" if path.suffix else "has no suffix"
+    return RecordingError(what, str(path), f"formats: {', '.join(SUFFIXES)}")

@@ -1,0 +1,176 @@
+"""Tables of the report that the diagnosis itself does not have."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import re
+from dataclasses import replace
+from datetime import datetime
+from importlib.metadata import PackageNotFoundError, requires, version
+from pathlib import Path
+
+from dynident.diagnosis.result import Candidate, Diagnosis, Step
+from dynident.reporting.content import first_set
+from dynident.reporting.joint_states import states
+from dynident.tables import Table, number, percent
+
+
+def joint_table(diagnosis: Diagnosis) -> Table:
+    """As `Diagnosis.joint_table`, the noise also in its unit, and in words how each joint does."""
+    given = diagnosis.joint_table()
+    words = {one.joint.name: one.words for one in states(diagnosis)}
+    rows = []
+    for joint in diagnosis.joints:
+        noise = joint.noise_rms
+        rows.append(
+            (
+                joint.name,
+                percent(joint.error_before),
+                *([percent(joint.error_after)] if diagnosis.steps else []),
+                percent(joint.noise_share),
+                number(joint.ratio_before, 3),
+                *([number(joint.ratio_after, 3)] if diagnosis.steps else []),
+                f"{number(joint.torque_rms, 3)} {joint.torque_unit}",
+                "-" if noise is None else f"{number(noise, 3)} {joint.torque_unit}",
+                words[joint.name],
+            )
+        )
+    overall = diagnosis.test_error
+    rows.append(
+        (
+            "all joints",
+            percent(overall.before),
+            *([percent(overall.after)] if diagnosis.steps else []),
+            percent(overall.noise_floor),
+            *([""] * (5 if diagnosis.steps else 4)),
+        )
+    )
+    columns = (
+        "joint",
+        *(("error as given", "error after") if diagnosis.steps else ("error",)),
+        "noise floor",
+        *(
+            f"systematic / noise{when}"
+            for when in ((" as given", " after") if diagnosis.steps else ("",))
+        ),
+        "torque rms",
+        "noise rms",
+        "how it does",
+    )
+    return Table(given.title, columns, tuple(rows), given.notes)
+
+
+def step_table(diagnosis: Diagnosis) -> Table:
+    """Effects added, with their laws and values."""
+    rows = tuple(
+        (
+            step.effect.title,
+            step.effect.law,
+            _values(diagnosis, step),
+            percent(step.test_error_before),
+            percent(step.test_error_after),
+            number(step.p_value, 2),
+            ", ".join(effect.title for effect in step.indistinguishable) or "nothing",
+        )
+        for step in diagnosis.steps
+    )
+    columns = (
+        "effect added",
+        "torque",
+        "values when added",
+        "error before",
+        "error after",
+        "p",
+        "cannot be told from",
+    )
+    return Table("Effects added, in order", columns, rows)
+
+
+def _values(diagnosis: Diagnosis, step: Step) -> str:
+    robot = diagnosis.after.model.robot
+    linear = zip(step.effect.parameters(robot), step.values, strict=True)
+    shapes = zip(step.effect.shape_parameters(robot), step.effect.shape, strict=True)
+    return ", ".join(f"{p.name} = {number(x)} {p.unit}" for p, x in (*linear, *shapes))
+
+
+def candidate_table(diagnosis: Diagnosis, shown: tuple[Candidate, ...]) -> Table:
+    """Candidates, those that cannot be told from the first effect marked."""
+    bracketed = first_set(diagnosis)
+    added = {step.effect.label for step in diagnosis.steps}
+    rows = tuple(
+        (
+            ("\u2503 " if c.effect.label in bracketed else "") + c.effect.title,
+            "added" if c.effect.label in added else c.status.replace("_", " "),
+            number(c.p_value, 2),
+            f"{round(100 * c.test_gain, 2) + 0.0:.2f}",
+            c.remark,
+        )
+        for c in shown
+    )
+    columns = ("effect", "status", "p", "gain, points", "remark")
+    notes = ("\u2503 These cannot be told apart with this data.",) if bracketed else ()
+    return Table("Candidates, tried on the model as given", columns, rows, notes)
+
+
+def remaining_table(diagnosis: Diagnosis) -> Table:
+    """Candidates on the final model."""
+    final = replace(diagnosis, candidates=diagnosis.remaining).candidate_table()
+    return replace(final, title="Candidates, tried on the final model", notes=())
+
+
+def absorbed_table(diagnosis: Diagnosis) -> Table:
+    """Effects that this data cannot show, and what would."""
+    rows = tuple(
+        (c.effect.title, c.remark or c.effect.advice)
+        for c in diagnosis.candidates
+        if c.status == "absorbed"
+    )
+    return Table("Absorbed effects", ("effect", "what would show it"), rows)
+
+
+def provenance(diagnosis: Diagnosis, command: str, study: Path | None) -> tuple[Table, Table]:
+    """Files and versions that a diagnosis rests on."""
+    description = diagnosis.after.model.robot.description
+    rows = []
+    if study is not None and study.is_file():
+        digest = hashlib.sha256(study.read_bytes()).hexdigest()
+        rows.append((str(study), "study", digest, ""))
+    if description is not None:
+        digest = hashlib.sha256(description.text.encode()).hexdigest()
+        rows.append((description.path, "robot description", digest, ""))
+    used = (("training", diagnosis.after.sources), ("test", diagnosis.test_sources))
+    for use, sources in used:
+        rows += [(s.file, use, s.sha256, s.filter) for s in sources]
+    columns = ("file", "used as", "SHA-256", "filter")
+    return Table("Files", columns, tuple(rows)), versions(command)
+
+
+def versions(command: str) -> Table:
+    """When and with what the page was made; the command line where there was one."""
+    made = [
+        ("written", datetime.now().astimezone().strftime("%Y-%m-%d %H:%M:%S %z")),
+        *([("command", command)] if command else []),
+        ("dynident", _version("dynident")),
+        ("Python", f"{platform.python_version()} on {platform.platform()}"),
+    ]
+    packages = (f"{package} {_version(package)}" for package in _dependencies())
+    made.append(("with", ", ".join(packages)))
+    return Table("Made", ("what", "value"), tuple(made))
+
+
+def _dependencies() -> list[str]:
+    """Packages that dynident itself asks for, without those of its extras."""
+    try:
+        wanted = requires("dynident") or []
+    except PackageNotFoundError:
+        return []
+    always = [line for line in wanted if "extra ==" not in line]
+    return sorted(re.split(r"[^\w.-]", line, maxsplit=1)[0] for line in always)
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"

@@ -1,0 +1,238 @@
+"""The report: one HTML file that opens anywhere, without a network."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import jinja2
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from dynident import files
+from dynident.diagnosis.result import Diagnosis
+from dynident.evidence.maps import ResidualMap
+from dynident.reporting.content import after_name, left, ranked, seen
+from dynident.reporting.diagnosis_tables import (
+    absorbed_table,
+    candidate_table,
+    joint_table,
+    provenance,
+    remaining_table,
+    step_table,
+    versions,
+)
+from dynident.reporting.glossary import meaning, use_of
+from dynident.reporting.intervals import parameter_table, widening_after, widening_before
+from dynident.reporting.joint_states import State, joint_errors, opened, states
+from dynident.reporting.loop_page import LoopSection, loop_section
+from dynident.reporting.next_steps import next_steps, summary
+from dynident.reporting.packing import packed
+from dynident.reporting.pictures import diagnosis_pictures as pictures
+from dynident.tables import Table, number, percent
+from dynident.validation.loop_run import QUANTITIES
+from dynident.validation.loop_validation import Unsimulated, Validation
+
+_TRACE_BYTES = 600_000
+"""What all torque traces together may take in the page."""
+_BYTES_PER_POINT = 32
+"""Five lines of a torque picture over one time, in single precision and base 64."""
+_HASH = 64
+"""Characters of a SHA-256."""
+_MOST_POINTS = 6600
+"""Six extremes for each pixel of a wide screen."""
+
+_KINDS = {
+    "follows": "nothing_missing",
+    "no_nearer": "unexplained",
+    "other_controller": "unexplained",
+    "not_simulated": "unknown",
+}
+"""Class of the page by verdict: its colour."""
+
+
+@dataclass(frozen=True)
+class _JointMaps:
+    """Residual maps of one joint, each with the name of its figure.
+
+    Attributes
+    ----------
+    joint, state, words : the joint and how it does, as `JointState` has it.
+    shown : whether they are shown without asking.
+    maps : name of the figure and what it shows.
+    """
+
+    joint: str
+    state: State
+    words: str
+    shown: bool
+    maps: tuple[tuple[str, ResidualMap], ...]
+
+
+def report(
+    found: Diagnosis | Validation,
+    to: str | Path = "report.html",
+    *,
+    loop: Validation | Unsimulated | None = None,
+    command: str = "",
+    study: str | Path | None = None,
+) -> Path:
+    """Write a diagnosis, or a validation in closed loop, as one self-contained HTML file.
+
+    Parameters
+    ----------
+    found : Diagnosis or Validation
+        As `diagnose` or `validate` returns it.
+    to : str or Path
+        The file to write; an old one is replaced in one step.
+    loop : Validation, optional
+        Of the diagnosis's final model: adds the section on the simulated loop. `Unsimulated` adds
+        the reason why there is none.
+    command : str, optional
+        The command line that led to it, for the provenance.
+    study : str or Path, optional
+        The study file, for the provenance.
+
+    Returns
+    -------
+    Path of the file.
+
+    Raises
+    ------
+    FileError
+        If the folder is missing or may not be written; an old file is then untouched.
+    """
+    return files.write_text(to, page(found, loop=loop, command=command, study=study))
+
+
+def page(
+    found: Diagnosis | Validation,
+    *,
+    loop: Validation | Unsimulated | None = None,
+    command: str = "",
+    study: str | Path | None = None,
+) -> str:
+    """Return the report as a string of HTML; see `report`."""
+    if isinstance(found, Validation):
+        return _validation_page(found, command)
+    tables = provenance(found, command, None if study is None else Path(study))
+    return _diagnosis_page(found, loop_section(loop), tables)
+
+
+def _diagnosis_page(
+    diagnosis: Diagnosis, closed: LoopSection | None, made: tuple[Table, ...]
+) -> str:
+    joint_maps = _joint_maps(diagnosis)
+    names = [f"torque-{i}" for i in range(len(diagnosis.traces))]
+    points = max(16, min(_MOST_POINTS, _TRACE_BYTES // _BYTES_PER_POINT // max(len(names), 1)))
+    figures = {"waterfall": pictures.waterfall(diagnosis)}
+    if len(diagnosis.joints) > 1:
+        figures["joints"] = joint_errors(diagnosis)
+    if ranked(diagnosis):
+        figures["ranking"] = pictures.ranking(diagnosis)
+    for name, trace in zip(names, diagnosis.traces, strict=True):
+        figures[name] = pictures.torques(diagnosis, trace, points)
+    for group in joint_maps:
+        for name, one in group.maps:
+            # The page has one legend for all of them.
+            figures[name] = pictures.residual_map(diagnosis, one).update_layout(showlegend=False)
+    figures |= dict(closed.figures) if closed else {}
+    place = {one.joint.name: i for i, one in enumerate(states(diagnosis))}
+    order = sorted(range(len(names)), key=lambda i: place[diagnosis.traces[i].joint])
+    known = diagnosis.noise_source != "unknown"
+    given_parameters = parameter_table(
+        diagnosis.before, widening_before(diagnosis), noise_known=known
+    )
+    parts = packed(figures)
+    return _template("report.html").render(
+        d=diagnosis,
+        closed=closed,
+        robot=diagnosis.after.model.robot.name,
+        sure=diagnosis.verdict != "unexplained" and known,
+        added=after_name(diagnosis) if diagnosis.steps else "",
+        summary=summary(diagnosis),
+        advice=next_steps(diagnosis),
+        joints=joint_table(diagnosis),
+        steps=step_table(diagnosis),
+        torques=[(names[i], diagnosis.traces[i]) for i in order],
+        thinned=any(len(trace.t) > points for trace in diagnosis.traces),
+        joint_maps=joint_maps,
+        candidates=candidate_table(diagnosis, ranked(diagnosis)),
+        weaker=candidate_table(diagnosis, ranked(diagnosis, len(diagnosis.candidates))[10:]),
+        remaining=remaining_table(diagnosis),
+        absorbed=absorbed_table(diagnosis),
+        parameters=parameter_table(diagnosis.after, widening_after(diagnosis), noise_known=known),
+        fit_error=diagnosis.after.error_table(),
+        given_parameters=given_parameters if diagnosis.steps else None,
+        provenance=made,
+        figures=parts.figures,
+        shared=parts.shared,
+        plotly=Markup(get_plotlyjs()),
+    )
+
+
+def _validation_page(validation: Validation, command: str) -> str:
+    closed = loop_section(validation)
+    assert closed is not None
+    closed = replace(closed, sentence="")  # the head of the page has it
+    errors = zip(QUANTITIES, validation.error_table().rows[-1][1:], strict=False)
+    parts = packed(dict(closed.figures))
+    used = tuple((s.file, s.sha256, s.filter) for s in validation.sources)
+    return _template("validation.html").render(
+        closed=closed,
+        robot=validation.robot,
+        kind=_KINDS[validation.verdict],
+        mark="\u2713" if validation.verdict == "follows" else "?",
+        sentence=validation.sentence,
+        errors=list(errors) if validation.runs else [],
+        provenance=(Table("Files", ("file", "SHA-256", "filter"), used), versions(command)),
+        figures=parts.figures,
+        shared=parts.shared,
+        plotly=Markup(get_plotlyjs()),
+    )
+
+
+def _template(name: str) -> jinja2.Template:
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("dynident.reporting"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {
+        "percent": percent,
+        "number": number,
+        "capitalize_first": lambda words: words[:1].upper() + words[1:],
+    }
+    words = {"left": left, "meaning": meaning, "seen": seen, "use_of": use_of}
+    environment.globals |= {"numeric": _numeric, **words}
+    return environment.get_template(name)
+
+
+def _numeric(table: Table) -> list[bool]:
+    """Which columns hold numbers, and are set flush right; a hash is none."""
+    return [
+        any(row[i] for row in table.rows)
+        and all(
+            not row[i] or (row[i][0] in "-+.0123456789" and len(row[i]) < _HASH)
+            for row in table.rows
+        )
+        for i in range(len(table.columns))
+    ]
+
+
+def _joint_maps(diagnosis: Diagnosis) -> tuple[_JointMaps, ...]:
+    shown = opened(diagnosis)
+    numbered = [(f"map-{i}", one) for i, one in enumerate(diagnosis.maps)]
+    groups = (
+        _JointMaps(
+            one.joint.name,
+            one.state,
+            one.words,
+            one.joint.name in shown,
+            tuple(pair for pair in numbered if pair[1].joint == one.joint.name),
+        )
+        for one in states(diagnosis)
+    )
+    return tuple(group for group in groups if group.maps)

@@ -1,0 +1,127 @@
+"""Parameters with intervals that are widened where the model is rejected."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynident.diagnosis.result import Diagnosis
+from dynident.fitting.estimate import Estimate
+from dynident.tables import Table, number, percent
+
+_QUANTILE = 1.959964
+"""Half width of a 95 % interval, in standard errors."""
+
+
+@dataclass(frozen=True)
+class Widening:
+    """Factors on standard errors: square root of residual over noise variance (Birge ratio).
+
+    A parameter of an effect at one joint has that joint's; what all joints share, the rigid body's
+    parameters, has that of all rows together.
+
+    Attributes
+    ----------
+    joints : by the name of the joint, 1 or more.
+    overall : root of their mean square.
+    """
+
+    joints: dict[str, float]
+    overall: float
+
+    def of(self, joint: str | None) -> float:
+        """Factor on the standard errors of a parameter, by the joint that it belongs to."""
+        return self.overall if joint is None else self.joints[joint]
+
+
+def widening_before(diagnosis: Diagnosis) -> Widening | None:
+    """Of the model as given; None where it is not rejected, or the noise is unknown."""
+    if not diagnosis.steps and diagnosis.verdict != "unexplained":
+        return None
+    return _widening({j.name: j.ratio_before for j in diagnosis.joints})
+
+
+def widening_after(diagnosis: Diagnosis) -> Widening | None:
+    """Of the final model; None where it is not rejected, or the noise is unknown."""
+    if diagnosis.verdict != "unexplained":
+        return None
+    return _widening({j.name: j.ratio_after for j in diagnosis.joints})
+
+
+def _widening(ratios: dict[str, float | None]) -> Widening | None:
+    # The residual's variance is the noise's and the systematic part's, which is ratio^2 of it.
+    squares = {name: 1.0 + r**2 for name, r in ratios.items() if r is not None}
+    if len(squares) < len(ratios) or not squares:
+        return None
+    joints = {name: float(np.sqrt(square)) for name, square in squares.items()}
+    return Widening(joints, float(np.sqrt(np.mean(list(squares.values())))))
+
+
+def parameter_table(estimate: Estimate, widening: Widening | None, *, noise_known: bool) -> Table:
+    """Values with 95 % intervals.
+
+    Parameters
+    ----------
+    estimate : of the diagnosis.
+    widening : None where the model is not rejected.
+    noise_known : else the intervals rest on the residual.
+    """
+    model = estimate.model
+    values = np.array(estimate.values)
+    # What is identified is the combination: its value and interval, not those of its head.
+    values[list(estimate.basis.independent)] = estimate.basis.coordinates(estimate.values)
+    values[~estimate.identified] = np.nan
+    factors = np.ones(model.size)
+    if widening is not None:
+        factors[:] = widening.overall
+        for effect in model.effects:
+            factors[model.slices[effect.label]] = widening.of(effect.joint)
+    half = _QUANTILE * factors * estimate.sigma
+    stands_for = [row[-1] for row in estimate.parameter_table().rows]
+    rows = tuple(
+        (
+            name,
+            number(values[i], 6),
+            _interval(values[i], half[i]),
+            percent(float(half[i] / abs(values[i])) if values[i] else None, 1),
+            model.units[i],
+            stands_for[i],
+        )
+        for i, name in enumerate(model.names)
+    )
+    columns = ("parameter", "value", "95 % interval", "\u00b1 relative", "unit", "stands for")
+    notes = (_in_words(widening, noise_known=noise_known), estimate.parameter_table().notes[0])
+    return Table("Parameters", columns, rows, notes)
+
+
+def _interval(value: float, half: float) -> str:
+    if not np.isfinite(value) or not np.isfinite(half):
+        return "-"
+    # As many digits as the width tells apart.
+    digits = 6
+    if half > 0 and value:
+        digits = int(np.clip(np.ceil(np.log10(abs(value) / half)) + 2, 2, 9))
+    return f"{number(value - half, digits)} to {number(value + half, digits)}"
+
+
+def _in_words(widening: Widening | None, *, noise_known: bool) -> str:
+    if widening is None and noise_known:
+        return (
+            "The intervals carry the noise of the measurement, as they should: what is left of the "
+            "torque is within the noise."
+        )
+    if widening is None:
+        return (
+            "The noise is unknown, so the whole residual was taken for noise. What the model lacks "
+            "may have pushed these values further than the intervals say."
+        )
+    each = ", ".join(f"{name} {number(x, 3)}" for name, x in widening.joints.items())
+    one = len(widening.joints) == 1
+    shared = "" if one else f"; {number(widening.overall, 3)} for the parameters that joints share"
+    return (
+        "This model is rejected: a residual beyond the noise remains. The intervals are therefore "
+        "wider than the noise alone would make them, by the root of the residual's variance over "
+        f"the noise's (Birge ratio): {each}{shared}. What is missing may still have pushed a value "
+        "out of its interval."
+    )

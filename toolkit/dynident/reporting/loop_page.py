@@ -1,0 +1,83 @@
+"""The section of the report on the simulated loop, and a page of its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import plotly.graph_objects as go
+
+from dynident.reporting.loop_content import loop_trace
+from dynident.reporting.pictures.loop_pictures import loop_quantity
+from dynident.tables import Table
+from dynident.validation.loop_run import QUANTITIES, Quantity
+from dynident.validation.loop_validation import Unsimulated, Validation
+
+_BYTES = 450_000
+"""What all pictures together may take in the page."""
+_BYTES_PER_POINT = 32
+"""Five lines over one time, in single precision and base 64."""
+_MOST_PICTURED = 8
+"""Joints times recordings that have pictures."""
+
+
+@dataclass(frozen=True)
+class LoopSection:
+    """What the section shows.
+
+    Attributes
+    ----------
+    failure : why there is nothing to show; empty where there is.
+    opening, sentence : what was done, and what came of it, in words.
+    first, rest : tables before the pictures, tables and sentences after them.
+    pictures : joint and recording of each set of pictures.
+    left_out : recordings without pictures.
+    figures : by name.
+    """
+
+    failure: str = ""
+    opening: str = ""
+    sentence: str = ""
+    first: tuple[Table, ...] = ()
+    rest: tuple[Table | str, ...] = ()
+    pictures: tuple[tuple[str, str], ...] = ()
+    left_out: int = 0
+    figures: tuple[tuple[str, go.Figure], ...] = ()
+    quantities: tuple[Quantity, ...] = QUANTITIES
+
+
+def loop_section(found: Validation | Unsimulated | None) -> LoopSection | None:
+    """Return what the section on the simulated loop shows; None where there is no controller."""
+    if found is None:
+        return None
+    if isinstance(found, Unsimulated):
+        return LoopSection(failure=found.reason)
+    opening = (
+        "The identified robot follows each recording's reference once more, under the stated "
+        "controller, and is compared with what was measured."
+    )
+    if not found.runs:
+        rest = (found.recording_table(), *found.notes[1:])
+        return LoopSection(opening=opening, sentence=found.sentence, rest=rest)
+    n = len(found.joints)
+    most = max(1, _MOST_PICTURED // n)
+    runs = found.runs[:most]
+    points = max(16, min(2500, _BYTES // _BYTES_PER_POINT // (len(QUANTITIES) * n * len(runs))))
+    worst = np.argsort(-np.nan_to_num(found.errors.joints[QUANTITIES.index("torque")]))
+    pairs = [(int(j), run) for run in runs for j in worst]
+    figures = [
+        (f"loop-{i}-{quantity}", loop_quantity(loop_trace(found, run, j, quantity).thinned(points)))
+        for i, (j, run) in enumerate(pairs)
+        for quantity in QUANTITIES
+    ]
+    tables = found.tables()
+    sentence, *notes = found.notes
+    return LoopSection(
+        opening=opening,
+        first=(found.error_table(),),
+        rest=(*(part for part in tables[1:] if isinstance(part, Table)), *notes),
+        sentence=sentence,
+        pictures=tuple((found.joints[j], run.name) for j, run in pairs),
+        left_out=len(found.runs) - len(runs),
+        figures=tuple(figures),
+    )

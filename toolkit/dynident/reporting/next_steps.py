@@ -1,0 +1,138 @@
+"""What a diagnosis asks its reader to do."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import dataclass
+
+from dynident.diagnosis.result import Diagnosis, Step
+from dynident.effects import Effect
+from dynident.reporting.joint_states import states
+from dynident.tables import percent
+
+
+@dataclass(frozen=True)
+class Advice:
+    """One thing to do: a sentence, what it rests on or leads to, and commands to type."""
+
+    what: str
+    why: str = ""
+    commands: tuple[str, ...] = ()
+
+
+def summary(diagnosis: Diagnosis) -> str:
+    """How far the model is off, for a reader who has never seen a residual."""
+    error = diagnosis.test_error
+    said = (
+        "On motions that the fit has not seen, the torque that the model predicts is off by "
+        f"{percent(error.before)} of the torque measured."
+    )
+    if error.noise_floor is None:
+        return f"{said} How much of that is noise is not known."
+    return f"{said} Noise alone would make {percent(error.noise_floor)}."
+
+
+def next_steps(diagnosis: Diagnosis) -> tuple[Advice, ...]:
+    """What to do, the most useful first."""
+    found = [*_to_add(diagnosis), *_to_separate(diagnosis)]
+    if diagnosis.verdict == "unexplained":
+        found.append(_unexplained(diagnosis))
+    if diagnosis.noise_source != "replicates":
+        found.append(_to_repeat(diagnosis))
+    absorbed = [c for c in diagnosis.candidates if c.status == "absorbed"]
+    if not found:
+        why = "What is left of the torque is noise, and no physics could take it away."
+        found.append(Advice("Nothing is to be added: use the model as it is.", why))
+    if absorbed:
+        many = len(absorbed) > 1
+        what = (
+            f"If you suspect one of the {len(absorbed)} effects"
+            if many
+            else "If you suspect the effect"
+        )
+        found.append(
+            Advice(
+                f"{what} that this data cannot show, record the motion named for it.",
+                "They are listed, each with its experiment, under \u201cWhat this data cannot "
+                "show\u201d.",
+            )
+        )
+    return tuple(found)
+
+
+def _to_add(diagnosis: Diagnosis) -> list[Advice]:
+    if not diagnosis.steps:
+        return []
+    error = diagnosis.test_error
+    labels = [step.effect.label for step in diagnosis.steps]
+    names = _listed([step.effect.title for step in diagnosis.steps])
+    brings = f"That brings the error from {percent(error.before)} to {percent(error.after)}"
+    floor = (
+        ""
+        if error.noise_floor is None
+        else f"; noise alone would make {percent(error.noise_floor)}"
+    )
+    return [
+        Advice(
+            f"Add {names} to the model, and fit it.",
+            f"{brings}{floor}.",
+            (
+                *(f"dynident add STUDY {shlex.quote(label)}" for label in labels),
+                "dynident fit STUDY",
+            ),
+        )
+    ]
+
+
+def _to_separate(diagnosis: Diagnosis) -> list[Advice]:
+    return [
+        Advice(
+            f"Before you believe in {step.effect.title}, record a motion that tells it from "
+            f"{_either(step.indistinguishable)}.",
+            f"With this data they do the same. {_experiments(step)}",
+        )
+        for step in diagnosis.steps
+        if step.indistinguishable
+    ]
+
+
+def _either(effects: tuple[Effect, ...]) -> str:
+    return " and from ".join(effect.title for effect in effects)
+
+
+def _experiments(step: Step) -> str:
+    """The experiment that tells them apart; else each effect's own, once, with what it shows."""
+    advice = getattr(step, "advice", "")
+    if advice:
+        return f"{advice[0].upper()}{advice[1:].rstrip('.')}."
+    shows: dict[str, list[str]] = {}
+    for effect in (step.effect, *step.indistinguishable):
+        shows.setdefault(effect.advice, []).append(effect.title)
+    return " ".join(f"To see {' or '.join(titles)}: {advice}." for advice, titles in shows.items())
+
+
+def _unexplained(diagnosis: Diagnosis) -> Advice:
+    worst = [one for one in states(diagnosis) if one.state == "failing"]
+    where = _listed([one.joint.name for one in worst[:3]]) or "the joints"
+    return Advice(
+        f"Look at the pictures of {where} below: something is left there that no effect of the "
+        "catalogue explains.",
+        "The shape in the pictures is what is known of it. Rule out the simple causes first: a "
+        "wrong unit or scale of a column, a clock that jitters, a filter that cuts too low, a "
+        "cable, a hand on the robot.",
+    )
+
+
+def _to_repeat(diagnosis: Diagnosis) -> Advice:
+    what = "Record a motion that repeats: the same period, twice or more, without a pause."
+    why = (
+        "What repeats is the model's fault, what does not is noise: only that tells how much of "
+        "the error can be taken away."
+    )
+    if diagnosis.noise_source == "given":
+        why = f"The noise is so far only what the study states. {why}"
+    return Advice(what, why)
+
+
+def _listed(names: list[str]) -> str:
+    return " and ".join([*([", ".join(names[:-1])] if names[1:] else []), *names[-1:]])

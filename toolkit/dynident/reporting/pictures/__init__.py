@@ -1,0 +1,1 @@
+"""Pictures, with plotly for pages and notebooks and with matplotlib for papers."""

@@ -1,0 +1,298 @@
+"""Plotly pictures of a diagnosis, for the report and for notebooks."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from dynident.diagnosis.result import Diagnosis, Trace
+from dynident.evidence.maps import ResidualMap
+from dynident.reporting.content import (
+    AFTER_COLOUR,
+    BAND,
+    BEFORE_COLOUR,
+    GIVEN,
+    GREY,
+    after_name,
+    bars,
+    first_set,
+    is_spectrum,
+    maps_of,
+    noise_of,
+    ranked,
+    thinned,
+    trace_of,
+    wrapped,
+    x_title,
+    y_title,
+)
+from dynident.reporting.pictures.look import FAINT, dressed, mark, plain
+
+
+def waterfall(diagnosis: Diagnosis) -> go.Figure:
+    """Held-out torque error as effects are added, down to the noise floor."""
+    rows = bars(diagnosis)
+    colours = {"given": BEFORE_COLOUR, "added": "rgba(31,127,196,0.45)", "final": AFTER_COLOUR}
+    figure = go.Figure(
+        go.Bar(
+            orientation="h",
+            y=list(range(len(rows))),
+            base=[row.start for row in rows],
+            x=[row.stop - row.start for row in rows],
+            marker={
+                "color": [colours[row.kind] for row in rows],
+                "line": {"color": AFTER_COLOUR, "width": [row.kind == "added" for row in rows]},
+                "pattern": {"shape": ["/" if row.kind == "added" else "" for row in rows]},
+            },
+            text=[f"\u2002{row.text}" for row in rows],
+            textposition="outside",
+            textangle=0,
+            cliponaxis=False,
+            customdata=[[row.start, row.stop] for row in rows],
+            hovertemplate="%{customdata[0]:.3f} % to %{customdata[1]:.3f} %<extra></extra>",
+            showlegend=False,
+        )
+    )
+    for i in range(len(rows) - 1):
+        level = rows[i].stop if rows[i].kind == "given" else rows[i].start
+        line = {"color": GREY, "width": 1, "dash": "dot"}
+        figure.add_shape(type="line", x0=level, x1=level, y0=i, y1=i + 1, line=line, layer="below")
+    floor = diagnosis.test_error.noise_floor
+    if floor is None:
+        head = "noise floor unknown"
+        place = {"x": 0, "xanchor": "left"}
+    else:
+        head = f"noise floor {100 * floor:.2f} %"
+        # Where there is room beside the line.
+        side, shift = ("right", -4) if 2 * floor > diagnosis.test_error.before else ("left", 4)
+        place = {"x": 100 * floor, "xanchor": side, "xshift": shift}
+        figure.add_vrect(
+            x0=0, x1=100 * floor, fillcolor=FAINT, line_width=0, layer="below"
+        ).add_vline(x=100 * floor, line={"color": GREY, "width": 2, "dash": "dash"})
+    figure.add_annotation(text=head, y=1, yref="paper", yanchor="bottom", showarrow=False, **place)
+    top = max(*(max(row.start, row.stop) for row in rows), 100 * (floor or 0.0), 1e-9)
+    ticks = ["<br>".join(plain(line) for line in row.lines) for row in rows]
+    figure.update_xaxes(title="held-out torque error (%)", range=[0, 1.22 * top], fixedrange=True)
+    figure.update_yaxes(
+        tickvals=list(range(len(rows))),
+        ticktext=ticks,
+        range=[len(rows) - 0.4, -0.6],
+        automargin=True,
+        fixedrange=True,
+        showgrid=False,
+        zeroline=False,
+        ticklabelstandoff=6,
+    )
+    height = 90 + sum(30 + 16 * len(row.lines) for row in rows)
+    return dressed(figure, height, top=28)
+
+
+def ranking(diagnosis: Diagnosis, most: int = 10) -> go.Figure:
+    """Candidates by how far each would bring the held-out error down, best at the top.
+
+    Those that the data cannot tell apart from the first effect added are bracketed.
+    """
+    shown = ranked(diagnosis, most)
+    figure = go.Figure()
+    for status, name, symbol in (
+        ("material", "material", "circle"),
+        ("not_material", "not material", "circle-open"),
+    ):
+        rows = [i for i, c in enumerate(shown) if c.status == status]
+        colour = AFTER_COLOUR if status == "material" else GREY
+        figure.add_trace(
+            go.Scatter(
+                x=[100 * shown[i].test_gain for i in rows],
+                y=rows,
+                mode="markers",
+                name=name,
+                marker=mark(colour, symbol),
+                hovertemplate="%{x:.3f} points<extra></extra>",
+                showlegend=bool(rows),
+            )
+        )
+        for i in rows:
+            stem = {"color": colour, "width": 2}
+            x1 = 100 * shown[i].test_gain
+            figure.add_shape(type="line", x0=0, x1=x1, y0=i, y1=i, line=stem, layer="below")
+    members = [i for i, c in enumerate(shown) if c.effect.label in first_set(diagnosis)]
+    if len(members) > 1:
+        _bracket(figure, members)
+    figure.update_xaxes(
+        title="held-out error would fall by (points)", zeroline=True, fixedrange=True
+    )
+    figure.update_yaxes(
+        tickvals=list(range(len(shown))),
+        ticktext=["<br>".join(plain(line) for line in wrapped(c.effect.title)) for c in shown],
+        range=[len(shown) - 0.4, -0.6],
+        automargin=True,
+        fixedrange=True,
+        zeroline=False,
+        ticklabelstandoff=6,
+    )
+    return dressed(figure, 110 + 36 * max(len(shown), 1), right=60 if len(members) > 1 else 16)
+
+
+def residual_map(diagnosis: Diagnosis, one: ResidualMap) -> go.Figure:
+    """Mean residual against one quantity, before and after, with the noise band."""
+    y = {"title": {"text": y_title(one)}, **_map_zero(one)}
+    layout = {"xaxis": {"title": {"text": x_title(one)}}, "yaxis": y, "dragmode": False}
+    return dressed(go.Figure(_map_traces(diagnosis, one), layout), 300, top=22)
+
+
+def residual_maps(diagnosis: Diagnosis, joint: str) -> go.Figure:
+    """All residual maps of a joint side by side.
+
+    Raises
+    ------
+    DynidentError
+        If the diagnosis has no such joint, or no map of it.
+    """
+    maps = maps_of(diagnosis, joint)
+    columns = min(len(maps), 3)
+    count = -(-len(maps) // columns)
+    figure = make_subplots(
+        rows=count,
+        cols=columns,
+        horizontal_spacing=0.24 / columns,
+        vertical_spacing=0.3 / count,
+    )
+    for i, one in enumerate(maps):
+        row, col = i // columns + 1, i % columns + 1
+        for trace in _map_traces(diagnosis, one):
+            trace.showlegend = trace.showlegend is not False and i == 0
+            figure.add_trace(trace.update(legendgroup=trace.name), row=row, col=col)
+        figure.update_xaxes(title=x_title(one), row=row, col=col)
+        figure.update_yaxes(title=y_title(one), row=row, col=col, **_map_zero(one))
+    return dressed(figure, 90 + 260 * count)
+
+
+def measured_and_predicted(
+    diagnosis: Diagnosis, joint: str, recording: str | None = None, points: int = 4000
+) -> go.Figure:
+    """Torque of a joint in a test recording, measured and predicted, and the residuals below.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    joint : str
+    recording : str, optional
+        Its name; by default the first.
+    points : int
+        About how many samples are drawn; the extremes are kept.
+
+    Raises
+    ------
+    DynidentError
+        If there is no such joint or recording.
+    """
+    return torques(diagnosis, trace_of(diagnosis, joint, recording), points)
+
+
+def torques(diagnosis: Diagnosis, trace: Trace, points: int) -> go.Figure:
+    """`measured_and_predicted` of a given trace."""
+    kept = thinned(trace, points)
+    t, measured = _small(trace.t[kept]), trace.measured[kept]
+    models = [(GIVEN, trace.before[kept], BEFORE_COLOUR, "dash")]
+    if diagnosis.steps:
+        models.append((after_name(diagnosis), trace.after[kept], AFTER_COLOUR, "solid"))
+    figure = make_subplots(
+        rows=2, cols=1, shared_xaxes=True, row_heights=[0.6, 0.4], vertical_spacing=0.06
+    )
+    line = {"color": GREY, "width": 3}
+    figure.add_trace(go.Scatter(x=t, y=_small(measured), name="measured", line=line), row=1, col=1)
+    noise = noise_of(diagnosis, trace.joint)
+    if noise is not None:
+        ends = np.array([t[0], t[-1], t[-1], t[0]])
+        edge = 2 * noise * np.array([1, 1, -1, -1])
+        figure.add_trace(_band(ends, edge, f"{BAND} (2 rms)"), row=2, col=1)
+    for name, predicted, colour, dash in models:
+        line = {"color": colour, "width": 1.8, "dash": dash}
+        group = {"name": plain(name), "legendgroup": name}
+        figure.add_trace(go.Scatter(x=t, y=_small(predicted), line=line, **group), row=1, col=1)
+        line = {"color": colour, "width": 1.2}
+        left = _small(measured - predicted)
+        figure.add_trace(
+            go.Scatter(x=t, y=left, line=line, showlegend=False, **group), row=2, col=1
+        )
+    figure.update_traces(selector={"type": "scatter", "fill": None}, mode="lines")
+    figure.update_xaxes(title="time (s)", row=2, col=1)
+    figure.update_yaxes(title=f"torque ({trace.torque_unit})", row=1, col=1)
+    figure.update_yaxes(title=f"residual ({trace.torque_unit})", row=2, col=1)
+    # Below, where the buttons do not cover it.
+    return dressed(figure, 580, top=34).update_layout(legend={"y": -0.13, "yanchor": "top"})
+
+
+def _map_traces(diagnosis: Diagnosis, one: ResidualMap) -> list[go.Scatter]:
+    at = np.asarray(one.at, dtype=float)
+    mode = "lines" if is_spectrum(one) else "lines+markers"
+    traces = []
+    known = np.isfinite(one.band)
+    if known.any():
+        edge = np.asarray(one.band, dtype=float)[known]
+        lower = np.zeros_like(edge) if is_spectrum(one) else -edge
+        x = np.concatenate([at[known], at[known][::-1]])
+        traces.append(_band(x, np.concatenate([edge, lower[::-1]]), BAND))
+    drawn = [(GIVEN, one.before, BEFORE_COLOUR, "circle-open")]
+    if diagnosis.steps:
+        drawn.append((after_name(diagnosis), one.after, AFTER_COLOUR, "diamond"))
+    for name, values, colour, symbol in drawn:
+        traces.append(
+            go.Scatter(
+                x=at,
+                y=np.asarray(values, dtype=float),
+                mode=mode,
+                name=plain(name),
+                line={"color": colour, "width": 2},
+                marker={"symbol": symbol, "size": 6},
+                hovertemplate="%{x:.4g}: %{y:.4g}<extra></extra>",
+            )
+        )
+    return traces
+
+
+def _map_zero(one: ResidualMap) -> dict:
+    return {"rangemode": "tozero"} if is_spectrum(one) else {"zeroline": True}
+
+
+def _band(x: np.ndarray, y: np.ndarray, name: str) -> go.Scatter:
+    return go.Scatter(
+        x=x,
+        y=y,
+        fill="toself",
+        fillcolor=FAINT,
+        mode="lines",
+        line={"width": 0},
+        hoverinfo="skip",
+        name=name,
+    )
+
+
+def _bracket(figure: go.Figure, members: list[int]) -> None:
+    # In pixels from the right edge of the plot, so that it is the same on any screen.
+    pixels = {
+        "type": "line",
+        "xref": "paper",
+        "xanchor": 1,
+        "xsizemode": "pixel",
+        "line": {"color": GREY, "width": 2},
+    }
+    figure.add_shape(x0=14, x1=14, y0=members[0], y1=members[-1], **pixels)
+    for i in members:
+        figure.add_shape(x0=6, x1=14, y0=i, y1=i, **pixels)
+    figure.add_annotation(
+        text="cannot be<br>told apart",
+        textangle=90,
+        x=1,
+        xref="paper",
+        xanchor="left",
+        xshift=16,
+        y=(members[0] + members[-1]) / 2,
+        showarrow=False,
+    )
+
+
+def _small(values: np.ndarray) -> np.ndarray:
+    # Single precision is finer than any screen, and halves the page.
+    return np.asarray(values, dtype=np.float32)

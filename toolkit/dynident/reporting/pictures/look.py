@@ -1,0 +1,48 @@
+"""One look for all plotly pictures, on light and dark pages."""
+
+from __future__ import annotations
+
+from html import escape
+
+import plotly.graph_objects as go
+
+from dynident.reporting.content import AFTER_COLOUR, GREY
+
+FAINT = "rgba(128,128,128,0.25)"
+_AXIS = {
+    "gridcolor": FAINT,
+    "zerolinecolor": "rgba(128,128,128,0.7)",
+    "title": {"standoff": 8, "font": {"size": 13}},
+}
+_LOOK = go.layout.Template(
+    layout={
+        "xaxis": _AXIS,
+        "yaxis": _AXIS,
+        "font": {"size": 13},
+        "paper_bgcolor": "rgba(0,0,0,0)",
+        "plot_bgcolor": "rgba(0,0,0,0)",
+        "legend": {"orientation": "h", "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"},
+        "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": GREY, "activecolor": AFTER_COLOUR},
+    }
+)
+
+
+def plain(words: str) -> str:
+    """Words that plotly shows as they are: it reads tags, and mathematics between dollar signs."""
+    return escape(words).replace("$", "&#36;")
+
+
+def mark(colour: str, symbol: str) -> dict:
+    """A mark for one value; the outline has its colour, so that open and full ones match."""
+    return {"color": colour, "symbol": symbol, "size": 11, "line": {"width": 2, "color": colour}}
+
+
+def look(height: int, top: int = 10, right: int = 16) -> dict:
+    """The package's look, as settings of a layout; sizes in pixels, the width is the screen's."""
+    margin = {"l": 62, "r": right, "t": top, "b": 46}
+    return {"template": _LOOK, "height": height, "margin": margin}
+
+
+def dressed(figure: go.Figure, height: int, top: int = 10, right: int = 16) -> go.Figure:
+    """Give a figure the package's look; sizes in pixels, the width is the screen's."""
+    return figure.update_layout(**look(height, top, right))

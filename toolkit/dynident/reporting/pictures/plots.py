@@ -1,0 +1,132 @@
+"""Matplotlib pictures of a diagnosis, where a picture must stand still: pages, papers."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from dynident import files
+from dynident.diagnosis.result import Diagnosis
+from dynident.evidence.maps import ResidualMap
+from dynident.reporting.content import (
+    AFTER_COLOUR,
+    BAND,
+    BEFORE_COLOUR,
+    GIVEN,
+    GREY,
+    after_name,
+    bars,
+    is_spectrum,
+    maps_of,
+    x_title,
+    y_title,
+)
+
+
+class Picture(Figure):
+    """A figure that notebooks show without pyplot and its global state."""
+
+    def _repr_png_(self) -> bytes:
+        buffer = BytesIO()
+        self.savefig(buffer, format="png")
+        return buffer.getvalue()
+
+
+def waterfall(diagnosis: Diagnosis) -> Figure:
+    """Held-out torque error as effects are added, down to the noise floor."""
+    rows = bars(diagnosis)
+    figure = Picture(figsize=(7.0, 1.1 + 0.55 * len(rows)), layout="constrained")
+    axes = figure.subplots()
+    for i, row in enumerate(rows):
+        added = row.kind == "added"
+        axes.barh(
+            i,
+            row.stop - row.start,
+            left=row.start,
+            height=0.7,
+            color="white" if added else BEFORE_COLOUR if row.kind == "given" else AFTER_COLOUR,
+            edgecolor=AFTER_COLOUR if added else "none",
+            hatch="//" if added else None,
+        )
+        end = max(row.start, row.stop)
+        axes.annotate(row.text, (end, i), (4, 0), textcoords="offset points", va="center")
+    floor = diagnosis.test_error.noise_floor
+    if floor is None:
+        axes.set_title("noise floor unknown", fontsize="medium", loc="left")
+    else:
+        axes.axvspan(0.0, 100 * floor, color=GREY, alpha=0.25, zorder=0)
+        axes.axvline(100 * floor, color=GREY, linestyle="--")
+        axes.set_title(f"noise floor {100 * floor:.2f} %", fontsize="medium", loc="left")
+    axes.set_yticks(range(len(rows)), ["\n".join(map(plain, row.lines)) for row in rows])
+    axes.invert_yaxis()
+    axes.set_xlabel("held-out torque error (%)")
+    axes.set_xlim(0.0, 1.18 * max(axes.get_xlim()[1], 1e-9))
+    axes.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
+def residual_maps(diagnosis: Diagnosis, joint: str, given: str = GIVEN) -> Figure:
+    """All residual maps of a joint side by side.
+
+    Parameters
+    ----------
+    diagnosis, joint : which maps.
+    given : what the legend calls the model that was diagnosed.
+
+    Raises
+    ------
+    DynidentError
+        If the diagnosis has no such joint, or no map of it.
+    """
+    maps = maps_of(diagnosis, joint)
+    columns = min(len(maps), 3)
+    rows = -(-len(maps) // columns)
+    figure = Picture(figsize=(3.6 * columns, 0.5 + 2.6 * rows), layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axes in grid[len(maps) :]:
+        axes.set_visible(False)
+    for axes, one in zip(grid, maps, strict=False):
+        _draw(axes, diagnosis, one, given)
+    handles, labels = grid[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper left", ncols=3, frameon=False)
+    return figure
+
+
+def _draw(axes: Axes, diagnosis: Diagnosis, one: ResidualMap, given: str) -> None:
+    marks = ("", "") if is_spectrum(one) else ("o", "D")
+    if np.isfinite(one.band).any():
+        lower = np.zeros_like(one.band) if is_spectrum(one) else -one.band
+        axes.fill_between(one.at, lower, one.band, color=GREY, alpha=0.3, lw=0, label=BAND)
+    name = plain(given)
+    axes.plot(
+        one.at, one.before, color=BEFORE_COLOUR, marker=marks[0], mfc="white", ms=4, label=name
+    )
+    if diagnosis.steps:
+        name = plain(after_name(diagnosis))
+        axes.plot(one.at, one.after, color=AFTER_COLOUR, marker=marks[1], ms=4, label=name)
+    axes.axhline(0.0, color=GREY, linewidth=0.8)
+    axes.set_xlabel(plain(x_title(one)))
+    axes.set_ylabel(plain(y_title(one)))
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def plain(text: str) -> str:
+    """Words as matplotlib shows them: a dollar sign in a joint's name is not mathematics."""
+    return text.replace("$", r"\$")
+
+
+def save(figure: Figure, path: str | Path) -> Path:
+    """Write a picture; the file's suffix is its format (.png, .svg, .pdf).
+
+    Raises
+    ------
+    FileError
+        If it cannot be written; an old file is then untouched.
+    """
+    buffer = BytesIO()
+    figure.savefig(buffer, format=Path(path).suffix.lower().removeprefix("."))
+    return files.write_bytes(path, buffer.getvalue())

@@ -1,0 +1,174 @@
+"""Measurement, simulation and reference of a recording through the same filters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dynident.closed_loop import Controller
+from dynident.errors import RecordingError
+from dynident.fitting.instrumental.noise_level import white_variance
+from dynident.fitting.sampling import LEAST_ROWS, Sampled, sample
+from dynident.model import Model
+from dynident.recording import Dataset, Noise, Recording, away_from_edges, mismatch, periods, within
+from dynident.validation.control_law import law_torque
+from dynident.validation.loop_run import QUANTITIES, LoopRun, Signals
+
+if TYPE_CHECKING:
+    from dynident.closed_loop.retrace import Retraced
+
+_REPEATS = 0.3
+"""Mismatch of two periods, relative to the motion, above which nothing repeats."""
+
+
+def filtered_run(
+    recording: Recording,
+    again: Retraced,
+    controller: Controller,
+    model: Model,
+    dataset: Dataset,
+    settling: float,
+) -> LoopRun:
+    """Pass measurement, simulation and reference through the same filters."""
+    assert recording.q_ref is not None
+    first = recording.t[0] + settling
+    window = (first, np.inf)
+    if recording.window is not None:
+        window = (max(first, recording.window[0]), recording.window[1])
+    if not window[0] < window[1]:
+        raise RecordingError("its window ends before the loop has settled", recording.where)
+    recording = recording.replace(window=window)
+    measured = sample(recording, dataset.filter)
+    simulated = sample(again.recording.replace(window=window), dataset.filter)
+    law = law_torque(recording, controller, model.robot)
+    reference = sample(recording.replace(q=recording.q_ref, tau=law), dataset.filter)
+    kept = _inside(measured)
+    noise = _noise(recording, dataset, kept, lambda one: law_torque(one, controller, model.robot))
+    return LoopRun(
+        recording.name,
+        measured.t[kept],
+        _signals(measured, kept),
+        _signals(simulated, kept),
+        _signals(reference, kept),
+        noise,
+        np.asarray(again.saturated, dtype=float),
+        _law_terms(recording, law, controller, model, dataset, kept),
+        _encoder_noise(recording, again.recording, dataset, kept),
+    )
+
+
+def _law_terms(
+    recording: Recording,
+    law: np.ndarray,
+    controller: Controller,
+    model: Model,
+    dataset: Dataset,
+    kept: np.ndarray,
+) -> np.ndarray:
+    """What each gain makes of the errors, as one more of it would add to the torque, rms (n,)."""
+    square = np.zeros(controller.n)
+    free = replace(controller, limit=None)
+    if controller.limit is not None:
+        law = law_torque(recording, free, model.robot)
+    for name in controller.law.gains:
+        doubled = replace(free, **{name: tuple(2.0 * x for x in getattr(free, name))})
+        term = law_torque(recording, doubled, model.robot) - law
+        tau = sample(recording.replace(tau=term), dataset.filter).tau[kept]
+        square += np.mean(tau**2, axis=0)
+    return np.sqrt(square)
+
+
+def _encoder_noise(
+    recording: Recording, simulated: Recording, dataset: Dataset, kept: np.ndarray
+) -> np.ndarray:
+    """Noise of the filtered positions, rms (n,), if that of the raw ones is white.
+
+    From third differences of what the simulation leaves of them: the motion that an imperfect
+    model misses is smooth, and leaves next to nothing in them.
+    """
+    rows = within(recording.t, *(recording.window or (-np.inf, np.inf)), recording.where)
+    white = np.sqrt(white_variance((recording.q - simulated.q)[rows]))
+    noise = Noise(white, np.zeros(recording.n))
+    alone = _stated(recording, noise, lambda one: one.tau)
+    assert alone is not None
+    return np.sqrt(np.mean(sample(alone, dataset.filter).q[kept] ** 2, axis=0))
+
+
+def _inside(sampled: Sampled) -> np.ndarray:
+    """Rows for which the filter saw nothing beyond the record's ends, (T,) bool.
+
+    There it makes up what it does not know from the last sample, noise and all. A record too short
+    for that keeps every row.
+    """
+    inside = away_from_edges(sampled.motion.t, sampled.parallel.transient)
+    first, last = sampled.motion.t[inside][[0, -1]] if inside.any() else (np.inf, -np.inf)
+    kept = (sampled.t >= first) & (sampled.t <= last)
+    return kept if kept.sum() >= LEAST_ROWS else np.ones(len(kept), dtype=bool)
+
+
+def _signals(sampled: Sampled, kept: np.ndarray) -> Signals:
+    return Signals(sampled.q[kept], sampled.v[kept], sampled.a[kept], sampled.tau[kept])
+
+
+def _noise(
+    recording: Recording,
+    dataset: Dataset,
+    kept: np.ndarray,
+    law: Callable[[Recording], np.ndarray],
+) -> np.ndarray | None:
+    """Noise of the measured quantities, rms (4, n): of repeated periods, else as stated.
+
+    The noise alone passes the filters, so that nothing of what they do to the motion at the ends
+    of the record is taken for noise. Its mean is over the rows that repeat.
+    """
+    alone = _repeated(recording) or _stated(recording, dataset.noise, law)
+    if alone is None:
+        return None
+    sampled = sample(alone, dataset.filter)
+    there = alone.t[np.any(alone.q != 0, axis=1) | np.any(alone.tau != 0, axis=1)]
+    if len(there):
+        folded = kept & (sampled.t >= there[0]) & (sampled.t <= there[-1])
+        kept = folded if folded.any() else kept
+    noise = _signals(sampled, kept)
+    return np.array([np.sqrt(np.mean(noise.of(one) ** 2, axis=0)) for one in QUANTITIES])
+
+
+def _repeated(recording: Recording) -> Recording | None:
+    """Return what differs from period to period within the recording's window, if it repeats."""
+    if recording.period is None:
+        return None
+    low, high = recording.window or (-np.inf, np.inf)
+    inside = np.flatnonzero((recording.t >= low) & (recording.t < high))
+    try:
+        found = periods(len(inside), recording.rate_hz, recording.period, recording.where)
+    except RecordingError:
+        return None
+    rows = inside[found.index]
+    if mismatch(recording.q[rows]) > _REPEATS:
+        return None
+    grown = np.sqrt(found.count / (found.count - 1))
+    changes = {}
+    for name in ("q", "tau"):
+        measured = getattr(recording, name)
+        folded = measured[rows]
+        noise = np.zeros_like(measured)
+        noise[rows] = (folded - folded.mean(axis=0)) * grown
+        changes[name] = noise
+    return recording.replace(**changes)
+
+
+def _stated(
+    recording: Recording, noise: Noise | None, law: Callable[[Recording], np.ndarray]
+) -> Recording | None:
+    """Return a draw of the stated noise, always the same; the torque's with what the law makes."""
+    if noise is None:
+        return None
+    stream = np.random.default_rng(0)
+    q = noise.position_std * stream.standard_normal(recording.q.shape)
+    tau = noise.torque_std * stream.standard_normal(recording.tau.shape)
+    # The controller answers to the noise of the encoder with torque.
+    answer = law(recording.replace(q=recording.q + q)) - law(recording)
+    return recording.replace(q=q, tau=tau + answer)
