@@ -6,8 +6,7 @@ from functools import cache
 from pathlib import Path
 
 from dynident.closed_loop import Controller, Experiment, ExperimentRun, Fourier, TrueEffect
-from dynident.recording import Recording
-from dynident.recording.formats import write
+from dynident.recording import Recording, write
 from synthetic import ARM, arm
 
 LOOP_STUDY = """\

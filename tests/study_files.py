@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from dynident.model import Model
-from dynident.recording import Recording
-from dynident.recording.formats import write
+from dynident.recording import Recording, write
 from synthetic import ARM, arm, synthetic, true_values
 
 STUDY = """\

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynident.recording.formats import write
+from dynident.recording import write
 from study_files import CONTROLLER, STUDY, csv_text, edited, listing, recording
 from synthetic import ARM
 

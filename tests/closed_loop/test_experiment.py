@@ -22,7 +22,7 @@ from dynident.closed_loop import (
     write_experiment,
 )
 from dynident.errors import DynidentError, EffectError, SimulationError, StudyError
-from dynident.recording.formats import read
+from dynident.recording import read
 from dynident.study import load
 
 RATE = 250.0

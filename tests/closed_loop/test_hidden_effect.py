@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dynident.closed_loop import load_experiment
-from dynident.recording.formats import read
+from dynident.recording import read
 from dynident.study import load
 
 PROBLEM = Path(__file__).parents[2] / "problems" / "hidden_effect"

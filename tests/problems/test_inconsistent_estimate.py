@@ -15,7 +15,7 @@ from dynident import fit as fit_model
 from dynident.closed_loop import Experiment, load_experiment
 from dynident.constraints import Within
 from dynident.inertia import margins, to_com
-from dynident.recording.formats import read
+from dynident.recording import read
 
 PROBLEM = Path(__file__).parents[2] / "problems" / "inconsistent_estimate"
 PUBLISHED = tomllib.loads((PROBLEM / "published.toml").read_text())

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from dynident.errors import DynidentError, FileError, RecordingError
-from dynident.recording import SUFFIXES, Column
-from dynident.recording.formats import read, write
+from dynident.recording import SUFFIXES, Column, read, write
 
 GOOD = "t,q.a,tau.a\n0,1,2\n0.001,1,2\n0.002,1,2\n"
 CSV = {

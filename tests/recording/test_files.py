@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynident.errors import DynidentWarning, FileError, RecordingError
-from dynident.recording import SUFFIXES, Column, Recording
-from dynident.recording.formats import read, write
+from dynident.recording import SUFFIXES, Column, Recording, read, write
 
 SIGNALS = ("q", "tau", "v", "q_ref")
 

@@ -10,10 +10,10 @@ from dynident.recording import (
     ParallelFilter,
     differentiate,
     periods,
+    read,
     require_repetition,
     uniform,
 )
-from dynident.recording.formats import read
 
 GTAU = 35.15065188248547
 EMPS = {

@@ -5,8 +5,7 @@ import pytest
 import scipy.io
 
 from dynident.errors import RecordingError
-from dynident.recording import Column, uniform
-from dynident.recording.formats import read, write
+from dynident.recording import Column, read, uniform, write
 from dynident.study import load
 from study_files import STUDY, write_study
 

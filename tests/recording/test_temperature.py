@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from dynident.errors import DynidentWarning, RecordingError
-from dynident.recording import SUFFIXES, Column, Dataset, numbered, uniform
-from dynident.recording.formats import read, write
+from dynident.recording import SUFFIXES, Column, Dataset, numbered, read, uniform, write
 
 NAN = float("nan")
 

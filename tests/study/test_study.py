@@ -10,8 +10,7 @@ import pytest
 from dynident.errors import DynidentError, DynidentWarning, FileError, StudyError
 from dynident.evidence import compare_models
 from dynident.fitting import fit
-from dynident.recording import Recording
-from dynident.recording.formats import write
+from dynident.recording import Recording, write
 from dynident.study import Study, load
 from study_files import CONTROLLER, RATE_HZ, STUDY, edited, recording, reordered, write_study
 

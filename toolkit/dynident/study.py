@@ -28,11 +28,11 @@ from dynident.recording import (
     Filter,
     Noise,
     Recording,
+    read,
     require_motion,
     require_torque,
     warn_of_missing_torque,
 )
-from dynident.recording.formats import read
 from dynident.robot import Robot
 from dynident.settings import SettingsTable, read_toml
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
@@ -122,4 +123,4 @@ def _is_number(cell: str) -> bool:
 
 def finite(value: float) -> float | None:
     """A number as JSON has it: None where it is not finite."""
-    return value if np.isfinite(value) else None
+    return value if math.isfinite(value) else None

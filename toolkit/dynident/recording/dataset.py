@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from dynident.errors import RecordingError
 from dynident.recording.filters import Filter
 from dynident.recording.recording import Recording
+
+NoiseSource = Literal["replicates", "given", "unknown"]
+"""Where the noise of recordings is known from: repetition, the study, or nowhere."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from scipy.optimize import lsq_linear
 
 from dynident.constraints import Within
 from dynident.errors import FitError
-from dynident.evidence import comparison as compare
+from dynident.evidence import compare
 from dynident.fitting import Estimate, Metric, Prior, Projection, fit, given_estimate, project, rows
 from dynident.fitting.consistent.programs import Solver
 from dynident.fitting.parameter_file import GivenParameters

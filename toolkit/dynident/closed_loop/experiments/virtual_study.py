@@ -11,7 +11,7 @@ from dynident import files
 from dynident.closed_loop.experiments.experiment import Experiment, Progress
 from dynident.effects import FRICTION_WIDTH, catalogue
 from dynident.errors import FileError, SimulationError
-from dynident.recording.formats import write as write_recording
+from dynident.recording import write as write_recording
 from dynident.robot import Robot
 
 STUDY = "study.toml"

@@ -13,8 +13,8 @@ import pytest
 from playwright.sync_api import sync_playwright
 
 from dynident.reporting import report
-from report.fabricated import diagnosis
-from report.fabricated_loop import validation
+from reporting.fabricated import diagnosis
+from reporting.fabricated_loop import validation
 
 BROWSER = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None

@@ -15,7 +15,7 @@ from dynident.errors import DynidentError
 from dynident.reporting import report
 from dynident.reporting.html import page
 from dynident.tables import percent
-from report.fabricated import diagnosis, effect
+from reporting.fabricated import diagnosis, effect
 
 
 @pytest.fixture(scope="module")

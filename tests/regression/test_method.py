@@ -15,8 +15,7 @@ from sklearn.model_selection import PredefinedSplit
 import dynident as di
 from dynident.errors import FitError
 from dynident.fitting import load_estimate, rows
-from dynident.fitting.noisy_inputs import encoder_noise
-from dynident.fitting.noisy_inputs import measured as input_noise
+from dynident.fitting.noisy_inputs import encoder_noise, input_noise
 from dynident.fitting.noisy_inputs.compressed import compress
 from dynident.fitting.noisy_inputs.named import NAMES
 from dynident.fitting.noisy_inputs.posed import pieces_of

@@ -20,7 +20,7 @@ from dynident.closed_loop import (
     TrueEffect,
 )
 from dynident.errors import SimulationError
-from dynident.evidence import comparison as compare
+from dynident.evidence import compare
 from dynident.fitting import Estimate
 from dynident.fitting.given import given_estimate
 from dynident.fitting.sampling import sample

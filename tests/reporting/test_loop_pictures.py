@@ -23,8 +23,8 @@ from dynident.reporting.pictures.loop_plots import simulated_loop as still
 from dynident.reporting.pictures.plots import save
 from dynident.validation.loop_run import QUANTITIES, Skipped
 from dynident.validation.loop_validation import Unsimulated, Validation
-from report.fabricated import diagnosis
-from report.fabricated_loop import validation
+from reporting.fabricated import diagnosis
+from reporting.fabricated_loop import validation
 
 
 @pytest.fixture(scope="module")

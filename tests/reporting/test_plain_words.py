@@ -15,7 +15,7 @@ from dynident.reporting.intervals import parameter_table, widening_after, wideni
 from dynident.reporting.joint_states import joint_errors, opened, states
 from dynident.reporting.next_steps import next_steps, summary
 from dynident.reporting.packing import packed
-from report.fabricated import diagnosis, effect
+from reporting.fabricated import diagnosis, effect
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from dynident.errors import DynidentError
 from dynident.reporting.content import bars, seen, thinned
 from dynident.reporting.pictures import diagnosis_pictures as pictures
 from dynident.reporting.pictures import plots
-from report.fabricated import RECORDINGS, diagnosis, effect
+from reporting.fabricated import RECORDINGS, diagnosis, effect
 
 
 def traces(figure: go.Figure) -> list[Any]:
