@@ -17,7 +17,7 @@ SHARES: dict[Kind, int] = {"healthy": 30, "known": 45, "two": 10, "foreign": 10,
 """Cases of each kind in a block."""
 JOINTS = {2: 75, 6: 12, 7: 13}
 """Cases of each number of joints in a block."""
-ABSORBED = ("rotor_inertia", "joint_zero", "payload")
+NOT_IDENTIFIABLE = ("rotor_inertia", "joint_zero", "payload")
 """Effects that some geometry hides: at the first joint, at the last (or a vertical first) joint,
 and in every recording."""
 RATIOS = (0.3, 30.0)
@@ -97,7 +97,7 @@ def _block(seed: int, block: int) -> list[Case]:
     known = iter(_cycle(KNOWN, SHARES["known"], seed, block))
     twos = iter(_cycle(KNOWN, 2 * SHARES["two"], seed + 1, block))
     foreign = iter(_cycle(FOREIGN, SHARES["foreign"], seed + 2, block))
-    absorbed = iter(_cycle(ABSORBED, SHARES["absorbed"], seed + 3, block))
+    absorbed = iter(_cycle(NOT_IDENTIFIABLE, SHARES["absorbed"], seed + 3, block))
     found = []
     for k in range(BLOCK):
         names: list[str] = []

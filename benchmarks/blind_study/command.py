@@ -97,12 +97,12 @@ def run_study(cases: list[Case], place: Place, size: Size, options: argparse.Nam
         stream = Parallel(return_as="generator_unordered")(
             delayed(answer)(case, place, size) for case in todo
         )
-        with place.answers.open("a") as handle, _progress(len(todo)) as tell:
+        with place.answers.open("a") as handle, _progress(len(todo)) as progress:
             for said in stream:
                 assert said is not None
                 handle.write(json.dumps(said) + "\n")
                 handle.flush()
-                tell(said)
+                progress(said)
 
 
 def _spread(backend: str, scheduler: str | None, jobs: int) -> Any:

@@ -127,7 +127,7 @@ def _tilt(at: _At) -> Start:
     return Start((float(0.02 * np.cos(angle)), float(0.02 * np.sin(angle))), (), 15.0)
 
 
-def _bump(at: _At) -> Start:
+def _pulse(at: _At) -> Start:
     """Its number and time are of the first recording, that others are moved to it."""
     time = float(at.rng.uniform(1.0, 7.0))
     return Start((0.3 * at.dry * _sign(at.rng),), (1.0, time, _log(at.rng, 0.05, 0.5)))
@@ -139,7 +139,7 @@ _STARTS: dict[str, Callable[[_At], Start]] = {
     ),
     "backlash": _gap,
     "base_tilt": _tilt,
-    "contact": _bump,
+    "contact": _pulse,
     "coulomb_friction": lambda at: Start((0.3 * at.dry,)),
     "drive_gain": lambda at: Start((0.03 * _sign(at.rng),), (), 15.0),
     "joint_coupling": _coupling,

@@ -87,10 +87,10 @@ def test_mended_links_are_whole(seed):
     com = rng.normal(size=3) * 0.1 * (mass != 0.0)
     broken = fore_of(di.check(Robot.from_text(urdf(fore(mass, com, inertia + inertia.T, shape)))))
     if not broken.broken:
-        assert broken.mend == ()
+        assert broken.remedy == ()
         return
-    assert broken.mend
-    new = {change.name: change.after for change in broken.mend}
+    assert broken.remedy
+    new = {change.name: change.after for change in broken.remedy}
     old = dict(zip(("com x", "com y", "com z"), com, strict=True))
     old |= {
         f"i{'xyz'[i]}{'xyz'[j]}": (inertia + inertia.T)[i, j] for i in range(3) for j in range(i, 3)
@@ -103,7 +103,7 @@ def test_mended_links_are_whole(seed):
     # What is left out of the mend are changes of 1e-5.
     for rule in again.rules:
         assert not rule.broken or rule.relative > -1e-4, rule
-    for change in broken.mend:
+    for change in broken.remedy:
         assert change.before != change.after
 
 

@@ -106,7 +106,7 @@ def test_mass_a_little_beyond_the_shapes_is_a_hint(writer, fore, axis, cause):
     found = di.check(Robot.from_text(writer(fore)))
     assert found.consistent and found.require() is found
     link = found.links[0]
-    assert link.name == "fore" and not link.broken and not link.mend
+    assert link.name == "fore" and not link.broken and not link.remedy
     assert link.worst.rule == "spread" and link.worst.relative < 0 and link.worst.doubtful
     first, *causes = link.hints
     assert re.fullmatch(BEYOND.format(axis), first)
@@ -205,7 +205,7 @@ def test_mildly_swapped_axes_are_seen_by_likeness_to_a_uniform_body():
 def test_healthy(writer):
     found = di.check(Robot.from_text(writer()))
     assert found.consistent and found.require() is found
-    assert all(not one.hints and not one.mend and not one.not_checked for one in found.links)
+    assert all(not one.hints and not one.remedy and not one.not_checked for one in found.links)
     fore = next(one for one in found.links if one.name == "fore")
     assert fore.length_from == "geometry" and fore.body == "fore"
     assert {one.rule for one in fore.rules} == {

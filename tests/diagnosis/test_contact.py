@@ -11,7 +11,13 @@ import pytest
 from scipy.signal import lfilter
 
 from dynident.diagnosis.nuisances.changes import Repeated, changes_of, scanned
-from dynident.diagnosis.nuisances.pulse_search import LEVEL, WIDTHS, Bump, bumps_in, without
+from dynident.diagnosis.nuisances.pulse_search import (
+    LEVEL,
+    WIDTHS,
+    DisturbancePulse,
+    pulses_in,
+    without,
+)
 from dynident.evidence.runs import Run
 
 STEP = 0.02
@@ -53,9 +59,9 @@ def data(seed: int, kind: str = "", repetitions: int = 4) -> list[Repeated]:
 
 def pushed(series: list[Repeated], k: int, p: int, time: float, width: float, height: float):
     one = series[k]
-    bump = np.zeros_like(one.residual)
-    bump[p] = height * np.exp(-(((one.t[p] - time) / width) ** 2) / 2)
-    return [replace(s, residual=s.residual + bump) if s is one else s for s in series]
+    pulse = np.zeros_like(one.residual)
+    pulse[p] = height * np.exp(-(((one.t[p] - time) / width) ** 2) / 2)
+    return [replace(s, residual=s.residual + pulse) if s is one else s for s in series]
 
 
 @pytest.mark.parametrize("kind", ["", "coloured", "slow"])
@@ -64,38 +70,38 @@ def test_one_burst_is_found_where_it_is_and_nowhere_else(kind: str, seed: int) -
     time = 50.0 + STEP * INSTANTS * 2 + 1.7
     # Slow noise of the same size hides more.
     height = 9.0 if kind == "coloured" else 5.0
-    (bump,) = bumps_in(pushed(data(seed, kind), 3, 2, time, 0.2, height))
-    assert (bump.run, bump.number, bump.repetition, bump.joint) == (1, 2, 2, "elbow")
-    assert bump.time == pytest.approx(time, abs=0.2)
-    assert 0.1 < bump.width < 0.4
-    assert bump.amplitude == pytest.approx(height, rel=0.5)
-    assert bump.p_value < LEVEL
+    (pulse,) = pulses_in(pushed(data(seed, kind), 3, 2, time, 0.2, height))
+    assert (pulse.run, pulse.number, pulse.repetition, pulse.joint) == (1, 2, 2, "elbow")
+    assert pulse.time == pytest.approx(time, abs=0.2)
+    assert 0.1 < pulse.width < 0.4
+    assert pulse.amplitude == pytest.approx(height, rel=0.5)
+    assert pulse.p_value < LEVEL
 
 
 @pytest.mark.parametrize("p", [0, 1])
 @pytest.mark.parametrize("height", [8.0, -8.0])
 def test_of_two_repetitions_it_is_the_one_with_the_larger_residual(p: int, height: float) -> None:
     time = STEP * INSTANTS * p + 2.5
-    quiet = [
+    below_noise = [
         replace(s, residual=noise(np.random.default_rng(k), "", s.speed))
         for k, s in enumerate(data(5, repetitions=2))
     ]
-    (bump,) = bumps_in(pushed(quiet, 0, p, time, 0.15, height))
-    assert (bump.repetition, bump.joint) == (p, "shoulder")
-    assert bump.time == pytest.approx(time, abs=0.1)
-    assert np.sign(bump.amplitude) == np.sign(height)
+    (pulse,) = pulses_in(pushed(below_noise, 0, p, time, 0.15, height))
+    assert (pulse.repetition, pulse.joint) == (p, "shoulder")
+    assert pulse.time == pytest.approx(time, abs=0.1)
+    assert np.sign(pulse.amplitude) == np.sign(height)
 
 
 def test_bursts_come_in_the_order_of_their_significance() -> None:
     series = pushed(data(1), 0, 1, STEP * INSTANTS + 2.0, 0.2, 6.0)
-    found = bumps_in(pushed(series, 3, 0, 53.0, 0.2, -12.0))
+    found = pulses_in(pushed(series, 3, 0, 53.0, 0.2, -12.0))
     assert [(b.run, b.joint) for b in found] == [(1, "elbow"), (0, "shoulder")]
     assert found[0].p_value <= found[1].p_value
 
 
 @pytest.mark.parametrize("kind", ["", "coloured", "slow", "coloured slow", "heavy"])
 def test_noise_is_no_contact(kind: str) -> None:
-    assert [seed for seed in range(6) if bumps_in(data(100 + seed, kind))] == []
+    assert [seed for seed in range(6) if pulses_in(data(100 + seed, kind))] == []
 
 
 def test_friction_that_falls_is_no_contact() -> None:
@@ -103,7 +109,7 @@ def test_friction_that_falls_is_no_contact() -> None:
         replace(s, residual=s.residual + 8.0 * np.exp(-s.t / 10.0) * np.sign(s.speed))
         for s in data(7)
     ]
-    assert bumps_in(warming) == ()
+    assert pulses_in(warming) == ()
 
 
 def test_the_scan_is_the_fit_at_every_row() -> None:
@@ -118,10 +124,10 @@ def test_the_scan_is_the_fit_at_every_row() -> None:
 def test_instants_of_a_bump_are_left_out_of_all_repetitions() -> None:
     t = STEP * np.arange(1000)
     recording: Any = SimpleNamespace(start=100.0)
-    version: Any = SimpleNamespace(t=t, recording=recording)
-    run = Run("repeated", (version,), np.arange(1000).reshape(4, 250), np.array([0, 125, 250]))
-    bump = Bump(0, 1, 2, "elbow", 100.0 + 11.0, 0.1, 5.0, 1e-9)
-    short = without(run, [bump])
+    replicate: Any = SimpleNamespace(t=t, recording=recording)
+    run = Run("repeated", (replicate,), np.arange(1000).reshape(4, 250), np.array([0, 125, 250]))
+    pulse = DisturbancePulse(0, 1, 2, "elbow", 100.0 + 11.0, 0.1, 5.0, 1e-9)
+    short = without(run, [pulse])
     assert without(run, []) is run
     # One second into the period, less and plus four widths.
     gone = set(range(250)) - set(short.index[0])

@@ -121,10 +121,10 @@ def test_an_effect_outside_the_catalogue_is_called_unknown(model: Model) -> None
 
 def test_absorbed_effects_come_with_their_experiment(model: Model) -> None:
     found = diagnosed(model, None, {})
-    absorbed = {c.effect.label: c for c in found.candidates if c.status == "absorbed"}
-    assert "rotor_inertia@shoulder" in absorbed
-    assert absorbed["rotor_inertia@shoulder"].p_value is None
-    assert "shoulder" in absorbed["rotor_inertia@shoulder"].remark
+    not_identifiable = {c.effect.label: c for c in found.candidates if c.status == "absorbed"}
+    assert "rotor_inertia@shoulder" in not_identifiable
+    assert not_identifiable["rotor_inertia@shoulder"].p_value is None
+    assert "shoulder" in not_identifiable["rotor_inertia@shoulder"].remark
 
 
 def test_without_repetition_or_stated_noise_the_verdict_says_so(model: Model) -> None:

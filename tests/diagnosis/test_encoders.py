@@ -10,7 +10,7 @@ import pytest
 from dynident import diagnose as find
 from dynident.diagnosis.nuisances.quantisation import rounding_power
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import fit_present
+from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.runs import gather
 from dynident.model import Model
@@ -38,12 +38,12 @@ def test_rounding_power_is_what_rounding_leaves(model: Model) -> None:
     runs = Dataset(recordings(model, STEP, 1e-3, 3))
     store = ColumnStore(model, gather(runs))
     store.prepare(model.effects)
-    present = fit_present(store, model)
-    judged = on_recordings(store, present)
+    fitted = fit_evidence(store, model)
+    judged = on_recordings(store, fitted)
     assert judged.ratio is not None and judged.noise_std is not None
     left = judged.ratio * judged.noise_std
     assert (left > 3.0 * judged.noise_std).all(), "rounding is not to be seen"
-    predicted = np.sqrt(rounding_power(present, runs))
+    predicted = np.sqrt(rounding_power(fitted, runs))
     np.testing.assert_allclose(predicted, left, rtol=0.3)
 
 
@@ -51,7 +51,7 @@ def test_there_is_none_without_steps(model: Model) -> None:
     runs = Dataset(recordings(model, 0.0, 1e-3, 1))
     store = ColumnStore(model, gather(runs))
     store.prepare(model.effects)
-    np.testing.assert_array_equal(rounding_power(fit_present(store, model), runs), np.zeros(2))
+    np.testing.assert_array_equal(rounding_power(fit_evidence(store, model), runs), np.zeros(2))
 
 
 def test_a_healthy_robot_with_a_coarse_encoder_lacks_nothing(model: Model) -> None:

@@ -23,8 +23,8 @@ def test_columns_linear_in_the_torque_may_be_made_of_filtered_torque() -> None:
     for kind in linear:
         for effect in kind.candidates(model.robot):
             quick = store.of(effect, 0, model, truth)[0]
-            version = store.runs[0].versions[0]
-            block = version.block(model, rigid=False)
-            slow = version.filtered(model.torque_without_loads(block, truth))
+            replicate = store.runs[0].replicates[0]
+            block = replicate.block(model, rigid=False)
+            slow = replicate.filtered(model.torque_without_loads(block, truth))
             joint = model.robot.names.index(str(effect.joint))
             assert np.allclose(quick[:, 0, 0], slow[:, joint], rtol=1e-9, atol=1e-9)

@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dynident.diagnosis.advice.candidate_experiments import Recorded, Trial, Trials
+from dynident.diagnosis.advice.candidate_experiments import (
+    CandidateExperiment,
+    CandidateExperiments,
+    Recorded,
+)
 from dynident.diagnosis.advice.experiments import Adviser, revealing, separating
 from dynident.effects import catalogue, effects_of
 from dynident.model import Model
@@ -31,7 +35,7 @@ def fitted(robot: Robot, *more: str) -> tuple[Model, np.ndarray]:
 
 @pytest.fixture(scope="module")
 def adviser() -> Adviser:
-    return Adviser(Trials(*fitted(arm()), RECORDED))
+    return Adviser(CandidateExperiments(*fitted(arm()), RECORDED))
 
 
 def one(label: str):
@@ -98,12 +102,12 @@ def test_an_effect_already_in_the_model_is_told_from_others() -> None:
 
 
 def test_difference_is_that_of_the_torques() -> None:
-    trials = Trials(*fitted(arm()), RECORDED)
+    trials = CandidateExperiments(*fitted(arm()), RECORDED)
     offset, drift = one("torque_offset@elbow"), one("torque_drift@elbow")
-    before, left = trials.difference(offset, [2.0], drift, Trial("wide"))
+    before, left = trials.difference(offset, [2.0], drift, CandidateExperiment("wide"))
     assert before == pytest.approx([0.0, 2.0], abs=1e-9)
     assert np.linalg.norm(left) < np.linalg.norm(before)
-    _, nothing = trials.difference(offset, [2.0], offset, Trial("wide"))
+    _, nothing = trials.difference(offset, [2.0], offset, CandidateExperiment("wide"))
     assert np.all(nothing < 1e-9)
 
 

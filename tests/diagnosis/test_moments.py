@@ -11,22 +11,22 @@ from dynident.moments.replicated import moments, solve
 RNG = np.random.default_rng(11)
 
 
-def repeated(signal: np.ndarray, versions: int, std: float, rng) -> np.ndarray:
-    return signal + std * rng.normal(size=(versions, *signal.shape))
+def repeated(signal: np.ndarray, replicates: int, std: float, rng) -> np.ndarray:
+    return signal + std * rng.normal(size=(replicates, *signal.shape))
 
 
 @pytest.mark.parametrize("versions", [2, 3, 5])
-def test_signal_moments_are_free_of_noise_in_the_mean(versions: int) -> None:
+def test_signal_moments_are_free_of_noise_in_the_mean(replicates: int) -> None:
     signal = RNG.normal(size=(60, 3))
     edges = np.array([0, 20, 60])
     total = np.zeros((3, 3))
     trials = 2000
     for _ in range(trials):
-        noisy = repeated(signal, versions, 0.5, RNG)
+        noisy = repeated(signal, replicates, 0.5, RNG)
         total += moments(noisy, noisy, edges, "repeated").signal.sum(axis=0)
-    expected = versions * signal.T @ signal
+    expected = replicates * signal.T @ signal
     # One trial's standard deviation is about 0.5 * 2 * sqrt(60) * versions at most.
-    tolerance = 5 * 8.0 * versions / np.sqrt(trials)
+    tolerance = 5 * 8.0 * replicates / np.sqrt(trials)
     assert np.allclose(total / trials, expected, atol=tolerance)
 
 
@@ -37,7 +37,7 @@ def test_moments_of_noisy_copies_are_corrected_in_the_mean() -> None:
     for _ in range(trials):
         measured = signal + 0.5 * RNG.normal(size=signal.shape)
         copies = np.stack([measured, *(measured + 0.5 * RNG.normal(size=(3, 80, 2)))])
-        total += moments(copies, copies, np.array([0, 80]), "perturbed").signal[0]
+        total += moments(copies, copies, np.array([0, 80]), "noise_augmented").signal[0]
     assert np.allclose(total / trials, signal.T @ signal, atol=5 * 12.0 / np.sqrt(trials))
 
 
@@ -88,8 +88,8 @@ def test_dependent_columns_get_the_smallest_answer_and_no_explosion() -> None:
 
 
 @pytest.mark.parametrize("versions", [2, 3])
-def test_differences_have_the_variance_of_the_noise(versions: int) -> None:
-    residual = repeated(np.sin(np.arange(4000.0)), versions, 0.3, RNG)
+def test_differences_have_the_variance_of_the_noise(replicates: int) -> None:
+    residual = repeated(np.sin(np.arange(4000.0)), replicates, 0.3, RNG)
     assert np.mean(differences(residual, "repeated") ** 2) == pytest.approx(0.09, rel=0.08)
     assert systematic_square(residual, "repeated") == pytest.approx(0.5, rel=0.08)
 

@@ -10,7 +10,7 @@ import pytest
 import dynident as di
 from dynident.effects import catalogue
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import fit_present
+from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
 from problem_scripts import PROBLEMS
 
@@ -25,8 +25,8 @@ def test_load_and_elasticity_settle_together_from_a_robot_without_bodies() -> No
         study.model, gather(replace(study.train, recordings=study.train.recordings[:2]))
     )
     store.prepare(study.model.effects)
-    alone = [fit_present(store, study.model + one) for one in (load, bends)]
-    both = fit_present(store, study.model + load + bends)
+    alone = [fit_evidence(store, study.model + one) for one in (load, bends)]
+    both = fit_evidence(store, study.model + load + bends)
     mu, c = both.values[-2:]
     sigma = np.sqrt(np.diag(both.covariance)[-2:])
     assert mu == pytest.approx(alone[0].values[-1], abs=3 * sigma[0])

@@ -10,7 +10,7 @@ from dynident.diagnosis.search.ranking import candidates, rank
 from dynident.diagnosis.search.selection import choose
 from dynident.effects import effects_of
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import Present, fit_present
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.runs import gather
 from dynident.model import Model
 from dynident.recording import Dataset
@@ -35,21 +35,21 @@ def store_of(seeds: range, drag: float, offset: float) -> ColumnStore:
     return store
 
 
-def added(store: ColumnStore, *labels: str) -> tuple[Present, list[Found]]:
+def added(store: ColumnStore, *labels: str) -> tuple[EvidenceFit, list[Found]]:
     """The model with effects added one after the other, as the diagnosis adds them."""
-    present, found = fit_present(store, PLAIN), []
+    fitted, found = fit_evidence(store, PLAIN), []
     for label in labels:
         (effect,) = effects_of(label, PLAIN.robot)
-        one = choose(store, present, rank(store, present, len(found), only=(effect,)))
+        one = choose(store, fitted, rank(store, fitted, len(found), only=(effect,)))
         assert one is not None
         found.append(one)
-        present = fit_present(store, present.model + effect, present)
-    return present, found
+        fitted = fit_evidence(store, fitted.model + effect, fitted)
+    return fitted, found
 
 
 def kept(store: ColumnStore, held: ColumnStore | None) -> list[str]:
-    present, found = added(store, DRAG, OFFSET)
-    left = without_superfluous(store, held, present, found, lambda _: None)
+    fitted, found = added(store, DRAG, OFFSET)
+    left = without_superfluous(store, held, fitted, found, lambda _: None)
     assert [e.label for e in left.final.model.effects][-len(left.found) :] == [
         one.score.effect.label for one in left.found
     ]
@@ -69,7 +69,7 @@ def test_what_does_not_help_in_the_test_recordings_goes() -> None:
 
 def test_what_another_effect_explains_as_well_goes() -> None:
     store = store_of(range(3), 0.4, 0.0)
-    plain = fit_present(store, PLAIN)
+    plain = fit_evidence(store, PLAIN)
     ripple, drag = (
         effects_of("torque_ripple@shoulder", PLAIN.robot)[0],
         effects_of(DRAG, PLAIN.robot)[0],
@@ -79,6 +79,8 @@ def test_what_another_effect_explains_as_well_goes() -> None:
     model = PLAIN
     for one in found:
         model = model + one.score.effect
-    left = without_superfluous(store, None, fit_present(store, model, plain), found, lambda _: None)
+    left = without_superfluous(
+        store, None, fit_evidence(store, model, plain), found, lambda _: None
+    )
     assert [one.score.effect.label for one in left.found] == [DRAG]
     assert np.isclose(left.final.values[left.final.model.slices[DRAG]], 0.4, atol=0.05)

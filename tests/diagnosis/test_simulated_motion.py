@@ -11,7 +11,7 @@ from dynident.closed_loop import Controller, Experiment, Fourier, Sensors, TrueE
 from dynident.closed_loop import ExperimentRun as Motion
 from dynident.diagnosis import diagnose
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import fit_present, model_columns
+from dynident.evidence.evidence_fit import fit_evidence, model_columns
 from dynident.evidence.simulated_motion import motion_of_loop
 from dynident.model import Model
 from dynident.recording import Dataset
@@ -68,21 +68,21 @@ def test_moved_torque_makes_plain_regression_instrumental(healthy: Dataset) -> N
     loop = motion_of_loop(model(), healthy, CONTROLLER)
     store = ColumnStore(model(), loop.runs)
     store.prepare(store.model.effects)
-    present = fit_present(store, store.model)
+    fitted = fit_evidence(store, store.model)
     # V' (y - W x), both whitened as the fit has it, over the norms of what is multiplied.
     V, e = [], []
     for r, run in enumerate(store.runs):
-        for j, noise in enumerate(present.noise):
-            measured, simulated = model_columns(store, store.model, r, j, present.values)
-            residual = measured @ np.append(-present.values, 1.0)
-            speed = run.versions[-1].v[:, j]
+        for j, noise in enumerate(fitted.noise):
+            measured, simulated = model_columns(store, store.model, r, j, fitted.values)
+            residual = measured @ np.append(-fitted.values, 1.0)
+            speed = run.replicates[-1].v[:, j]
             e.append(noise.whiten(residual[:, None], speed)[run.index[0], 0])
             V.append(noise.whiten(simulated[:, :-1], speed)[run.index[0]])
     V, e = np.concatenate(V), np.concatenate(e)
     correlation = (V.T @ e) / (np.linalg.norm(V, axis=0) * np.linalg.norm(e))
     assert np.abs(correlation).max() < 1e-4
     truth = [v for values in FRICTION.values() for v in values]
-    assert np.allclose(present.values[-4:], truth, atol=0.12)
+    assert np.allclose(fitted.values[-4:], truth, atol=0.12)
 
 
 def test_a_hidden_offset_is_found(healthy: Dataset) -> None:

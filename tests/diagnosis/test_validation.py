@@ -189,9 +189,9 @@ def test_no_nearer_demands_a_clear_ratio() -> None:
 def test_a_healthy_torque_is_not_accused() -> None:
     """What the controller makes of the encoders' noise is noise; a hundredth is not material."""
     made = recordings(noise=1e-4)[0].replace(period=None)
-    quiet = dataset(made, noise=Noise(np.full(2, 1e-4), np.zeros(2)))
+    below_noise = dataset(made, noise=Noise(np.full(2, 1e-4), np.zeros(2)))
     assert not any(
-        "times the noise" in one for one in validate(estimate(), quiet, CONTROLLER).notes
+        "times the noise" in one for one in validate(estimate(), below_noise, CONTROLLER).notes
     )
     tiny = dataset(noise=Noise(np.full(2, 1e-9), np.full(2, 1e-9)))
     near = validate(estimate(1.002), tiny, CONTROLLER)

@@ -31,9 +31,9 @@ def recordings(model: Model, **values: float) -> tuple[Recording, ...]:
 
 def with_contact(recording: Recording, size: float) -> Recording:
     """A bump of 0.4 s that returns in every period, at the elbow."""
-    bump = size * np.exp(-(((np.mod(recording.t, 8.0) - 3.0) / 0.15) ** 2))
+    pulse = size * np.exp(-(((np.mod(recording.t, 8.0) - 3.0) / 0.15) ** 2))
     tau = np.array(recording.tau)
-    tau[:, 1] += bump
+    tau[:, 1] += pulse
     return recording.replace(tau=tau)
 
 

@@ -360,7 +360,7 @@ def test_wrong_places_are_refused(kind: type[Effect]) -> None:
         with pytest.raises(EffectError) as caught:
             effect.on(ROBOT)
         assert kind.name in str(caught.value)
-        assert caught.value.mend
+        assert caught.value.remedy
     if kind.place != "robot":
         with pytest.raises(EffectError, match="travel, swing, hoist"):
             kind("swimg", "hoist" if kind.place == "pair" else None).on(ROBOT)

@@ -50,10 +50,10 @@ def test_a_recorded_temperature_takes_the_place_of_time() -> None:
 
 def test_a_contact_is_in_one_recording_only() -> None:
     one = effect("contact@hinge", 3, 100.0, 0.5)
-    bump = one.columns(block(number=3))[:, 0, 0]
-    assert T[np.argmax(bump)] == pytest.approx(100.0, abs=0.05)
+    pulse = one.columns(block(number=3))[:, 0, 0]
+    assert T[np.argmax(pulse)] == pytest.approx(100.0, abs=0.05)
     # The area of a Gaussian bump of height one.
-    assert np.trapezoid(bump, T) == pytest.approx(0.5 * np.sqrt(2 * np.pi), rel=1e-3)
+    assert np.trapezoid(pulse, T) == pytest.approx(0.5 * np.sqrt(2 * np.pi), rel=1e-3)
     assert not np.any(one.columns(block(number=2)))
     assert list(one.variants(ROBOT)) == [one]
 

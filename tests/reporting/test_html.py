@@ -115,9 +115,9 @@ def test_it_says_what_the_diagnosis_says(found, html):
     for one in found.maps:
         if one.sentence:
             assert one.sentence[1:] in text
-    absorbed = [c for c in found.candidates if c.status == "absorbed"]
-    assert absorbed
-    for candidate in absorbed:
+    not_identifiable = [c for c in found.candidates if c.status == "absorbed"]
+    assert not_identifiable
+    for candidate in not_identifiable:
         assert candidate.effect.title in text and candidate.remark in text
 
 

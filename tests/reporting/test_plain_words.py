@@ -43,12 +43,12 @@ def test_an_effect_of_ones_own_is_explained_by_what_it_looks_like():
 
 
 def test_what_to_do_names_commands_and_the_experiment_that_separates(found):
-    add, separate, absorbed = next_steps(found)
+    add, separate, not_identifiable = next_steps(found)
     assert add.commands == ("dynident add STUDY stribeck_friction@elbow", "dynident fit STUDY")
     assert "asymmetric friction at elbow" in separate.what
     for one in (found.steps[0].effect, *found.steps[0].indistinguishable):
         assert one.advice in separate.why
-    assert "cannot show" in absorbed.what
+    assert "cannot show" in not_identifiable.what
 
 
 def test_without_noise_the_first_thing_is_a_motion_that_repeats():

@@ -19,10 +19,10 @@ class DynidentError(Exception):
         What to do about it.
     """
 
-    def __init__(self, what: str, where: str | None = None, mend: str | None = None) -> None:
-        self.what, self.where, self.mend = what, where, mend
+    def __init__(self, what: str, where: str | None = None, remedy: str | None = None) -> None:
+        self.what, self.where, self.remedy = what, where, remedy
         message = f"{where}: {what}" if where else what
-        super().__init__(f"{message}. {mend}" if mend else message)
+        super().__init__(f"{message}. {remedy}" if remedy else message)
 
 
 class FileError(DynidentError):
@@ -77,11 +77,11 @@ class SimulationError(DynidentError):
         self,
         what: str,
         where: str | None = None,
-        mend: str | None = None,
+        remedy: str | None = None,
         *,
         reason: str = "setting",
     ) -> None:
-        super().__init__(what, where, mend)
+        super().__init__(what, where, remedy)
         self.reason = reason
 
 

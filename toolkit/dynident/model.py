@@ -38,7 +38,9 @@ class Model:
             if labels.count(label) > 1:
                 raise EffectError("is in the model twice", label, "name it once")
         if not self.friction_width > 0:
-            raise EffectError(f"friction_width = {self.friction_width:g}", mend="choose it above 0")
+            raise EffectError(
+                f"friction_width = {self.friction_width:g}", remedy="choose it above 0"
+            )
         object.__setattr__(self, "effects", checked)
 
     # --- with other effects --------------------------------------------------------------------
@@ -225,7 +227,7 @@ class Model:
         """Predicted torque, (T, n) in N m or N."""
         return self.columns(block, values) @ values
 
-    def settled(self, at: np.ndarray, found: np.ndarray) -> np.ndarray:
+    def relaxed(self, at: np.ndarray, found: np.ndarray) -> np.ndarray:
         """Values at which to take columns that depend on the present model next.
 
         Where a share e is added to the torque, the plain repetition (at `found`) shrinks its error
@@ -282,14 +284,14 @@ class Model:
         if "body" in effect.needs and block.body is None:
             values = self.given_values() if values is None else values
             carries = block.carries_payload
-            body = self.present_robot(values, effect, carries_payload=carries)
-            empty = self.present_robot(values, effect) if carries else body
+            body = self.current_robot(values, effect, carries_payload=carries)
+            empty = self.current_robot(values, effect) if carries else body
             block = replace(block, body=body, empty=empty, rotor=self.rotor(values))
         if "rigid" in effect.needs and block.rigid is None:
             block = replace(block, rigid=self.robot.regressor(block.q, block.v, block.a))
         return block
 
-    def present_robot(
+    def current_robot(
         self, values: np.ndarray, before: Effect | None = None, *, carries_payload: bool = False
     ) -> Robot:
         """Return the robot with the bodies, and the changes of them, that the parameters say.

@@ -39,10 +39,10 @@ def find_data(file: str, folder: Path) -> Path:
     downloaded = _download(Path(file).name)
     if downloaded is not None:
         return downloaded
-    mend = f"put it beside the study, or name the data folder in the variable {VARIABLE}"
+    remedy = f"put it beside the study, or name the data folder in the variable {VARIABLE}"
     if "EMPS" in file:
-        mend += "; or `pip install nonlinear-benchmarks`, which downloads this benchmark"
-    raise FileError("no such data file", str(tried[0]), mend)
+        remedy += "; or `pip install nonlinear-benchmarks`, which downloads this benchmark"
+    raise FileError("no such data file", str(tried[0]), remedy)
 
 
 def _download(name: str) -> Path | None:
@@ -55,8 +55,8 @@ def _download(name: str) -> Path | None:
     try:
         locations = EMPS(data_file_locations=True)
     except Exception as error:  # its downloads fail in many ways; all mean: not to be had
-        mend = f"name the data folder in the variable {VARIABLE}"
-        raise FileError(f"the download failed ({error})", name, mend) from None
+        remedy = f"name the data folder in the variable {VARIABLE}"
+        raise FileError(f"the download failed ({error})", name, remedy) from None
     for location in locations:
         if Path(location).name == name:
             return Path(location)

@@ -151,8 +151,8 @@ def load(path: str | Path) -> Study:
         for use in ("train", "test")
     }
     if not sets["train"].recordings:
-        mend = 'set use = "train" for some of them'
-        raise StudyError("no recording is for training", str(path), mend)
+        remedy = 'set use = "train" for some of them'
+        raise StudyError("no recording is for training", str(path), remedy)
     for dataset in sets.values():
         require_torque(dataset.recordings)
     warn_of_missing_torque(recordings)
@@ -189,8 +189,8 @@ def add_effects(path: str | Path, effects: tuple[Effect, ...]) -> None:
         if {**said, "effects": sorted(said.get("effects", []))} == wanted:
             files.write_text(path, candidate)
             return
-    mend = f"write them into it: {', '.join(labels)}"
-    raise StudyError("the effects cannot be added to this file", str(path), mend)
+    remedy = f"write them into it: {', '.join(labels)}"
+    raise StudyError("the effects cannot be added to this file", str(path), remedy)
 
 
 def _with_effects(text: str, labels: list[str]) -> Iterator[str]:
@@ -224,7 +224,7 @@ def _in(path: Path, key: str) -> Iterator[None]:
     try:
         yield
     except DynidentError as error:
-        raise StudyError(error.what, f"{path}: {key}", error.mend) from None
+        raise StudyError(error.what, f"{path}: {key}", error.remedy) from None
 
 
 def _robot(said: _StudyFile, path: Path) -> Robot:
@@ -238,8 +238,8 @@ def _robot(said: _StudyFile, path: Path) -> Robot:
         raise StudyError(str(error), f"{path}: joints") from None
     for link in robot.links:
         if not np.all(np.isfinite(link.phi)):
-            what, mend = "its inertia is not finite", "mend the numbers of its inertial element"
-            raise RobotError(what, f"{file}: link '{link.name}'", mend)
+            what, remedy = "its inertia is not finite", "mend the numbers of its inertial element"
+            raise RobotError(what, f"{file}: link '{link.name}'", remedy)
     return robot
 
 

@@ -118,6 +118,6 @@ def test_too_few_rounds_are_told(model, true):
 
 def test_progress_is_told(model, true):
     heard = []
-    method = IV(Stubborn(true, lambda values: True), tell=lambda *said: heard.append(said))
+    method = IV(Stubborn(true, lambda values: True), progress=lambda *said: heard.append(said))
     method.fit(model, dataset(true))
     assert heard and all(done <= total for _, done, total in heard)

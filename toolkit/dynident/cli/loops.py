@@ -98,8 +98,8 @@ def _make(file: Path, out: Path, as_json: bool) -> None:
     from dynident.closed_loop import load_experiment, write_experiment
 
     loaded = load_experiment(file)
-    with progress("simulating") as tell:
-        written = write_experiment(loaded, out, progress=tell)
+    with progress("simulating") as show_progress:
+        written = write_experiment(loaded, out, progress=show_progress)
     if as_json:
         print_json({"written": [str(path) for path in written]})
     else:
@@ -147,14 +147,14 @@ def _controller(study: Study, recordings: Dataset) -> Controller:
     """The study's controller, if the loop can be simulated with what the study says."""
     path, names = study.path, study.robot.names
     if study.controller is None:
-        mend = "state the one that ran: kind, gains, rate_hz"
-        raise StudyError("has no [controller], so that its loop is not known", str(path), mend)
+        remedy = "state the one that ran: kind, gains, rate_hz"
+        raise StudyError("has no [controller], so that its loop is not known", str(path), remedy)
     require_rate(study, study.controller)
     if all(r.q_ref is None for r in recordings.recordings):
         column = f"q_ref.{names[0]}" if len(names) == 1 else "q_ref.<joint>"
         what = f"no recording has the reference that the controller followed, {column}"
-        mend = "record it, or map it to the column that has it in [columns]"
-        raise StudyError(what, str(path), mend)
+        remedy = "record it, or map it to the column that has it in [columns]"
+        raise StudyError(what, str(path), remedy)
     return study.controller
 
 
@@ -162,8 +162,8 @@ def _estimate(study: Study, saved: Path | None, chosen: Chosen) -> Estimate:
     from dynident.fitting import fit, load_estimate
 
     if saved is None:
-        with progress("fitting") as tell:
-            method = chosen.estimator(study, "joint", tell)
+        with progress("fitting") as show_progress:
+            method = chosen.estimator(study, "joint", show_progress)
             return fit(study.model, study.train, method)
     found = load_estimate(saved)
     if found.model.robot.names != study.robot.names:
@@ -176,12 +176,12 @@ def _estimate(study: Study, saved: Path | None, chosen: Chosen) -> Estimate:
 def _validation(estimate: Estimate, recordings: Dataset, controller: Controller) -> Validation:
     from dynident.validation import validate
 
-    with progress("simulating") as tell:
+    with progress("simulating") as show_progress:
         return validate(
             estimate,
             recordings,
             controller,
-            progress=lambda done, total: tell(f"{done:.1f} of {total:.1f} s", done, total),
+            progress=lambda done, total: show_progress(f"{done:.1f} of {total:.1f} s", done, total),
         )
 
 

@@ -67,13 +67,13 @@ class Chosen:
             )
 
     def estimator(
-        self, study: Study, weighting: Literal["joint", "none"], tell: Callable[..., Any]
+        self, study: Study, weighting: Literal["joint", "none"], show_progress: Callable[..., Any]
     ) -> Method:
         """Return the estimator of a study; raises what `iv` raises."""
         from dynident.fitting import LeastSquares, Regression
 
         if self.method == "iv":
-            return self.iv(study, weighting, tell)
+            return self.iv(study, weighting, show_progress)
         if self.method in REGRESSIONS:
             return Regression(self.method, self.input_noise or "none")
         return LeastSquares(weighting)
@@ -93,7 +93,9 @@ class Chosen:
         found: Any = Regression(self.method).regressor(study.model, study.train)
         return start_sensitivity(found), reliability_profile(found)
 
-    def iv(self, study: Study, weighting: Literal["joint", "none"], tell: Callable[..., Any]) -> IV:
+    def iv(
+        self, study: Study, weighting: Literal["joint", "none"], show_progress: Callable[..., Any]
+    ) -> IV:
         """Return the instrumental variable estimator of a study.
 
         Raises
@@ -107,23 +109,23 @@ class Chosen:
         start = self.start or "least_squares"
         if self.instruments == "periods":
             periods: Any = SwappedPeriods()
-            return IV(periods, weighting=weighting, tell=tell)
+            return IV(periods, weighting=weighting, progress=show_progress)
         if self.instruments == "filtered":
             assert self.cutoff is not None
-            return IV(Filtered(self.cutoff), weighting=weighting, tell=tell)
+            return IV(Filtered(self.cutoff), weighting=weighting, progress=show_progress)
         if study.controller is None:
-            mend = "state the one that ran, or choose --instruments periods or filtered"
+            remedy = "state the one that ran, or choose --instruments periods or filtered"
             what = "has no [controller], so that its loop cannot be simulated for instruments"
-            raise StudyError(what, str(study.path), mend)
+            raise StudyError(what, str(study.path), remedy)
         require_rate(study, study.controller)
         for recording in study.train.recordings:
             if recording.q_ref is None:
-                mend = (
+                remedy = (
                     f"add columns q_ref.{recording.joints[0]}, ..., or choose --instruments "
                     "periods or --instruments filtered --cutoff HZ"
                 )
-                raise StudyError("the recording has no reference", recording.where, mend)
-        return IV(study.controller, start=start, weighting=weighting, tell=tell)
+                raise StudyError("the recording has no reference", recording.where, remedy)
+        return IV(study.controller, start=start, weighting=weighting, progress=show_progress)
 
 
 def require_rate(study: Study, controller: Controller) -> None:
@@ -137,7 +139,7 @@ def require_rate(study: Study, controller: Controller) -> None:
     try:
         controller.simulated_rate()
     except DynidentError as error:
-        raise StudyError(error.what, f"{study.path}: {error.where}", error.mend) from None
+        raise StudyError(error.what, f"{study.path}: {error.where}", error.remedy) from None
 
 
 def method_options(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -72,7 +72,9 @@ def progress(title: str) -> Iterator[Callable[..., None]]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(title, total=None)
 
-        def tell(doing: object = "", done: float | None = None, total: float | None = None) -> None:
+        def show_progress(
+            doing: object = "", done: float | None = None, total: float | None = None
+        ) -> None:
             bar.update(task, description=f"{title}: {doing}", completed=done, total=total)
 
-        yield tell
+        yield show_progress

@@ -119,9 +119,9 @@ def fit(
     require_places(study, out, robot, plot)
     require_picture(plot)
     loaded = load_study(study)
-    with progress("fitting") as tell:
+    with progress("fitting") as show_progress:
         weighting = "none" if ordinary else "joint"
-        method = chosen.estimator(loaded, weighting, tell)
+        method = chosen.estimator(loaded, weighting, show_progress)
         if consistency != "none":
             method = Constrained(Within(consistency), weighting=weighting)
         estimate = fit_model(loaded.model, loaded.train, method)
@@ -202,8 +202,8 @@ def add(study: Path, effect: str, as_json: bool) -> None:
     if any("payload" in one.needs for one in fresh):
         recordings = (loaded.train + loaded.test).recordings
         if not any(r.payload for r in recordings):
-            mend = "set payload = true in the [[recordings]] that carry it"
-            raise StudyError("no recording carries a payload", str(study), mend)
+            remedy = "set payload = true in the [[recordings]] that carry it"
+            raise StudyError("no recording carries a payload", str(study), remedy)
     comparison = comparison_of(loaded, (effect,))
     add_effects(study, fresh)
     if as_json:

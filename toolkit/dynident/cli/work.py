@@ -34,8 +34,8 @@ def require_places(study: Path, *paths: Path | None) -> None:
 def require_picture(path: Path | None) -> None:
     """Refuse a picture whose suffix is no format, before it is drawn."""
     if path is not None and path.suffix.lower() not in _PICTURES:
-        mend = f"end its name in {', '.join(_PICTURES)}"
-        raise FileError("is no kind of picture that can be written", str(path), mend)
+        remedy = f"end its name in {', '.join(_PICTURES)}"
+        raise FileError("is no kind of picture that can be written", str(path), remedy)
 
 
 def load_study(path: Path) -> Study:
@@ -50,9 +50,11 @@ def diagnosis_of(study: Study) -> Diagnosis:
     """Run the search for what the model lacks."""
     from dynident.diagnosis import diagnose as search
 
-    with progress("diagnosing") as tell:
+    with progress("diagnosing") as show_progress:
         controller = study.controller
-        return search(study.model, study.train, study.test, controller=controller, tell=tell)
+        return search(
+            study.model, study.train, study.test, controller=controller, progress=show_progress
+        )
 
 
 def comparison_of(study: Study, additions: tuple[str, ...]) -> Comparison:

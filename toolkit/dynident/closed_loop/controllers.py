@@ -76,8 +76,8 @@ class Controller:
 
     def __post_init__(self) -> None:
         if self.kind not in LAWS:
-            mend = f"kinds: {', '.join(LAWS)}"
-            raise SimulationError(f"no controller of kind '{self.kind}'", "controller.kind", mend)
+            remedy = f"kinds: {', '.join(LAWS)}"
+            raise SimulationError(f"no controller of kind '{self.kind}'", "controller.kind", remedy)
         for name in (*GAINS, "limit", "drive_gain"):
             value = getattr(self, name)
             if value is not None:
@@ -87,19 +87,19 @@ class Controller:
         for name in ("limit", "drive_gain"):
             value = getattr(self, name)
             if value is not None and (len(value) != self.n or not all(x > 0 for x in value)):
-                mend = "give one positive number per joint"
-                raise SimulationError(f"{name} = {list(value)}", f"controller.{name}", mend)
+                remedy = "give one positive number per joint"
+                raise SimulationError(f"{name} = {list(value)}", f"controller.{name}", remedy)
         if self.law.through_model and self.drive_gain is not None:
             what = f"the model of a {self.kind} makes torques, not signals"
             raise SimulationError(what, "controller.drive_gain", "leave it out")
         for name in ("rate_hz", "derivative_cutoff_hz"):
             value = getattr(self, name)
             if value is not None and not (value > 0 and math.isfinite(value)):
-                mend = "choose a positive number"
-                raise SimulationError(f"{name} = {value:g}", f"controller.{name}", mend)
+                remedy = "choose a positive number"
+                raise SimulationError(f"{name} = {value:g}", f"controller.{name}", remedy)
         if not (self.delay_s >= 0 and math.isfinite(self.delay_s)):
-            mend = "choose it 0 or above"
-            raise SimulationError(f"delay_s = {self.delay_s:g}", "controller.delay_s", mend)
+            remedy = "choose it 0 or above"
+            raise SimulationError(f"delay_s = {self.delay_s:g}", "controller.delay_s", remedy)
 
     @property
     def n(self) -> int:
@@ -129,22 +129,22 @@ class Controller:
         """
         if self.rate_hz is None:
             what = "the controller's rate is not stated"
-            mend = "give its samples per second"
-            raise SimulationError(what, "controller.rate_hz", mend, reason="clock")
+            remedy = "give its samples per second"
+            raise SimulationError(what, "controller.rate_hz", remedy, reason="clock")
         return self.rate_hz
 
     def _check_gain(self, name: str, value: tuple[float, ...]) -> None:
         where, wanted = f"controller.{name}", name in self.law.gains
         if bool(value) != wanted:
             verb = "needs" if wanted else "takes no"
-            mend = f"its gains are {', '.join(self.law.gains)}"
-            raise SimulationError(f'a "{self.kind}" controller {verb} {name}', where, mend)
+            remedy = f"its gains are {', '.join(self.law.gains)}"
+            raise SimulationError(f'a "{self.kind}" controller {verb} {name}', where, remedy)
         if wanted and len(value) != self.n:
-            mend = "give one gain per joint"
-            raise SimulationError(f"{len(value)} gains for {self.n} joints", where, mend)
+            remedy = "give one gain per joint"
+            raise SimulationError(f"{len(value)} gains for {self.n} joints", where, remedy)
         if not all(x >= 0 and math.isfinite(x) for x in value):
-            mend = "gains are finite and not negative"
-            raise SimulationError(f"{name} = {list(value)}", where, mend)
+            remedy = "gains are finite and not negative"
+            raise SimulationError(f"{name} = {list(value)}", where, remedy)
 
 
 class ControllerFile(SettingsTable):
@@ -179,8 +179,8 @@ class ControllerFile(SettingsTable):
             if not isinstance(value, Sequence):
                 return (float(value),) * robot.n
             if len(value) != robot.n:
-                what, mend = f"{len(value)} values for {robot.n} joints", "give one per joint"
-                raise StudyError(what, f"{where}.{name}", mend)
+                what, remedy = f"{len(value)} values for {robot.n} joints", "give one per joint"
+                raise StudyError(what, f"{where}.{name}", remedy)
             return tuple(value)
 
         said = self.model_dump()
@@ -190,4 +190,4 @@ class ControllerFile(SettingsTable):
             return Controller(**said)
         except DynidentError as error:
             key = (error.where or "").partition(".")[2]
-            raise StudyError(error.what, f"{where}.{key}".rstrip("."), error.mend) from None
+            raise StudyError(error.what, f"{where}.{key}".rstrip("."), error.remedy) from None

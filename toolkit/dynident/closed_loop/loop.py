@@ -59,7 +59,7 @@ class ClosedLoop:
 
     def __init__(self, *, accuracy: float = ACCURACY) -> None:
         if not (0 < accuracy < 1):
-            raise SimulationError(f"accuracy = {accuracy:g}", mend="choose it between 0 and 1")
+            raise SimulationError(f"accuracy = {accuracy:g}", remedy="choose it between 0 and 1")
         self._accuracy = accuracy
         self._plants: dict[Hashable, Plant] = {}
         self._notes: dict[str, None] = {}
@@ -122,14 +122,14 @@ class ClosedLoop:
         for number, group in enumerate(groups):
             past = sum(lengths[:number])
 
-            def tell(done: float, past: float = past) -> None:
+            def advance(done: float, past: float = past) -> None:
                 if progress is not None:
                     progress(past + done, sum(lengths))
 
             # Robots on their way to infinity are noticed by where they are, not by NumPy.
             with np.errstate(all="ignore"):
                 found += self._simulate(
-                    tasks[group], kept[group], before, controller, sensors, scale, tell
+                    tasks[group], kept[group], before, controller, sensors, scale, advance
                 )
         return tuple(found)
 
@@ -141,7 +141,7 @@ class ClosedLoop:
         controller: Controller,
         sensors: Sensors,
         scale: np.ndarray,
-        tell: Callable[[float], None],
+        advance: Callable[[float], None],
     ) -> list[Rollout]:
         from dynident.closed_loop.plant.drive import Drive, ReferenceSamples
         from dynident.closed_loop.plant.stepping import JointLoop, Measurement, Stepper
@@ -170,7 +170,7 @@ class ClosedLoop:
         drive = Drive(controller, reference, nominal, scale, settled)
         stepper = Stepper(plant, joints, rate, controller.delay_s, self._accuracy)
         measurement = Measurement(noise, np.tile(resolution, len(tasks)))
-        motion = stepper.run(time, reference, drive, measurement, tell)
+        motion = stepper.run(time, reference, drive, measurement, advance)
         return [
             _rollout(motion, reference, slice(before, before + length), k, tasks, rate, resolution)
             for k, length in enumerate(kept)
@@ -244,8 +244,8 @@ def _check(task: Task, n: int, controller: Controller) -> None:
             raise SimulationError(what, task.name or None, "give each as many joints as the robot")
     for one in (robot, nominal or robot):
         if not np.isfinite(one.theta).all():
-            mend = "mend the inertial elements of its description"
-            raise SimulationError("has inertial values that are not finite", one.name, mend)
+            remedy = "mend the inertial elements of its description"
+            raise SimulationError("has inertial values that are not finite", one.name, remedy)
     for one in task.mechanism.effects:
         if not np.isfinite(one.values).all():
             values = ", ".join(f"{x:g}" for x in one.values)
@@ -255,8 +255,8 @@ def _check(task: Task, n: int, controller: Controller) -> None:
 def _scale(given: np.ndarray | None, n: int) -> np.ndarray:
     scale = np.ones(n) if given is None else np.asarray(given, dtype=float)
     if scale.shape != (n,) or not (np.isfinite(scale).all() and (scale >= 0).all()):
-        mend = f"give {n} finite numbers of 0 or above"
-        raise SimulationError(f"feedback_scale = {scale.tolist()}", mend=mend)
+        remedy = f"give {n} finite numbers of 0 or above"
+        raise SimulationError(f"feedback_scale = {scale.tolist()}", remedy=remedy)
     return scale
 
 
@@ -283,8 +283,8 @@ def _needed(
 
 def _samples(seconds: float, rate: float, name: str, least: int) -> int:
     if not (np.isfinite(seconds) and round(seconds * rate) >= least):
-        mend = f"choose {least / rate:g} s or more"
-        raise SimulationError(f"{name} = {seconds:g} s at {rate:g} Hz", mend=mend)
+        remedy = f"choose {least / rate:g} s or more"
+        raise SimulationError(f"{name} = {seconds:g} s at {rate:g} Hz", remedy=remedy)
     return round(seconds * rate)
 
 

@@ -114,10 +114,10 @@ class Mechanism:
         values = np.asarray(values, dtype=float)
         if values.shape != (model.size,):
             what = f"values of shape {values.shape} for a model of {model.size} parameters"
-            raise SimulationError(what, mend="give them in the order of Model.names")
+            raise SimulationError(what, remedy="give them in the order of Model.names")
         for name, value in zip(model.names, values, strict=True):
             if not np.isfinite(value):
-                raise SimulationError(f"{name} = {value:g}", mend="give finite values")
+                raise SimulationError(f"{name} = {value:g}", remedy="give finite values")
         robot = model.robot
         if theta is None:
             rigid = values[: len(model.base.independent)]
@@ -143,8 +143,8 @@ class Mechanism:
     def _check_gain(self) -> None:
         for joint, gain in zip(self.robot.names, self.gain, strict=True):
             if not (gain > 0 and np.isfinite(gain)):
-                what, mend = f"torque gain {gain:g}", "choose a gain error above -1"
-                raise SimulationError(what, f"joint '{joint}'", mend)
+                what, remedy = f"torque gain {gain:g}", "choose a gain error above -1"
+                raise SimulationError(what, f"joint '{joint}'", remedy)
 
     @cached_property
     def inertia(self) -> np.ndarray:
@@ -221,8 +221,8 @@ class Mechanism:
             own = float(self.inertia[made.joint, made.joint])
             made = replace(made, rotor=own) if own > 0 else made
             if not made.rotor > 0:
-                mend = "give it rotor_inertia, or the effect a rotor share above 0"
-                raise SimulationError("a motor without inertia before a spring", where, mend)
+                remedy = "give it rotor_inertia, or the effect a rotor share above 0"
+                raise SimulationError("a motor without inertia before a spring", where, remedy)
             found[made.joint] = made
         return tuple(found[joint] for joint in sorted(found))
 

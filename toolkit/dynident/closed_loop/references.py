@@ -56,14 +56,14 @@ class SampledReference:
         fits = t.ndim == 1 and len(t) >= 2 and q.ndim == 2 and len(q) == len(t)
         if not fits or (v is not None and v.shape != q.shape):
             shapes = ", ".join(str(x.shape) for x in (t, q, v) if x is not None)
-            mend = "give t (T,) with T of 2 or more, q (T, n), v (T, n) or none"
-            raise SimulationError(f"shapes {shapes}", "reference", mend, reason="reference")
+            remedy = "give t (T,) with T of 2 or more, q (T, n), v (T, n) or none"
+            raise SimulationError(f"shapes {shapes}", "reference", remedy, reason="reference")
         for name, x in (("t", t), ("q", q), ("v", v)):
             if x is not None and not np.isfinite(x).all():
                 raise SimulationError(f"{name} is not finite", "reference", reason="reference")
         if not (np.diff(t) > 0).all():
-            what, mend = "its time does not increase", "sort the samples by time"
-            raise SimulationError(what, "reference", mend, reason="clock")
+            what, remedy = "its time does not increase", "sort the samples by time"
+            raise SimulationError(what, "reference", remedy, reason="clock")
         t = t - t[0]
         spline = CubicSpline(t, q) if v is None else CubicHermiteSpline(t, q, v)
         self._pieces = (spline, spline.derivative(), spline.derivative(2))
@@ -80,8 +80,8 @@ class SampledReference:
         """
         if recording.q_ref is None:
             what = "the recording has no reference, so its loop cannot be run again"
-            mend = f"add the columns q_ref.{recording.joints[0]}, ..."
-            raise SimulationError(what, recording.where, mend, reason="reference")
+            remedy = f"add the columns q_ref.{recording.joints[0]}, ..."
+            raise SimulationError(what, recording.where, remedy, reason="reference")
         return cls(recording.t, recording.q_ref)
 
     @property

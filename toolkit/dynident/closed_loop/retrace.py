@@ -69,13 +69,13 @@ def retrace(
     """
     if len(mechanisms) != len(recordings):
         what = f"{len(mechanisms)} mechanisms for {len(recordings)} recordings"
-        raise SimulationError(what, mend="give one for each recording")
+        raise SimulationError(what, remedy="give one for each recording")
     rate = controller.simulated_rate()
     tasks = []
     for mechanism, recording in zip(mechanisms, recordings, strict=True):
         if recording.joints != mechanism.robot.names:
-            mend = f"the robot's are {', '.join(mechanism.robot.names)}"
-            raise SimulationError("the recording has other joints", recording.where, mend)
+            remedy = f"the robot's are {', '.join(mechanism.robot.names)}"
+            raise SimulationError("the recording has other joints", recording.where, remedy)
         reference = SampledReference.of(recording)
         # One sample beyond the last time stamp, to interpolate to it.
         samples = int(np.ceil(recording.duration * rate - _ROUNDING)) + 2
@@ -98,8 +98,8 @@ def retrace(
         if error.reason != "unstable":
             raise
         # The recorded loop did run: it is not its gains that are to be lowered.
-        mend = "are gains, rate_hz and delay_s those of the recorded loop?"
-        raise SimulationError(error.what, error.where, mend, reason=error.reason) from error
+        remedy = "are gains, rate_hz and delay_s those of the recorded loop?"
+        raise SimulationError(error.what, error.where, remedy, reason=error.reason) from error
     return tuple(
         Retraced(_resampled(recording, rollout, rate), rollout, rollout.saturated)
         for recording, rollout in zip(recordings, rollouts, strict=True)

@@ -44,8 +44,8 @@ class Sensors:
         value = np.atleast_1d(np.asarray(0.0 if given is None else given, dtype=float))
         where = f"sensors.{name}"
         if value.shape not in ((1,), (n,)):
-            mend = "give one number, or one per joint"
-            raise SimulationError(f"{value.size} values for {n} joints", where, mend)
+            remedy = "give one number, or one per joint"
+            raise SimulationError(f"{value.size} values for {n} joints", where, remedy)
         if not (np.isfinite(value).all() and (value >= 0).all()):
             raise SimulationError(f"{value.tolist()}", where, "choose numbers of 0 or above")
         return np.broadcast_to(value, (n,)).copy()

@@ -158,16 +158,16 @@ def _per_joint(value, robot: Robot, name: str, default: np.ndarray) -> np.ndarra
         return default
     given = np.atleast_1d(np.asarray(value, dtype=float))
     if given.shape not in ((1,), (robot.n,)):
-        mend = "give one number, or one per joint"
-        raise SimulationError(f"{given.size} for {robot.n} joints", f"trajectory.{name}", mend)
+        remedy = "give one number, or one per joint"
+        raise SimulationError(f"{given.size} for {robot.n} joints", f"trajectory.{name}", remedy)
     return np.broadcast_to(given, (robot.n,)).copy()
 
 
 def _within(fine: np.ndarray, robot: Robot, name: str, what: str) -> None:
     for joint, ok in zip(robot.joints, fine, strict=True):
         if not ok:
-            mend = (
+            remedy = (
                 f"the joint moves from {joint.lower:.4g} to {joint.upper:.4g}, "
                 f"at {joint.velocity:.4g} a second or less"
             )
-            raise SimulationError(what, f"trajectory.{name}, joint '{joint.name}'", mend)
+            raise SimulationError(what, f"trajectory.{name}, joint '{joint.name}'", remedy)

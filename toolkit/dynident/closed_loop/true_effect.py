@@ -72,8 +72,8 @@ def ordered(effect: Effect, robot: Robot, values) -> tuple[float, ...]:
         names = tuple(parameter.name for parameter in parameters)
         for name in values:
             if name not in names:
-                mend = nearest(name, names, "parameters")
-                raise EffectError(f"no parameter '{name}'", effect.label, mend)
+                remedy = nearest(name, names, "parameters")
+                raise EffectError(f"no parameter '{name}'", effect.label, remedy)
         values = [values.get(name, 0.0) for name in names]
     if len(values) != len(parameters):
         names = ", ".join(parameter.name for parameter in parameters)
@@ -81,8 +81,8 @@ def ordered(effect: Effect, robot: Robot, values) -> tuple[float, ...]:
     for value, parameter in zip(values, parameters, strict=True):
         if not (np.isfinite(value) and parameter.lower <= value <= parameter.upper):
             limits = f"between {parameter.lower:g} and {parameter.upper:g} {parameter.unit}"
-            mend = f"choose it {limits}"
-            raise EffectError(f"{parameter.name} = {value:g}", effect.label, mend)
+            remedy = f"choose it {limits}"
+            raise EffectError(f"{parameter.name} = {value:g}", effect.label, remedy)
     return tuple(float(value) for value in values)
 
 
@@ -91,7 +91,7 @@ def _shaped(effect: Effect, robot: Robot, shape) -> Effect:
         names = tuple(one.name for one in effect.shape_parameters(robot))
         for name in shape:
             if name not in names:
-                mend = nearest(name, names, "shape parameters")
-                raise EffectError(f"no shape parameter '{name}'", effect.label, mend)
+                remedy = nearest(name, names, "shape parameters")
+                raise EffectError(f"no shape parameter '{name}'", effect.label, remedy)
         shape = [shape.get(name, own) for name, own in zip(names, effect.shape, strict=True)]
     return effect.shaped(*shape).on(robot) if len(shape) else effect

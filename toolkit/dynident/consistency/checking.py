@@ -13,7 +13,7 @@ from dynident.consistency.findings import Check
 from dynident.consistency.hints import hints
 from dynident.consistency.joint_parameters import JointCheck, Size, of_description, of_estimate
 from dynident.consistency.link import LinkCheck
-from dynident.consistency.remedy import mend
+from dynident.consistency.remedy import remedy
 from dynident.consistency.rules import TITLES, judge
 from dynident.errors import RobotError, UnsupportedError
 from dynident.robot import Description, Link, Robot
@@ -68,7 +68,7 @@ def _holder(what: Any) -> Check:
     if not isinstance(robot, Robot):
         raise RobotError(
             f"a {type(what).__name__} has no robot to check",
-            mend="give a Robot, an Estimate, or the path of a robot description or estimate",
+            remedy="give a Robot, an Estimate, or the path of a robot description or estimate",
         )
     estimate = getattr(what, "estimate", None)
     if isinstance(estimate, Estimate):
@@ -194,7 +194,7 @@ def _link(subject: CheckedBody) -> LinkCheck:
         tuple(rules),
         (*subject.not_checked, *verdicts.not_checked),
         tuple(told),
-        mend(body) if broken else (),
+        remedy(body) if broken else (),
     )
 
 

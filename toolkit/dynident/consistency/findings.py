@@ -66,14 +66,14 @@ class Check:
             return self
         count = len(self.broken) + sum(one.broken for one in self.joints)
         more = f" (and {count - 1} more)" if count > 1 else ""
-        mend = "see them all with `dynident check`, or Check.show()"
+        remedy = "see them all with `dynident check`, or Check.show()"
         if self.broken:
             worst = self.broken[0]
             rule = worst.worst
             what = f"{TITLES[rule.rule]} is broken: {rule.words}{more}"
-            raise ConsistencyError(what, f"{self.name}: {worst.title}", mend)
+            raise ConsistencyError(what, f"{self.name}: {worst.title}", remedy)
         joint = next(one for one in self.joints if one.broken)
-        raise ConsistencyError(f"{joint.words}{more}", f"{self.name}: {joint.name}", mend)
+        raise ConsistencyError(f"{joint.words}{more}", f"{self.name}: {joint.name}", remedy)
 
     # --- in words ------------------------------------------------------------------------------
 

@@ -50,7 +50,7 @@ class LinkCheck:
     rules: tuple[RuleMargin, ...]
     not_checked: tuple[str, ...] = ()
     hints: tuple[str, ...] = ()
-    mend: tuple[Change, ...] = ()
+    remedy: tuple[Change, ...] = ()
 
     @property
     def broken(self) -> tuple[RuleMargin, ...]:
@@ -106,7 +106,7 @@ class LinkCheck:
                     "after": finite(one.after),
                     "unit": one.unit,
                 }
-                for one in self.mend
+                for one in self.remedy
             ],
         }
 
@@ -123,8 +123,8 @@ class LinkCheck:
                 continue
             lines.append(f"  {TITLES[rule.rule]}: {rule.words}")
         lines += [f"  {hint}" for hint in self.hints]
-        if self.mend:
-            changes = [str(change) for change in self.mend if change.shows]
+        if self.remedy:
+            changes = [str(change) for change in self.remedy if change.shows]
             lines.append("  smallest change that mends it (moments about the centre of mass):")
             # Three to a line fit 110 columns.
             lines += [f"    {', '.join(changes[i : i + 3])}" for i in range(0, len(changes), 3)]

@@ -46,7 +46,7 @@ class Change:
         return f"{self.before:.4g}" != f"{self.after:.4g}"
 
 
-def mend(body: Body) -> tuple[Change, ...]:
+def remedy(body: Body) -> tuple[Change, ...]:
     """Return the smallest change after which a body keeps every rule; none if there is none.
 
     Mass and moments move to the nearest consistent ones (`dynident.nlp.nearest_body`). A centre of

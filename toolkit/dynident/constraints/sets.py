@@ -244,15 +244,15 @@ class Within:
 
     def __post_init__(self) -> None:
         if self.consistency not in NOTIONS:
-            mend = f"choose one of {', '.join(NOTIONS)}"
-            raise FitError(f"no notion of consistency '{self.consistency}'", mend=mend)
+            remedy = f"choose one of {', '.join(NOTIONS)}"
+            raise FitError(f"no notion of consistency '{self.consistency}'", remedy=remedy)
         if not 0.0 <= self.inset < 0.1:
-            raise FitError(f"inset = {self.inset:g}", mend="choose it from 0 to 0.1")
+            raise FitError(f"inset = {self.inset:g}", remedy="choose it from 0 to 0.1")
         sets = self.sets if isinstance(self.sets, Sequence) else (self.sets,)
         for one in sets:
             if not hasattr(one, "on"):
-                mend = "give TotalMass, Known, Bounds, Sum, CentreInBox, ..."
-                raise FitError(f"a {type(one).__name__} is no constraint set", mend=mend)
+                remedy = "give TotalMass, Known, Bounds, Sum, CentreInBox, ..."
+                raise FitError(f"a {type(one).__name__} is no constraint set", remedy=remedy)
         object.__setattr__(self, "sets", tuple(sets))
 
     @property

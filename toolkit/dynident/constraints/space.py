@@ -97,7 +97,7 @@ class ParameterSpace:
             If there is no such link.
         """
         if name not in self.bodies:
-            raise FitError(f"no link '{name}'", mend=f"links: {', '.join(self.bodies)}")
+            raise FitError(f"no link '{name}'", remedy=f"links: {', '.join(self.bodies)}")
         k = self.bodies.index(name)
         return slice(10 * k, 10 * k + 10)
 
@@ -110,8 +110,8 @@ class ParameterSpace:
             If there is no such parameter.
         """
         if name not in self.names:
-            mend = f"for instance {self.names[0]}, {self.names[-1]}"
-            raise FitError(f"no standard parameter '{name}'", mend=mend)
+            remedy = f"for instance {self.names[0]}, {self.names[-1]}"
+            raise FitError(f"no standard parameter '{name}'", remedy=remedy)
         return self.names.index(name)
 
     def sized(self, effects: np.ndarray) -> ParameterSpace:

@@ -23,7 +23,7 @@ from dynident.diagnosis.search.scoring import Score
 from dynident.diagnosis.verdict import noise_source, notes_on, verdict_of
 from dynident.effects import Effect
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import Present, fit_present
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import HeldOut, on_blocks, on_recordings, with_noise_of
 from dynident.evidence.maps import residual_maps
 from dynident.fitting.estimate import Estimate
@@ -62,8 +62,8 @@ class Search:
     """
 
     store: ColumnStore
-    start: Present
-    final: Present
+    start: EvidenceFit
+    final: EvidenceFit
     found: tuple[Found, ...]
     rounds: tuple[Ranking, ...]
     disturbances: tuple[Disturbance, ...] = ()
@@ -81,16 +81,16 @@ def told(
     train, test : the recordings, for their provenance.
     held : evidence of the test recordings; None where blocks of time are held out.
     """
-    store, start, present = search.store, search.start, search.final
+    store, start, fitted = search.store, search.start, search.final
     found, rounds, given = search.found, search.rounds, search.start.model
-    by_label = {e.label: e for e in present.model.effects}
+    by_label = {e.label: e for e in fitted.model.effects}
     stages = [start]
     for one in found[:-1]:
         wider = stages[-1].model + by_label[one.score.effect.label]
-        stages.append(fit_present(store, wider.with_shapes(present.model.effects), stages[-1]))
+        stages.append(fit_evidence(store, wider.with_shapes(fitted.model.effects), stages[-1]))
     if found:
         # With its dry friction blunted where that was called for later.
-        stages.append(present)
+        stages.append(fitted)
     judged = [
         with_noise_of(on_recordings(held, s), on_recordings(store, s))
         if held
@@ -149,12 +149,12 @@ def _advised(steps: tuple[Step, ...], adviser: Adviser) -> tuple[Step, ...]:
 
 
 def _revealed(
-    candidates: tuple[Candidate, ...], store: ColumnStore, present: Present
+    candidates: tuple[Candidate, ...], store: ColumnStore, fitted: EvidenceFit
 ) -> tuple[Candidate, ...]:
     """Say which experiment would show what is absorbed."""
     if not any(one.status == "absorbed" for one in candidates):
         return candidates
-    adviser = Adviser.of(store, present)
+    adviser = Adviser.of(store, fitted)
     return tuple(
         replace(one, remark=adviser.revealing(one.effect)) if one.status == "absorbed" else one
         for one in candidates
@@ -188,11 +188,13 @@ def _joint_results(given: Model, before: HeldOut, after: HeldOut) -> tuple[Joint
     )
 
 
-def _candidates(ranking: Ranking, error: float, present: Present) -> tuple[Candidate, ...]:
-    total = present.error_total
+def _candidates(ranking: Ranking, error: float, fitted: EvidenceFit) -> tuple[Candidate, ...]:
+    total = fitted.error_total
     found = []
     for score, refusal in zip(ranking.scores, ranking.refusals, strict=True):
-        status: Status = "absorbed" if score.absorbed else "not_material" if refusal else "material"
+        status: Status = (
+            "absorbed" if score.not_identifiable else "not_material" if refusal else "material"
+        )
         # Held out where it was cross-validated, else the drop less its price.
         gain = score.gains.sum() if score.gains is not None else score.penalised
         share = min(max(float(gain) / total, -1.0), 1.0) if np.isfinite(gain) else 0.0
@@ -200,7 +202,7 @@ def _candidates(ranking: Ranking, error: float, present: Present) -> tuple[Candi
             Candidate(
                 score.effect,
                 status,
-                None if score.absorbed else ranking.corrected(score),
+                None if score.not_identifiable else ranking.corrected(score),
                 error * (1.0 - float(np.sqrt(1.0 - share))),
                 score.values,
                 refusal,
@@ -209,26 +211,26 @@ def _candidates(ranking: Ranking, error: float, present: Present) -> tuple[Candi
     return tuple(found)
 
 
-def _estimate(store: ColumnStore, present: Present, train: Dataset) -> Estimate:
+def _estimate(store: ColumnStore, fitted: EvidenceFit, train: Dataset) -> Estimate:
     """The fit of the diagnosis as an `Estimate`."""
-    fitted = on_recordings(store, present)
-    model = present.model
+    judged = on_recordings(store, fitted)
+    model = fitted.model
     # Rows that span what the data tell: directions in which the columns are noise are not told.
-    told = present.solution.basis.T @ present.moments.sums()[1][:-1, :-1]
+    told = fitted.solution.basis.T @ fitted.moments.sums()[1][:-1, :-1]
     basis = base_parameters(told, model.names, _RANK_TOLERANCE)
     kept, combination = list(basis.independent), basis.combination
     covariance = np.zeros((model.size, model.size))
-    covariance[np.ix_(kept, kept)] = combination @ present.covariance @ combination.T
+    covariance[np.ix_(kept, kept)] = combination @ fitted.covariance @ combination.T
     return Estimate(
         model,
-        basis.lift(basis.coordinates(present.values), model.given_values()),
+        basis.lift(basis.coordinates(fitted.values), model.given_values()),
         covariance,
         basis,
-        fitted.residual_rms,
-        fitted.joint_errors,
-        fitted.error,
+        judged.residual_rms,
+        judged.joint_errors,
+        judged.error,
         float(np.linalg.cond(told[:, kept])),
-        present.rows,
+        fitted.rows,
         _method(store),
         "solved",
         (),

@@ -10,10 +10,10 @@ import numpy as np
 from dynident.closed_loop import Controller
 from dynident.diagnosis.assembly import Found, Search, told
 from dynident.diagnosis.nuisances.contacts import Contacts
-from dynident.diagnosis.nuisances.friction_width import blunted
+from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.nuisances.quantisation import nothing_but_rounding
 from dynident.diagnosis.result import Diagnosis
-from dynident.diagnosis.search.global_search import Asked, second_look
+from dynident.diagnosis.search.global_search import RankedModel, global_search
 from dynident.diagnosis.search.payload_recordings import carry, decide_payload
 from dynident.diagnosis.search.pruning import without_superfluous
 from dynident.diagnosis.search.ranking import Ranking, candidates, rank
@@ -21,7 +21,7 @@ from dynident.diagnosis.search.selection import alternatives_only, breaks_its_pr
 from dynident.diagnosis.search.shaped_fit import refitted, shaped
 from dynident.diagnosis.verdict import RESOLUTION
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import Present, fit_present
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.runs import gather
 from dynident.evidence.simulated_motion import SimulatedMotion, motion_of_loop
@@ -44,7 +44,7 @@ def diagnose(
     *,
     controller: Controller | None = None,
     most: int | None = None,
-    tell: Callable[[str], None] = lambda _: None,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Diagnosis:
     """Find where a model fails and which physical effects it lacks.
 
@@ -68,31 +68,31 @@ def diagnose(
     most = max(MOST_EFFECTS, 2 * given.robot.n) if most is None else most
     train, *others = numbered(train, *([] if test is None else [test]))
     test = others[0] if others else None
-    tell("reading the motion")
-    loop = motion_of_loop(given, train, controller, tell)
+    progress("reading the motion")
+    loop = motion_of_loop(given, train, controller, progress)
     store = ColumnStore(given, loop.runs or gather(train))
     held = ColumnStore(given, gather(test)) if test is not None and len(test) else None
-    tell("evaluating every effect")
+    progress("evaluating every effect")
     everything = [v for effect in candidates(given) for v in effect.variants(given.robot)]
     store.prepare([*given.effects, *everything])
-    start = blunted(store, shaped(store, given))
-    tell("looking for contacts")
+    start = with_friction_width(store, shaped(store, given))
+    progress("looking for contacts")
     if held is not None:
         held.prepare(start.model.effects)
     contacts = Contacts.leave_out(store, held, start)
-    if contacts.bumps:
-        start = blunted(store, shaped(store, given))
-    grown = _Growth(store, loop, train, start, most, tell).run()
-    present, found, rounds = grown.present, grown.found, grown.rounds
+    if contacts.pulses:
+        start = with_friction_width(store, shaped(store, given))
+    grown = _Growth(store, loop, train, start, most, progress).run()
+    fitted, found, rounds = grown.fitted, grown.found, grown.rounds
     if held is not None:
-        decide_payload(held, present)
-    kept = without_superfluous(store, held, present, found, tell)
+        decide_payload(held, fitted)
+    kept = without_superfluous(store, held, fitted, found, progress)
     if len(kept.found) < len(found):
-        rounds.append(rank(store, kept.final, len(kept.found), tell))
+        rounds.append(rank(store, kept.final, len(kept.found), progress))
     sure = contacts.confirmed(kept.final)
-    if sure.bumps != contacts.bumps:
-        start = fit_present(store, start.model, start)
-        kept = replace(kept, final=fit_present(store, kept.final.model, kept.final))
+    if sure.pulses != contacts.pulses:
+        start = fit_evidence(store, start.model, start)
+        kept = replace(kept, final=fit_evidence(store, kept.final.model, kept.final))
     disturbances = sure.told(start)
     search = Search(
         store, start, kept.final, tuple(kept.found), tuple(rounds), disturbances, loop.notes
@@ -104,13 +104,13 @@ def diagnose(
 class _Grown:
     """A model with the effects that were added, and the ranking of each round."""
 
-    present: Present
+    fitted: EvidenceFit
     found: list[Found]
     rounds: list[Ranking]
 
     @property
-    def asked(self) -> Asked:
-        return Asked(self.present, self.rounds[-1])
+    def asked(self) -> RankedModel:
+        return RankedModel(self.fitted, self.rounds[-1])
 
 
 @dataclass(frozen=True)
@@ -120,64 +120,66 @@ class _Growth:
     store: ColumnStore
     loop: SimulatedMotion
     train: Dataset
-    start: Present
+    start: EvidenceFit
     most: int
-    tell: Callable[[str], None]
+    progress: Callable[[str], None]
 
     def run(self) -> _Grown:
         """Grow a model from the first one, and again if a second look finds what was missed."""
         before = self.store.runs
-        nothing = _Grown(self.start, [], [rank(self.store, self.start, 0, self.tell)])
+        nothing = _Grown(self.start, [], [rank(self.store, self.start, 0, self.progress)])
         grown = self.grown(nothing)
         if not self.most or self.loop.runs:
             return grown  # simulated motions are renewed as the model grows: there is no way back
-        again = second_look(self.store, nothing.asked, grown.asked, self.tell)
+        again = global_search(self.store, nothing.asked, grown.asked, self.progress)
         if again is None:
             return grown
         runs = self.store.runs
         base = grown
-        if again.present is not grown.present:
+        if again.fitted is not grown.fitted:
             # Who carries a payload, and what was kept for a first look, belong to the other branch.
             base, self.store.runs = nothing, before
-            self.store.look_again()
+            self.store.renew_screening()
         other = self.grown(replace(base, rounds=[*base.rounds[:-1], again.ranking]))
-        if other.present.misfit(self.start) < grown.present.misfit(self.start):
+        if other.fitted.misfit(self.start) < grown.fitted.misfit(self.start):
             return other
         self.store.runs = runs
         return grown
 
     def grown(self, one: _Grown) -> _Grown:
         """Add the best effect and ask again, until nothing is material any more."""
-        store, present = self.store, one.present
+        store, fitted = self.store, one.fitted
         found, rounds = list(one.found), list(one.rounds)
-        while len(found) < self.most and not _resolved(store, present, self.train):
-            chosen = choose(store, present, rounds[-1])
+        while len(found) < self.most and not _resolved(store, fitted, self.train):
+            chosen = choose(store, fitted, rounds[-1])
             if chosen is None:
                 break
-            self.tell(f"adding {chosen.score.effect.label}")
+            self.progress(f"adding {chosen.score.effect.label}")
             carry(store, chosen.score)
-            wider = blunted(store, refitted(store, present.model + chosen.score.effect, present))
-            if breaks_its_promise(present, wider, chosen.score):
+            wider = with_friction_width(
+                store, refitted(store, fitted.model + chosen.score.effect, fitted)
+            )
+            if breaks_its_promise(fitted, wider, chosen.score):
                 break
             found.append(chosen)
-            present = wider
-            if _has_changed(store, self.start, present):
-                store.look_again()
-            if self.loop.renew(store, present):
-                present = blunted(store, refitted(store, present.model, present))
-            rounds.append(rank(store, present, len(found), self.tell))
+            fitted = wider
+            if _has_changed(store, self.start, fitted):
+                store.renew_screening()
+            if self.loop.renew(store, fitted):
+                fitted = with_friction_width(store, refitted(store, fitted.model, fitted))
+            rounds.append(rank(store, fitted, len(found), self.progress))
             found[-1] = alternatives_only(chosen, rounds[-1])
-        return _Grown(present, found, rounds)
+        return _Grown(fitted, found, rounds)
 
 
-def _has_changed(store: ColumnStore, start: Present, present: Present) -> bool:
+def _has_changed(store: ColumnStore, start: EvidenceFit, fitted: EvidenceFit) -> bool:
     """Whether effects have changed the predicted torque enough to look at candidates again."""
-    before, now = (on_recordings(store, one) for one in (start, present))
+    before, now = (on_recordings(store, one) for one in (start, fitted))
     return now.error < before.error - _ANOTHER
 
 
-def _resolved(store: ColumnStore, present: Present, train: Dataset) -> bool:
+def _resolved(store: ColumnStore, fitted: EvidenceFit, train: Dataset) -> bool:
     """Whether what is left is what the processing cannot resolve, or what encoders' steps leave."""
-    judged = on_recordings(store, present)
+    judged = on_recordings(store, fitted)
     small = np.all(judged.residual_rms <= RESOLUTION * judged.torque_rms)
-    return bool(small) or nothing_but_rounding(judged, present, train)
+    return bool(small) or nothing_but_rounding(judged, fitted, train)

@@ -300,7 +300,7 @@ class Diagnosis:
     def candidate_table(self, most: int = 10) -> Table:
         """The ranking on the model as given."""
         shown = [c for c in self.candidates if c.status != "absorbed"][:most]
-        absorbed = [c for c in self.candidates if c.status == "absorbed"]
+        not_identifiable = [c for c in self.candidates if c.status == "absorbed"]
         rows = tuple(
             (
                 c.effect.label,
@@ -311,7 +311,7 @@ class Diagnosis:
             )
             for c in shown
         )
-        notes = tuple(f"Absorbed: {c.effect.title}. {c.remark}" for c in absorbed)
+        notes = tuple(f"Absorbed: {c.effect.title}. {c.remark}" for c in not_identifiable)
         columns = ("effect", "status", "p", "gain, points", "remark")
         return Table("Candidates, tried on the model as given", columns, rows, notes)
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynident.diagnosis.nuisances.friction_width import blunting_notes
+from dynident.diagnosis.nuisances.friction_width import friction_width_notes
 from dynident.diagnosis.result import Verdict
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import Present
+from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut
 from dynident.recording.dataset import NoiseSource
 
@@ -54,10 +54,10 @@ def noise_source(store: ColumnStore, held: ColumnStore | None) -> NoiseSource:
     kinds = {run.kind for run in (*store.runs, *(held.runs if held else ()))}
     if "repeated" in kinds:
         return "replicates"
-    return "given" if "perturbed" in kinds else "unknown"
+    return "given" if "noise_augmented" in kinds else "unknown"
 
 
-def notes_on(store, held, present: Present, source: NoiseSource) -> tuple[str, ...]:
+def notes_on(store, held, fitted: EvidenceFit, source: NoiseSource) -> tuple[str, ...]:
     """Return the caveats that belong to a verdict, in plain words."""
     notes = []
     if held is None:
@@ -79,8 +79,10 @@ def notes_on(store, held, present: Present, source: NoiseSource) -> tuple[str, .
             f"squares, whose columns carry noise{floor}. Small effects may be false; record a "
             "repeated motion."
         )
-    if any("payload" in effect.needs for effect in present.model.effects):
-        carriers = [r.recording.name for r in store.runs if r.recording.payload]
-        carriers += [r.recording.name for r in (held.runs if held else ()) if r.recording.payload]
-        notes.append(f"Payload carried in: {', '.join(carriers)}.")
-    return (*notes, *blunting_notes(present))
+    if any("payload" in effect.needs for effect in fitted.model.effects):
+        payload_recordings = [r.recording.name for r in store.runs if r.recording.payload]
+        payload_recordings += [
+            r.recording.name for r in (held.runs if held else ()) if r.recording.payload
+        ]
+        notes.append(f"Payload carried in: {', '.join(payload_recordings)}.")
+    return (*notes, *friction_width_notes(fitted))

@@ -68,7 +68,7 @@ class Block:
     def index(self, joint: str | None) -> int:
         """Column of a joint."""
         if joint not in self.names:
-            raise EffectError(f"no joint '{joint}'", mend=f"joints: {', '.join(self.names)}")
+            raise EffectError(f"no joint '{joint}'", remedy=f"joints: {', '.join(self.names)}")
         return self.names.index(joint)
 
     def present(self, label: str) -> Robot:

@@ -92,7 +92,7 @@ class Effect(ABC):
     does not matter whether they are filtered or made of filtered torque, which is quicker."""
     secant: ClassVar[bool] = False
     """Whether its torque is not linear in its parameters, so that columns are taken at `point`."""
-    timed: ClassVar[bool] = False
+    time_varying: ClassVar[bool] = False
     """Whether its columns depend on the time in the session: they do not repeat with the motion."""
     found_by: ClassVar[Literal["residual", "repetition"]] = "residual"
     """Where it shows: in what repetitions have in common, or in what differs between them."""
@@ -219,7 +219,7 @@ class Effect(ABC):
         """
         return [[one.columns(block) for one in variants] for block in blocks]
 
-    def clock(self, block: Block) -> np.ndarray:
+    def time_factor(self, block: Block) -> np.ndarray:
         """The factor of its columns that depends on the time of the session, (T,)."""
         return np.ones(len(block.t))
 

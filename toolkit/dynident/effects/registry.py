@@ -45,7 +45,7 @@ def effects_of(label: str, robot) -> tuple[Effect, ...]:
     if name not in known:
         close = difflib.get_close_matches(name, known, n=1)
         hint = f"did you mean '{close[0]}'?" if close else f"effects: {', '.join(known)}"
-        raise EffectError(f"no effect is named '{name}'", mend=hint)
+        raise EffectError(f"no effect is named '{name}'", remedy=hint)
     effect = known[name]
     if not place and effect.place == "joint or robot":
         return (effect().on(robot),)

@@ -46,7 +46,8 @@ class ColumnStore:
         if any(run.columns_from == "recording" for run in self.runs):
             return None
         runs = tuple(
-            replace(run, versions=run.versions[-1:], columns_from="recording") for run in self.runs
+            replace(run, replicates=run.replicates[-1:], columns_from="recording")
+            for run in self.runs
         )
         if self._simulation is None:
             self._simulation = ColumnStore(self.model, runs)
@@ -71,14 +72,14 @@ class ColumnStore:
         for run in self.runs:
             rigid: Signals = []
             found: dict[Effect, Signals] = {effect: [] for effect in wanted}
-            for version in run.versions:
+            for replicate in run.replicates:
 
                 def evaluate(block: Block) -> list[np.ndarray]:
                     assert block.rigid is not None
                     loaded = replace(block, carries_payload=True)
                     return [block.rigid[:, :, base], *(acting(e, loaded) for e in wanted)]
 
-                first, *others = version.decimate(self.model, evaluate)
+                first, *others = replicate.decimate(self.model, evaluate)
                 rigid.append(first)
                 for effect, columns in zip(wanted, others, strict=True):
                     found[effect].append(columns)
@@ -99,7 +100,7 @@ class ColumnStore:
         wanted = list(self._simulation._known) if self._simulation else []
         self.runs, self._simulation, self._now = runs, None, None
         self._full.clear()
-        self.look_again()
+        self.renew_screening()
         fresh = self.simulation
         assert fresh is not None
         fresh.prepare(dict.fromkeys([*wanted, *self._known]))
@@ -121,12 +122,14 @@ class ColumnStore:
         if self.simulation is not None and effect not in model:
             return self.simulation.of(effect, run, model, values)
         if effect.linear_in_torque:
-            rows = zip(self.runs[run].versions, self._filtered(run, model, values), strict=True)
+            rows = zip(self.runs[run].replicates, self._filtered(run, model, values), strict=True)
             return [acting(effect, replace(self._rows(v), torque=torque)) for v, torque in rows]
         if effect.needs & {"torque", "body"}:
             return self._of_present(effect, run, model, values)
         if effect not in self._known:
-            self._known[effect] = [[self._plain(effect, v) for v in r.versions] for r in self.runs]
+            self._known[effect] = [
+                [self._plain(effect, v) for v in r.replicates] for r in self.runs
+            ]
         return self._known[effect][run]
 
     def screening(self, effect: Effect, run: int, model: Model, values: np.ndarray) -> Signals:
@@ -153,38 +156,38 @@ class ColumnStore:
         known = {*self._present, *self._screened}
         every = range(len(self.runs))
         new = [v for v in dict.fromkeys(variants) if any((v, r) not in known for r in every)]
-        places = [(r, i) for r, run in enumerate(self.runs) for i in range(len(run.versions))]
-        samples = max(version.motion.samples for run in self.runs for version in run.versions)
+        places = [(r, i) for r, run in enumerate(self.runs) for i in range(len(run.replicates))]
+        samples = max(replicate.motion.samples for run in self.runs for replicate in run.replicates)
         step = max(1, _TOGETHER // (samples * max(len(new), 1)))
         found: dict[Hashable, Signals] = {(v, r): [] for v in new for r in every}
         for start in range(0, len(places) if new else 0, step):
             some = places[start : start + step]
             blocks = [self._block(first, *place, model, values) for place in some]
             for (r, i), each in zip(some, first.family(new, blocks), strict=True):
-                version = self.runs[r].versions[i]
+                replicate = self.runs[r].replicates[i]
                 for variant, columns in zip(new, each, strict=True):
-                    found[variant, r].append(version.filtered(columns))
+                    found[variant, r].append(replicate.filtered(columns))
         self._present.update(found)
 
-    def look_again(self) -> None:
+    def renew_screening(self) -> None:
         """Let `screening` evaluate everything anew: the model has become another one."""
         self._screened.clear()
 
-    def clock(self, effect: Effect, run: int) -> np.ndarray:
+    def time_factor(self, effect: Effect, run: int) -> np.ndarray:
         """The factor of an effect's columns that depends on the time, folded, (P, S)."""
-        version, recording = self.runs[run].versions[0], self.runs[run].recording
-        block = replace(self._rows(version), t=version.t + recording.start)
+        replicate, recording = self.runs[run].replicates[0], self.runs[run].recording
+        block = replace(self._rows(replicate), t=replicate.t + recording.start)
         if recording.temperature is not None:
             columns = recording.temperature.T
-            at = [np.interp(version.t, recording.t, column) for column in columns]
+            at = [np.interp(replicate.t, recording.t, column) for column in columns]
             block = replace(block, temperature=np.stack(at, axis=1))
-        return effect.clock(block)[self.runs[run].index]
+        return effect.time_factor(block)[self.runs[run].index]
 
-    def _plain(self, effect: Effect, version: Sampled) -> np.ndarray:
+    def _plain(self, effect: Effect, replicate: Sampled) -> np.ndarray:
         if "whole" in effect.needs:
-            block = replace(version.block(self.model, rigid=False), carries_payload=True)
-            return version.filtered(acting(effect, self.model.ready(effect, block, None)))
-        return version.decimate(
+            block = replace(replicate.block(self.model, rigid=False), carries_payload=True)
+            return replicate.filtered(acting(effect, self.model.ready(effect, block, None)))
+        return replicate.decimate(
             self.model,
             lambda block: [acting(effect, replace(block, carries_payload=True))],
             rigid="rigid" in effect.needs,
@@ -197,11 +200,11 @@ class ColumnStore:
         values = np.zeros(model.size) if values is None else values
         self._look_at(model, values)
         if (effect, run) not in self._present:
-            count = len(self.runs[run].versions)
+            count = len(self.runs[run].replicates)
             blocks = [self._block(effect, run, i, model, values) for i in range(count)]
             self._present[effect, run] = [
-                version.filtered(acting(effect, block))
-                for version, block in zip(self.runs[run].versions, blocks, strict=True)
+                replicate.filtered(acting(effect, block))
+                for replicate, block in zip(self.runs[run].replicates, blocks, strict=True)
             ]
         return self._present[effect, run]
 
@@ -215,31 +218,33 @@ class ColumnStore:
             self._blocks.clear()
 
     def _block(
-        self, effect: Effect, run: int, version: int, model: Model, values: np.ndarray
+        self, effect: Effect, run: int, replicate: int, model: Model, values: np.ndarray
     ) -> Block:
         """A whole version with what an effect needs of the present model; shared by many."""
-        sampled = self.runs[run].versions[version]
+        sampled = self.runs[run].replicates[replicate]
         # What comes before an effect of the model is another robot than what a candidate sees.
         label = effect.label if "body" in effect.needs and effect in model else ""
-        key = (run, version, effect.needs & {"body", "rigid", "torque"}, label)
+        key = (run, replicate, effect.needs & {"body", "rigid", "torque"}, label)
         if key in self._blocks:
             return self._blocks[key]
         # One motion for all effects: what a robot does along it is then evaluated once.
-        motion = self._blocks.get(("motion", run, version))
+        motion = self._blocks.get(("motion", run, replicate))
         motion = sampled.block(model, rigid=False) if motion is None else motion
         block = model.ready(effect, motion, values)
         if "torque" in effect.needs:
-            block = replace(block, torque=self._torque(effect, run, version, block, model, values))
+            block = replace(
+                block, torque=self._torque(effect, run, replicate, block, model, values)
+            )
         if sampled.motion.samples <= _SHARED:
             self._blocks[key] = block
-            self._blocks["motion", run, version] = motion
+            self._blocks["motion", run, replicate] = motion
         return block
 
     def _torque(
         self,
         effect: Effect,
         run: int,
-        version: int,
+        replicate: int,
         block: Block,
         model: Model,
         values: np.ndarray,
@@ -253,10 +258,10 @@ class ColumnStore:
         if effect not in model or changes_bodies or len(block.t) > _SHARED:
             return model.torque_without_loads(block, values)
         base, tip = list(model.base.independent), 10 * (model.robot.tip % model.robot.n)
-        if (run, version) not in self._full:
+        if (run, replicate) not in self._full:
             whole = model.robot.regressor(block.q, block.v, block.a)
-            self._full[run, version] = whole[:, :, [*base, *range(tip, tip + 10)]]
-        rigid = self._full[run, version]
+            self._full[run, replicate] = whole[:, :, [*base, *range(tip, tip + 10)]]
+        rigid = self._full[run, replicate]
         torque = rigid[:, :, : len(base)] @ values[: len(base)]
         for one in model.effects:
             own = values[model.slices[one.label]]
@@ -266,8 +271,8 @@ class ColumnStore:
                 torque = torque + one.columns(block) @ own
         return torque
 
-    def _rows(self, version: Sampled) -> Block:
-        return self.model.block(version.t, version.q, version.v, version.a, rigid=False)
+    def _rows(self, replicate: Sampled) -> Block:
+        return self.model.block(replicate.t, replicate.q, replicate.v, replicate.a, rigid=False)
 
     def _filtered(self, run: int, model: Model, values: np.ndarray | None) -> list[np.ndarray]:
         """Decimated rows of the torque that the model predicts, but for effects that scale it."""

@@ -9,7 +9,7 @@ from typing import Any
 from dynident.closed_loop import Controller
 from dynident.errors import FitError
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import fit_present
+from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.held_out import HeldOut, on_blocks, on_recordings
 from dynident.evidence.maps import residual_maps
 from dynident.evidence.runs import gather
@@ -139,7 +139,7 @@ def compare(
     named = {"model": estimates} if isinstance(estimates, Estimate) else dict(estimates)
     if not named or not dataset.recordings:
         what = "no estimate" if not named else "no recording to compare with"
-        raise FitError(what, mend='mark some recordings use = "test"')
+        raise FitError(what, remedy='mark some recordings use = "test"')
     runs = gather(dataset)
     results = []
     for estimate in named.values():
@@ -174,19 +174,19 @@ def compare_models(
     """
     runs = gather(train)
     held = gather(test) if len(test) else None
-    results, fitted, loops = [], [], []
+    results, compared, loops = [], [], []
     for model in models.values():
         if shaped_effects(model):
             model = refine_shapes(model, train).model
         store = ColumnStore(model, runs)
         store.prepare(model.effects)
-        present = fit_present(store, model)
+        fitted = fit_evidence(store, model)
         if held is None:
-            results.append(on_blocks(store, present))
+            results.append(on_blocks(store, fitted))
         else:
             judge = ColumnStore(model, held)
             judge.prepare(model.effects)
-            results.append(on_recordings(judge, present))
-        fitted.append(model)
-        loops.append(loop_of(Judged(model, present.values), test if held else train, controller))
-    return Comparison(tuple(models), tuple(fitted), tuple(results), tuple(loops))
+            results.append(on_recordings(judge, fitted))
+        compared.append(model)
+        loops.append(loop_of(Judged(model, fitted.values), test if held else train, controller))
+    return Comparison(tuple(models), tuple(compared), tuple(results), tuple(loops))

@@ -15,9 +15,15 @@ from dynident.evidence.noise_model import (
     systematic_square,
 )
 from dynident.evidence.runs import Signals
-from dynident.fitting.settling import Settling
+from dynident.fitting.fixed_point import FixedPoint
 from dynident.model import Model
-from dynident.moments.replicated import Clocked, Moments, MomentSolution, clocked, solve
+from dynident.moments.replicated import (
+    Moments,
+    MomentSolution,
+    TimeVarying,
+    solve,
+    time_varying_moments,
+)
 
 _ROUNDS = 3  # fit, measure the noise, fit again: the noise model settles at once
 _PRESENT_ROUNDS = 30  # at most, until columns that depend on the model's values settle as well
@@ -25,7 +31,7 @@ _PRESENT_TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True)
-class Present:
+class EvidenceFit:
     """A model as it fits the training data.
 
     Attributes
@@ -57,7 +63,7 @@ class Present:
     squares: np.ndarray
     variances: np.ndarray
 
-    def misfit(self, over: Present) -> float:
+    def misfit(self, over: EvidenceFit) -> float:
         """Systematic square over the variances of another fit, summed over joints.
 
         By it fits are compared: `error_signal` depends on the metric, which is another one when
@@ -72,7 +78,7 @@ class Present:
         return float(combination @ self.moments.sums()[1] @ combination)
 
 
-def fit_present(store: ColumnStore, model: Model, near: Present | None = None) -> Present:
+def fit_evidence(store: ColumnStore, model: Model, near: EvidenceFit | None = None) -> EvidenceFit:
     """Fit a model to the runs of a store.
 
     Parameters
@@ -87,12 +93,14 @@ def fit_present(store: ColumnStore, model: Model, near: Present | None = None) -
     n = model.robot.n
     at = _held(model, _beginning(model, near))
     torque_std = [
-        float(np.sqrt(np.mean(np.concatenate([r.versions[0].tau[:, j] for r in store.runs]) ** 2)))
+        float(
+            np.sqrt(np.mean(np.concatenate([r.replicates[0].tau[:, j] for r in store.runs]) ** 2))
+        )
         for j in range(n)
     ]
     noise = tuple(flat_noise(std or 1.0) for std in torque_std) if near is None else near.noise
     known = any(run.kind != "single" for run in store.runs)
-    columns, values, settling = [], at, Settling()
+    columns, values, fixed_point = [], at, FixedPoint()
     for round in range(_PRESENT_ROUNDS if model.needs_values else _ROUNDS):
         if not columns or model.needs_values:
             model = model.at(at)
@@ -110,17 +118,17 @@ def fit_present(store: ColumnStore, model: Model, near: Present | None = None) -
             values
         ):
             break
-        at = _held(model, settling.following(model, at, values))
+        at = _held(model, fixed_point.following(model, at, values))
     white = _whiten(store, columns, noise, values)
     summed = _moments(store, model, white)
     values, solution = _solve(summed)
     rows = sum(
-        part.shape[1] * (1 if run.kind == "perturbed" else part.shape[0])
+        part.shape[1] * (1 if run.kind == "noise_augmented" else part.shape[0])
         for run, joints in zip(store.runs, white, strict=True)
         for part in joints
     )
     left = [_Left.of(store, columns, values, j) for j in range(n)]
-    return Present(
+    return EvidenceFit(
         model.at(_held(model, values)),
         values,
         solution.covariance,
@@ -136,7 +144,7 @@ def fit_present(store: ColumnStore, model: Model, near: Present | None = None) -
     )
 
 
-def _beginning(model: Model, near: Present | None) -> np.ndarray:
+def _beginning(model: Model, near: EvidenceFit | None) -> np.ndarray:
     """Values at which columns that depend on them are taken first, (p,)."""
     if near is None:
         return model.points()
@@ -182,7 +190,7 @@ def model_columns(
         if "payload" in effect.needs:
             at = [c * float(bool(recording.payload)) for c in at]
         parts.append(at)
-    torque = [version.tau[:, [joint]] for version in store.runs[run].versions]
+    torque = [replicate.tau[:, [joint]] for replicate in store.runs[run].replicates]
     return [np.hstack(pieces) for pieces in zip(*parts, torque, strict=True)]
 
 
@@ -207,14 +215,14 @@ def _whiten(store: ColumnStore, columns, noise, values) -> tuple[tuple[np.ndarra
 
 
 def _moments(store: ColumnStore, model: Model, white) -> Moments:
-    found, timed = None, timed_columns(model)
+    found, time_varying = None, time_varying_mask(model)
     for r, (run, joints) in enumerate(zip(store.runs, white, strict=True)):
         parts = [run.moments(w, w) for w in joints]
         here = Moments(np.sum([p.signal for p in parts], 0), np.sum([p.total for p in parts], 0))
-        if run.kind == "repeated" and timed.any():
-            own = [with_clock(store, model, r, w) for w in joints]
-            other = np.sum([clocked(one, one, run.edges) for one in own], axis=0)
-            here = here.where(timed[:, None] | timed[None, :], other)
+        if run.kind == "repeated" and time_varying.any():
+            own = [time_varying_columns(store, model, r, w) for w in joints]
+            other = np.sum([time_varying_moments(one, one, run.edges) for one in own], axis=0)
+            here = here.where(time_varying[:, None] | time_varying[None, :], other)
         found = here if found is None else found + here
     assert found is not None
     return found
@@ -230,20 +238,24 @@ def _signal(store: ColumnStore, white, values: np.ndarray) -> float:
     )
 
 
-def with_clock(store: ColumnStore, model: Model, run: int, white: np.ndarray) -> Clocked:
+def time_varying_columns(
+    store: ColumnStore, model: Model, run: int, white: np.ndarray
+) -> TimeVarying:
     """Whitened columns of a model and the torque, (P, S, p + 1), with what time does to them."""
-    clock = np.ones_like(white)
+    time_factor = np.ones_like(white)
     for effect in model.effects:
-        if effect.timed:
-            clock[:, :, model.slices[effect.label]] = store.clock(effect, run)[:, :, None]
-    return Clocked(white, clock, np.arange(white.shape[2]) == model.size)
+        if effect.time_varying:
+            time_factor[:, :, model.slices[effect.label]] = store.time_factor(effect, run)[
+                :, :, None
+            ]
+    return TimeVarying(white, time_factor, np.arange(white.shape[2]) == model.size)
 
 
-def timed_columns(model: Model) -> np.ndarray:
+def time_varying_mask(model: Model) -> np.ndarray:
     """Which of a model's columns, and the torque after them, depend on the time, (p + 1,)."""
     mask = np.zeros(model.size + 1, dtype=bool)
     for effect in model.effects:
-        mask[model.slices[effect.label]] = effect.timed
+        mask[model.slices[effect.label]] = effect.time_varying
     return mask
 
 
@@ -279,7 +291,7 @@ class _Left:
                 left.plain.append(residual[0])
                 continue
             left.systematic.append(systematic_square(residual, run.kind))
-            speed = run.versions[0].v[:, joint][run.index]
+            speed = run.replicates[0].v[:, joint][run.index]
             for stretch, v in zip(differences(residual, run.kind), speed, strict=False):
                 left.stretches.append(stretch)
                 left.speeds.append(v)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import stats
 
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import Present, model_columns
+from dynident.evidence.evidence_fit import EvidenceFit, model_columns
 from dynident.evidence.noise_model import differences, inflation, systematic_square
 from dynident.fitting.estimate import Estimate
 from dynident.moments.replicated import Kind, solve
@@ -86,41 +86,41 @@ class HeldOut:
         return float(np.linalg.norm(self.noise_std) / np.linalg.norm(self.torque_rms))
 
 
-def on_recordings(store: ColumnStore, present: Present | Estimate) -> HeldOut:
+def on_recordings(store: ColumnStore, fitted: EvidenceFit | Estimate) -> HeldOut:
     """Judge a fitted model on the recordings of a store, which it has not seen."""
-    combination = np.append(-present.values, 1.0)
-    n = present.model.robot.n
+    combination = np.append(-fitted.values, 1.0)
+    n = fitted.model.robot.n
     runs, folded, doubt = [], [], []
     for r, run in enumerate(store.runs):
-        first = run.versions[0]
-        joints = [model_columns(store, present.model, r, j, present.values) for j in range(n)]
+        first = run.replicates[0]
+        joints = [model_columns(store, fitted.model, r, j, fitted.values) for j in range(n)]
         residual = np.stack([c[0] @ combination for c in joints], axis=-1)
         kept, predicted = run.kept, first.tau - residual
         signals = (first.t, first.q, first.v, first.a, first.tau, predicted)
         runs.append(HeldOutRun(run.recording.name, *(x[kept] for x in signals)))
         folded.append(np.stack([run.fold([v @ combination for v in c]) for c in joints], axis=-1))
-        doubt.append(np.array([_doubt(c[0], present) for c in joints]))
+        doubt.append(np.array([_doubt(c[0], fitted) for c in joints]))
     return _judged(store, tuple(runs), folded, doubt)
 
 
-def on_blocks(store: ColumnStore, present: Present) -> HeldOut:
+def on_blocks(store: ColumnStore, fitted: EvidenceFit) -> HeldOut:
     """Judge a model on blocks of time, each predicted by the fit to all others."""
-    n = present.model.robot.n
+    n = fitted.model.robot.n
     runs, folded, doubt, block = [], [], [], 0
     for r, run in enumerate(store.runs):
-        joints = [model_columns(store, present.model, r, j, present.values) for j in range(n)]
+        joints = [model_columns(store, fitted.model, r, j, fitted.values) for j in range(n)]
         columns = np.stack([run.fold(c) for c in joints], axis=2)  # (P, S, n, p + 1)
         residual = np.empty(columns.shape[:3])
         for start, stop in zip(run.edges[:-1], run.edges[1:], strict=True):
-            signal, total = present.moments.without(block)
+            signal, total = fitted.moments.without(block)
             values = solve(signal[:-1, :-1], total[:-1, :-1], signal[:-1, -1]).values
             residual[:, start:stop] = columns[:, start:stop] @ np.append(-values, 1.0)
             block += 1
-        measured = 1 if run.kind == "perturbed" else len(residual)
+        measured = 1 if run.kind == "noise_augmented" else len(residual)
         rows = run.index[:measured].ravel()
         order = np.argsort(rows)
         rows, misfit = rows[order], residual[:measured].reshape(-1, n)[order]
-        first = run.versions[0]
+        first = run.replicates[0]
         tau = first.tau[rows]
         runs.append(
             HeldOutRun(
@@ -134,7 +134,7 @@ def on_blocks(store: ColumnStore, present: Present) -> HeldOut:
             )
         )
         folded.append(residual)
-        doubt.append(np.array([_doubt(c[0], present) for c in joints]))
+        doubt.append(np.array([_doubt(c[0], fitted) for c in joints]))
     return _judged(store, tuple(runs), folded, doubt)
 
 
@@ -163,10 +163,10 @@ def with_noise_of(judged: HeldOut, noise: HeldOut) -> HeldOut:
     )
 
 
-def _doubt(columns: np.ndarray, present: Present | Estimate) -> float:
+def _doubt(columns: np.ndarray, fitted: EvidenceFit | Estimate) -> float:
     """Mean square of the torque that the covariance of the parameters makes uncertain."""
     used = columns[:, :-1]
-    return float(np.mean(np.sum((used @ present.covariance) * used, axis=1)))
+    return float(np.mean(np.sum((used @ fitted.covariance) * used, axis=1)))
 
 
 def _variance(residual: np.ndarray, kind: Kind) -> float:
@@ -215,8 +215,8 @@ def _judged(
     excess = np.average(squares, axis=0, weights=sizes)
     spread = np.array([[_variance(e[..., j], kind) for j in range(n)] for kind, e in pairs])
     error = np.sqrt((sizes**2 @ spread) / sizes.sum() ** 2)
-    fitted = _LARGEST * np.average(doubt, axis=0, weights=[e.shape[1] for e in folded])
-    least = excess - _QUANTILE * error - fitted
+    doubtful = _LARGEST * np.average(doubt, axis=0, weights=[e.shape[1] for e in folded])
+    least = excess - _QUANTILE * error - doubtful
     safe = np.where(power > 0, power, 1.0)
     ratio, at_least = (np.sqrt(np.clip(x, 0.0, None) / safe) for x in (excess, least))
     grown = np.array([inflation([row for d in ds for row in d]) for ds in noise])

@@ -35,19 +35,19 @@ def differences(residual: np.ndarray, kind: Kind) -> np.ndarray:
     -------
     (P, S) or (P - 1, S), with the variance of the noise in one version.
     """
-    if kind == "perturbed":
+    if kind == "noise_augmented":
         return residual[1:] - residual[0]
-    versions = len(residual)
-    return (residual - residual.mean(axis=0)) * np.sqrt(versions / (versions - 1))
+    replicates = len(residual)
+    return (residual - residual.mean(axis=0)) * np.sqrt(replicates / (replicates - 1))
 
 
 def systematic_square(residual: np.ndarray, kind: Kind) -> float:
     """Mean square of what the versions of a residual (P, S) have in common, noise taken out."""
-    if kind == "perturbed":
+    if kind == "noise_augmented":
         return float(np.mean(residual[0] ** 2) - np.mean((residual[1:] - residual[0]) ** 2))
-    versions = len(residual)
+    replicates = len(residual)
     products = residual.sum(axis=0) ** 2 - (residual**2).sum(axis=0)
-    return float(np.mean(products)) / (versions * (versions - 1))
+    return float(np.mean(products)) / (replicates * (replicates - 1))
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,7 @@ class Run:
     """
 
     kind: Kind
-    versions: tuple[Sampled, ...]
+    replicates: tuple[Sampled, ...]
     index: np.ndarray
     edges: np.ndarray
     columns_from: Literal["recording", "simulation"] = "recording"
@@ -64,13 +64,13 @@ class Run:
     @property
     def kept(self) -> np.ndarray:
         """Rows of the recording that are judged, (T,) mask."""
-        whole = np.ones(len(self.versions[0].t), dtype=bool)
+        whole = np.ones(len(self.replicates[0].t), dtype=bool)
         return whole if self.left_out is None else ~self.left_out
 
     @property
     def recording(self) -> Recording:
         """The recording itself."""
-        return self.versions[0].recording
+        return self.replicates[0].recording
 
     def fold(self, signals: Sequence[np.ndarray]) -> np.ndarray:
         """Arrange measured signals, (T, ...) for each version, as (P, S, ...)."""
@@ -105,9 +105,9 @@ class Run:
         Of a simulated motion there is one version, without noise.
         """
         if self.columns_from == "simulation":
-            speed = self.versions[-1].v[:, joint]
+            speed = self.replicates[-1].v[:, joint]
             return noise.whiten(signals[-1], speed)[self.index[:1]]
-        speed = self.versions[0].v[:, joint]
+        speed = self.replicates[0].v[:, joint]
         return self.fold([noise.whiten(one, speed) for one in signals])
 
     def moments(self, left: np.ndarray, right: np.ndarray) -> Moments:
@@ -147,21 +147,21 @@ def gather(dataset: Dataset, seed: int = 0, *, simulated: Dataset | None = None)
             require_repetition(first.q[ORDER:], found, where)
             index = ORDER + found.index
             kind: Kind = "repeated"
-            versions: tuple[Sampled, ...] = (first,)
+            replicates: tuple[Sampled, ...] = (first,)
         elif dataset.noise and not repeats:
             # Where columns come from elsewhere, the copies tell the size of the noise only.
             count = COPIES if simulated is None else _COPIES_BESIDE
             copies = (noisy(recording, dataset.noise, stream) for _ in range(count))
-            versions = (first, *(sample(copy, dataset.filter) for copy in copies))
-            index, kind = np.tile(usable, (len(versions), 1)), "perturbed"
+            replicates = (first, *(sample(copy, dataset.filter) for copy in copies))
+            index, kind = np.tile(usable, (len(replicates), 1)), "noise_augmented"
         else:
-            versions, index, kind = (first,), usable[None, :], "single"
+            replicates, index, kind = (first,), usable[None, :], "single"
         edges = np.linspace(0, index.shape[1], per_run + 1).round().astype(int)
-        runs.append(Run(kind, versions, index, edges))
+        runs.append(Run(kind, replicates, index, edges))
     if simulated is None:
         return tuple(runs)
     return tuple(
-        replace(run, versions=(*run.versions, motion), columns_from="simulation")
+        replace(run, replicates=(*run.replicates, motion), columns_from="simulation")
         for run, motion in zip(runs, simulated_versions(runs, simulated), strict=True)
     )
 
@@ -180,7 +180,7 @@ def simulated_versions(runs: Sequence[Run], simulated: Dataset) -> tuple[Sampled
 def resimulated(runs: Sequence[Run], simulated: Dataset) -> tuple[Run, ...]:
     """Return runs with other simulated motions in place of theirs."""
     return tuple(
-        replace(run, versions=(*run.versions[:-1], motion))
+        replace(run, replicates=(*run.replicates[:-1], motion))
         for run, motion in zip(runs, simulated_versions(runs, simulated), strict=True)
     )
 
@@ -194,4 +194,4 @@ def noisy(recording: Recording, noise: Noise, stream: np.random.Generator) -> Re
 
 def flagged_run(run: Run, carries: bool) -> Run:
     """Return a run marked as carrying the payload, or not."""
-    return replace(run, versions=tuple(flagged(v, carries) for v in run.versions))
+    return replace(run, replicates=tuple(flagged(v, carries) for v in run.replicates))

@@ -17,7 +17,7 @@ from dynident.closed_loop import Controller
 from dynident.effects import Effect
 from dynident.errors import DynidentError
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import Present
+from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.runs import Run, gather, resimulated
 from dynident.fitting.history import Ending
 from dynident.fitting.instrumental import IV, SimulatedLoop
@@ -48,7 +48,7 @@ class SimulatedMotion:
     measured: Dataset | None = None
     left_out: tuple[Effect, ...] = ()
 
-    def renew(self, store: ColumnStore, present: Present) -> bool:
+    def renew(self, store: ColumnStore, fitted: EvidenceFit) -> bool:
         """Simulate another model and give its motion to a store.
 
         What cannot be simulated is left out, with a note; where nothing can, the motion stays.
@@ -59,11 +59,11 @@ class SimulatedMotion:
         """
         if self.controller is None or self.measured is None:
             return False
-        model, values = present.model, present.values
-        carriers = [run.recording.payload for run in store.runs]
+        model, values = fitted.model, fitted.values
+        payload_recordings = [run.recording.payload for run in store.runs]
         recordings = (
             one.replace(payload=carries)
-            for one, carries in zip(self.measured.recordings, carriers, strict=True)
+            for one, carries in zip(self.measured.recordings, payload_recordings, strict=True)
         )
         measured = replace(self.measured, recordings=tuple(recordings))
         problem = ""
@@ -93,7 +93,7 @@ def motion_of_loop(
     model: Model,
     dataset: Dataset,
     controller: Controller | None,
-    tell: Callable[[str], None] = lambda _: None,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> SimulatedMotion:
     """Simulate a model, fitted with the simulation's instruments, in its recorded loop.
 
@@ -116,9 +116,9 @@ def motion_of_loop(
         return SimulatedMotion(notes=(note,))
 
     def told(what: str, done: float, total: float) -> None:
-        tell(f"{what}, {100 * done / total:.0f} %" if total else what)
+        progress(f"{what}, {100 * done / total:.0f} %" if total else what)
 
-    method = IV(SimulatedLoop(controller), rounds=_ROUNDS, tolerance=_TOLERANCE, tell=told)
+    method = IV(SimulatedLoop(controller), rounds=_ROUNDS, tolerance=_TOLERANCE, progress=told)
     try:
         found = method.iterated(model, dataset)
         runs = gather(found.source.measured, simulated=found.instruments)

@@ -131,7 +131,7 @@ class Estimate:
             If there is no such parameter.
         """
         if name not in self.names:
-            raise FitError(f"no parameter '{name}'", mend=f"parameters: {', '.join(self.names)}")
+            raise FitError(f"no parameter '{name}'", remedy=f"parameters: {', '.join(self.names)}")
         return float(self.values[self.names.index(name)])
 
     # --- in words ------------------------------------------------------------------------------

@@ -60,13 +60,15 @@ def prior_model(model: Model, robot: Robot) -> Model:
     """
     if robot is model.robot:
         return model
-    mend = "give a description of the same robot"
+    remedy = "give a description of the same robot"
     if robot.names != model.robot.names or robot.bodies != model.robot.bodies:
-        raise FitError("has other joints or links than the estimate", f"prior '{robot.name}'", mend)
+        raise FitError(
+            "has other joints or links than the estimate", f"prior '{robot.name}'", remedy
+        )
     other = replace(model, robot=robot)
     same = other.base.independent == model.base.independent and np.allclose(
         other.base.K, model.base.K, rtol=1e-6, atol=1e-9
     )
     if not same:
-        raise FitError("has other kinematics than the estimate", f"prior '{robot.name}'", mend)
+        raise FitError("has other kinematics than the estimate", f"prior '{robot.name}'", remedy)
     return other

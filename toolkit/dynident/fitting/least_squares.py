@@ -10,8 +10,8 @@ from scipy.linalg import solve_triangular
 
 from dynident.errors import FitError
 from dynident.fitting.estimate import DataSource, Estimate
+from dynident.fitting.fixed_point import FixedPoint, not_converged
 from dynident.fitting.sampling import rows
-from dynident.fitting.settling import Settling, unsettled
 from dynident.model import Model
 from dynident.moments.factors import TriangularFactors, factorise
 from dynident.recording import Dataset, default_filter
@@ -49,18 +49,18 @@ class LeastSquares:
             If there are fewer equations than parameters, or the torque is zero throughout.
         """
         if not dataset.recordings:
-            raise FitError("no recording to fit", mend='mark some recordings use = "train"')
+            raise FitError("no recording to fit", remedy='mark some recordings use = "train"')
         factors = factorise(rows(model, dataset))
         solution = solve_factors(model, factors, self.weighting)
         if model.needs_values:
-            model, factors, solution = self._settle(model, dataset, solution.values)
+            model, factors, solution = self._iterate(model, dataset, solution.values)
         return estimate_of(self.name, self.weighting, model, dataset, factors, solution)
 
-    def _settle(
+    def _iterate(
         self, model: Model, dataset: Dataset, values: np.ndarray
     ) -> tuple[Model, TriangularFactors, LinearSolution]:
         """Fit with columns at the values fitted before, until both agree."""
-        settling = Settling()
+        fixed_point = FixedPoint()
         for _ in range(_ROUNDS):
             model = model.at(values)
             factors = factorise(rows(model, dataset, values))
@@ -68,9 +68,9 @@ class LeastSquares:
             change = np.linalg.norm(solution.values - values) / np.linalg.norm(values)
             if change <= _TOLERANCE:
                 break
-            values = settling.following(model, values, solution.values)
+            values = fixed_point.following(model, values, solution.values)
         else:
-            solution = replace(solution, notes=(*solution.notes, unsettled(float(change))))
+            solution = replace(solution, notes=(*solution.notes, not_converged(float(change))))
         return model.at(solution.values), factors, solution
 
 
@@ -98,9 +98,9 @@ def solve_factors(
     """
     if factors.rows <= model.size:
         what = f"{factors.rows} equations for {model.size} parameters"
-        raise FitError(what, mend="record longer, or raise rate_hz in [filter]")
+        raise FitError(what, remedy="record longer, or raise rate_hz in [filter]")
     if not np.any(factors.torque_norms > 0):
-        raise FitError("the torque is zero throughout", mend="is it the right column?")
+        raise FitError("the torque is zero throughout", remedy="is it the right column?")
     ordinary = _solve(model, factors, np.ones(len(factors.counts)))
     std = residual_std(factors, ordinary)
     if weighting == "none" or len(std) == 1:

@@ -75,7 +75,7 @@ def read_parameters(
         is unknown, missing or there twice, or a value is not a finite number or beyond `LARGEST`.
     """
     if order is not None and order not in ORDERS:
-        raise FileError(f"no order '{order}' of parameters", mend=f"orders: {', '.join(ORDERS)}")
+        raise FileError(f"no order '{order}' of parameters", remedy=f"orders: {', '.join(ORDERS)}")
     model = Model(model) if isinstance(model, Robot) else model
     cells = _cells(files.read_text(path), str(path))
     reader = _ParameterReader(str(path), model)
@@ -93,8 +93,8 @@ def read_parameters(
         what = "the first line holds numbers, and no order" if numbers else "no layout is known"
         raise FileError(what, f"{path}, header", f"write {_LAYOUTS}")
     if order is not None:
-        mend = f"leave out the order '{order}'"
-        raise FileError("the header names the parameters, and says their order", str(path), mend)
+        remedy = f"leave out the order '{order}'"
+        raise FileError("the header names the parameters, and says their order", str(path), remedy)
     return read(header, cells[1:])
 
 
@@ -129,8 +129,8 @@ class _ParameterReader:
         names = [_ALIASES.get(name, name) for name in header]
         missing = [name for name in PARAMETERS if name not in names]
         if missing:
-            mend = f"a column is needed for each of {', '.join(PARAMETERS)}"
-            raise FileError(f"no column {', '.join(missing)}", self.file, mend)
+            remedy = f"a column is needed for each of {', '.join(PARAMETERS)}"
+            raise FileError(f"no column {', '.join(missing)}", self.file, remedy)
         places = {name: _column(names, name, self.file) for name in PARAMETERS}
         if _VISCOUS in names:
             places[_VISCOUS] = _column(names, _VISCOUS, self.file)
@@ -162,8 +162,8 @@ class _ParameterReader:
         n, each = self.robot.n, len(values) // self.robot.n
         if len(values) not in (10 * n, 11 * n):
             what = f"{len(values)} numbers for {n} moving bodies ({', '.join(self.robot.bodies)})"
-            mend = f"{10 * n} are needed, or {11 * n} with the viscous friction of each joint"
-            raise FileError(what, self.file, mend)
+            remedy = f"{10 * n} are needed, or {11 * n} with the viscous friction of each joint"
+            raise FileError(what, self.file, remedy)
         table = values.reshape(n, each)
         theta = table[:, [list(order).index(name) for name in PARAMETERS]]
         viscous = dict(zip(self.robot.names, table[:, 10:].ravel().tolist(), strict=False))

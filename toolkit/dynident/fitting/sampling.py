@@ -172,8 +172,8 @@ def sample(recording: Recording, settings: Filter | None) -> Sampled:
     count = kept.stop - kept.start
     if count < LEAST_ROWS:
         what = f"only {count} rows are left after filtering and decimation"
-        mend = f"at least {LEAST_ROWS} are needed: record longer, or raise rate_hz in [filter]"
-        raise RecordingError(what, recording.where, mend)
+        remedy = f"at least {LEAST_ROWS} are needed: record longer, or raise rate_hz in [filter]"
+        raise RecordingError(what, recording.where, remedy)
     q, v, a, tau = (parallel.apply(x)[kept] for x in (motion.q, motion.v, motion.a, motion.tau))
     return Sampled(recording, motion, parallel, kept, times[kept], q, v, a, tau)
 

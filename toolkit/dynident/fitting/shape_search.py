@@ -57,8 +57,8 @@ def refine_shapes(model: Model, dataset: Dataset) -> Shaped:
     shaped = _ShapeSearch(model, samples, _without_secants(model, dataset)).run(screen=True)
     for _ in range(_PASSES):
         before = shaped.model
-        settled = LeastSquares().fit(before, dataset)
-        shaped = _ShapeSearch(settled.model, samples, settled.values).run(screen=False)
+        relaxed = LeastSquares().fit(before, dataset)
+        shaped = _ShapeSearch(relaxed.model, samples, relaxed.values).run(screen=False)
         if np.allclose(_logarithms(before), _logarithms(shaped.model), atol=10 * _PRECISION):
             break
     return shaped

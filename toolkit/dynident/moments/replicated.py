@@ -19,7 +19,7 @@ import numpy as np
 
 from dynident.errors import FitError
 
-Kind = Literal["repeated", "perturbed", "single"]
+Kind = Literal["repeated", "noise_augmented", "single"]
 """How the versions of a signal come about: repetitions of a period; the measured record followed
 by copies to which the stated noise was added once more; or one record, of unknown noise."""
 
@@ -74,7 +74,7 @@ def moments(left: np.ndarray, right: np.ndarray, edges: np.ndarray, kind: Kind) 
     signal, total = [], []
     for start, stop in pairwise(edges):
         one, two = left[:, start:stop], right[:, start:stop]
-        if kind == "perturbed":
+        if kind == "noise_augmented":
             plain = one[0].T @ two[0]
             noise = sum(
                 (a - one[0]).T @ (b - two[0]) for a, b in zip(one[1:], two[1:], strict=True)
@@ -91,7 +91,7 @@ def moments(left: np.ndarray, right: np.ndarray, edges: np.ndarray, kind: Kind) 
     return Moments(np.array(signal), np.array(total))
 
 
-def clocked(left: Clocked, right: Clocked, edges: np.ndarray) -> np.ndarray:
+def time_varying_moments(left: TimeVarying, right: TimeVarying, edges: np.ndarray) -> np.ndarray:
     """Signal moments of columns of which some depend on the time, (B, a, b).
 
     Such a column is another one in each repetition, and products of repetitions are not its
@@ -111,7 +111,7 @@ def clocked(left: Clocked, right: Clocked, edges: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Clocked:
+class TimeVarying:
     """Columns of a recording that repeats, with what the time of the session does to them.
 
     Attributes

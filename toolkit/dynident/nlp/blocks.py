@@ -250,8 +250,8 @@ def numbers_of(given: ArrayLike, size: int, where: str, what: str) -> np.ndarray
     except (TypeError, ValueError):
         raise ProgramError(f"{what} is not made of numbers", where) from None
     if found.shape not in ((), (1,), (size,), (size, 1)):
-        mend = f"Give {size} numbers, or one for all"
-        raise ProgramError(f"{what} has the shape {found.shape}", where, mend)
+        remedy = f"Give {size} numbers, or one for all"
+        raise ProgramError(f"{what} has the shape {found.shape}", where, remedy)
     found = np.array(np.broadcast_to(found.ravel(), (size,)))
     if np.any(np.isnan(found)):
         index = int(np.flatnonzero(np.isnan(found))[0])
@@ -285,8 +285,8 @@ def _expression(given: Any, where: str) -> Any:
     import casadi as ca
 
     if isinstance(given, ca.SX):
-        mend = "Make a casadi.Function of it and call that with the symbols of the variables"
-        raise ProgramError("the expression is an SX", where, mend)
+        remedy = "Make a casadi.Function of it and call that with the symbols of the variables"
+        raise ProgramError("the expression is an SX", where, remedy)
     try:
         expression = given if isinstance(given, ca.MX) else ca.MX(given)
     except (NotImplementedError, TypeError):

@@ -232,7 +232,7 @@ class Problem:
                 f"the metric leaves {self.free_directions} of {self.space.size} directions free: "
                 "there is a continuum of minimisers"
             )
-            raise FitError(what, mend="give a prior, the robot description for instance")
+            raise FitError(what, remedy="give a prior, the robot description for instance")
 
     @cached_property
     def unconstrained(self) -> np.ndarray | None:

@@ -54,8 +54,8 @@ class Program:
         known = set()
         for block in self.blocks:
             if names.count(block.name) > 1:
-                mend = "Name it otherwise, or put it in place by `program.replacing(block)`"
-                raise ProgramError(f"{block.name} is in the program twice", self.title, mend)
+                remedy = "Name it otherwise, or put it in place by `program.replacing(block)`"
+                raise ProgramError(f"{block.name} is in the program twice", self.title, remedy)
             if isinstance(block, Variable):
                 known.add(block.symbol.__hash__())
                 continue

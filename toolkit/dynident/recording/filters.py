@@ -53,8 +53,8 @@ class Filter:
                 f"decimation = {self.decimation!r}", "filter", 'write "pick" or "chebyshev"'
             )
         if len(self.edge_s) != 2 or not all(math.isfinite(e) and e >= 0 for e in self.edge_s):
-            mend = "give two times in s, not negative"
-            raise RecordingError(f"edge_s = {self.edge_s!r}", "filter", mend)
+            remedy = "give two times in s, not negative"
+            raise RecordingError(f"edge_s = {self.edge_s!r}", "filter", remedy)
         if self.cutoff_hz and self.rate_hz and self.cutoff_hz >= self.rate_hz / 2:
             raise RecordingError(
                 f"cutoff_hz = {self.cutoff_hz:g} is not below half of rate_hz = {self.rate_hz:g}",

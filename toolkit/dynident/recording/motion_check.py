@@ -73,8 +73,8 @@ def require_motion(recordings: Sequence[Recording], kinds: Sequence[str]) -> Non
     ]
     where = recordings[0].where
     if len(still) == len(travel):
-        mend = "record a motion that excites every joint"
-        raise RecordingError("the robot does not move", where, mend)
+        remedy = "record a motion that excites every joint"
+        raise RecordingError("the robot does not move", where, remedy)
     if still:
         names = ", ".join(still)
         what = f"{where}: {names} stands still in every training recording, so that its friction"

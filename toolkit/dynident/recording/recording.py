@@ -209,8 +209,8 @@ class Recording:
                 raise ValueError
             array = np.array(value, dtype=np.float64)
         except (TypeError, ValueError):
-            mend = "give an array of real numbers"
-            raise RecordingError(f"{column} does not hold numbers", self.where, mend) from None
+            remedy = "give an array of real numbers"
+            raise RecordingError(f"{column} does not hold numbers", self.where, remedy) from None
         array.setflags(write=False)
         return array
 
@@ -258,18 +258,18 @@ class Recording:
         row = int(late[0]) + 1
         before, here = float(self.t[row - 1]), float(self.t[row])
         if before == here:
-            what, mend = f"the time stamp {here!r} s is there twice", "drop one of the two rows"
+            what, remedy = f"the time stamp {here!r} s is there twice", "drop one of the two rows"
         else:
-            what, mend = f"time goes back from {before!r} to {here!r} s", "sort the rows by time"
+            what, remedy = f"time goes back from {before!r} to {here!r} s", "sort the rows by time"
         more = f" ({len(late)} such rows)" if len(late) > 1 else ""
-        raise RecordingError(what + more, f"{self.row(row)}, column t", mend)
+        raise RecordingError(what + more, f"{self.row(row)}, column t", remedy)
 
     def _check_settings(self) -> None:
         def positive(name: str, unit: str, value: Any, least: float) -> float:
             number = _number(value)
             if not (math.isfinite(number) and number > least):
-                mend = f"choose it above {least:.4g} {unit}"
-                raise RecordingError(f"{name} = {value!r}", self.where, mend)
+                remedy = f"choose it above {least:.4g} {unit}"
+                raise RecordingError(f"{name} = {value!r}", self.where, remedy)
             return number
 
         if self.period is not None:
@@ -281,13 +281,13 @@ class Recording:
         if self.window is not None:
             window = tuple(_number(limit) for limit in self.window)
             if len(window) != 2 or not window[0] < window[1]:
-                mend = "give two times in s, the earlier one first"
-                raise RecordingError(f"window = {self.window!r}", self.where, mend)
+                remedy = "give two times in s, the earlier one first"
+                raise RecordingError(f"window = {self.window!r}", self.where, remedy)
             object.__setattr__(self, "window", window)
         whole = isinstance(self.number, (int, np.integer)) and not isinstance(self.number, bool)
         if not (whole and 0 <= self.number < 2**31):
-            mend = "give its place, from 1, or 0"
-            raise RecordingError(f"number = {self.number!r}", self.where, mend)
+            remedy = "give its place, from 1, or 0"
+            raise RecordingError(f"number = {self.number!r}", self.where, remedy)
         for key, valid in (("use", USES), ("torque", TORQUES)):
             if getattr(self, key) not in valid:
                 choices = " or ".join(f'"{one}"' for one in valid)
@@ -315,8 +315,8 @@ def _joint_names(joints: Any, where: str) -> tuple[str, ...]:
         raise RecordingError("no joints are named", where, "name at least one")
     for name in names:
         if not isinstance(name, str) or name != name.strip() or not (name and name.isprintable()):
-            mend = "a joint is named by one line of text without blanks around it"
-            raise RecordingError(f"{name!r} is no name of a joint", where, mend)
+            remedy = "a joint is named by one line of text without blanks around it"
+            raise RecordingError(f"{name!r} is no name of a joint", where, remedy)
         if names.count(name) > 1:
             raise RecordingError(f"the joint '{name}' is named twice", where, "name it once")
     return names

@@ -37,10 +37,10 @@ def warn_of_units(recording: Recording, kinds: Sequence[str] | None = None) -> N
     # A velocity that does not fit an odd clock or position says nothing new.
     for column, oddity in found or _velocity_oddities(recording):
         where = f"{recording.where}, column {column}"
-        mend = "convert it, or give its scale in the column mapping"
+        remedy = "convert it, or give its scale in the column mapping"
         if column.startswith("temperature."):
-            mend = "subtract 273.15"
-        warnings.warn(f"{where}: {oddity} If so, {mend}", DynidentWarning, stacklevel=3)
+            remedy = "subtract 273.15"
+        warnings.warn(f"{where}: {oddity} If so, {remedy}", DynidentWarning, stacklevel=3)
 
 
 def _oddities(recording: Recording, kinds: Sequence[str] | None):

@@ -65,7 +65,7 @@ def refit(
     """
     within = within or Within()
     if within.consistency == "none":
-        raise FitError("a refit makes links consistent", mend="choose full or semi consistency")
+        raise FitError("a refit makes links consistent", remedy="choose full or semi consistency")
     subject = what
     if not isinstance(subject, RefitSubject):
         known = study.model if study else prior.robot if isinstance(prior, Prior) else prior

@@ -68,13 +68,13 @@ def require_usable(robot: Robot) -> None:
         if broken:
             finite = np.all(np.isfinite(link.phi))
             what = "is beyond any robot" if finite else "is not finite"
-            mend = "state numbers first: nothing is near to what is not a number"
+            remedy = "state numbers first: nothing is near to what is not a number"
             raise RobotError(
-                f"{what} ({broken})", where, "state it in SI units" if finite else mend
+                f"{what} ({broken})", where, "state it in SI units" if finite else remedy
             )
         if 0.0 < abs(mass) < 1.0 / LARGEST:
-            mend = "state 0 if it has no mass, and its mass in kg if it has"
-            raise RobotError(f"has next to no mass (m = {mass:g})", where, mend)
+            remedy = "state 0 if it has no mass, and its mass in kg if it has"
+            raise RobotError(f"has next to no mass (m = {mass:g})", where, remedy)
 
 
 def read_subject(
@@ -115,16 +115,16 @@ def _read(path: Path, model: Model | Robot | None, order: str | None) -> RefitSu
     text = files.read_text(path)
     start, suffix = text.lstrip()[:1], path.suffix.lower()
     if not start:
-        mend = "give a robot description, a saved estimate or a CSV of parameters"
-        raise FileError("is empty", str(path), mend)
+        remedy = "give a robot description, a saved estimate or a CSV of parameters"
+        raise FileError("is empty", str(path), remedy)
     # What it is shows in its first character; a file that is damaged, by its name.
     if start not in "<{" and suffix in _DESCRIPTIONS:
         start = "<"
     if start not in "<{" and suffix == ".json":
         start = "{"
     if start in ("<", "{") and order is not None:
-        mend = f"leave out the order '{order}'"
-        raise FileError("is no CSV file, and says its own order", str(path), mend)
+        remedy = f"leave out the order '{order}'"
+        raise FileError("is no CSV file, and says its own order", str(path), remedy)
     if start == "<":
         robot = Robot.from_text(text, str(path))
         return RefitSubject(robot, robot, source=path)

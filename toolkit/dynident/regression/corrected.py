@@ -57,7 +57,7 @@ class CorrectedLeastSquares(StatisticsRegressor):
         signal = unit.gram / N - psi
         if np.linalg.eigvalsh(unit.gram / N).min(initial=1.0) < _DEPENDENT * max(len(inputs), 1):
             what = "some inputs are combinations of others: no row tells them apart"
-            raise FitError(what, mend="leave them out, or give more rows than inputs")
+            raise FitError(what, remedy="leave them out, or give more rows than inputs")
         # Of an empty set of inputs all is signal.
         shares = eigh(psi, unit.gram / N, eigvals_only=True) if len(psi) else np.zeros(1)
         self.signal_share_ = 1.0 - float(shares[-1])
@@ -65,8 +65,8 @@ class CorrectedLeastSquares(StatisticsRegressor):
         self.signal_share_doubt_ = float(shares[-1]) * np.sqrt(2.0 / N)
         if self.signal_share_ <= 0:
             what = "in some direction the input noise is all that the inputs hold"
-            mend = "excite more, leave inputs out, or look whether the noise is overstated"
-            raise FitError(what, mend=mend)
+            remedy = "excite more, leave inputs out, or look whether the noise is overstated"
+            raise FitError(what, remedy=remedy)
         inverse = np.linalg.inv(signal)
         found = inverse @ unit.cross / N
         self.condition_number_ = float(np.linalg.cond(signal)) if len(psi) else 1.0

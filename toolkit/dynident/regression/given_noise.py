@@ -26,13 +26,13 @@ def covariance_of(noise: ArrayLike, inputs: int) -> np.ndarray:
     given = _numbers(noise)
     if given.shape not in ((), (inputs,), (inputs, inputs)):
         what = f"input noise of shape {given.shape} for {inputs} inputs"
-        raise FitError(what, mend=f"give a variance, ({inputs},) or ({inputs}, {inputs})")
+        raise FitError(what, remedy=f"give a variance, ({inputs},) or ({inputs}, {inputs})")
     psi = given if given.ndim == 2 else np.diag(np.broadcast_to(given, (inputs,)))
     rounding = _ROUNDING * np.abs(psi).max(initial=0.0)
     sound = bool(np.all(np.isfinite(psi))) and np.allclose(psi, psi.T, rtol=0, atol=rounding)
     if not sound or np.linalg.eigvalsh(psi).min(initial=0.0) < -rounding:
         what = "the input noise is no covariance"
-        raise FitError(what, mend="give variances that are not negative, symmetric where (d, d)")
+        raise FitError(what, remedy="give variances that are not negative, symmetric where (d, d)")
     return (psi + psi.T) / 2
 
 
@@ -65,4 +65,4 @@ def _numbers(noise: ArrayLike) -> np.ndarray:
         return np.asarray(noise, dtype=float)
     except (TypeError, ValueError):
         what = f"input noise {noise!r} is no number, and no array of numbers"
-        raise FitError(what, mend="give variances, or a covariance") from None
+        raise FitError(what, remedy="give variances, or a covariance") from None

@@ -194,7 +194,7 @@ def _checked(regression: JointFactorRegression, reliabilities: Sequence[float]) 
     least, most = RELIABILITIES
     if not len(reliabilities) or not all(least <= rho <= most for rho in reliabilities):
         what = f"reliabilities {list(reliabilities)}"
-        raise FitError(what, mend="give at least one, each between 0 and 1")
+        raise FitError(what, remedy="give at least one, each between 0 and 1")
 
 
 def _used(regression: JointFactorRegression) -> Statistics:
@@ -219,8 +219,8 @@ def reliability_profile(
     """
     _checked(regression, reliabilities)
     if np.all(regression.known_ | regression.constant_):
-        mend = "there is nothing to profile: leave one to be found"
-        raise FitError("the noise of every input is given", mend=mend)
+        remedy = "there is nothing to profile: leave one to be found"
+        raise FitError("the noise of every input is given", remedy=remedy)
     statistics = regression.statistics_
     variance = _used(regression).scale[:-1] ** 2
     given = variances_of(regression.input_noise, statistics.inputs)

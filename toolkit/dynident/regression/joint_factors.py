@@ -117,7 +117,7 @@ class JointFactorRegression(StatisticsRegressor):
         """
         check_is_fitted(self)
         if not 0 < level < 1:
-            raise FitError(f"level = {level!r}", mend="choose it between 0 and 1, such as 0.95")
+            raise FitError(f"level = {level!r}", remedy="choose it between 0 and 1, such as 0.95")
         if self.queries == "noisy":
             middle, sigma = self.least_squares_, self.sigma_noisy_
         else:
@@ -157,7 +157,7 @@ class JointFactorRegression(StatisticsRegressor):
 
     def _check(self) -> None:
         if self.queries not in ("noisy", "noiseless"):
-            raise FitError(f"queries = {self.queries!r}", mend='choose "noisy" or "noiseless"')
+            raise FitError(f"queries = {self.queries!r}", remedy='choose "noisy" or "noiseless"')
         self._require("reliability", *RELIABILITIES)
         self._require("max_iter", 1, np.inf)
         self._require("tol", 1e-300, np.inf)

@@ -58,7 +58,7 @@ class Statistics:
         X, y = np.asarray(X, dtype=float), np.asarray(y, dtype=float)
         if X.ndim != 2 or y.shape != X.shape[:1] or not len(X):
             what = f"inputs of shape {X.shape} beside an output of shape {y.shape}"
-            raise FitError(what, mend="give (N, d) and (N,), N at least 1")
+            raise FitError(what, remedy="give (N, d) and (N,), N at least 1")
         # About the block's own mean: sums of squares about zero lose digits to a large offset.
         # From the first row: what is constant is then zero, not the rounding of a long sum.
         first = np.append(X[0], y[0])
@@ -92,7 +92,7 @@ class Statistics:
         each = (cls.of(X, y) for X, y in blocks)
         first = next(each, None)
         if first is None:
-            raise FitError("no rows", mend="give at least one block")
+            raise FitError("no rows", remedy="give at least one block")
         return reduce(add, each, first)
 
     def __add__(self, other: Statistics) -> Statistics:
@@ -103,7 +103,7 @@ class Statistics:
         """
         if len(self.mean) != len(other.mean):
             what = f"{len(other.mean) - 1} inputs after {len(self.mean) - 1}"
-            raise FitError(what, mend="the blocks of one regression have the same inputs")
+            raise FitError(what, remedy="the blocks of one regression have the same inputs")
         count = self.count + other.count
         apart = other.mean - self.mean
         share = self.count * other.count / count

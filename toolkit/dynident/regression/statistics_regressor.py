@@ -93,9 +93,9 @@ class StatisticsRegressor(RegressorMixin, BaseEstimator):
         """
         if statistics.count < 2:
             what = f"n_samples = {statistics.count} says nothing of a slope"
-            raise FitError(what, mend="give at least two rows")
+            raise FitError(what, remedy="give at least two rows")
         if not np.all(np.isfinite(statistics.scatter)) or not np.all(np.isfinite(statistics.mean)):
-            raise FitError("the statistics are not finite", mend="clean or scale the data first")
+            raise FitError("the statistics are not finite", remedy="clean or scale the data first")
         before = dict(vars(self))
         try:
             self._fit(statistics)
@@ -161,8 +161,8 @@ class StatisticsRegressor(RegressorMixin, BaseEstimator):
         """Raise FitError unless a setting is a number, at least and at most so large."""
         value = getattr(self, setting)
         if not isinstance(value, Real) or not least <= float(value) <= most:
-            mend = f"choose a number from {least:g} to {most:g}"
-            raise FitError(f"{setting} = {value!r}", mend=mend)
+            remedy = f"choose a number from {least:g} to {most:g}"
+            raise FitError(f"{setting} = {value!r}", remedy=remedy)
 
     def __sklearn_is_fitted__(self) -> bool:
         return hasattr(self, "coef_")

@@ -48,7 +48,7 @@ class TotalLeastSquares(StatisticsRegressor):
         output = null[-1]
         if unit.power > 0 and output @ output < _NO_OUTPUT**2:
             what = "the smallest direction of inputs and output leaves the output out"
-            raise FitError(what, mend="choose a larger rcond, or another estimator")
+            raise FitError(what, remedy="choose a larger rcond, or another estimator")
         # The member of the null space with an output of -1 and the least inputs.
         size = output @ output
         found = -null[:-1] @ output / size if size > 0 else np.zeros(len(spectrum))

@@ -116,7 +116,7 @@ def trace_of(diagnosis: Diagnosis, joint: str, recording: str | None = None) -> 
 def _check_joint(diagnosis: Diagnosis, joint: str) -> None:
     known = [one.name for one in diagnosis.joints]
     if joint not in known:
-        raise DynidentError(f"no joint '{joint}'", mend=f"joints: {', '.join(known)}")
+        raise DynidentError(f"no joint '{joint}'", remedy=f"joints: {', '.join(known)}")
 
 
 def noise_of(diagnosis: Diagnosis, joint: str) -> float | None:

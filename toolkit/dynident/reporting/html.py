@@ -160,7 +160,7 @@ def _diagnosis_page(
         candidates=candidate_table(diagnosis, ranked(diagnosis)),
         weaker=candidate_table(diagnosis, ranked(diagnosis, len(diagnosis.candidates))[10:]),
         remaining=remaining_table(diagnosis),
-        absorbed=absorbed_table(diagnosis),
+        not_identifiable=absorbed_table(diagnosis),
         parameters=parameter_table(diagnosis.after, widening_after(diagnosis), noise_known=known),
         fit_error=diagnosis.after.error_table(),
         given_parameters=given_parameters if diagnosis.steps else None,

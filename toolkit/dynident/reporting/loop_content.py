@@ -103,5 +103,5 @@ def joint_of(validation: Validation, joint: str) -> int:
     """
     if joint not in validation.joints:
         valid = ", ".join(validation.joints)
-        raise DynidentError(f"no joint '{joint}'", mend=f"joints: {valid}")
+        raise DynidentError(f"no joint '{joint}'", remedy=f"joints: {valid}")
     return validation.joints.index(joint)

@@ -39,14 +39,14 @@ def next_steps(diagnosis: Diagnosis) -> tuple[Advice, ...]:
         found.append(_unexplained(diagnosis))
     if diagnosis.noise_source != "replicates":
         found.append(_to_repeat(diagnosis))
-    absorbed = [c for c in diagnosis.candidates if c.status == "absorbed"]
+    not_identifiable = [c for c in diagnosis.candidates if c.status == "absorbed"]
     if not found:
         why = "What is left of the torque is noise, and no physics could take it away."
         found.append(Advice("Nothing is to be added: use the model as it is.", why))
-    if absorbed:
-        many = len(absorbed) > 1
+    if not_identifiable:
+        many = len(not_identifiable) > 1
         what = (
-            f"If you suspect one of the {len(absorbed)} effects"
+            f"If you suspect one of the {len(not_identifiable)} effects"
             if many
             else "If you suspect the effect"
         )

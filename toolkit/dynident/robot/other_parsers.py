@@ -55,8 +55,8 @@ def simulate_in_drake(robot: Robot, text: str, where: str) -> float:
     _, format_, contents = take_apart(text, where)
     for link in robot.links if format_ == "mjcf" else ():
         if link.source == "inertial element" and link.phi[0] == 0.0:
-            what, mend = "states a mass of zero, which Drake and MuJoCo refuse", "give it a mass"
-            raise RobotError(what, f"{where}: link '{link.name}'", mend)
+            what, remedy = "states a mass of zero, which Drake and MuJoCo refuse", "give it a mass"
+            raise RobotError(what, f"{where}: link '{link.name}'", remedy)
     plant: Any = MultibodyPlant(0.0)
     try:
         with quiet():

@@ -106,8 +106,8 @@ def require_format(robot: Robot, path: str | Path) -> None:
     suffix, own = Path(path).suffix.lower(), robot.description and robot.description.format
     for format_, suffixes in _FILES.items():
         if own is not None and suffix in suffixes and format_ != own:
-            mend = "name the file accordingly: a description is patched, not converted"
-            raise FileError(f"the description is of the format {own.upper()}", str(path), mend)
+            remedy = "name the file accordingly: a description is patched, not converted"
+            raise FileError(f"the description is of the format {own.upper()}", str(path), remedy)
 
 
 def write_verified(
@@ -162,8 +162,10 @@ def _verify(
             simulated = simulate_in_drake(reloaded, text, where)
         by_parser = require_pinocchio(reloaded, text, where)
     except DynidentError as error:
-        mend = " ".join(filter(None, (error.mend and f"{error.mend}.", "Nothing was written")))
-        raise RobotError(f"the new description fails: {error.what}", error.where, mend) from None
+        remedy = " ".join(
+            filter(None, (error.remedy and f"{error.remedy}.", "Nothing was written"))
+        )
+        raise RobotError(f"the new description fails: {error.what}", error.where, remedy) from None
     return Verification(
         where,
         len(reloaded.links),

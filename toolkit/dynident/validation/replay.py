@@ -129,8 +129,8 @@ def simulate_again(
         if dataset.recordings:
             what = f"no recording has the reference that the controller followed ({_column(robot)})"
         where = ", ".join(r.where for r in dataset.recordings) or None
-        mend = f"record it as the column {_column(robot)}, or map it to one in [columns]"
-        raise SimulationError(what, where, mend)
+        remedy = f"record it as the column {_column(robot)}, or map it to one in [columns]"
+        raise SimulationError(what, where, remedy)
     usable = [uniform(r) for r in dataset.recordings if r.q_ref is not None]
     nothing = Validation(
         robot.name,

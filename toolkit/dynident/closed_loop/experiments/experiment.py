@@ -52,8 +52,8 @@ class ExperimentRun:
     def __post_init__(self) -> None:
         path = PurePosixPath(self.file)
         if len(path.parts) != 1 or path.suffix.lower() not in _SUFFIXES or "\\" in self.file:
-            mend = f"give a name without folder that ends in {', '.join(_SUFFIXES)}"
-            raise SimulationError(f"'{self.file}' cannot be the file of a recording", mend=mend)
+            remedy = f"give a name without folder that ends in {', '.join(_SUFFIXES)}"
+            raise SimulationError(f"'{self.file}' cannot be the file of a recording", remedy=remedy)
         if self.use not in ("train", "test"):
             raise SimulationError(f'use = "{self.use}"', self.file, 'write "train" or "test"')
         if not np.isfinite(self.start):
@@ -95,20 +95,20 @@ class Experiment:
         object.__setattr__(self, "runs", tuple(self.runs))
         object.__setattr__(self, "effects", tuple(self.effects))
         if not self.runs:
-            raise SimulationError("no recordings are asked for", mend="ask for at least one")
+            raise SimulationError("no recordings are asked for", remedy="ask for at least one")
         files = [run.file for run in self.runs]
         for file in files:
             if files.count(file) > 1:
                 raise SimulationError("two recordings have this name", file, "rename one of them")
         if self.torque not in ("held_command", "measured"):
-            mend = 'write "held_command" or "measured"'
-            raise SimulationError(f'torque = "{self.torque}"', mend=mend)
+            remedy = 'write "held_command" or "measured"'
+            raise SimulationError(f'torque = "{self.torque}"', remedy=remedy)
         if not (self.friction_width > 0 and np.isfinite(self.friction_width)):
-            mend = "choose it above 0"
-            raise SimulationError(f"friction_width = {self.friction_width}", mend=mend)
+            remedy = "choose it above 0"
+            raise SimulationError(f"friction_width = {self.friction_width}", remedy=remedy)
         if self.nominal is not None and self.nominal.names != self.robot.names:
-            mend = f"the true robot has {', '.join(self.robot.names)}"
-            raise SimulationError("the nominal robot has other joints", self.nominal.name, mend)
+            remedy = f"the true robot has {', '.join(self.robot.names)}"
+            raise SimulationError("the nominal robot has other joints", self.nominal.name, remedy)
         for part in fields(self.sensors):
             self.sensors.each(part.name, self.robot.n)
         self.controller.simulated_rate()
@@ -166,12 +166,12 @@ class Experiment:
         for group, length in zip(groups, lengths, strict=True):
             names = group[0].name + (f" to {group[-1].name}" if len(group) > 1 else "")
 
-            def tell(done: float, _: float, before=before, names=names) -> None:
+            def advance(done: float, _: float, before=before, names=names) -> None:
                 if progress is not None:
                     progress(names, before + done, sum(lengths))
 
             found += simulate(
-                group, self.controller, self.sensors, lead_in=self.lead_in, progress=tell
+                group, self.controller, self.sensors, lead_in=self.lead_in, progress=advance
             )
             before += length
         return tuple(found)

@@ -140,4 +140,4 @@ def _run(
 def _at(error: DynidentError, path: Path, key: str = "") -> StudyError:
     """Return the complaint with the file, and the key in it, in front."""
     where = ": ".join(part for part in (str(path), key, error.where or "") if part)
-    return StudyError(error.what, where, error.mend)
+    return StudyError(error.what, where, error.remedy)

@@ -46,8 +46,8 @@ def write_experiment(
     folder = Path(folder)
     nominal = experiment.nominal or experiment.robot
     if nominal.description is None:
-        mend = "start from Robot.from_file or Robot.from_text"
-        raise SimulationError("has no description that could be written", nominal.name, mend)
+        remedy = "start from Robot.from_file or Robot.from_text"
+        raise SimulationError("has no description that could be written", nominal.name, remedy)
     files.require_folder(folder)
     recordings = experiment.run(progress)
     try:

@@ -65,7 +65,7 @@ def _refusals() -> Iterator[None]:
     try:
         yield
     except DynidentError as error:
-        raise SimulationError(error.what, error.where, error.mend, reason="massless") from None
+        raise SimulationError(error.what, error.where, error.remedy, reason="massless") from None
 
 
 class Plant:
@@ -197,7 +197,7 @@ class Plant:
         rest = inertia - np.diag(np.diag(inertia))
         if np.any(rest[at]) or np.any(rest[:, at]):
             what = "the inertia of a motor is coupled to a joint that gives way"
-            raise SimulationError(what, mend="leave out the coupling's ca, or the transmission")
+            raise SimulationError(what, remedy="leave out the coupling's ca, or the transmission")
         inertia[at, at] = 0.0
         n = mechanisms[0].robot.n
         widths = np.repeat([one.friction_width for one in mechanisms], n)

@@ -64,8 +64,8 @@ class Gears:
         for joint, rate in zip(joints, fastest, strict=True):
             if not rate < _FASTEST:
                 what = f"the transmission is too stiff to be integrated ({rate:.2g} rad/s)"
-                mend = "choose a larger compliance, or a larger rotor inertia"
-                raise SimulationError(what, f"joint '{joint}'", mend, reason="unstable")
+                remedy = "choose a larger compliance, or a larger rotor inertia"
+                raise SimulationError(what, f"joint '{joint}'", remedy, reason="unstable")
 
     def torque(self, bent: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """Return the transmitted torque of deflections and their rates."""

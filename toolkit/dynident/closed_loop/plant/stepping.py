@@ -234,8 +234,8 @@ class Stepper:
         what += f": joint '{one.name}'"
         what += "" if speed is None else f" moves at {speed:.3g} {one.unit}/s"
         where = f"{one.task}, t = {time:.4g} s" if one.task else f"t = {time:.4g} s"
-        mend = "lower the controller's gains, or raise its rate_hz"
-        return SimulationError(what, where, mend, reason="unstable")
+        remedy = "lower the controller's gains, or raise its rate_hz"
+        return SimulationError(what, where, remedy, reason="unstable")
 
 
 def _rms(x: np.ndarray) -> np.ndarray:

@@ -49,7 +49,7 @@ class Recorded:
     @classmethod
     def of(cls, store: ColumnStore) -> Recorded:
         """Return the ranges of the recordings in a store."""
-        runs = [run.versions[0] for run in store.runs]
+        runs = [run.replicates[0] for run in store.runs]
         starts = [run.recording.start for run in runs]
         ends = [run.recording.start + run.recording.duration for run in runs]
 
@@ -71,7 +71,7 @@ Motion = tuple[str, str | None]
 
 
 @dataclass(frozen=True)
-class Trial:
+class CandidateExperiment:
     """An experiment that could be made.
 
     Attributes
@@ -95,11 +95,11 @@ class Trial:
         return tuple((name, self.joint) for name in parts.get(self.kind, (self.kind,)))
 
 
-EVERYTHING = Trial("everything")
+EVERYTHING = CandidateExperiment("everything")
 
 
 @dataclass(eq=False)
-class Trials:
+class CandidateExperiments:
     """Experiments evaluated with a fitted model; each motion is evaluated once.
 
     Attributes
@@ -118,13 +118,13 @@ class Trials:
     _blocks_ready: dict[Hashable, Block] = field(default_factory=dict)
     _columns: dict[Motion, np.ndarray] = field(default_factory=dict)
     _effects: dict[tuple[Effect, Motion], np.ndarray] = field(default_factory=dict)
-    _bases: dict[Trial, np.ndarray] = field(default_factory=dict)
+    _bases: dict[CandidateExperiment, np.ndarray] = field(default_factory=dict)
 
-    def without(self, effects: Sequence[Effect]) -> Trials:
+    def without(self, effects: Sequence[Effect]) -> CandidateExperiments:
         """Return the same experiments with these effects not counted as the model's."""
         return replace(self, excluded=tuple(effect.label for effect in effects), _bases={})
 
-    def left(self, effect: Effect, trial: Trial = EVERYTHING) -> float:
+    def left(self, effect: Effect, trial: CandidateExperiment = EVERYTHING) -> float:
         """Share of an effect's columns that is left beside the model's, in an experiment.
 
         The largest over all directions of the columns; 0 where they vanish.
@@ -136,7 +136,7 @@ class Trials:
         rest = own - basis @ (basis.T @ own)
         return float(np.linalg.svd(rest, compute_uv=False)[0])
 
-    def absorbing(self, effect: Effect, trial: Trial = EVERYTHING) -> tuple[str, ...]:
+    def absorbing(self, effect: Effect, trial: CandidateExperiment = EVERYTHING) -> tuple[str, ...]:
         """Return the names of the model's parameters that take most of an effect's torque.
 
         None where it makes no torque.
@@ -151,7 +151,7 @@ class Trials:
         return tuple(self.model.names[self._counted()[k]] for k in large)
 
     def difference(
-        self, effect: Effect, own: Sequence[float], other: Effect, trial: Trial
+        self, effect: Effect, own: Sequence[float], other: Effect, trial: CandidateExperiment
     ) -> tuple[np.ndarray, np.ndarray]:
         """Compare an effect's torque with what another effect and the model can make of it.
 
@@ -179,7 +179,7 @@ class Trials:
         shape = (-1, self.model.robot.n)
         return tuple(np.sqrt(np.mean(x.reshape(shape) ** 2, axis=0)) for x in (torque, remaining))
 
-    def columns(self, effect: Effect, trial: Trial) -> np.ndarray:
+    def columns(self, effect: Effect, trial: CandidateExperiment) -> np.ndarray:
         """Columns of an effect in an experiment, (rows, k)."""
         return np.concatenate([self._of_effect(effect, motion) for motion in trial.motions])
 
@@ -250,7 +250,7 @@ class Trials:
             self._blocks[motion] = self.model.block(t + late, q, v, a, carries_payload=loaded)
         return self._blocks[motion]
 
-    def _model_columns(self, trial: Trial) -> np.ndarray:
+    def _model_columns(self, trial: CandidateExperiment) -> np.ndarray:
         for motion in trial.motions:
             if motion not in self._columns:
                 found = self.model.columns(self._block(motion), self.values)[::_EVERY]
@@ -266,7 +266,7 @@ class Trials:
                 counted[self.model.slices[label]] = False
         return np.flatnonzero(counted)
 
-    def _basis(self, trial: Trial) -> np.ndarray:
+    def _basis(self, trial: CandidateExperiment) -> np.ndarray:
         """Orthonormal basis of the model's columns, (rows, r)."""
         if trial not in self._bases:
             self._bases[trial] = _orthonormal(self._model_columns(trial))

@@ -7,12 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynident.diagnosis.advice.candidate_experiments import SLOW, Recorded, Trial, Trials
-from dynident.diagnosis.search.scoring import ABSORBED
+from dynident.diagnosis.advice.candidate_experiments import (
+    SLOW,
+    CandidateExperiment,
+    CandidateExperiments,
+    Recorded,
+)
+from dynident.diagnosis.search.scoring import NOT_IDENTIFIABLE
 from dynident.effects import Effect
 from dynident.errors import DynidentError
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import Present
+from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.model import Model
 
 _CLEARLY = 0.05
@@ -31,12 +36,12 @@ class Adviser:
     trials : experiments that could be made.
     """
 
-    trials: Trials
+    trials: CandidateExperiments
 
     @classmethod
-    def of(cls, store: ColumnStore, present: Present) -> Adviser:
+    def of(cls, store: ColumnStore, fitted: EvidenceFit) -> Adviser:
         """Return the adviser for a model as it fits the recordings of a store."""
-        return cls(Trials(present.model, present.values, Recorded.of(store)))
+        return cls(CandidateExperiments(fitted.model, fitted.values, Recorded.of(store)))
 
     def revealing(self, effect: Effect) -> str:
         """Say which experiment would show an effect that the recordings do not show.
@@ -48,10 +53,10 @@ class Adviser:
             # What depends on the past is no part of a model that sees the instant only.
             return self._by_kind(effect)
         try:
-            absorbed = self.trials.left(effect) < ABSORBED
+            not_identifiable = self.trials.left(effect) < NOT_IDENTIFIABLE
         except DynidentError:
             return effect.advice
-        if not absorbed:
+        if not not_identifiable:
             return self._by_kind(effect)
         part = " and ".join(self.trials.absorbing(effect))
         why = f"its torque cannot be told from that of {part}" if part else "it makes no torque"
@@ -94,7 +99,11 @@ class Adviser:
     # --- telling apart -------------------------------------------------------------------------
 
     def _best_trial(
-        self, trials: Trials, first: Effect, values: Sequence[float], others: Sequence[Effect]
+        self,
+        trials: CandidateExperiments,
+        first: Effect,
+        values: Sequence[float],
+        others: Sequence[Effect],
     ) -> _Separation | None:
         found = []
         for trial in self._candidates((first, *others)):
@@ -109,16 +118,16 @@ class Adviser:
         most = max((one.size for one in found), default=0.0)
         return next((one for one in found if one.size >= _NEARLY * most), None)
 
-    def _candidates(self, effects: Sequence[Effect]) -> list[Trial]:
+    def _candidates(self, effects: Sequence[Effect]) -> list[CandidateExperiment]:
         """Experiments in which effects may differ, the simpler ones first."""
         kinds = {effect.shown_by for effect in effects}
         alone = {name for effect in effects for name in (effect.joint, effect.source) if name}
         if len(self.trials.model.robot.names) == 1:
             alone = set()
         return [
-            *(Trial("alone", name) for name in sorted(alone)),
-            *(Trial(kind) for kind in ("slow", "wide", "fast")),
-            *(Trial(kind) for kind in ("session", "payload") if kind in kinds),
+            *(CandidateExperiment("alone", name) for name in sorted(alone)),
+            *(CandidateExperiment(kind) for kind in ("slow", "wide", "fast")),
+            *(CandidateExperiment(kind) for kind in ("session", "payload") if kind in kinds),
         ]
 
     def _in_words(self, first: Effect, best: _Separation) -> str:
@@ -128,7 +137,7 @@ class Adviser:
         there = f": there they differ by {best.rms:.2g} {unit} (rms) at {robot.names[best.joint]}"
         return self._trial_in_words(best.trial, j, first) + there
 
-    def _trial_in_words(self, trial: Trial, j: int, first: Effect) -> str:
+    def _trial_in_words(self, trial: CandidateExperiment, j: int, first: Effect) -> str:
         names, unit = self.trials.model.robot.names, self._unit(j)
         if trial.kind == "alone":
             k = self._index(trial.joint)
@@ -236,7 +245,7 @@ class Adviser:
 class _Separation:
     """An experiment that tells effects apart: how far, and where most, N m or N."""
 
-    trial: Trial
+    trial: CandidateExperiment
     size: float
     joint: int
     rms: float
@@ -244,7 +253,7 @@ class _Separation:
 
 def revealing(effect: Effect, model: Model, values: np.ndarray, recorded: Recorded) -> str:
     """Say which experiment would show an effect; see `Adviser.revealing`."""
-    return Adviser(Trials(model, values, recorded)).revealing(effect)
+    return Adviser(CandidateExperiments(model, values, recorded)).revealing(effect)
 
 
 def separating(
@@ -255,4 +264,4 @@ def separating(
     recorded: Recorded,
 ) -> str:
     """Say which experiment would tell effects apart; see `Adviser.separating`."""
-    return Adviser(Trials(model, values, recorded)).separating(effects, own)
+    return Adviser(CandidateExperiments(model, values, recorded)).separating(effects, own)

@@ -30,7 +30,7 @@ class Repeated:
 
     Attributes
     ----------
-    run, number, joint : as in `Bump`.
+    run, number, joint : as in `DisturbancePulse`.
     t : (P, S) s, in the session.
     residual : (P, S) N m or N.
     speed : (P, S) rad/s or m/s.
@@ -81,18 +81,18 @@ class Changes:
         instants = len(self.kept)
         p = int(row // instants)
         own = slice(p * instants, (p + 1) * instants)
-        bump = np.exp(-(((np.arange(own.start, own.stop) - row) / width) ** 2) / 2)
-        columns = np.column_stack([self.change[own], bump, *_slow(self.of.speed[p]).T])
+        pulse = np.exp(-(((np.arange(own.start, own.stop) - row) / width) ** 2) / 2)
+        columns = np.column_stack([self.change[own], pulse, *_slow(self.of.speed[p]).T])
         columns = columns * self.still[own, None]
         white = np.asarray(lfilter(self.colour, [1.0], columns, axis=0))
-        change, bump, slow = white[:, 0], white[:, 1], white[:, 2:]
-        power = max(float(bump @ bump), 1e-300)
-        along = slow.T @ bump
+        change, pulse, slow = white[:, 0], white[:, 1], white[:, 2:]
+        power = max(float(pulse @ pulse), 1e-300)
+        along = slow.T @ pulse
         unknown = along @ np.linalg.pinv(slow[self.kept].T @ slow[self.kept], 1e-10) @ along
-        parts = bump * change
+        parts = pulse * change
         total = float(parts.sum())
         largest = int(np.argmax(parts * np.sign(total)))
-        rest = max(power - float(bump[largest] ** 2), 1e-300)
+        rest = max(power - float(pulse[largest] ** 2), 1e-300)
         alone = (total - float(parts[largest])) / total * np.sqrt(power / rest) if total else 1.0
         return float(np.clip(alone, 0.0, 1.0) / np.sqrt(1.0 + unknown / power))
 
@@ -108,8 +108,8 @@ class Changes:
         around = np.round(rows).astype(int)[:, None] + np.arange(-half, half + 1 + ORDER)
         inside = (around >= 0) & (around < length)
         at = np.clip(around, 0, length - 1)
-        bump = np.exp(-(((around - rows[:, None]) / width) ** 2) / 2) * inside
-        template = lfilter(self.colour, [1.0], bump * self.still[at], axis=1) * inside
+        pulse = np.exp(-(((around - rows[:, None]) / width) ** 2) / 2) * inside
+        template = lfilter(self.colour, [1.0], pulse * self.still[at], axis=1) * inside
         white = lfilter(self.colour, [1.0], signal * self.still)
         product = np.sum(template * white[at], axis=1)
         power = np.maximum(np.sum(template**2, axis=1), 1e-300)
@@ -119,25 +119,25 @@ class Changes:
 def scanned(one: Changes, width: float) -> np.ndarray:
     """The z value of `Changes.match` at every row, (P S,), by convolutions."""
     half = int(np.ceil(REACH * width))
-    bump = np.exp(-((np.arange(-half, half + 1) / width) ** 2) / 2)
+    pulse = np.exp(-((np.arange(-half, half + 1) / width) ** 2) / 2)
     white = np.asarray(lfilter(one.colour, [1.0], one.change * one.still))
     back = np.asarray(lfilter(one.colour, [1.0], white[::-1]))[::-1] * one.still
-    product = _convolved(back, bump)
+    product = _convolved(back, pulse)
     # The whitened bump's square: over the lags that the filter mixes.
     power = np.zeros(len(back))
-    for lag in range(min(len(one.colour), len(bump))):
+    for lag in range(min(len(one.colour), len(pulse))):
         both = float(one.colour[: len(one.colour) - lag] @ one.colour[lag:])
         pairs = one.still[: len(back) - lag] * one.still[lag:]
-        kernel = bump[: len(bump) - lag] * bump[lag:]
+        kernel = pulse[: len(pulse) - lag] * pulse[lag:]
         full = np.pad(oaconvolve(pairs, kernel[::-1]), len(one.colour))
         start = len(one.colour) + half - lag
         power += (1.0 if lag == 0 else 2.0) * both * full[start : start + len(back)]
     return product / np.sqrt(np.maximum(power, 1e-300))
 
 
-def _convolved(signal: np.ndarray, bump: np.ndarray) -> np.ndarray:
-    half = len(bump) // 2
-    return oaconvolve(signal, bump)[half : half + len(signal)]
+def _convolved(signal: np.ndarray, pulse: np.ndarray) -> np.ndarray:
+    half = len(pulse) // 2
+    return oaconvolve(signal, pulse)[half : half + len(signal)]
 
 
 def changes_of(series: Sequence[Repeated], left_out: Sequence[np.ndarray]) -> list[Changes]:

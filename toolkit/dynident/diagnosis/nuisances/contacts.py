@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from dynident.diagnosis.nuisances.pulse_search import Bump, find_contacts, without
+from dynident.diagnosis.nuisances.pulse_search import DisturbancePulse, find_contacts, without
 from dynident.diagnosis.result import Candidate, Step
 from dynident.diagnosis.verdict import RESOLUTION
 from dynident.effects import Effect, catalogue
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import Present
+from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.runs import Run
 from dynident.model import Model
@@ -20,21 +20,21 @@ from dynident.model import Model
 class Disturbance:
     """A contact, with the held-out error before and after it is left out."""
 
-    bump: Bump
+    pulse: DisturbancePulse
     error_before: float
     error_after: float
 
     def effect(self, model: Model) -> Effect:
         """Return it as the effect of the catalogue that was found in repetitions."""
         kind = catalogue()["contact"]
-        shape = (float(self.bump.number), self.bump.time, self.bump.width)
-        return kind(self.bump.joint, None, shape).on(model.robot)
+        shape = (float(self.pulse.number), self.pulse.time, self.pulse.width)
+        return kind(self.pulse.joint, None, shape).on(model.robot)
 
     def step(self, model: Model) -> Step:
         """Return it as a step of the diagnosis."""
-        values = (self.bump.amplitude,)
+        values = (self.pulse.amplitude,)
         return Step(
-            self.effect(model), values, self.error_before, self.error_after, (), self.bump.p_value
+            self.effect(model), values, self.error_before, self.error_after, (), self.pulse.p_value
         )
 
 
@@ -53,11 +53,13 @@ class Contacts:
     held: ColumnStore | None
     whole: tuple[Run, ...]
     whole_held: tuple[Run, ...]
-    bumps: tuple[Bump, ...]
-    bumps_held: tuple[Bump, ...]
+    pulses: tuple[DisturbancePulse, ...]
+    pulses_held: tuple[DisturbancePulse, ...]
 
     @classmethod
-    def leave_out(cls, store: ColumnStore, held: ColumnStore | None, present: Present) -> Contacts:
+    def leave_out(
+        cls, store: ColumnStore, held: ColumnStore | None, fitted: EvidenceFit
+    ) -> Contacts:
         """Find contacts in the recordings and leave their instants out of both stores.
 
         Parameters
@@ -66,81 +68,87 @@ class Contacts:
         present : the model as it fits the training recordings.
         """
         whole, whole_held = store.runs, held.runs if held is not None else ()
-        bumps = _resolved(store, present, find_contacts(store, present))
-        bumps_held = (
-            _resolved(held, present, find_contacts(held, present)) if held is not None else ()
+        pulses = _resolved(store, fitted, find_contacts(store, fitted))
+        pulses_held = (
+            _resolved(held, fitted, find_contacts(held, fitted)) if held is not None else ()
         )
-        found = cls(store, held, whole, whole_held, bumps, bumps_held)
-        found._leave(bumps, bumps_held)
+        found = cls(store, held, whole, whole_held, pulses, pulses_held)
+        found._leave(pulses, pulses_held)
         return found
 
-    def confirmed(self, present: Present) -> Contacts:
+    def confirmed(self, fitted: EvidenceFit) -> Contacts:
         """Keep the contacts that a better model still shows, and leave only these out.
 
         What a poor model lacks is not quite the same in every repetition, as motions are not, and
         may look like a contact.
         """
-        if not (self.bumps or self.bumps_held):
+        if not (self.pulses or self.pulses_held):
             return self
         self._leave((), ())
-        again = find_contacts(self.store, present) if self.bumps else ()
+        again = find_contacts(self.store, fitted) if self.pulses else ()
         again_held = ()
-        if self.held is not None and self.bumps_held:
-            again_held = find_contacts(self.held, present)
-        bumps, bumps_held = _common(again, self.bumps), _common(again_held, self.bumps_held)
-        self._leave(bumps, bumps_held)
-        return replace(self, bumps=bumps, bumps_held=bumps_held)
+        if self.held is not None and self.pulses_held:
+            again_held = find_contacts(self.held, fitted)
+        pulses, pulses_held = _common(again, self.pulses), _common(again_held, self.pulses_held)
+        self._leave(pulses, pulses_held)
+        return replace(self, pulses=pulses, pulses_held=pulses_held)
 
-    def told(self, present: Present) -> tuple[Disturbance, ...]:
+    def told(self, fitted: EvidenceFit) -> tuple[Disturbance, ...]:
         """One disturbance a joint, the clearest, with the error before and after it is left out."""
         judged = self.held or self.store
-        clearest: dict[str, Bump] = {}
-        for bump in sorted((*self.bumps, *self.bumps_held), key=lambda one: one.p_value):
-            clearest.setdefault(bump.joint, bump)
+        clearest: dict[str, DisturbancePulse] = {}
+        for pulse in sorted((*self.pulses, *self.pulses_held), key=lambda one: one.p_value):
+            clearest.setdefault(pulse.joint, pulse)
         if not clearest:
             return ()
         self._leave((), ())
-        before = on_recordings(judged, present).error
-        self._leave(self.bumps, self.bumps_held)
-        after = on_recordings(judged, present).error
+        before = on_recordings(judged, fitted).error
+        self._leave(self.pulses, self.pulses_held)
+        after = on_recordings(judged, fitted).error
         told = []
-        for bump in clearest.values():
-            told.append(Disturbance(bump, before, after))
+        for pulse in clearest.values():
+            told.append(Disturbance(pulse, before, after))
             before = after
         return tuple(told)
 
-    def _leave(self, bumps: Sequence[Bump], bumps_held: Sequence[Bump]) -> None:
-        self.store.runs = _masked(self.store.runs, self.whole, bumps)
+    def _leave(
+        self, pulses: Sequence[DisturbancePulse], pulses_held: Sequence[DisturbancePulse]
+    ) -> None:
+        self.store.runs = _masked(self.store.runs, self.whole, pulses)
         if self.held is not None:
-            self.held.runs = _masked(self.held.runs, self.whole_held, bumps_held)
+            self.held.runs = _masked(self.held.runs, self.whole_held, pulses_held)
 
 
 def _masked(
-    runs: tuple[Run, ...], whole: tuple[Run, ...], bumps: Sequence[Bump]
+    runs: tuple[Run, ...], whole: tuple[Run, ...], pulses: Sequence[DisturbancePulse]
 ) -> tuple[Run, ...]:
     """Runs as they are now, with these bumps and no others left out."""
     found = []
     for r, (run, original) in enumerate(zip(runs, whole, strict=True)):
         again = replace(run, index=original.index, edges=original.edges, left_out=None)
-        found.append(without(again, [bump for bump in bumps if bump.run == r]))
+        found.append(without(again, [pulse for pulse in pulses if pulse.run == r]))
     return tuple(found)
 
 
-def _resolved(store: ColumnStore, present: Present, bumps: Sequence[Bump]) -> tuple[Bump, ...]:
+def _resolved(
+    store: ColumnStore, fitted: EvidenceFit, pulses: Sequence[DisturbancePulse]
+) -> tuple[DisturbancePulse, ...]:
     """Bumps at joints whose residual is more than what differentiation and filters leave."""
-    if not bumps:
+    if not pulses:
         return ()
-    judged = on_recordings(store, present)
-    names = present.model.robot.names
+    judged = on_recordings(store, fitted)
+    names = fitted.model.robot.names
     matters = judged.residual_rms > RESOLUTION * judged.torque_rms
-    return tuple(bump for bump in bumps if matters[names.index(bump.joint)])
+    return tuple(pulse for pulse in pulses if matters[names.index(pulse.joint)])
 
 
-def _common(bumps: Sequence[Bump], others: Sequence[Bump]) -> tuple[Bump, ...]:
+def _common(
+    pulses: Sequence[DisturbancePulse], others: Sequence[DisturbancePulse]
+) -> tuple[DisturbancePulse, ...]:
     """Bumps that are among others too, at about the same time."""
     return tuple(
         one
-        for one in bumps
+        for one in pulses
         if any(
             (one.run, one.joint, one.repetition) == (two.run, two.joint, two.repetition)
             and abs(one.time - two.time) <= 2.0 * (one.width + two.width)
@@ -154,7 +162,7 @@ def contact_candidates(
 ) -> tuple[Candidate, ...]:
     """Return what is to be said of contacts at every joint."""
     repeats = any(run.kind == "repeated" for run in store.runs)
-    by_joint = {one.bump.joint: one for one in found}
+    by_joint = {one.pulse.joint: one for one in found}
     candidates = []
     for effect in catalogue()["contact"].candidates(model.robot):
         effect = effect.on(model.robot)
@@ -163,7 +171,7 @@ def contact_candidates(
             gain = one.error_before - one.error_after
             candidates.append(
                 Candidate(
-                    one.effect(model), "material", one.bump.p_value, gain, (one.bump.amplitude,)
+                    one.effect(model), "material", one.pulse.p_value, gain, (one.pulse.amplitude,)
                 )
             )
         elif repeats:

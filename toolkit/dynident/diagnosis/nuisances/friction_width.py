@@ -15,7 +15,7 @@ import numpy as np
 from dynident.diagnosis.search.ranking import rank
 from dynident.effects import Block, JointEffect, Parameter, ShapeParameter
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import Present, fit_present
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 
 _LEAST_SHARE = 0.05  # of a joint's dry friction, to be told
 _BLUNTER = (
@@ -26,7 +26,7 @@ _BLUNTER = (
 _SHARPER = ("sharper", "The study's friction_width is larger than the joint's.")
 
 
-class BluntedFriction(JointEffect):
+class FrictionWidthColumn(JointEffect):
     """A share of the dry friction that reverses over k times the width: no loss at speed.
 
     With k below 1 it is sharper than the law, with k above 1 blunter.
@@ -49,28 +49,28 @@ class BluntedFriction(JointEffect):
         return block.sign(v / self.shape[0]) - block.sign(v)
 
 
-def blunted(store: ColumnStore, present: Present) -> Present:
+def with_friction_width(store: ColumnStore, fitted: EvidenceFit) -> EvidenceFit:
     """Return the fit with dry friction blunted at the joints where the data call for it."""
-    model = present.model
+    model = fitted.model
     dry = [e.joint for e in model.effects if e.name == "coulomb_friction"]
-    wanted = tuple(BluntedFriction(joint).on(model.robot) for joint in dry)
+    wanted = tuple(FrictionWidthColumn(joint).on(model.robot) for joint in dry)
     wanted = tuple(effect for effect in wanted if effect not in model)
     if not wanted:
-        return present
-    for score in rank(store, present, 0, only=wanted, least=0.0).material:
+        return fitted
+    for score in rank(store, fitted, 0, only=wanted, least=0.0).material:
         model = model + score.effect
-    return present if model is present.model else fit_present(store, model)
+    return fitted if model is fitted.model else fit_evidence(store, model)
 
 
-def blunting_notes(present: Present) -> tuple[str, ...]:
+def friction_width_notes(fitted: EvidenceFit) -> tuple[str, ...]:
     """What was blunted, in plain words."""
-    model, notes = present.model, []
+    model, notes = fitted.model, []
     for effect in model.effects:
-        if isinstance(effect, BluntedFriction):
+        if isinstance(effect, FrictionWidthColumn):
             wide = effect.shape[0] * model.friction_width
             unit = model.robot.units[model.robot.names.index(str(effect.joint))]
-            share = present.values[model.slices[effect.label]][0]
-            whole = present.values[model.slices[f"coulomb_friction@{effect.joint}"]][0]
+            share = fitted.values[model.slices[effect.label]][0]
+            whole = fitted.values[model.slices[f"coulomb_friction@{effect.joint}"]][0]
             if share < _LEAST_SHARE * whole:
                 continue  # what was added since has taken its place
             part = f"{100 * share / whole:.0f} % of it" if 0 < share < whole else "it"

@@ -17,7 +17,7 @@ from scipy.optimize import minimize
 from dynident.diagnosis.nuisances.changes import REACH, Changes, Repeated, changes_of, scanned
 from dynident.diagnosis.nuisances.tails import QUARTER, chance_of, degrees_of_freedom
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import Present, residuals
+from dynident.evidence.evidence_fit import EvidenceFit, residuals
 from dynident.evidence.runs import Run
 
 LEVEL = 1e-6
@@ -37,7 +37,7 @@ _PEAKS = 5  # positions, with what surrounds them, that are no witnesses of the 
 
 
 @dataclass(frozen=True)
-class Bump:
+class DisturbancePulse:
     """A burst in one repetition: amplitude exp(-((t - time) / width)^2 / 2).
 
     Attributes
@@ -62,7 +62,7 @@ class Bump:
     p_value: float
 
 
-def find_contacts(store: ColumnStore, present: Present) -> tuple[Bump, ...]:
+def find_contacts(store: ColumnStore, fitted: EvidenceFit) -> tuple[DisturbancePulse, ...]:
     """Find bursts in single repetitions; the most significant first.
 
     Parameters
@@ -74,11 +74,11 @@ def find_contacts(store: ColumnStore, present: Present) -> tuple[Bump, ...]:
     None at all where nothing repeats.
     """
     found = []
-    folded = residuals(store, present.model, present.values)
+    folded = residuals(store, fitted.model, fitted.values)
     for r, (run, residual) in enumerate(zip(store.runs, folded, strict=True)):
         if run.kind != "repeated" or len(run.index) < 2:
             continue
-        first, recording = run.versions[0], run.recording
+        first, recording = run.replicates[0], run.recording
         for j, joint in enumerate(recording.joints):
             found.append(
                 Repeated(
@@ -90,10 +90,10 @@ def find_contacts(store: ColumnStore, present: Present) -> tuple[Bump, ...]:
                     first.v[:, j][run.index],
                 )
             )
-    return bumps_in(found)
+    return pulses_in(found)
 
 
-def bumps_in(data: Sequence[Repeated]) -> tuple[Bump, ...]:
+def pulses_in(data: Sequence[Repeated]) -> tuple[DisturbancePulse, ...]:
     """Find bumps in residuals of any joints and recordings; the most significant first."""
     left, found = list(data), []
     while len(found) < _MOST:
@@ -102,10 +102,10 @@ def bumps_in(data: Sequence[Repeated]) -> tuple[Bump, ...]:
             break
         found.append(best)
         left = [_cleared(one, best) for one in left]
-    return tuple(sorted(found, key=lambda bump: bump.p_value))
+    return tuple(sorted(found, key=lambda pulse: pulse.p_value))
 
 
-def without(run: Run, bumps: Sequence[Bump]) -> Run:
+def without(run: Run, pulses: Sequence[DisturbancePulse]) -> Run:
     """Return a run without the instants of bumps, in all repetitions.
 
     That is four widths on either side, or a quarter of the repetition where that is less.
@@ -115,13 +115,13 @@ def without(run: Run, bumps: Sequence[Bump]) -> Run:
     run : Run
     bumps : of this run; others must not be among them.
     """
-    if not bumps:
+    if not pulses:
         return run
-    t = run.versions[0].t[run.index] + run.recording.start
+    t = run.replicates[0].t[run.index] + run.recording.start
     kept = np.ones(t.shape[1], dtype=bool)
-    for bump in bumps:
-        reach = min(REACH * bump.width, float(t[0, -1] - t[0, 0]) / 4)
-        kept &= ~np.any(np.abs(t - bump.time) < reach, axis=0)
+    for pulse in pulses:
+        reach = min(REACH * pulse.width, float(t[0, -1] - t[0, 0]) / 4)
+        kept &= ~np.any(np.abs(t - pulse.time) < reach, axis=0)
     before = np.concatenate([[0], np.cumsum(kept)])
     left_out = ~run.kept
     left_out[run.index[:, ~kept].ravel()] = True
@@ -133,7 +133,7 @@ def without(run: Run, bumps: Sequence[Bump]) -> Run:
 # --- one search ---------------------------------------------------------------------------------
 
 
-def _best(data: Sequence[Repeated]) -> Bump | None:
+def _best(data: Sequence[Repeated]) -> DisturbancePulse | None:
     """The most significant bump, whether it is or not."""
     by_joint = {one.joint: [s for s in data if s.joint == one.joint] for one in data}
     found, positions = [], 0
@@ -257,7 +257,7 @@ def _usual(z: np.ndarray, rows: np.ndarray, width: float) -> float:
     return float(np.median(z[away] if away.any() else z)) / QUARTER
 
 
-def _refined(place: _PulsePlace, p_value: float) -> Bump:
+def _refined(place: _PulsePlace, p_value: float) -> DisturbancePulse:
     """The bump with its best time and width, in the repetition where it is."""
     one, row, width = place.of, place.row, place.width
     least, most = WIDTHS[0] / one.of.step, _SHARE * one.of.residual.shape[1]
@@ -280,7 +280,7 @@ def _refined(place: _PulsePlace, p_value: float) -> Bump:
         if abs(sizes[1]) > abs(sizes[0]):
             row, amplitude = twin, -amplitude
     time = float(np.interp(row, np.arange(one.change.size), one.of.t.ravel()))
-    return Bump(
+    return DisturbancePulse(
         one.of.run,
         one.of.number,
         int(row // instants),
@@ -292,9 +292,9 @@ def _refined(place: _PulsePlace, p_value: float) -> Bump:
     )
 
 
-def _cleared(one: Repeated, bump: Bump) -> Repeated:
+def _cleared(one: Repeated, pulse: DisturbancePulse) -> Repeated:
     """Return a series without a bump that was found in it."""
-    if (one.run, one.joint) != (bump.run, bump.joint):
+    if (one.run, one.joint) != (pulse.run, pulse.joint):
         return one
-    shape = np.exp(-(((one.t - bump.time) / bump.width) ** 2) / 2)
-    return replace(one, residual=one.residual - bump.amplitude * shape)
+    shape = np.exp(-(((one.t - pulse.time) / pulse.width) ** 2) / 2)
+    return replace(one, residual=one.residual - pulse.amplitude * shape)

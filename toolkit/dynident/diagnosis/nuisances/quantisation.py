@@ -12,7 +12,7 @@ import numpy as np
 
 from dynident.diagnosis.verdict import WITHIN_NOISE, within_noise
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import Present, model_columns
+from dynident.evidence.evidence_fit import EvidenceFit, model_columns
 from dynident.evidence.held_out import HeldOut
 from dynident.evidence.runs import gather
 from dynident.fitting.sampling import sample
@@ -22,20 +22,20 @@ _RECORDINGS = 2  # of each dataset, that are looked at
 _DRAWS = 2
 
 
-def with_rounding(judged: HeldOut, present: Present, dataset: Dataset) -> HeldOut:
+def with_rounding(judged: HeldOut, fitted: EvidenceFit, dataset: Dataset) -> HeldOut:
     """Return a judgement that knows what the encoders' steps do, where anything is left at all."""
     if judged.least_ratio is None or within_noise(judged):
         return judged
-    return replace(judged, rounding=rounding_power(present, dataset))
+    return replace(judged, rounding=rounding_power(fitted, dataset))
 
 
-def nothing_but_rounding(judged: HeldOut, present: Present, dataset: Dataset) -> bool:
+def nothing_but_rounding(judged: HeldOut, fitted: EvidenceFit, dataset: Dataset) -> bool:
     """Whether a residual beyond the noise is no more than encoders' steps leave."""
-    rounded = with_rounding(judged, present, dataset)
+    rounded = with_rounding(judged, fitted, dataset)
     return rounded.rounding is not None and within_noise(rounded)
 
 
-def rounding_power(present: Present, dataset: Dataset) -> np.ndarray:
+def rounding_power(fitted: EvidenceFit, dataset: Dataset) -> np.ndarray:
     """Mean square of the torque error that repeats because positions are rounded, (n,).
 
     The filtered motion is rounded again, on a lattice that is moved, with two draws of the noise
@@ -46,14 +46,14 @@ def rounding_power(present: Present, dataset: Dataset) -> np.ndarray:
     present : the fitted model.
     dataset : recordings; positions that lie on no lattice count as not rounded.
     """
-    n = present.model.robot.n
+    n = fitted.model.robot.n
     found = []
     for recording in dataset.recordings[:_RECORDINGS]:
         steps = resolution(recording.q)
         if not steps.any():
             found.append(np.zeros(n))
             continue
-        smooth, *rounded = _predicted(present, dataset, _again(recording, dataset, steps))
+        smooth, *rounded = _predicted(fitted, dataset, _again(recording, dataset, steps))
         first, second = (one - smooth for one in rounded)
         found.append(np.clip(np.mean(first * second, axis=0), 0.0, None))
     return np.mean(found, axis=0)
@@ -80,15 +80,17 @@ def _again(recording: Recording, dataset: Dataset, steps: np.ndarray) -> list[Re
     return found
 
 
-def _predicted(present: Present, dataset: Dataset, recordings: list[Recording]) -> list[np.ndarray]:
+def _predicted(
+    fitted: EvidenceFit, dataset: Dataset, recordings: list[Recording]
+) -> list[np.ndarray]:
     """Torque that the model predicts along each recording, (T, n)."""
-    store = ColumnStore(present.model, gather(Dataset(tuple(recordings), dataset.filter)))
-    store.prepare(present.model.effects)
-    joints = range(present.model.robot.n)
+    store = ColumnStore(fitted.model, gather(Dataset(tuple(recordings), dataset.filter)))
+    store.prepare(fitted.model.effects)
+    joints = range(fitted.model.robot.n)
     each = []
     for r in range(len(recordings)):
-        columns = [model_columns(store, present.model, r, j, present.values)[0] for j in joints]
-        each.append(np.stack([c[:, :-1] @ present.values for c in columns], axis=1))
+        columns = [model_columns(store, fitted.model, r, j, fitted.values)[0] for j in joints]
+        each.append(np.stack([c[:, :-1] @ fitted.values for c in columns], axis=1))
     return each
 
 

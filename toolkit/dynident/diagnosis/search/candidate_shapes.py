@@ -13,13 +13,13 @@ from dynident.diagnosis.search.scoring import (
     Columns,
     Score,
     candidate_moments,
-    carried,
     impossible,
+    moments_with_payload,
     score,
 )
 from dynident.effects import Effect
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import Present
+from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.runs import Signals
 from dynident.model import Model
 
@@ -39,7 +39,7 @@ class Beside:
     """
 
     store: ColumnStore
-    whole: Present
+    whole: EvidenceFit
 
     def columns(self, effect: Effect, run: int, model: Model, values: np.ndarray) -> Signals:
         """As `ColumnStore.of`."""
@@ -48,51 +48,51 @@ class Beside:
 
 def score_at(
     store: ColumnStore,
-    present: Present,
+    fitted: EvidenceFit,
     effect: Effect,
     like: Score,
     grid: int,
     columns_of: Columns | None = None,
 ) -> Score:
     """Score an effect with other columns; carriers of a payload as in `like`."""
-    (parts,) = candidate_moments(store, present, [effect], columns_of)
-    if like.carriers is not None:
-        parts = tuple(carried(part, store, like.carriers) for part in parts)
-    return score(present, effect, *parts, grid=grid, carriers=like.carriers)
+    (parts,) = candidate_moments(store, fitted, [effect], columns_of)
+    if like.payload_recordings is not None:
+        parts = tuple(moments_with_payload(part, store, like.payload_recordings) for part in parts)
+    return score(fitted, effect, *parts, grid=grid, payload_recordings=like.payload_recordings)
 
 
 def refined(
-    store: ColumnStore, present: Present, one: Score, columns_of: Columns | None = None
+    store: ColumnStore, fitted: EvidenceFit, one: Score, columns_of: Columns | None = None
 ) -> Score:
     """Return a score at the shape parameters and secants that fit best."""
     if not one.drop > 0:
         return one
-    if not one.effect.shape_parameters(present.model.robot):
-        return _at_its_values(store, present, one, columns_of) if one.effect.secant else one
+    if not one.effect.shape_parameters(fitted.model.robot):
+        return _at_its_values(store, fitted, one, columns_of) if one.effect.secant else one
     has_slopes = type(one.effect).sensitivities is not Effect.sensitivities
     search = by_gradient if has_slopes else _by_trial
     if one.effect.point:
-        one = _at_best_value(store, present, one, columns_of)
-    return _better(one, search(store, present, one, columns_of))
+        one = _at_best_value(store, fitted, one, columns_of)
+    return _better(one, search(store, fitted, one, columns_of))
 
 
 def _better(one: Score, other: Score) -> Score:
-    return other if other.settled_drop > one.settled_drop else one
+    return other if other.drop_at_point > one.drop_at_point else one
 
 
 def _at_its_values(
-    store: ColumnStore, present: Present, one: Score, columns_of: Columns | None
+    store: ColumnStore, fitted: EvidenceFit, one: Score, columns_of: Columns | None
 ) -> Score:
     """Take secants through the values found, until they settle."""
     for _ in range(_SECANTS):
         if not one.values or not np.any(one.values):
             return one
-        effect = one.effect.at(_within_bounds(one, present))
+        effect = one.effect.at(_within_bounds(one, fitted))
         old = one.effect.point or (0.0,) * len(effect.point)
         change = np.linalg.norm(np.subtract(effect.point, old))
         if change <= _SETTLED * np.linalg.norm(effect.point):
             break
-        better = score_at(store, present, effect, one, grid_of(effect, present), columns_of)
+        better = score_at(store, fitted, effect, one, grid_of(effect, fitted), columns_of)
         store.forget(effect)
         if not better.drop > 0.5 * one.drop:
             break  # the secant has left the range in which the law is what it is
@@ -101,7 +101,7 @@ def _at_its_values(
 
 
 def _at_best_value(
-    store: ColumnStore, present: Present, one: Score, columns_of: Columns | None
+    store: ColumnStore, fitted: EvidenceFit, one: Score, columns_of: Columns | None
 ) -> Score:
     """Seek the value at which the column that is taken there fits best.
 
@@ -112,11 +112,11 @@ def _at_best_value(
     def loss(logarithm: float) -> float:
         nonlocal best
         effect = one.effect.at([float(np.exp(logarithm))])
-        found = score_at(store, present, effect, one, grid_of(effect, present), columns_of)
+        found = score_at(store, fitted, effect, one, grid_of(effect, fitted), columns_of)
         store.forget(effect)
-        if found.settled_drop > best.settled_drop and not impossible(found, present.model):
+        if found.drop_at_point > best.drop_at_point and not impossible(found, fitted.model):
             best = found
-        return -found.settled_drop
+        return -found.drop_at_point
 
     (start,) = np.log(one.effect.point)
     span = (start - _VALUE_RANGE, start + _VALUE_RANGE)
@@ -124,20 +124,20 @@ def _at_best_value(
     return best
 
 
-def _within_bounds(one: Score, present: Present) -> list[float]:
-    limits = one.effect.parameters(present.model.robot)
+def _within_bounds(one: Score, fitted: EvidenceFit) -> list[float]:
+    limits = one.effect.parameters(fitted.model.robot)
     return np.clip(one.values, [p.lower for p in limits], [p.upper for p in limits]).tolist()
 
 
 def _by_trial(
-    store: ColumnStore, present: Present, one: Score, columns_of: Columns | None
+    store: ColumnStore, fitted: EvidenceFit, one: Score, columns_of: Columns | None
 ) -> Score:
-    shapes = one.effect.shape_parameters(present.model.robot)
-    grid = grid_of(one.effect, present)
+    shapes = one.effect.shape_parameters(fitted.model.robot)
+    grid = grid_of(one.effect, fitted)
 
     def at(shape: np.ndarray) -> Score:
         effect = one.effect.shaped(*np.exp(np.atleast_1d(shape)))
-        result = score_at(store, present, effect, one, grid, columns_of)
+        result = score_at(store, fitted, effect, one, grid, columns_of)
         store.forget(effect)
         return result
 
@@ -156,7 +156,7 @@ def _minimum(loss: Callable[[np.ndarray], float], shapes, start) -> np.ndarray:
     return minimize(loss, np.log(start), bounds=bounds, method="Nelder-Mead").x
 
 
-def reshaped(store: ColumnStore, others: Present, whole: Present, effect: Effect) -> Score:
+def reshaped(store: ColumnStore, others: EvidenceFit, whole: EvidenceFit, effect: Effect) -> Score:
     """Return an effect's score at the shape that fits best near its own.
 
     Parameters
@@ -165,21 +165,21 @@ def reshaped(store: ColumnStore, others: Present, whole: Present, effect: Effect
     effect : as it is in the model.
     """
     beside = Beside(store, whole).columns
-    blank = Score(effect, None, absorbed=False)
+    blank = Score(effect, None, not_identifiable=False)
     now = score_at(store, others, effect, blank, grid_of(effect, others), beside)
     return refined(store, others, now, beside)
 
 
-def best_shape(store: ColumnStore, present: Present, effect: Effect) -> Effect:
+def best_shape(store: ColumnStore, fitted: EvidenceFit, effect: Effect) -> Effect:
     """Return an effect at the shape at which it explains most; as it is where it explains nothing.
 
-    `present` is the model without it.
+    `fitted` is the model without it.
     """
-    tried = [effect, *effect.variants(present.model.robot)]
-    found = candidate_moments(store, present, tried)
-    scores = (score(present, one, *parts, 1) for one, parts in zip(tried, found, strict=True))
-    best = max(scores, key=lambda one: one.settled_drop)
-    return refined(store, present, best).effect if best.settled_drop > 0 else effect
+    tried = [effect, *effect.variants(fitted.model.robot)]
+    found = candidate_moments(store, fitted, tried)
+    scores = (score(fitted, one, *parts, 1) for one, parts in zip(tried, found, strict=True))
+    best = max(scores, key=lambda one: one.drop_at_point)
+    return refined(store, fitted, best).effect if best.drop_at_point > 0 else effect
 
 
 def _neighbours(shape, value: float) -> tuple[float, float]:

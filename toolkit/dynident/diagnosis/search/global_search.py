@@ -15,12 +15,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.optimize import OptimizeResult, differential_evolution
 
-from dynident.diagnosis.search.ranking import ALIKE, Ranking, candidates, judged, quiet_joints
+from dynident.diagnosis.search.ranking import ALIKE, Ranking, candidates, joints_below_noise, judged
 from dynident.diagnosis.search.scoring import Score, candidate_moments, impossible, score
 from dynident.diagnosis.verdict import within_noise
 from dynident.effects import Effect
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import Present, fit_present, residuals
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, residuals
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.noise_model import systematic_square
 from dynident.model import Model
@@ -34,19 +34,19 @@ _PATIENCE = 6  # generations after which a search that explains nothing is given
 
 
 @dataclass(frozen=True)
-class Asked:
+class RankedModel:
     """A model, and what is missing from it by a first or a second look."""
 
-    present: Present
+    fitted: EvidenceFit
     ranking: Ranking
 
 
-def second_look(
+def global_search(
     store: ColumnStore,
-    start: Asked,
-    last: Asked,
-    tell: Callable[[str], None] = lambda _: None,
-) -> Asked | None:
+    start: RankedModel,
+    last: RankedModel,
+    progress: Callable[[str], None] = lambda _: None,
+) -> RankedModel | None:
     """Return one of two models with an effect that was missed at the head of its ranking.
 
     What explains more or less waits until that is in the model, and comes up again if needed.
@@ -61,50 +61,50 @@ def second_look(
     -------
     That of the two of whose residual it explains the larger share; None for none, or no need.
     """
-    if not last.present.noise_known or within_noise(on_recordings(store, last.present)):
+    if not last.fitted.noise_known or within_noise(on_recordings(store, last.fitted)):
         return None
-    sought = _sought(store, start.present.model, last.present)
+    sought = _sought(store, start.fitted.model, last.fitted)
     if not sought:
         return None
     # An effect that is in the last model with a wrong shape is missing from the first one.
-    wrong = sought[0] in last.present.model or last.present is start.present
+    wrong = sought[0] in last.fitted.model or last.fitted is start.fitted
     bases = (start,) if wrong else (last, start)
-    part, searches = _worst_recording(store, bases[0].present), []
+    part, searches = _worst_recording(store, bases[0].fitted), []
     if not part[1].error_signal > 0:
         return None
     for effect in sought:
-        tell(f"{effect.label}, a second look")
+        progress(f"{effect.label}, a second look")
         searches.append(_GlobalSearch.run(*part, effect))
     finals = [
-        _final(store, one.present, searches) if one.present.error_signal > 0 else None
+        _final(store, one.fitted, searches) if one.fitted.error_signal > 0 else None
         for one in bases
     ]
     found = [(one, base) for one, base in zip(finals, bases, strict=True) if one is not None]
     if not found:
         return None
-    one, base = max(found, key=lambda pair: pair[0].fall / pair[1].present.error_signal)
+    one, base = max(found, key=lambda pair: pair[0].fall / pair[1].fitted.error_signal)
     tests = base.ranking.tests + sum(search.tried for search in searches)
-    best, refusal = judged(store, base.present, one, tests)
-    return None if refusal else Asked(base.present, _headed(base.ranking, best, tests))
+    best, refusal = judged(store, base.fitted, one, tests)
+    return None if refusal else RankedModel(base.fitted, _headed(base.ranking, best, tests))
 
 
-def _sought(store: ColumnStore, model: Model, last: Present) -> list[Effect]:
+def _sought(store: ColumnStore, model: Model, last: EvidenceFit) -> list[Effect]:
     """Effects of many shapes: those that were added with one that may be wrong, or else all."""
-    quiet = quiet_joints(store, last)
+    below_noise = joints_below_noise(store, last)
     every = [one for one in candidates(model) if one.sought_in(model.robot)]
     added = [one for one in every if one in last.model]
-    return added or [one for one in every if one.joint not in quiet]
+    return added or [one for one in every if one.joint not in below_noise]
 
 
-def _final(store: ColumnStore, present: Present, searches: list[_GlobalSearch]) -> Score | None:
+def _final(store: ColumnStore, fitted: EvidenceFit, searches: list[_GlobalSearch]) -> Score | None:
     """The best of what was found on one recording, by all of them; None if it explains little."""
     scores = [
         score
         for search in searches
         if search.finalists
-        for score in _scores(store, present, search.finalists)
-        if not impossible(score, present.model)
-        and score.settled_drop > _LEAST * present.error_signal
+        for score in _scores(store, fitted, search.finalists)
+        if not impossible(score, fitted.model)
+        and score.drop_at_point > _LEAST * fitted.error_signal
     ]
     return max(scores, key=lambda one: one.fall, default=None)
 
@@ -120,21 +120,20 @@ def _headed(ranking: Ranking, best: Score, tests: int) -> Ranking:
     return Ranking((best, *(one for one, _ in others)), tests, ("", *(why for _, why in others)))
 
 
-def _worst_recording(store: ColumnStore, present: Present) -> tuple[ColumnStore, Present]:
+def _worst_recording(store: ColumnStore, fitted: EvidenceFit) -> tuple[ColumnStore, EvidenceFit]:
     """The recording with most systematic residual over noise, and the model as it alone fits it."""
-    left = residuals(store, present.model, present.values)
+    left = residuals(store, fitted.model, fitted.values)
     sizes = [
         -1.0
         if run.kind == "single"
         else sum(
-            systematic_square(e[..., j], run.kind) / present.variances[j]
-            for j in range(e.shape[-1])
+            systematic_square(e[..., j], run.kind) / fitted.variances[j] for j in range(e.shape[-1])
         )
         for run, e in zip(store.runs, left, strict=True)
     ]
     alone = ColumnStore(store.model, (store.runs[int(np.argmax(sizes))],))
-    alone.prepare(present.model.effects)
-    return alone, fit_present(alone, present.model, present)
+    alone.prepare(fitted.model.effects)
+    return alone, fit_evidence(alone, fitted.model, fitted)
 
 
 @dataclass
@@ -142,19 +141,19 @@ class _GlobalSearch:
     """A search over the shapes of one effect, and over the values at which its column is taken."""
 
     store: ColumnStore
-    present: Present
+    fitted: EvidenceFit
     effect: Effect
     best: list[Score] = field(default_factory=list)
     tried: int = 0
     generations: int = 0
 
     @classmethod
-    def run(cls, store: ColumnStore, present: Present, effect: Effect) -> _GlobalSearch:
+    def run(cls, store: ColumnStore, fitted: EvidenceFit, effect: Effect) -> _GlobalSearch:
         """Search through all shapes, until enough is explained or no more is to be hoped for."""
-        search = cls(store, present, effect)
+        search = cls(store, fitted, effect)
         differential_evolution(
             search.loss,
-            np.log(effect.sought_in(present.model.robot)),
+            np.log(effect.sought_in(fitted.model.robot)),
             popsize=_POPULATION,
             maxiter=_GENERATIONS,
             init="sobol",
@@ -169,7 +168,7 @@ class _GlobalSearch:
     @property
     def explained(self) -> float:
         """Share of the systematic square that the best shape takes away."""
-        return self.best[0].fall / self.present.error_signal if self.best else 0.0
+        return self.best[0].fall / self.fitted.error_signal if self.best else 0.0
 
     @property
     def finalists(self) -> list[Effect]:
@@ -178,14 +177,14 @@ class _GlobalSearch:
 
     def loss(self, logs: np.ndarray) -> np.ndarray:
         """What the shapes in the columns of `logs` (unknowns, V) leave, (V,)."""
-        shapes = len(self.effect.shape_parameters(self.present.model.robot))
+        shapes = len(self.effect.shape_parameters(self.fitted.model.robot))
         tried = [self.effect.shaped(*x[:shapes]).at(x[shapes:]) for x in np.exp(logs.T)]
-        scores = _scores(self.store, self.present, tried)
+        scores = _scores(self.store, self.fitted, tried)
         self.tried += len(tried)
-        possible = [one for one in scores if not impossible(one, self.present.model)]
+        possible = [one for one in scores if not impossible(one, self.fitted.model)]
         self.best = sorted([*self.best, *possible], key=lambda s: -s.fall)[:_FINALISTS]
         # How wrong a wrong one is does not matter, and may be beyond all numbers.
-        worst = -self.present.error_signal
+        worst = -self.fitted.error_signal
         return np.array([-max(one.fall, worst) for one in scores])
 
     def ends(self, intermediate_result: OptimizeResult) -> bool:
@@ -195,10 +194,10 @@ class _GlobalSearch:
         return hopeless or self.explained > _ENOUGH
 
 
-def _scores(store: ColumnStore, present: Present, tried: list[Effect]) -> list[Score]:
-    parts = candidate_moments(store, present, tried)
+def _scores(store: ColumnStore, fitted: EvidenceFit, tried: list[Effect]) -> list[Score]:
+    parts = candidate_moments(store, fitted, tried)
     for one in tried:
         store.forget(one)
     return [
-        score(present, one, *part, grid=len(tried)) for one, part in zip(tried, parts, strict=True)
+        score(fitted, one, *part, grid=len(tried)) for one, part in zip(tried, parts, strict=True)
     ]

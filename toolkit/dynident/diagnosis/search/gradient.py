@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from dynident.diagnosis.search.scoring import Columns, Score, candidate_moments, impossible, score
 from dynident.effects import Block, Effect, Parameter
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import Present
+from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.moments.replicated import Moments
 
 _EVALUATIONS = 25  # at most
@@ -60,13 +60,13 @@ class Tangent(Effect):
         return np.concatenate(parts, axis=2)
 
 
-def grid_of(effect: Effect, present: Present) -> int:
+def grid_of(effect: Effect, fitted: EvidenceFit) -> int:
     """Number of shapes that are tried of an effect."""
-    return sum(1 for _ in effect.variants(present.model.robot))
+    return sum(1 for _ in effect.variants(fitted.model.robot))
 
 
 def by_gradient(
-    store: ColumnStore, present: Present, one: Score, columns_of: Columns | None
+    store: ColumnStore, fitted: EvidenceFit, one: Score, columns_of: Columns | None
 ) -> Score:
     """Minimise the residual over the shapes with exact derivatives, linear parameters solved for.
 
@@ -74,10 +74,10 @@ def by_gradient(
     its moments, of which a square root is a least-squares problem with few rows.
     """
     effect, k = one.effect, len(one.values)
-    shapes = effect.shape_parameters(present.model.robot)
-    pointed = effect.parameters(present.model.robot) if effect.point else ()
+    shapes = effect.shape_parameters(fitted.model.robot)
+    pointed = effect.parameters(fitted.model.robot) if effect.point else ()
     limits = np.array([(s.lower, s.upper) for s in (*shapes, *pointed)]).T
-    grid = grid_of(effect, present)
+    grid = grid_of(effect, fitted)
     best = one
 
     @lru_cache(maxsize=1)
@@ -86,19 +86,19 @@ def by_gradient(
         x = np.clip(np.exp(logarithms), *limits)
         trial = effect.shaped(*x[: len(shapes)]).at(x[len(shapes) :].tolist())
         tangent = Tangent.to(trial)
-        ((with_model, with_self),) = candidate_moments(store, present, [tangent], columns_of)
+        ((with_model, with_self),) = candidate_moments(store, fitted, [tangent], columns_of)
         store.forget(tangent)
         plain = slice(0, k)
         found = score(
-            present,
+            fitted,
             trial,
             Moments(with_model.signal[:, :, plain], with_model.total[:, :, plain]),
             Moments(with_self.signal[:, plain, plain], with_self.total[:, plain, plain]),
             grid=grid,
         )
-        if found.settled_drop > best.settled_drop and not impossible(found, present.model):
+        if found.drop_at_point > best.drop_at_point and not impossible(found, fitted.model):
             best = found
-        return _Trial.of(present, found, with_model.sums()[0], with_self.sums()[0])
+        return _Trial.of(fitted, found, with_model.sums()[0], with_self.sums()[0])
 
     # Not further than to the next shapes of the grid: beyond, other peaks lead astray.
     start = np.array([*effect.shape, *effect.point])
@@ -130,7 +130,7 @@ class _Trial:
 
     @classmethod
     def of(
-        cls, present: Present, found: Score, with_model: np.ndarray, with_self: np.ndarray
+        cls, fitted: EvidenceFit, found: Score, with_model: np.ndarray, with_self: np.ndarray
     ) -> _Trial:
         """Return the problem from signal moments.
 
@@ -140,15 +140,15 @@ class _Trial:
         with_model : (p + 1, k + s k) of the model's columns and the torque with the tangent's.
         with_self : (k + s k, k + s k) of the tangent's columns with themselves.
         """
-        p, k = len(present.values), len(found.effect.parameters(present.model.robot))
+        p, k = len(fitted.values), len(found.effect.parameters(fitted.model.robot))
         values = np.array(found.effect.point or found.values or (0.0,) * k)
         count = with_self.shape[0] // k - 1
         # What the torque changes by, along the logarithm of each shape.
         along = block_diag(np.eye(k), *[values[:, None]] * count)
         with_model, with_self = with_model @ along, along.T @ with_self @ along
-        back = present.solution.project(with_model[:p])
+        back = fitted.solution.project(with_model[:p])
         left = with_self - with_model[:p].T @ back
-        right = with_model[p] - back.T @ present.moments.sums()[0][:p, p]
+        right = with_model[p] - back.T @ fitted.moments.sums()[0][:p, p]
         curvature, slope = left[k:, k:], right[k:] - left[k:, :k] @ values
         if not found.effect.point:
             # Linear parameters follow (Kaufman): what they can do is not the shapes' merit.
@@ -157,7 +157,7 @@ class _Trial:
         root = np.sqrt(np.clip(size, _ROUNDING * max(size[-1], 0.0), None))
         down = np.divide(turn.T @ slope, root, out=np.zeros_like(root), where=root > 0)
         # Noise and all, so that near the optimum the sum stays what it is a sum of.
-        rest = present.error_total - found.settled_drop - down @ down
+        rest = fitted.error_total - found.drop_at_point - down @ down
         return cls(
             np.append(-down, np.sqrt(max(rest, 0.0))),
             np.vstack([root[:, None] * turn.T, np.zeros(count)]),

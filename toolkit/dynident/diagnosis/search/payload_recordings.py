@@ -6,22 +6,22 @@ import numpy as np
 
 from dynident.diagnosis.search.scoring import Score
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import Present, residuals
+from dynident.evidence.evidence_fit import EvidenceFit, residuals
 from dynident.evidence.runs import flagged_run
 
 
 def carry(store: ColumnStore, score: Score) -> None:
     """Mark the runs that carry the payload, once that is known."""
-    if score.carriers is not None:
+    if score.payload_recordings is not None:
         store.runs = tuple(
             flagged_run(run, carries)
-            for run, carries in zip(store.runs, score.carriers, strict=True)
+            for run, carries in zip(store.runs, score.payload_recordings, strict=True)
         )
 
 
-def decide_payload(held: ColumnStore, present: Present) -> None:
+def decide_payload(held: ColumnStore, fitted: EvidenceFit) -> None:
     """Decide which test recordings carry a payload of known inertia, where the study is silent."""
-    if not any("payload" in effect.needs for effect in present.model.effects):
+    if not any("payload" in effect.needs for effect in fitted.model.effects):
         return
     stated = [run.recording.payload is not None for run in held.runs]
     sums = []
@@ -30,7 +30,7 @@ def decide_payload(held: ColumnStore, present: Present) -> None:
             run if said else flagged_run(run, carries)
             for run, said in zip(held.runs, stated, strict=True)
         )
-        misfits = residuals(held, present.model, present.values)
+        misfits = residuals(held, fitted.model, fitted.values)
         sums.append([float(np.sum(e**2)) for e in misfits])
     held.runs = tuple(
         run if said else flagged_run(run, with_load < without)

@@ -11,7 +11,7 @@ from dynident.diagnosis.assembly import Found
 from dynident.diagnosis.search.ranking import rank
 from dynident.effects import Effect
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import Present, fit_present
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import on_recordings
 
 _LEAST_FALL = 0.015  # of a joint's squared noise that an effect must take off the held-out residual
@@ -21,33 +21,33 @@ _LEAST_FALL = 0.015  # of a joint's squared noise that an effect must take off t
 class Kept:
     """What is left when superfluous effects are dropped."""
 
-    final: Present
+    final: EvidenceFit
     found: list[Found]
 
 
 def without_superfluous(
     store: ColumnStore,
     held: ColumnStore | None,
-    present: Present,
+    fitted: EvidenceFit,
     found: list[Found],
-    tell: Callable[[str], None],
+    progress: Callable[[str], None],
 ) -> Kept:
     """Drop every added effect that the others have made superfluous, or that helps nowhere else."""
     kept = list(found)
     for one in found:
         if _belongs(one.score.effect, kept):
             continue
-        effect = next(e for e in present.model.effects if e.label == one.score.effect.label)
-        rest = fit_present(store, present.model - effect, present)
-        tell(f"doing without {effect.label}")
+        effect = next(e for e in fitted.model.effects if e.label == one.score.effect.label)
+        rest = fit_evidence(store, fitted.model - effect, fitted)
+        progress(f"doing without {effect.label}")
         needed = len(kept) == 1 or rank(store, rest, len(kept) - 1, only=(effect,)).material
-        if not needed or not _helps(held, rest, present):
+        if not needed or not _helps(held, rest, fitted):
             kept.remove(one)
-            present = rest
-    return Kept(present, kept)
+            fitted = rest
+    return Kept(fitted, kept)
 
 
-def _helps(held: ColumnStore | None, without: Present, present: Present) -> bool:
+def _helps(held: ColumnStore | None, without: EvidenceFit, fitted: EvidenceFit) -> bool:
     """Whether an effect lowers the residual of the test recordings at any joint.
 
     The whole of it, or what of it repeats: columns that carry noise may take the latter away and
@@ -55,7 +55,7 @@ def _helps(held: ColumnStore | None, without: Present, present: Present) -> bool
     """
     if held is None:
         return True  # its gain was cross-validated
-    before, after = (on_recordings(held, one) for one in (without, present))
+    before, after = (on_recordings(held, one) for one in (without, fitted))
     falls = [before.residual_rms**2 - after.residual_rms**2]
     scale = after.residual_rms
     if after.noise_std is not None and after.ratio is not None:

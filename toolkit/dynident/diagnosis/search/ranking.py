@@ -13,14 +13,14 @@ from dynident.diagnosis.search.confidence_set import confidence_set
 from dynident.diagnosis.search.scoring import (
     Score,
     candidate_moments,
-    carried,
     cross_validate,
     impossible,
+    moments_with_payload,
     score,
 )
 from dynident.effects import Block, Effect, catalogue
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import Present, residuals
+from dynident.evidence.evidence_fit import EvidenceFit, residuals
 from dynident.evidence.noise_model import differences, systematic_square
 from dynident.evidence.runs import Run
 from dynident.model import Model
@@ -63,7 +63,7 @@ class Ranking:
     def material(self) -> tuple[Score, ...]:
         """Scores that pass every gate, best first."""
         pairs = zip(self.scores, self.refusals, strict=True)
-        return tuple(s for s, refusal in pairs if not refusal and not s.absorbed)
+        return tuple(s for s, refusal in pairs if not refusal and not s.not_identifiable)
 
     def corrected(self, one: Score) -> float:
         """The p value of a score, corrected for all tests of this round."""
@@ -81,9 +81,9 @@ def candidates(model: Model) -> list[Effect]:
 
 def rank(
     store: ColumnStore,
-    present: Present,
+    fitted: EvidenceFit,
     added: int,
-    tell: Callable[[str], None] = lambda _: None,
+    progress: Callable[[str], None] = lambda _: None,
     only: tuple[Effect, ...] = (),
     least: float | None = None,
 ) -> Ranking:
@@ -97,26 +97,26 @@ def rank(
     only : candidates, where not the whole catalogue is meant.
     least : share of the squared residual that they must explain; None for `LEAST_SHARE`.
     """
-    model, best, tests = present.model, [], 0
-    quiet = quiet_joints(store, present)
+    model, best, tests = fitted.model, [], 0
+    below_noise = joints_below_noise(store, fitted)
     noisy = all(run.kind == "single" and run.columns_from == "recording" for run in store.runs)
     for effect in only or candidates(model):
         driven = {"body", "whole"} <= effect.needs
-        if driven and (noisy or effect.joint in quiet):
-            best.append(Score(effect, None, absorbed=False))
+        if driven and (noisy or effect.joint in below_noise):
+            best.append(Score(effect, None, not_identifiable=False))
             continue
-        tell(effect.label)
-        tried = list(_score_variants(store, present, effect))
+        progress(effect.label)
+        tried = list(_score_variants(store, fitted, effect))
         tests += len(tried)
         best.append(max(tried, key=lambda s: s.penalised))
     best.sort(key=lambda s: -s.penalised)
     for i in range(len(only) or min(CONTENDERS, len(best))):
-        if best[i].absorbed:
+        if best[i].not_identifiable:
             break
         if best[i].p_value * tests > _HOPELESS or best[i].penalised == -np.inf:
             continue
-        tell(f"{best[i].effect.label}, cross-validated")
-        best[i] = _confirm(store, present, best[i])
+        progress(f"{best[i].effect.label}, cross-validated")
+        best[i] = _confirm(store, fitted, best[i])
     best.sort(key=lambda s: -s.penalised)
     least = LEAST_SHARE[min(added, 1)] if least is None else least
     scores = tuple(best)
@@ -126,19 +126,19 @@ def rank(
 
 def _unseen(one: Score, noisy: bool) -> str:
     """Why a driven response was not evaluated; empty where it was."""
-    if one.drop != 0 or one.absorbed or not {"body", "whole"} <= one.effect.needs:
+    if one.drop != 0 or one.not_identifiable or not {"body", "whole"} <= one.effect.needs:
         return ""
     return _NOISY if noisy else f"nothing is left to explain at {one.effect.joint}"
 
 
-def quiet_joints(store: ColumnStore, present: Present) -> frozenset[str]:
+def joints_below_noise(store: ColumnStore, fitted: EvidenceFit) -> frozenset[str]:
     """Joints at which no residual worth a costly search is left; none where noise is unknown."""
-    if not present.noise_known:
+    if not fitted.noise_known:
         return frozenset()
-    left = zip(store.runs, residuals(store, present.model, present.values), strict=True)
+    left = zip(store.runs, residuals(store, fitted.model, fitted.values), strict=True)
     judged: list[tuple[Kind, np.ndarray]] = [(r.kind, e) for r, e in left if r.kind != "single"]
     found = []
-    for j, name in enumerate(present.model.robot.names):
+    for j, name in enumerate(fitted.model.robot.names):
         systematic = np.mean([systematic_square(e[..., j], kind) for kind, e in judged])
         each = [differences(e[..., j], kind).ravel() for kind, e in judged]
         noise = np.mean(np.concatenate(each) ** 2)
@@ -174,7 +174,7 @@ def indistinguishable(ranking: Ranking, winner: Score) -> tuple[Effect, ...]:
     )
 
 
-def carrier_choices(runs: tuple[Run, ...]) -> list[tuple[bool, ...]]:
+def payload_choices(runs: tuple[Run, ...]) -> list[tuple[bool, ...]]:
     """Which runs may carry the payload: as the study says, or every choice where it is silent."""
     stated = [run.recording.payload for run in runs]
     if any(flag is not None for flag in stated):
@@ -186,24 +186,24 @@ def carrier_choices(runs: tuple[Run, ...]) -> list[tuple[bool, ...]]:
     return [c for c in every if any(c) and not all(c)] or [(True,) * len(runs)]
 
 
-def _score_variants(store: ColumnStore, present: Present, effect: Effect) -> Iterator[Score]:
+def _score_variants(store: ColumnStore, fitted: EvidenceFit, effect: Effect) -> Iterator[Score]:
     if "payload" in effect.needs:
-        choices = carrier_choices(store.runs)
-        (whole,) = candidate_moments(store, present, [effect])
+        choices = payload_choices(store.runs)
+        (whole,) = candidate_moments(store, fitted, [effect])
         for choice in choices:
-            parts = (carried(part, store, choice) for part in whole)
-            one = score(present, effect, *parts, grid=len(choices), carriers=choice)
+            parts = (moments_with_payload(part, store, choice) for part in whole)
+            one = score(fitted, effect, *parts, grid=len(choices), payload_recordings=choice)
             # A load has mass: of two complementary choices only one can be meant.
-            yield _possible(one, present.model)
+            yield _possible(one, fitted.model)
         return
-    seen = _seen(present, effect)
-    shapes = [variant.suited(seen) for variant in effect.variants(present.model.robot)]
+    seen = _seen(fitted, effect)
+    shapes = [variant.suited(seen) for variant in effect.variants(fitted.model.robot)]
     if effect.point:
         # Found before, where no variant may be near enough.
         shapes = list(dict.fromkeys([*shapes, effect]))
-    found = candidate_moments(store, present, shapes, store.screening)
+    found = candidate_moments(store, fitted, shapes, store.screening)
     for shaped, parts in zip(shapes, found, strict=True):
-        yield _possible(score(present, shaped, *parts, grid=len(shapes)), present.model)
+        yield _possible(score(fitted, shaped, *parts, grid=len(shapes)), fitted.model)
 
 
 def _possible(one: Score, model: Model) -> Score:
@@ -211,33 +211,33 @@ def _possible(one: Score, model: Model) -> Score:
     return replace(one, penalised=-np.inf) if impossible(one, model) else one
 
 
-def _seen(present: Present, effect: Effect) -> Block:
+def _seen(fitted: EvidenceFit, effect: Effect) -> Block:
     """One sample with what an effect needs of the present model."""
-    still = np.zeros((1, present.model.robot.n))
-    block = present.model.block(np.zeros(1), still, still, still, rigid=False)
-    return present.model.ready(effect, block, present.values)
+    still = np.zeros((1, fitted.model.robot.n))
+    block = fitted.model.block(np.zeros(1), still, still, still, rigid=False)
+    return fitted.model.ready(effect, block, fitted.values)
 
 
-def judged(store: ColumnStore, present: Present, one: Score, tests: int) -> tuple[Score, str]:
+def judged(store: ColumnStore, fitted: EvidenceFit, one: Score, tests: int) -> tuple[Score, str]:
     """Return a score refined and cross-validated, and why it is not material; empty if it is."""
-    one = _confirm(store, present, one)
-    return one, _refusal(one, store, present.model, tests, LEAST_SHARE[0])
+    one = _confirm(store, fitted, one)
+    return one, _refusal(one, store, fitted.model, tests, LEAST_SHARE[0])
 
 
-def _confirm(store: ColumnStore, present: Present, one: Score) -> Score:
-    one = refined(store, present, one)
-    (parts,) = candidate_moments(store, present, [one.effect])
-    if one.carriers is not None:
-        parts = tuple(carried(part, store, one.carriers) for part in parts)
-    without, with_effect = cross_validate(present, *parts)
+def _confirm(store: ColumnStore, fitted: EvidenceFit, one: Score) -> Score:
+    one = refined(store, fitted, one)
+    (parts,) = candidate_moments(store, fitted, [one.effect])
+    if one.payload_recordings is not None:
+        parts = tuple(moments_with_payload(part, store, one.payload_recordings) for part in parts)
+    without, with_effect = cross_validate(fitted, *parts)
     # Columns taken at a value count as far as that is the value found.
-    settled = one.penalised - (one.drop - one.settled_drop)
-    return replace(one, penalised=settled, losses=with_effect, gains=without - with_effect)
+    relaxed = one.penalised - (one.drop - one.drop_at_point)
+    return replace(one, penalised=relaxed, losses=with_effect, gains=without - with_effect)
 
 
 def _refusal(one: Score, store: ColumnStore, model: Model, tests: int, least: float) -> str:
     """Why an effect is not material; empty where it is."""
-    if one.absorbed:
+    if one.not_identifiable:
         return one.effect.advice
     if beyond := impossible(one, model):
         return beyond

@@ -10,12 +10,12 @@ from scipy import stats
 
 from dynident.effects import Effect
 from dynident.evidence.column_store import ColumnStore, joints_of
-from dynident.evidence.evidence_fit import Present, timed_columns, with_clock
+from dynident.evidence.evidence_fit import EvidenceFit, time_varying_columns, time_varying_mask
 from dynident.evidence.runs import Signals
 from dynident.model import Model
-from dynident.moments.replicated import Clocked, Moments, clocked, solve
+from dynident.moments.replicated import Moments, TimeVarying, solve, time_varying_moments
 
-ABSORBED = 2e-3
+NOT_IDENTIFIABLE = 2e-3
 """Share of an effect's columns (in norm) left beside the model, below which it is absorbed."""
 
 _UNSEEN = 1e-3
@@ -47,8 +47,8 @@ class Score:
     """
 
     effect: Effect
-    carriers: tuple[bool, ...] | None
-    absorbed: bool
+    payload_recordings: tuple[bool, ...] | None
+    not_identifiable: bool
     rank: int = 0
     drop: float = 0.0
     share: float = 0.0
@@ -61,7 +61,7 @@ class Score:
     gains: np.ndarray | None = None
 
     @property
-    def settled_drop(self) -> float:
+    def drop_at_point(self) -> float:
         """The drop if its value is the one at which its column was taken.
 
         A column that is not linear in the value says nothing of another value.
@@ -73,13 +73,13 @@ class Score:
 
 def candidate_moments(
     store: ColumnStore,
-    present: Present,
+    fitted: EvidenceFit,
     variants: Sequence[Effect],
     columns_of: Columns | None = None,
 ) -> list[tuple[Moments, Moments]]:
     """Moments of columns with the model's and the torque, and with themselves.
 
-    A payload counts as carried in every run; see `carried`.
+    A payload counts as carried in every run; see `moments_with_payload`.
 
     Parameters
     ----------
@@ -90,31 +90,35 @@ def candidate_moments(
     -------
     (B, p + 1, k) and (B, k, k) for each variant
     """
-    joints = joints_of(variants[0], present.model)
+    joints = joints_of(variants[0], fitted.model)
     look = columns_of or store.of
-    timed = timed_columns(present.model)
-    mixed = variants[0].timed or timed.any()
+    time_varying = time_varying_mask(fitted.model)
+    mixed = variants[0].time_varying or time_varying.any()
     with_model, with_self = None, None
     width = 0
     if columns_of is None or columns_of == store.screening:
-        store.together(variants, present.model, present.values)
+        store.together(variants, fitted.model, fitted.values)
     for r, run in enumerate(store.runs):
-        each = [look(effect, r, present.model, present.values) for effect in variants]
+        each = [look(effect, r, fitted.model, fitted.values) for effect in variants]
         width = each[0][0].shape[2]
         signals = [np.concatenate(shapes, axis=2) for shapes in zip(*each, strict=True)]
         one, two = [], []
         for position, joint in enumerate(joints):
-            white = run.whitened([s[:, position] for s in signals], joint, present.noise[joint])
-            known = present.white[r][joint]
+            white = run.whitened([s[:, position] for s in signals], joint, fitted.noise[joint])
+            known = fitted.white[r][joint]
             one.append(run.moments(known, white))
             two.append(run.moments(white, white))
             if run.kind == "repeated" and mixed:
-                new = Clocked(white, _clock(store, variants, r), np.zeros(white.shape[2], bool))
-                old = with_clock(store, present.model, r, known)
-                chosen = timed[:, None] | np.full(white.shape[2], variants[0].timed)
-                one[-1] = one[-1].where(chosen, clocked(old, new, run.edges))
-                if variants[0].timed:
-                    two[-1] = two[-1].where(np.array(True), clocked(new, new, run.edges))
+                new = TimeVarying(
+                    white, _time_factors(store, variants, r), np.zeros(white.shape[2], bool)
+                )
+                old = time_varying_columns(store, fitted.model, r, known)
+                chosen = time_varying[:, None] | np.full(white.shape[2], variants[0].time_varying)
+                one[-1] = one[-1].where(chosen, time_varying_moments(old, new, run.edges))
+                if variants[0].time_varying:
+                    two[-1] = two[-1].where(
+                        np.array(True), time_varying_moments(new, new, run.edges)
+                    )
         sums = [
             Moments(np.sum([m.signal for m in part], 0), np.sum([m.total for m in part], 0))
             for part in (one, two)
@@ -129,12 +133,12 @@ def candidate_moments(
     ]
 
 
-def _clock(store: ColumnStore, variants: Sequence[Effect], run: int) -> np.ndarray:
+def _time_factors(store: ColumnStore, variants: Sequence[Effect], run: int) -> np.ndarray:
     """What the time of the session does to the columns of effects, (P, S, k) over all of them."""
     factors = []
     for effect in variants:
         count = len(effect.parameters(store.model.robot))
-        factors += [store.clock(effect, run)] * count
+        factors += [store.time_factor(effect, run)] * count
     return np.stack(factors, axis=2)
 
 
@@ -146,71 +150,76 @@ def _block(part: Moments, columns: slice) -> Moments:
     return Moments(part.signal[:, columns, columns], part.total[:, columns, columns])
 
 
-def carried(part: Moments, store: ColumnStore, carriers: tuple[bool, ...]) -> Moments:
+def moments_with_payload(
+    part: Moments, store: ColumnStore, payload_recordings: tuple[bool, ...]
+) -> Moments:
     """Moments of columns that are zero in the runs which do not carry the payload."""
-    blocks = [np.full(len(run.edges) - 1, c) for run, c in zip(store.runs, carriers, strict=True)]
+    blocks = [
+        np.full(len(run.edges) - 1, c)
+        for run, c in zip(store.runs, payload_recordings, strict=True)
+    ]
     mask = np.concatenate(blocks).astype(float)[:, None, None]
     return Moments(part.signal * mask, part.total * mask)
 
 
 def score(
-    present: Present,
+    fitted: EvidenceFit,
     effect: Effect,
     with_model: Moments,
     with_self: Moments,
     grid: int,
-    carriers: tuple[bool, ...] | None = None,
+    payload_recordings: tuple[bool, ...] | None = None,
 ) -> Score:
     """Score an effect from its moments; `grid` is the number of shapes that were tried."""
-    p = len(present.values)
-    solution = present.solution
+    p = len(fitted.values)
+    solution = fitted.solution
     signal, total = with_model.sums()
     own_signal, own_total = with_self.sums()
     back = solution.project(signal[:p])  # the model's share of the columns
     left_signal = own_signal - signal[:p].T @ back
-    model_total = present.moments.sums()[1][:p, :p]
+    model_total = fitted.moments.sums()[1][:p, :p]
     cross = back.T @ total[:p]
     left_total = own_total - cross - cross.T + back.T @ model_total @ back
     scale = np.sqrt(np.clip(np.diag(own_signal), 0.0, None))
-    seen = _seen(effect, present, scale)
+    seen = _seen(effect, fitted, scale)
     if not np.any(seen):
-        return Score(effect, carriers, absorbed=True)
+        return Score(effect, payload_recordings, not_identifiable=True)
     scale = np.where(seen, scale, 1.0)
     # Directions of the columns, by what is left of them beside the model.
     size, directions = np.linalg.eigh(own_signal * np.outer(seen, seen) / np.outer(scale, scale))
     keep = size > 1e-9 * size[-1]
     white = directions[:, keep] / np.sqrt(size[keep]) / scale[:, None]
     left, turn = np.linalg.eigh(white.T @ left_signal @ white)
-    visible = left > ABSORBED**2
+    visible = left > NOT_IDENTIFIABLE**2
     if not np.any(visible):
-        return Score(effect, carriers, absorbed=True)
+        return Score(effect, payload_recordings, not_identifiable=True)
     directions = white @ turn[:, visible]
     part = solve(
         directions.T @ left_signal @ directions,
         directions.T @ left_total @ directions,
-        directions.T @ (signal[p] - back.T @ present.moments.sums()[0][:p, p]),
+        directions.T @ (signal[p] - back.T @ fitted.moments.sums()[0][:p, p]),
     )
     if part.rank == 0:
-        return Score(effect, carriers, absorbed=False)
+        return Score(effect, payload_recordings, not_identifiable=False)
     values = directions @ part.values
-    moment = directions.T @ (signal[p] - back.T @ present.moments.sums()[0][:p, p])
+    moment = directions.T @ (signal[p] - back.T @ fitted.moments.sums()[0][:p, p])
     drop = float(part.values @ moment)
     covariance = directions @ part.covariance @ directions.T
     at = np.array(effect.point) if len(effect.point) == len(values) else values
-    combination = np.append(-present.values, 1.0)
-    with_model_columns = (combination @ present.moments.sums()[1])[:p]
+    combination = np.append(-fitted.values, 1.0)
+    with_model_columns = (combination @ fitted.moments.sums()[1])[:p]
     with_noise = combination @ total - with_model_columns @ back
-    shapes = len(effect.shape_parameters(present.model.robot))
-    price = (part.rank + shapes) * np.log(present.rows) + 2.0 * np.log(grid)
+    shapes = len(effect.shape_parameters(fitted.model.robot))
+    price = (part.rank + shapes) * np.log(fitted.rows) + 2.0 * np.log(grid)
     penalised = drop - price
-    blocks = _block_scores(present, with_model, with_self, back, values) @ directions @ part.basis
+    blocks = _block_scores(fitted, with_model, with_self, back, values) @ directions @ part.basis
     return Score(
         effect,
-        carriers,
-        absorbed=False,
+        payload_recordings,
+        not_identifiable=False,
         rank=part.rank,
         drop=drop,
-        share=drop / present.error_total,
+        share=drop / fitted.error_total,
         p_value=_block_p_value(part.basis.T @ moment, blocks),
         penalised=float(penalised),
         values=tuple(float(v) for v in values),
@@ -219,11 +228,11 @@ def score(
     )
 
 
-def _seen(effect: Effect, present: Present, scale: np.ndarray) -> np.ndarray:
+def _seen(effect: Effect, fitted: EvidenceFit, scale: np.ndarray) -> np.ndarray:
     """Which columns, of these norms, could be told from rounding errors at any possible value."""
-    bounds = [(p.lower, p.upper) for p in effect.parameters(present.model.robot)]
+    bounds = [(p.lower, p.upper) for p in effect.parameters(fitted.model.robot)]
     reach = np.array([max(abs(low), abs(high)) for low, high in bounds])
-    return scale > _UNSEEN * np.sqrt(present.rows) / reach
+    return scale > _UNSEEN * np.sqrt(fitted.rows) / reach
 
 
 def impossible(one: Score, model: Model) -> str:
@@ -232,7 +241,7 @@ def impossible(one: Score, model: Model) -> str:
     Of several values some may leave their bounds by their uncertainty. A single one that is out of
     them says that at its bound, where there is no effect, the data are explained better.
     """
-    if one.absorbed:
+    if one.not_identifiable:
         return ""
     parameters = one.effect.parameters(model.robot)
     for parameter, value, sigma in zip(parameters, one.values, one.sigma, strict=False):
@@ -243,12 +252,12 @@ def impossible(one: Score, model: Model) -> str:
 
 
 def cross_validate(
-    present: Present, with_model: Moments, with_self: Moments
+    fitted: EvidenceFit, with_model: Moments, with_self: Moments
 ) -> tuple[np.ndarray, np.ndarray]:
     """Held-out squared residuals per block, without and with an effect, (B,) each."""
-    signal = _joined(present.moments.signal, with_model.signal, with_self.signal)
-    total = _joined(present.moments.total, with_model.total, with_self.total)
-    p = len(present.values)
+    signal = _joined(fitted.moments.signal, with_model.signal, with_self.signal)
+    total = _joined(fitted.moments.total, with_model.total, with_self.total)
+    p = len(fitted.values)
     both = Moments(signal, total)
     without = np.r_[0:p, signal.shape[1] - 1]
     return (
@@ -281,13 +290,17 @@ def _joined(model: np.ndarray, cross: np.ndarray, own: np.ndarray) -> np.ndarray
 
 
 def _block_scores(
-    present: Present, with_model: Moments, with_self: Moments, back: np.ndarray, values: np.ndarray
+    fitted: EvidenceFit,
+    with_model: Moments,
+    with_self: Moments,
+    back: np.ndarray,
+    values: np.ndarray,
 ) -> np.ndarray:
     """Each block's moment of cleared columns and the residual with the effect in, (B, k)."""
-    p = len(present.values)
-    combination = np.append(-present.values + back @ values, 1.0)
+    p = len(fitted.values)
+    combination = np.append(-fitted.values + back @ values, 1.0)
     plain = np.einsum("i,bik->bk", combination, with_model.signal) - with_self.signal @ values
-    model = np.einsum("i,bij->bj", combination, present.moments.signal)[:, :p]
+    model = np.einsum("i,bij->bj", combination, fitted.moments.signal)[:, :p]
     model -= np.einsum("bik,k->bi", with_model.signal[:, :p], values)
     return plain - model @ back
 

@@ -9,14 +9,14 @@ from dynident.diagnosis.search.ranking import ALIKE, Ranking, indistinguishable
 from dynident.diagnosis.search.scoring import Score
 from dynident.effects import Effect
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import Present, fit_present
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 
 _FIRST_SHARE = 0.75  # of the largest drop that a simpler effect must reach, to be named first
 _NEARLY = 0.85  # of the largest drop, from which a rival that is not linear is fitted to compare
 _LEAST_KEPT = 0.1  # of the drop that an effect promises, that is left when all is fitted with it
 
 
-def choose(store: ColumnStore, present: Present, ranking: Ranking) -> Found | None:
+def choose(store: ColumnStore, fitted: EvidenceFit, ranking: Ranking) -> Found | None:
     """The best material effect; or the simpler one in it, where that does most of the work."""
     material = ranking.material
     if not material:
@@ -32,7 +32,7 @@ def choose(store: ColumnStore, present: Present, ranking: Ranking) -> Found | No
     if simpler:
         # The column that they share is the same whoever it belongs to: both are named.
         return Found(simpler[0], ranking.corrected(simpler[0]), (best.effect,))
-    alike = {*indistinguishable(ranking, best), *_alike_once_fitted(store, present, ranking)}
+    alike = {*indistinguishable(ranking, best), *_alike_once_fitted(store, fitted, ranking)}
     among = [s for s in material if s is best or s.effect in alike]
     as_good = [s for s in among if s.drop >= _FIRST_SHARE * best.drop]
     chosen = min(as_good, key=_size)  # the first of the simplest: they stand in order
@@ -41,7 +41,7 @@ def choose(store: ColumnStore, present: Present, ranking: Ranking) -> Found | No
 
 
 def _alike_once_fitted(
-    store: ColumnStore, present: Present, ranking: Ranking
+    store: ColumnStore, fitted: EvidenceFit, ranking: Ranking
 ) -> tuple[Effect, ...]:
     """Rivals of the best effect that explain the same once each is fitted together with the model.
 
@@ -60,22 +60,22 @@ def _alike_once_fitted(
         return ()
 
     def explained(effect: Effect) -> float:
-        wider = fit_present(store, present.model + effect, present)
-        return present.misfit(present) - wider.misfit(present)
+        wider = fit_evidence(store, fitted.model + effect, fitted)
+        return fitted.misfit(fitted) - wider.misfit(fitted)
 
     most = explained(best.effect)
     return tuple(s.effect for s in rivals if explained(s.effect) >= (1.0 - ALIKE) * most)
 
 
-def breaks_its_promise(present: Present, wider: Present, one: Score) -> bool:
+def breaks_its_promise(fitted: EvidenceFit, wider: EvidenceFit, one: Score) -> bool:
     """Whether a driven response does not explain in a model what it explained beside it.
 
     With it the bodies change, and with them the response, which may not follow.
     """
-    if not ({"body", "whole"} <= one.effect.needs and present.noise_known):
+    if not ({"body", "whole"} <= one.effect.needs and fitted.noise_known):
         return False
-    promised = min(one.drop / present.error_signal, 1.0) if present.error_signal > 0 else 1.0
-    before, after = present.misfit(present), wider.misfit(present)
+    promised = min(one.drop / fitted.error_signal, 1.0) if fitted.error_signal > 0 else 1.0
+    before, after = fitted.misfit(fitted), wider.misfit(fitted)
     return before - after < _LEAST_KEPT * promised * before
 
 

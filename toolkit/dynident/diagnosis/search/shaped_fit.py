@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dynident.diagnosis.search.candidate_shapes import best_shape, reshaped
 from dynident.evidence.column_store import ColumnStore
-from dynident.evidence.evidence_fit import Present, fit_present
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.model import Model
 
 _REFITS = 12  # of shapes whose columns depend on the bodies
@@ -12,37 +12,37 @@ _GAINED = 0.02  # share of the systematic square that another refit must take aw
 _NEGLIGIBLE = 0.005  # of the square of the noise, that no refit is worth
 
 
-def shaped(store: ColumnStore, model: Model) -> Present:
+def shaped(store: ColumnStore, model: Model) -> EvidenceFit:
     """Fit a model as it was given, each shape parameter sought on its grid."""
-    present = fit_present(store, model)
-    for effect in present.model.effects:
+    fitted = fit_evidence(store, model)
+    for effect in fitted.model.effects:
         if effect.shape_parameters(model.robot):
-            others = fit_present(store, present.model - effect, present)
+            others = fit_evidence(store, fitted.model - effect, fitted)
             better = best_shape(store, others, effect)
-            present = fit_present(store, present.model.with_shapes((better,)), present)
-    return refitted(store, present.model, present)
+            fitted = fit_evidence(store, fitted.model.with_shapes((better,)), fitted)
+    return refitted(store, fitted.model, fitted)
 
 
-def refitted(store: ColumnStore, model: Model, near: Present | None = None) -> Present:
+def refitted(store: ColumnStore, model: Model, near: EvidenceFit | None = None) -> EvidenceFit:
     """Fit a model, each shape parameter refined with the others as they are.
 
     Responses that depend on the bodies are refined again with the bodies that come out, which were
     others while the effect was missing, until nothing is gained.
     """
-    present = fit_present(store, model, near)
+    fitted = fit_evidence(store, model, near)
     with_shapes = [e.label for e in model.effects if e.shape_parameters(model.robot)]
     driven = [e.label for e in model.effects if {"body", "whole"} <= e.needs]
     for again in range(_REFITS if driven else 1):
         labels = with_shapes if again == 0 and len(with_shapes) > 1 else driven
-        before = present
+        before = fitted
         for label in labels:
-            effect = next(e for e in present.model.effects if e.label == label)
-            others = fit_present(store, present.model - effect, present)
-            better = reshaped(store, others, present, effect).effect
-            trial = fit_present(store, present.model.with_shapes((better,)), present)
-            if trial.misfit(present) < present.misfit(present):
-                present = trial
-        had, has = before.misfit(before), present.misfit(before)
+            effect = next(e for e in fitted.model.effects if e.label == label)
+            others = fit_evidence(store, fitted.model - effect, fitted)
+            better = reshaped(store, others, fitted, effect).effect
+            trial = fit_evidence(store, fitted.model.with_shapes((better,)), fitted)
+            if trial.misfit(fitted) < fitted.misfit(fitted):
+                fitted = trial
+        had, has = before.misfit(before), fitted.misfit(before)
         if had - has < _GAINED * had + _NEGLIGIBLE * before.noise_known:
             break
-    return present
+    return fitted

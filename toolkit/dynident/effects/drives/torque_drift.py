@@ -11,7 +11,7 @@ class TorqueDrift(JointEffect):
     """Torque in proportion to the time since the session began: rate t."""
 
     name = "torque_drift"
-    timed = True
+    time_varying = True
     law = "rate t"
     sign_of = "a ramp against the time of the session, whatever the joint does"
     confounded_with = ("torque_offset", "thermal_friction")
@@ -24,5 +24,5 @@ class TorqueDrift(JointEffect):
     def at_joint(self, block: Block) -> np.ndarray:
         return block.t[:, None]
 
-    def clock(self, block: Block) -> np.ndarray:
+    def time_factor(self, block: Block) -> np.ndarray:
         return block.t

@@ -30,7 +30,7 @@ class ThermalFriction(JointEffect):
     """
 
     name = "thermal_friction"
-    timed = True
+    time_varying = True
     # Where the session is short beside T nothing warms up, and these two are what it looks like.
     stands_in_for = ("viscous_friction", "coulomb_friction")
     law = "h (Fvt v + Fct sign(v)), h = exp(-t/T) or (temperature - 25 C)/10 K"
@@ -52,7 +52,7 @@ class ThermalFriction(JointEffect):
 
     def at_joint(self, block: Block) -> np.ndarray:
         v = block.v[:, [block.index(self.joint)]]
-        return self.clock(block)[:, None] * np.hstack([v, block.sign(v)])
+        return self.time_factor(block)[:, None] * np.hstack([v, block.sign(v)])
 
     def sensitivities(self, block: Block) -> np.ndarray:
         columns = self.columns(block)
@@ -65,7 +65,7 @@ class ThermalFriction(JointEffect):
         """Return the temperature of the session's times t (T,) that this law takes, in C."""
         return COOL + SPAN * np.exp(-t / self.shape[0])
 
-    def clock(self, block: Block) -> np.ndarray:
+    def time_factor(self, block: Block) -> np.ndarray:
         recorded = self._temperature(block)
         if recorded is None:
             return np.exp(-block.t / self.shape[0])

@@ -37,7 +37,7 @@ _MEAN: weakref.WeakKeyDictionary[Robot, np.ndarray] = weakref.WeakKeyDictionary(
 def along_motion(block: Block) -> tuple[Robot, Along]:
     """Return the present model's robot, and what it does along a motion."""
     if block.body is None:
-        raise EffectError("needs the present model's bodies", mend="give the block a body")
+        raise EffectError("needs the present model's bodies", remedy="give the block a body")
     robot, key = block.body, id(block.q)
     kept = _ALONG.get(key)
     if kept is not None and kept[1] is block.v and kept[2] is block.a:

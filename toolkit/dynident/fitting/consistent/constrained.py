@@ -53,8 +53,8 @@ class Constrained:
     def __post_init__(self) -> None:
         require_solver(self.solver)
         if not isinstance(self.within, Within):
-            mend = 'give Within("full") or Within("semi")'
-            raise FitError(f"a {type(self.within).__name__} is no set", "within", mend)
+            remedy = 'give Within("full") or Within("semi")'
+            raise FitError(f"a {type(self.within).__name__} is no set", "within", remedy)
 
     @single_threaded
     def fit(self, model: Model, dataset: Dataset) -> Estimate:

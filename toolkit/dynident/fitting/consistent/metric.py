@@ -67,16 +67,16 @@ class Metric:
         M = np.asarray(M, dtype=float)
         if M.shape != (len(names), len(names)) or not np.all(np.isfinite(M)):
             raise FitError(f"a metric of shape {M.shape} does not fit {len(names)} parameters")
-        mend = "it must be X'X of some data, or Metric.corrected"
+        remedy = "it must be X'X of some data, or Metric.corrected"
         size = np.sqrt(np.abs(np.diag(M)))
         if np.any(np.abs(M - M.T) > 1e-8 * np.outer(size, size)):
-            raise FitError("the metric is not symmetric", mend=mend)
+            raise FitError("the metric is not symmetric", remedy=remedy)
         root, lost = _root(M, size)
         if lost > 1e-8:
             what = f"the metric has a negative direction ({lost:.1g} of the largest)"
-            raise FitError(what, mend=mend)
+            raise FitError(what, remedy=remedy)
         if not 0 < noise_std < np.inf:
-            raise FitError(f"noise_std = {noise_std:g}", mend="choose it above 0")
+            raise FitError(f"noise_std = {noise_std:g}", remedy="choose it above 0")
         return Metric(root / noise_std, tuple(names), rows, "given matrix")
 
     @staticmethod
@@ -93,7 +93,7 @@ class Metric:
         std = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
         if not len(kept) or not np.any(std > 0):
             what = "the estimate has no covariance to take a metric from"
-            raise FitError(what, mend="give a metric: Metric.of_data(model, recordings)")
+            raise FitError(what, remedy="give a metric: Metric.of_data(model, recordings)")
         # What a constraint holds has no variance: it is known better than by any data.
         std = np.where(std > 0, std, _HELD / estimate.basis.scale[kept])
         covariance = covariance + np.diag(np.where(np.diag(covariance) > 0, 0.0, std**2))
@@ -155,7 +155,7 @@ class Metric:
         noise = np.asarray(input_noise, dtype=float)
         if noise.shape != self.matrix.shape or not np.all(np.isfinite(noise)):
             what = f"input noise of shape {noise.shape} for {len(self.names)} parameters"
-            raise FitError(what, mend="give the (p, p) matrix N Psi")
+            raise FitError(what, remedy="give the (p, p) matrix N Psi")
         difference = self.matrix - noise
         size = np.sqrt(np.diag(self.matrix))
         size[size == 0] = 1.0
@@ -186,7 +186,7 @@ class Metric:
         weights = np.asarray(relevance, dtype=float)
         if weights.shape != (len(self.names),) or not np.all(weights >= 0):
             what = f"relevance weights of shape {weights.shape} for {len(self.names)} parameters"
-            raise FitError(what, mend="give one weight of at least 0 for each")
+            raise FitError(what, remedy="give one weight of at least 0 for each")
         off = tuple(name for name, w in zip(self.names, weights, strict=True) if w == 0)
         source = f"{self.source}, weighted by relevance"
         return replace(self, R=self.R * weights, source=source, irrelevant=off)

@@ -60,8 +60,10 @@ def mapping_of(space: ParameterSpace, metric: Metric, names: tuple[str, ...]) ->
     if metric.names == names:
         return space.combination
     what = f"the metric's {len(metric.names)} parameters are not those of the estimate"
-    mend = f"state it for the model's {len(names)} ({names[0]}, ...), or all {space.size} standard"
-    raise FitError(what, mend=mend)
+    remedy = (
+        f"state it for the model's {len(names)} ({names[0]}, ...), or all {space.size} standard"
+    )
+    raise FitError(what, remedy=remedy)
 
 
 def sized(space: ParameterSpace, rows: np.ndarray, count: int, x_hat: np.ndarray) -> ParameterSpace:

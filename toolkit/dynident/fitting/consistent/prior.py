@@ -49,13 +49,13 @@ class Prior:
 
     def __post_init__(self) -> None:
         if not isinstance(self.robot, Robot):
-            mend = "give a Robot: Robot.from_file(...)"
-            raise FitError(f"a {type(self.robot).__name__} is no prior", mend=mend)
+            remedy = "give a Robot: Robot.from_file(...)"
+            raise FitError(f"a {type(self.robot).__name__} is no prior", remedy=remedy)
         if self.distance not in ("quadratic", "entropic"):
-            mend = "choose quadratic or entropic"
-            raise FitError(f"no distance '{self.distance}' of a prior", mend=mend)
+            remedy = "choose quadratic or entropic"
+            raise FitError(f"no distance '{self.distance}' of a prior", remedy=remedy)
         if not 0 < self.spread < np.inf:
-            raise FitError(f"spread = {self.spread:g} of a prior", mend="choose it above 0")
+            raise FitError(f"spread = {self.spread:g} of a prior", remedy="choose it above 0")
 
     def rows(self, space: ParameterSpace, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rows of least squares, (k, s) and (k,): |A x - b|^2 in units of the spread.

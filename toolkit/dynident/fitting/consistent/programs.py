@@ -40,7 +40,7 @@ def require_solver(solver: str) -> None:
         Naming the choices.
     """
     if solver not in ("conic", "nlp"):
-        raise FitError(f"no solver '{solver}'", mend="choose conic or nlp")
+        raise FitError(f"no solver '{solver}'", remedy="choose conic or nlp")
 
 
 def solve(problem: Problem, solver: Solver, stay: np.ndarray | None = None) -> Answer:
@@ -116,4 +116,4 @@ def _require(status: Status, problem: Problem) -> None:
         names = [c.name for one in problem.within.sets for c in one.on(problem.space)]
         what = "no robot satisfies all constraints at once"
         raise FitError(what, ", ".join(dict.fromkeys(names)) or None, "loosen one of them")
-    raise FitError(f"no answer was found ({status})", mend="check units; try solver='conic'")
+    raise FitError(f"no answer was found ({status})", remedy="check units; try solver='conic'")

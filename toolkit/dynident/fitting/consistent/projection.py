@@ -210,8 +210,8 @@ def _estimate(what: Estimate | Robot | Projection) -> Estimate:
     if isinstance(what, Robot):
         return given_estimate(what)
     if not isinstance(what, Estimate):
-        mend = "give an Estimate, a Robot or a Projection"
-        raise FitError(f"a {type(what).__name__} cannot be projected", mend=mend)
+        remedy = "give an Estimate, a Robot or a Projection"
+        raise FitError(f"a {type(what).__name__} cannot be projected", remedy=remedy)
     return what
 
 
@@ -227,8 +227,8 @@ def _standard(before: Estimate, model: Model, space: ParameterSpace) -> np.ndarr
     x = np.concatenate([*inertial, before.values[len(model.base.independent) :]])
     if not np.all(np.isfinite(x)):
         names = [n for n, v in zip(space.names, x, strict=True) if not np.isfinite(v)]
-        mend = "state a number for it first: nothing is near to what is not a number"
-        raise FitError("is not finite", ", ".join(names[:5]), mend)
+        remedy = "state a number for it first: nothing is near to what is not a number"
+        raise FitError("is not finite", ", ".join(names[:5]), remedy)
     return x
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from dynident.closed_loop import Controller
 from dynident.errors import DynidentError, FitError, SimulationError
 from dynident.fitting.estimate import Estimate
+from dynident.fitting.fixed_point import FixedPoint
 from dynident.fitting.history import Ending, Round, Way
 from dynident.fitting.instrumental.estimate_assembly import assemble
 from dynident.fitting.instrumental.loop_source import LoopSource
@@ -21,10 +22,15 @@ from dynident.fitting.instrumental.normal_equations import (
     solve,
 )
 from dynident.fitting.instrumental.simulated_loop import SimulatedLoop
-from dynident.fitting.instrumental.source import Guess, Instruments, InstrumentSource, Tell, silent
+from dynident.fitting.instrumental.source import (
+    Guess,
+    Instruments,
+    InstrumentSource,
+    ProgressCallback,
+    silent,
+)
 from dynident.fitting.instrumental.starts import START_NAMES, Start, start_values
 from dynident.fitting.least_squares import LeastSquares
-from dynident.fitting.settling import Settling
 from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.threads import single_threaded
@@ -65,19 +71,19 @@ class IV:
     weighting: Literal["joint", "none"] = "joint"
     tolerance: float = 1e-2
     rounds: int = 20
-    tell: Tell = field(default=silent, compare=False)
+    progress: ProgressCallback = field(default=silent, compare=False)
     name: ClassVar[str] = "instrumental variables"
 
     def __post_init__(self) -> None:
         if not hasattr(self.chosen, "prepare"):
             what = f"a {type(self.instruments).__name__} is no choice of instruments"
-            mend = (
+            remedy = (
                 "give the study's controller (a [controller] table), SwappedPeriods() or Filtered"
             )
-            raise FitError(what, "IV", mend)
+            raise FitError(what, "IV", remedy)
         if not isinstance(self.start, Estimate) and self.start not in START_NAMES:
-            mend = f"choose {', '.join(START_NAMES)}, or give an estimate"
-            raise FitError(f"start = {self.start!r}", "IV", mend)
+            remedy = f"choose {', '.join(START_NAMES)}, or give an estimate"
+            raise FitError(f"start = {self.start!r}", "IV", remedy)
         if not 0 < self.tolerance < 1 or self.rounds < 1:
             what = f"tolerance = {self.tolerance!r}, rounds = {self.rounds!r}"
             raise FitError(what, "IV", "choose a tolerance between 0 and 1, and 1 round or more")
@@ -106,10 +112,10 @@ class IV:
     def iterated(self, model: Model, dataset: Dataset) -> Iterations:
         """Return the iterations of a fit, done; raises what `fit` raises."""
         if not dataset.recordings:
-            raise FitError("no recording to fit", mend='mark some recordings use = "train"')
+            raise FitError("no recording to fit", remedy='mark some recordings use = "train"')
         first = LeastSquares(self.weighting).fit(model, dataset)
         start = start_values(self.start, model, first)
-        guess = Guess(start, (model.given_values(), first.values), self.tell)
+        guess = Guess(start, (model.given_values(), first.values), self.progress)
         source = self.chosen.prepare(model, dataset, guess)
         name = "an earlier estimate" if isinstance(self.start, Estimate) else self.start
         if self.start == "least_squares" and _hopeless(source, start):
@@ -158,7 +164,7 @@ class Iterations:
         self, method: IV, model: Model, source: InstrumentSource, start: np.ndarray, start_name: str
     ) -> None:
         self._method, self.model, self.source = method, model, source
-        self._settling = Settling()
+        self._settling = FixedPoint()
         self._good: np.ndarray | None = None
         self.start, self.start_name = start, start_name
         self.simulated: np.ndarray | None = None
@@ -175,7 +181,7 @@ class Iterations:
         """Iterate until the residual stays, or an estimate cannot be simulated."""
         limit = self._method.rounds if self.source.iterates else 1
         for count in range(limit):
-            self._method.tell("instrumental variables", count, limit)
+            self._method.progress("instrumental variables", count, limit)
             try:
                 way = self._renew()
             except SimulationError as error:
@@ -201,8 +207,8 @@ class Iterations:
         """Go back to the last estimate that could be simulated, and what was found there."""
         if len(self._past) < 2:
             what = f"the first estimate has no motion, nor has any part of the way to it: {error}"
-            mend = "choose another start, or look for what the model lacks"
-            raise SimulationError(what.rstrip("."), "IV", mend, reason=error.reason) from None
+            remedy = "choose another start, or look for what the model lacks"
+            raise SimulationError(what.rstrip("."), "IV", remedy, reason=error.reason) from None
         lost = len(self.rounds)
         self._restore(self._past[-2])
         self.ending = Ending.NOT_SIMULATED

@@ -51,7 +51,7 @@ class LoopSource:
             what = f"a controller of {controller.n} joints for a robot of {n}"
             raise SimulationError(what, "controller", "give its gains for every joint")
         controller.simulated_rate()
-        self._settings, self._model, self._tell = settings, model, guess.tell
+        self._settings, self._model, self._tell = settings, model, guess.progress
         references = [_reference(one) for one in dataset.recordings]
         self._matrices = InertiaMatrices(model, poses_of(references))
         self._start = guess.start
@@ -59,8 +59,8 @@ class LoopSource:
         self._stiffness = stiffness(controller, self._believed)
         for joint, k in zip(model.robot.names, self._stiffness, strict=True):
             if not k > 0:
-                mend = "nothing holds it at its reference: choose other instruments"
-                raise SimulationError(f"kp = 0 at joint '{joint}'", "controller", mend)
+                remedy = "nothing holds it at its reference: choose other instruments"
+                raise SimulationError(f"kp = 0 at joint '{joint}'", "controller", remedy)
         # Of a double integrator under this feedback (equation 44).
         frequencies = np.sqrt(self._stiffness / self._believed)
         if settings.natural_frequency_hz is not None:
@@ -207,8 +207,8 @@ class LoopSource:
             sound = [J for J in inertias if np.all(np.isfinite(J)) and np.all(J > 0)]
             if sound:
                 return np.max(sound, axis=0)
-        mend = 'start from "regular", or state natural_frequency_hz'
-        raise SimulationError("no start has positive joint inertias", "instruments", mend)
+        remedy = 'start from "regular", or state natural_frequency_hz'
+        raise SimulationError("no start has positive joint inertias", "instruments", remedy)
 
     def _column_scale(self) -> np.ndarray:
         scale = np.ones(self._model.size)
@@ -219,11 +219,11 @@ class LoopSource:
 
 def _reference(recording: Recording) -> np.ndarray:
     if recording.q_ref is None:
-        mend = (
+        remedy = (
             f"add columns q_ref.{recording.joints[0]}, ..., or take other instruments: "
             "di.fitting.SwappedPeriods() or di.fitting.Filtered(cutoff_hz)"
         )
-        raise SimulationError("the recording has no reference", recording.where, mend)
+        raise SimulationError("the recording has no reference", recording.where, remedy)
     return recording.q_ref
 
 
@@ -235,6 +235,6 @@ def _without_transient(recording: Recording, transient: float) -> Recording:
         what = (
             f"{recording.duration:.4g} s are shorter than the loop's transient, {transient:.3g} s"
         )
-        mend = "record longer, leave it out, or state the loop's natural_frequency_hz"
-        raise FitError(what, recording.where, mend)
+        remedy = "record longer, leave it out, or state the loop's natural_frequency_hz"
+        raise FitError(what, recording.where, remedy)
     return recording.replace(window=(first, last))

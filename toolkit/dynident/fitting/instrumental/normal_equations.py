@@ -128,9 +128,9 @@ def solve(
     factors = found.factors
     if factors.rows <= found.size:
         what = f"{factors.rows} equations for {found.size} parameters"
-        raise FitError(what, mend="record longer, or raise rate_hz in [filter]")
+        raise FitError(what, remedy="record longer, or raise rate_hz in [filter]")
     if not np.any(factors.torque_norms > 0):
-        raise FitError("the torque is zero throughout", mend="is it the right column?")
+        raise FitError("the torque is zero throughout", remedy="is it the right column?")
     ordinary = _solve(found, names, given, np.ones(len(factors.counts)))
     if weighting == "none" or len(factors.counts) == 1:
         return ordinary

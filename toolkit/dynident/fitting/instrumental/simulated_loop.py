@@ -44,16 +44,16 @@ class SimulatedLoop:
     def __post_init__(self) -> None:
         if not isinstance(self.controller, Controller):
             what = f"a {type(self.controller).__name__} where a Controller is needed"
-            mend = "give the study's: di.IV(study.controller); it needs a [controller] table"
-            raise FitError(what, "instruments", mend)
+            remedy = "give the study's: di.IV(study.controller); it needs a [controller] table"
+            raise FitError(what, "instruments", remedy)
         if self.lift not in ("minimum_norm", "consistent"):
-            mend = 'choose "minimum_norm" or "consistent"'
-            raise FitError(f"lift = {self.lift!r}", "instruments", mend)
+            remedy = 'choose "minimum_norm" or "consistent"'
+            raise FitError(f"lift = {self.lift!r}", "instruments", remedy)
         if self.natural_frequency_hz is not None:
             given = np.atleast_1d(np.asarray(self.natural_frequency_hz, dtype=float))
             if given.shape not in ((1,), (self.controller.n,)) or not np.all(given > 0):
-                mend = "give one positive number, or one per joint"
-                raise FitError(f"natural_frequency_hz = {given.tolist()}", "instruments", mend)
+                remedy = "give one positive number, or one per joint"
+                raise FitError(f"natural_frequency_hz = {given.tolist()}", "instruments", remedy)
 
     @property
     def name(self) -> str:

@@ -13,7 +13,7 @@ from dynident.fitting.sampling import LEAST_ROWS
 from dynident.model import Model
 from dynident.recording import Dataset, Filter, ParallelFilter, Recording, default_filter, uniform
 
-Tell = Callable[[str, float, float], None]
+ProgressCallback = Callable[[str, float, float], None]
 """(what is being done, how much is done, how much there is to do)."""
 
 _PERIODS = 3.0
@@ -37,7 +37,7 @@ class Guess:
 
     start: np.ndarray
     others: tuple[np.ndarray, ...] = ()
-    tell: Tell = field(default=silent)
+    progress: ProgressCallback = field(default=silent)
 
 
 class InstrumentSource(Protocol):
@@ -123,10 +123,10 @@ def _away_from_ends(recording: Recording, settings: Filter | None) -> Recording:
     last = min(last, float(recording.t[-1]) - margin)
     if last - first < LEAST_ROWS / rate:
         what = f"{recording.duration:.4g} s are next to nothing between the filter's ends"
-        mend = (
+        remedy = (
             f"it needs {margin:.3g} s at each: record longer, raise the cut-offs, or leave it out"
         )
-        raise RecordingError(what, recording.where, mend)
+        raise RecordingError(what, recording.where, remedy)
     return recording.replace(window=(first, last))
 
 

@@ -24,8 +24,8 @@ def start_values(start: Start | Estimate, model: Model, least_squares: Estimate)
     """
     if isinstance(start, Estimate):
         if start.names != model.names:
-            mend = "fit the same model, or start from least squares"
-            raise FitError("the estimate to start from has other parameters", "IV.start", mend)
+            remedy = "fit the same model, or start from least squares"
+            raise FitError("the estimate to start from has other parameters", "IV.start", remedy)
         return np.array(start.values)
     if start == "least_squares":
         return least_squares.values

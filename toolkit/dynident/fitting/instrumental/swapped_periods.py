@@ -35,8 +35,8 @@ class SwappedPeriods:
         """
         told = [r for r in prepared(dataset).recordings if r.period is not None]
         if not told:
-            mend = "state the period of a recording, or choose other instruments"
-            raise FitError("no recording repeats with a known period", "instruments", mend)
+            remedy = "state the period of a recording, or choose other instruments"
+            raise FitError("no recording repeats with a known period", "instruments", remedy)
         skipped = [r.where for r in dataset.recordings if r.period is None]
         pairs = [_swapped(one) for one in told]
         notes = ("Instruments: the other periods of each recording.",)
@@ -60,8 +60,8 @@ def _swapped(recording: Recording) -> tuple[Recording, Recording]:
     whole = round(recording.period * rate)
     count = recording.samples // whole
     if count < 2:
-        mend = "record two periods or more, or choose other instruments"
-        raise FitError(f"it holds no two whole periods of {recording.period:g} s", where, mend)
+        remedy = "record two periods or more, or choose other instruments"
+        raise FitError(f"it holds no two whole periods of {recording.period:g} s", where, remedy)
     found = periods(count * whole, rate, recording.period, where)
     # Counted from the end, where the motion is settled best.
     rows = slice(recording.samples - count * whole, recording.samples)

@@ -49,8 +49,8 @@ def encoder_noise(
         If no noise of the positions is stated.
     """
     if dataset.noise is None:
-        mend = "state position_std in [noise], or take the noise from repetitions"
-        raise FitError("the noise of the encoders is not stated", mend=mend)
+        remedy = "state position_std in [noise], or take the noise from repetitions"
+        raise FitError("the noise of the encoders is not stated", remedy=remedy)
     rng = np.random.default_rng(seed)
     factors = factorise(rows(model, dataset, values))
     std = solve_factors(model, factors).torque_std

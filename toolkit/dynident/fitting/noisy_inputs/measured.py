@@ -42,7 +42,7 @@ class InputNoise:
         """
         if names != self.names:
             what = f"the input noise is that of {len(self.names)} other parameters"
-            raise FitError(what, mend="take it from the model that is fitted")
+            raise FitError(what, remedy="take it from the model that is fitted")
         return self.gram / self.rows
 
 
@@ -83,7 +83,7 @@ def input_noise(model: Model, dataset: Dataset, values: np.ndarray | None = None
         gram += difference.T @ difference * folded.count / (folded.count - 1)
         seen += folded.count * folded.rows
     if not seen:
-        raise FitError("no recording repeats", mend="state its period, or give the input noise")
+        raise FitError("no recording repeats", remedy="state its period, or give the input noise")
     gram *= used / seen
     size = np.sum(total**2, axis=0)
     share = np.divide(np.diag(gram), size, out=np.zeros(p), where=size > 0)

@@ -102,7 +102,7 @@ class Regression:
         if regressor is None:
             what = f"{self.estimator} is scikit-learn's, fitted to compressed rows"
             raise FitError(
-                what, mend="choose bayes, factors, corrected, truncated, stepwise or total"
+                what, remedy="choose bayes, factors, corrected, truncated, stepwise or total"
             )
         posed = pose(model, dataset)
         return _fitted(regressor, posed, self._psi(posed, dataset))
@@ -115,7 +115,7 @@ class Regression:
             return self.estimator
         if self.estimator not in NAMES:
             what = f"no regression '{self.estimator}'"
-            raise FitError(what, mend=f"choose {', '.join(NAMES)}")
+            raise FitError(what, remedy=f"choose {', '.join(NAMES)}")
         return own(self.estimator)
 
     def _found(self, posed: PosedRegression, dataset: Dataset) -> _Found:
@@ -128,7 +128,7 @@ class Regression:
         assert isinstance(self.estimator, str)
         if not (isinstance(self.noise, str) and self.noise == "none"):
             what = f"{self.estimator} has no place for the noise of its inputs"
-            raise FitError(what, mend="leave it out, or choose corrected, factors or bayes")
+            raise FitError(what, remedy="leave it out, or choose corrected, factors or bayes")
         compressed = posed.compressed
         scale = np.sqrt(np.mean(compressed.X**2, axis=0))
         folds = compressed.piece * _FOLDS // (compressed.piece.max() + 1)
@@ -159,7 +159,7 @@ class Regression:
             return encoder_noise(model, dataset, values)
         if self.noise != "none":
             what = f"noise = {self.noise!r} of the inputs"
-            raise FitError(what, mend="choose none, repeats or encoders, or give an InputNoise")
+            raise FitError(what, remedy="choose none, repeats or encoders, or give an InputNoise")
         return None
 
 
@@ -190,18 +190,18 @@ def _fitted(
 
     if not isinstance(regressor, StatisticsRegressor):
         what = f"a {type(regressor).__name__} is no regression from sufficient statistics"
-        raise FitError(what, mend="name one, or give an estimator of dynident.fitting.regression")
+        raise FitError(what, remedy="name one, or give an estimator of dynident.fitting.regression")
     if np.any(getattr(regressor, "input_noise", None)):
         what = "the estimator's own input_noise is in units that only its rows have"
-        raise FitError(what, mend="give it as noise = of Regression")
+        raise FitError(what, remedy="give it as noise = of Regression")
     regressor = regressor.another(fit_intercept=False)
     takes_noise = isinstance(regressor, CorrectedLeastSquares | JointFactorRegression)
     if psi is not None and not takes_noise:
         what = f"{regressor.words} has no place for the noise of its inputs"
-        raise FitError(what, mend="leave it out, or choose corrected, factors or bayes")
+        raise FitError(what, remedy="leave it out, or choose corrected, factors or bayes")
     if psi is None and isinstance(regressor, CorrectedLeastSquares):
-        mend = 'state noise = "repeats" or "encoders"'
-        raise FitError("corrected least squares needs the noise of the inputs", mend=mend)
+        remedy = 'state noise = "repeats" or "encoders"'
+        raise FitError("corrected least squares needs the noise of the inputs", remedy=remedy)
     if psi is not None:
         regressor.set_params(input_noise=psi)
     names = [posed.model.names[i] for i in posed.kept]

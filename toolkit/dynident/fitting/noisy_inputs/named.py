@@ -90,8 +90,8 @@ def validated(name: str, rows: Compressed) -> Validated:
         count = search.best_params_["n_components"]
         border = ", the most that were tried" if count == _COMPONENTS else ""
         return Validated(np.ravel(search.best_estimator_.coef_), f"{count} components{border}")
-    mend = f"choose {', '.join(NAMES)}"
-    raise FitError(f"no regression '{name}'", mend=mend)
+    remedy = f"choose {', '.join(NAMES)}"
+    raise FitError(f"no regression '{name}'", remedy=remedy)
 
 
 NAMES = (

@@ -45,15 +45,15 @@ class PosedRegression:
 
 def pose(model: Model, dataset: Dataset) -> PosedRegression:
     """Return the regression of a model and data; raises as least squares does."""
-    settled = LeastSquares().fit(model, dataset)
-    model, kept = settled.model, list(settled.basis.independent)
-    values = settled.values if model.needs_values else None
+    relaxed = LeastSquares().fit(model, dataset)
+    model, kept = relaxed.model, list(relaxed.basis.independent)
+    values = relaxed.values if model.needs_values else None
     pieces = pieces_of(model, dataset, values)
     factors = _whole(pieces)
     first = solve_factors(model, factors)
     compressed = compress(pieces, 1.0 / first.torque_std)
     compressed = replace(compressed, X=compressed.X[:, kept])
-    return PosedRegression(model, settled.basis, values, factors, first, kept, compressed)
+    return PosedRegression(model, relaxed.basis, values, factors, first, kept, compressed)
 
 
 def pieces_of(model: Model, dataset: Dataset, values: np.ndarray | None) -> list[TriangularFactors]:

@@ -40,8 +40,8 @@ def open_npz(data: bytes, file: str) -> ColumnTable:
             except Exception as error:
                 if "allow_pickle" in str(error):
                     what = f"'{name}' holds Python objects, which are never loaded"
-                    mend = "save it as an array of doubles"
-                    raise RecordingError(what, file, mend) from None
+                    remedy = "save it as an array of doubles"
+                    raise RecordingError(what, file, remedy) from None
                 raise _damaged(f"the array '{name}'", file, error) from None
             if not isinstance(found[name], np.ndarray):
                 raise RecordingError(f"'{name}' is not an array", file, "save it with numpy.savez")
@@ -129,8 +129,8 @@ def pyarrow_parquet(file: str):
     try:
         import pyarrow.parquet as parquet
     except ImportError:
-        mend = "pip install 'dynident[parquet]'"
-        raise RecordingError("Parquet files need pyarrow", file, mend) from None
+        remedy = "pip install 'dynident[parquet]'"
+        raise RecordingError("Parquet files need pyarrow", file, remedy) from None
     return parquet
 
 

@@ -42,8 +42,8 @@ class Column:
         if not isinstance(self.name, str) or not self.name:
             raise RecordingError(f"{self.name!r} is no name of a column", "columns")
         if not (math.isfinite(self.scale) and self.scale != 0):
-            mend = "give a number other than zero"
-            raise RecordingError(f"scale = {self.scale!r} of '{self.name}'", "columns", mend)
+            remedy = "give a number other than zero"
+            raise RecordingError(f"scale = {self.scale!r} of '{self.name}'", "columns", remedy)
 
 
 @dataclass(frozen=True)
@@ -178,11 +178,11 @@ def _checked(
     valid = ["t", *(f"{signal}.{joint}" for signal in signals for joint in joints)]
     for ours in columns:
         if ours not in valid:
-            mend = f"columns: t, {', '.join(f'{s}.<joint>' for s in signals)}; " + (
+            remedy = f"columns: t, {', '.join(f'{s}.<joint>' for s in signals)}; " + (
                 f"joints: {', '.join(joints)}"
             )
             what = f"the column mapping names '{ours}', which is not ours"
-            raise RecordingError(what, file, mend + _close(ours, valid))
+            raise RecordingError(what, file, remedy + _close(ours, valid))
     return {
         ours: theirs if isinstance(theirs, Column) else Column(theirs)
         for ours, theirs in columns.items()
@@ -212,16 +212,16 @@ def _vector(x: np.ndarray, name: str, index: int | None, file: str) -> np.ndarra
         raise RecordingError(what, file, "save it as an array of doubles")
     if index is not None:
         if x.ndim != 2 or index >= x.shape[1]:
-            mend = "name[i] is column i, from 0, of a table with one row a sample"
+            remedy = "name[i] is column i, from 0, of a table with one row a sample"
             raise RecordingError(
-                f"'{name}' has the shape {x.shape}, and no column {index}", file, mend
+                f"'{name}' has the shape {x.shape}, and no column {index}", file, remedy
             )
         x = x[:, index]
     elif x.ndim == 2 and 1 in x.shape:
         x = x.ravel()
     if x.ndim != 1:
-        mend = f"map the columns, as {name}[0]" if x.ndim == 2 else "make it one-dimensional"
-        raise RecordingError(f"'{name}' has the shape {x.shape}, not (T,)", file, mend)
+        remedy = f"map the columns, as {name}[0]" if x.ndim == 2 else "make it one-dimensional"
+        raise RecordingError(f"'{name}' has the shape {x.shape}, not (T,)", file, remedy)
     with np.errstate(over="ignore"):
         return x.astype(np.float64)
 

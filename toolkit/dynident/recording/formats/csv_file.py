@@ -43,8 +43,8 @@ def open_csv(data: bytes, file: str) -> ColumnTable:
 
     def load(wanted: Sequence[str]) -> dict[str, np.ndarray]:
         if not body.strip():
-            mend = "is the file complete?"
-            raise RecordingError("holds a header but no samples", file, mend)
+            remedy = "is the file complete?"
+            raise RecordingError("holds a header but no samples", file, remedy)
         places = [names.index(name) for name in wanted]
         values = _fast(body, separator, len(names), places)
         if values is None:
@@ -155,8 +155,8 @@ def _cell(text: str, where: str) -> float:
     if not is_number(text):
         comma = text.count(",") == 1 and is_number(text.replace(",", "."))
         shown = text if len(text) <= 30 else text[:27] + "..."
-        mend = "write a decimal point" if comma else "every cell holds a number"
-        raise RecordingError(f"'{shown}' is not a number", where, mend)
+        remedy = "write a decimal point" if comma else "every cell holds a number"
+        raise RecordingError(f"'{shown}' is not a number", where, remedy)
     if not np.isfinite(value := float(text)):
         raise RecordingError(f"'{text}' is not a finite number", where, "repair or cut the gap")
     return value

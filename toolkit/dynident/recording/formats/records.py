@@ -30,14 +30,14 @@ def pick(table: ColumnTable, record: str) -> ColumnTable:
     """
     if COLUMNS not in table.names:
         what = f"record '{record}' is asked for, and no array '{COLUMNS}' names its columns"
-        mend = "records are for NPZ and MAT files; else map the columns, as name[0]"
-        raise RecordingError(what, table.file, mend)
+        remedy = "records are for NPZ and MAT files; else map the columns, as name[0]"
+        raise RecordingError(what, table.file, remedy)
     records = [name for name in table.names if name != COLUMNS]
     if record not in records:
         close = difflib.get_close_matches(record, records, 1)
         shown = ", ".join(records[:20]) + (", ..." if len(records) > 20 else "")
-        mend = f"did you mean '{close[0]}'?" if close else f"it holds {shown or 'none'}"
-        raise RecordingError(f"no record '{record}'", table.file, mend)
+        remedy = f"did you mean '{close[0]}'?" if close else f"it holds {shown or 'none'}"
+        raise RecordingError(f"no record '{record}'", table.file, remedy)
     names = _names(table)
     where = f"{table.file}, record {record}"
 

@@ -43,8 +43,8 @@ def convergence(
         raise DynidentError("there are no iterations to draw")
     first = next(iter(shown.values()))
     if any(one.names != first.names for one in shown.values()):
-        mend = "draw each in a picture of its own"
-        raise DynidentError("the estimates have different parameters", mend=mend)
+        remedy = "draw each in a picture of its own"
+        raise DynidentError("the estimates have different parameters", remedy=remedy)
     panels = len(first.names) + 1
     columns = min(panels, _WIDE)
     rows = -(-panels // columns)

@@ -104,7 +104,7 @@ def inertia_sections(robots: Mapping[str, Robot], plane: str = "xz") -> Figure:
     """
     first = _same_bodies(robots)
     if len(plane) != 2 or not set(plane) <= set("xyz") or plane[0] == plane[1]:
-        raise DynidentError(f"no plane '{plane}'", mend='write two of x, y, z, as in "xz"')
+        raise DynidentError(f"no plane '{plane}'", remedy='write two of x, y, z, as in "xz"')
     across = np.eye(3)[["xyz".index(axis) for axis in plane]]
     eye = View(across, np.cross(*across))
     every = {
@@ -202,12 +202,12 @@ def _extent(
 
 def _same_bodies(robots: Mapping[str, Robot]) -> Robot:
     if not robots:
-        raise DynidentError("no robot to draw", mend='pass them by name: {"before": robot}')
+        raise DynidentError("no robot to draw", remedy='pass them by name: {"before": robot}')
     first = next(iter(robots.values()))
     for name, robot in robots.items():
         if robot.bodies != first.bodies:
-            mend = f"the first has {', '.join(first.bodies)}"
-            raise DynidentError(f"'{name}' has other bodies", mend=mend)
+            remedy = f"the first has {', '.join(first.bodies)}"
+            raise DynidentError(f"'{name}' has other bodies", remedy=remedy)
     return first
 
 
@@ -216,7 +216,7 @@ def _posture(robot: Robot, q: ArrayLike | None) -> np.ndarray:
         posture = np.asarray(q, dtype=float)
         if posture.shape != (robot.n,) or not np.all(np.isfinite(posture)):
             what = f"q has shape {posture.shape}, or is not finite"
-            raise DynidentError(what, mend=f"give {robot.n} joint positions, in rad or m")
+            raise DynidentError(what, remedy=f"give {robot.n} joint positions, in rad or m")
         return posture
     return np.array(
         [0.0 if j.lower <= 0.0 <= j.upper else (j.lower + j.upper) / 2 for j in robot.joints]

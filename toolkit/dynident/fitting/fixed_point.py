@@ -11,7 +11,7 @@ _SHRUNK = 0.9
 _SHORTEST = 0.1
 
 
-class Settling:
+class FixedPoint:
     """Where the columns are taken next, with shorter steps while the values swing.
 
     A step that does not shrink the change overshoots: a half of it does.
@@ -22,7 +22,7 @@ class Settling:
 
     def following(self, model: Model, at: np.ndarray, found: np.ndarray) -> np.ndarray:
         """Return the values (p,) after `at`, where the columns were taken, and `found`."""
-        step = model.settled(at, found) - at
+        step = model.relaxed(at, found) - at
         change = float(np.linalg.norm(step))
         if change > _SHRUNK * self._change:
             self._share = max(self._share / 2, _SHORTEST)
@@ -30,7 +30,7 @@ class Settling:
         return at + self._share * step
 
 
-def unsettled(change: float) -> str:
+def not_converged(change: float) -> str:
     """Say that values did not settle; `change` is the last one, relative."""
     return (
         "The columns that depend on the parameters themselves have not settled: in the last round "
