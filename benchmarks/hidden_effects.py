@@ -147,16 +147,16 @@ def _recordings(
 
 def _scaled(case: Case, robot: Robot, known: list[TrueEffect], hidden: TrueEffect) -> TrueEffect:
     """Scale an effect so that it leaves `strength` times the noise in the residual."""
-    from dynident.evidence.column_store import ColumnStore
+    from dynident.evidence.columns import Evidence
     from dynident.evidence.evidence_fit import fit_evidence
     from dynident.evidence.held_out import on_recordings
     from dynident.evidence.runs import gather
 
     model = Model(robot, tuple(one.effect for one in known))
     for _ in range(3):
-        store = ColumnStore(model, gather(Dataset(_recordings(case, robot, [*known, hidden], 2))))
-        store.prepare(model.effects)
-        judged = on_recordings(store, fit_evidence(store, model))
+        evidence = Evidence(model, gather(Dataset(_recordings(case, robot, [*known, hidden], 2))))
+        evidence.prepare(model.effects)
+        judged = on_recordings(evidence, fit_evidence(evidence, model))
         assert judged.ratio is not None
         ratio = float(judged.ratio.max())
         if ratio > 0.3 and abs(ratio / case.strength - 1.0) < 0.15:

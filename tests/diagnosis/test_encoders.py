@@ -9,7 +9,7 @@ import pytest
 
 from dynident import diagnose as find
 from dynident.diagnosis.nuisances.quantisation import rounding_power
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.runs import gather
@@ -36,10 +36,10 @@ def recordings(model: Model, step: float, torque_std: float, count: int) -> tupl
 
 def test_rounding_power_is_what_rounding_leaves(model: Model) -> None:
     runs = Dataset(recordings(model, STEP, 1e-3, 3))
-    store = ColumnStore(model, gather(runs))
-    store.prepare(model.effects)
-    fitted = fit_evidence(store, model)
-    judged = on_recordings(store, fitted)
+    evidence = Evidence(model, gather(runs))
+    evidence.prepare(model.effects)
+    fitted = fit_evidence(evidence, model)
+    judged = on_recordings(evidence, fitted)
     assert judged.ratio is not None and judged.noise_std is not None
     left = judged.ratio * judged.noise_std
     assert (left > 3.0 * judged.noise_std).all(), "rounding is not to be seen"
@@ -49,9 +49,9 @@ def test_rounding_power_is_what_rounding_leaves(model: Model) -> None:
 
 def test_there_is_none_without_steps(model: Model) -> None:
     runs = Dataset(recordings(model, 0.0, 1e-3, 1))
-    store = ColumnStore(model, gather(runs))
-    store.prepare(model.effects)
-    np.testing.assert_array_equal(rounding_power(fit_evidence(store, model), runs), np.zeros(2))
+    evidence = Evidence(model, gather(runs))
+    evidence.prepare(model.effects)
+    np.testing.assert_array_equal(rounding_power(fit_evidence(evidence, model), runs), np.zeros(2))
 
 
 def test_a_healthy_robot_with_a_coarse_encoder_lacks_nothing(model: Model) -> None:

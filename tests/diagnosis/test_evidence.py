@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.effects import catalogue
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.runs import gather
 from dynident.model import Model
 from dynident.recording import Dataset
@@ -16,14 +16,14 @@ def test_columns_linear_in_the_torque_may_be_made_of_filtered_torque() -> None:
     model = Model(arm()) + "viscous_friction" + "coulomb_friction" + "payload"
     truth = true_values(model, Fv__shoulder=1.2, Fc__elbow=0.6, **{"payload.mass": 0.4})
     run = synthetic(model, truth, 0, rate_hz=250.0, payload=True)
-    store = ColumnStore(model, gather(Dataset((run,))))
-    store.prepare(model.effects)
+    evidence = Evidence(model, gather(Dataset((run,))))
+    evidence.prepare(model.effects)
     linear = [e for e in catalogue().values() if e.linear_in_torque]
     assert linear
     for kind in linear:
         for effect in kind.candidates(model.robot):
-            quick = store.of(effect, 0, model, truth)[0]
-            replicate = store.runs[0].replicates[0]
+            quick = evidence.of(effect, 0, model, truth)[0]
+            replicate = evidence.runs[0].replicates[0]
             block = replicate.block(model, rigid=False)
             slow = replicate.filtered(model.torque_without_loads(block, truth))
             joint = model.robot.names.index(str(effect.joint))

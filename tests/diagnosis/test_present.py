@@ -9,7 +9,7 @@ import pytest
 
 import dynident as di
 from dynident.effects import catalogue
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
 from problem_scripts import PROBLEMS
@@ -21,12 +21,12 @@ def test_load_and_elasticity_settle_together_from_a_robot_without_bodies() -> No
     known = catalogue()
     load = known["load_friction"]("elbow")
     bends = known["joint_elasticity"]("shoulder", None, (20.0, 0.1, 0.3))
-    store = ColumnStore(
+    evidence = Evidence(
         study.model, gather(replace(study.train, recordings=study.train.recordings[:2]))
     )
-    store.prepare(study.model.effects)
-    alone = [fit_evidence(store, study.model + one) for one in (load, bends)]
-    both = fit_evidence(store, study.model + load + bends)
+    evidence.prepare(study.model.effects)
+    alone = [fit_evidence(evidence, study.model + one) for one in (load, bends)]
+    both = fit_evidence(evidence, study.model + load + bends)
     mu, c = both.values[-2:]
     sigma = np.sqrt(np.diag(both.covariance)[-2:])
     assert mu == pytest.approx(alone[0].values[-1], abs=3 * sigma[0])

@@ -9,7 +9,7 @@ from dynident.diagnosis.search.pruning import without_superfluous
 from dynident.diagnosis.search.ranking import candidates, rank
 from dynident.diagnosis.search.selection import choose
 from dynident.effects import effects_of
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.runs import gather
 from dynident.model import Model
@@ -21,7 +21,7 @@ PLAIN = Model(arm()) + "viscous_friction" + "coulomb_friction"
 DRAG, OFFSET = "quadratic_drag@shoulder", "torque_offset@elbow"
 
 
-def store_of(seeds: range, drag: float, offset: float) -> ColumnStore:
+def evidence_of(seeds: range, drag: float, offset: float) -> Evidence:
     """Recordings of an arm with a drag and an offset that the plain model lacks."""
     full = PLAIN + DRAG + OFFSET
     truth = true_values(full, **FRICTION, Fq__shoulder=drag, offset__elbow=offset)
@@ -29,27 +29,27 @@ def store_of(seeds: range, drag: float, offset: float) -> ColumnStore:
         synthetic(full, truth, seed, rate_hz=250.0, position_std=2e-5, torque_std=0.3)
         for seed in seeds
     )
-    store = ColumnStore(PLAIN, gather(Dataset(made)))
+    evidence = Evidence(PLAIN, gather(Dataset(made)))
     every = [v for e in candidates(PLAIN) for v in e.variants(PLAIN.robot)]
-    store.prepare([*PLAIN.effects, *every])
-    return store
+    evidence.prepare([*PLAIN.effects, *every])
+    return evidence
 
 
-def added(store: ColumnStore, *labels: str) -> tuple[EvidenceFit, list[Found]]:
+def added(evidence: Evidence, *labels: str) -> tuple[EvidenceFit, list[Found]]:
     """The model with effects added one after the other, as the diagnosis adds them."""
-    fitted, found = fit_evidence(store, PLAIN), []
+    fitted, found = fit_evidence(evidence, PLAIN), []
     for label in labels:
         (effect,) = effects_of(label, PLAIN.robot)
-        one = choose(store, fitted, rank(store, fitted, len(found), only=(effect,)))
+        one = choose(evidence, fitted, rank(evidence, fitted, len(found), only=(effect,)))
         assert one is not None
         found.append(one)
-        fitted = fit_evidence(store, fitted.model + effect, fitted)
+        fitted = fit_evidence(evidence, fitted.model + effect, fitted)
     return fitted, found
 
 
-def kept(store: ColumnStore, held: ColumnStore | None) -> list[str]:
-    fitted, found = added(store, DRAG, OFFSET)
-    left = without_superfluous(store, held, fitted, found, lambda _: None)
+def kept(evidence: Evidence, held: Evidence | None) -> list[str]:
+    fitted, found = added(evidence, DRAG, OFFSET)
+    left = without_superfluous(evidence, held, fitted, found, lambda _: None)
     assert [e.label for e in left.final.model.effects][-len(left.found) :] == [
         one.score.effect.label for one in left.found
     ]
@@ -57,30 +57,30 @@ def kept(store: ColumnStore, held: ColumnStore | None) -> list[str]:
 
 
 def test_what_helps_in_training_and_in_the_test_stays() -> None:
-    store = store_of(range(3), 0.4, 0.4)
-    assert kept(store, store_of(range(3, 5), 0.4, 0.4)) == [DRAG, OFFSET]
-    assert kept(store, None) == [DRAG, OFFSET]
+    evidence = evidence_of(range(3), 0.4, 0.4)
+    assert kept(evidence, evidence_of(range(3, 5), 0.4, 0.4)) == [DRAG, OFFSET]
+    assert kept(evidence, None) == [DRAG, OFFSET]
 
 
 def test_what_does_not_help_in_the_test_recordings_goes() -> None:
     """The machine of the test recordings has no drag."""
-    assert kept(store_of(range(3), 0.4, 0.4), store_of(range(3, 5), 0.0, 0.4)) == [OFFSET]
+    assert kept(evidence_of(range(3), 0.4, 0.4), evidence_of(range(3, 5), 0.0, 0.4)) == [OFFSET]
 
 
 def test_what_another_effect_explains_as_well_goes() -> None:
-    store = store_of(range(3), 0.4, 0.0)
-    plain = fit_evidence(store, PLAIN)
+    evidence = evidence_of(range(3), 0.4, 0.0)
+    plain = fit_evidence(evidence, PLAIN)
     ripple, drag = (
         effects_of("torque_ripple@shoulder", PLAIN.robot)[0],
         effects_of(DRAG, PLAIN.robot)[0],
     )
-    ranking = rank(store, plain, 0, only=(ripple, drag))
+    ranking = rank(evidence, plain, 0, only=(ripple, drag))
     found = [Found(s, 0.0, ()) for s in sorted(ranking.scores, key=lambda s: s.drop)]
     model = PLAIN
     for one in found:
         model = model + one.score.effect
     left = without_superfluous(
-        store, None, fit_evidence(store, model, plain), found, lambda _: None
+        evidence, None, fit_evidence(evidence, model, plain), found, lambda _: None
     )
     assert [one.score.effect.label for one in left.found] == [DRAG]
     assert np.isclose(left.final.values[left.final.model.slices[DRAG]], 0.4, atol=0.05)

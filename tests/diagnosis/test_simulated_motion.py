@@ -10,7 +10,7 @@ import pytest
 from dynident.closed_loop import Controller, Experiment, Fourier, Sensors, TrueEffect
 from dynident.closed_loop import ExperimentRun as Motion
 from dynident.diagnosis import diagnose
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import fit_evidence, model_columns
 from dynident.evidence.simulated_motion import motion_of_loop
 from dynident.model import Model
@@ -66,14 +66,14 @@ def test_a_healthy_robot_is_accused_by_least_squares_and_not_by_simulated_instru
 
 def test_moved_torque_makes_plain_regression_instrumental(healthy: Dataset) -> None:
     loop = motion_of_loop(model(), healthy, CONTROLLER)
-    store = ColumnStore(model(), loop.runs)
-    store.prepare(store.model.effects)
-    fitted = fit_evidence(store, store.model)
+    evidence = Evidence(model(), loop.runs)
+    evidence.prepare(evidence.model.effects)
+    fitted = fit_evidence(evidence, evidence.model)
     # V' (y - W x), both whitened as the fit has it, over the norms of what is multiplied.
     V, e = [], []
-    for r, run in enumerate(store.runs):
+    for r, run in enumerate(evidence.runs):
         for j, noise in enumerate(fitted.noise):
-            measured, simulated = model_columns(store, store.model, r, j, fitted.values)
+            measured, simulated = model_columns(evidence, evidence.model, r, j, fitted.values)
             residual = measured @ np.append(-fitted.values, 1.0)
             speed = run.replicates[-1].v[:, j]
             e.append(noise.whiten(residual[:, None], speed)[run.index[0], 0])

@@ -22,7 +22,7 @@ from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.search.scoring import Score
 from dynident.diagnosis.verdict import noise_source, notes_on, verdict_of
 from dynident.effects import Effect
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import HeldOut, on_blocks, on_recordings, with_noise_of
 from dynident.evidence.maps import residual_maps
@@ -61,7 +61,7 @@ class Search:
     notes : on its instruments, where they come from a simulation or could not.
     """
 
-    store: ColumnStore
+    evidence: Evidence
     start: EvidenceFit
     final: EvidenceFit
     found: tuple[Found, ...]
@@ -70,9 +70,7 @@ class Search:
     notes: tuple[str, ...] = ()
 
 
-def told(
-    search: Search, train: Dataset, test: Dataset | None, held: ColumnStore | None
-) -> Diagnosis:
+def told(search: Search, train: Dataset, test: Dataset | None, held: Evidence | None) -> Diagnosis:
     """Put what a search found into words and numbers.
 
     Parameters
@@ -81,20 +79,20 @@ def told(
     train, test : the recordings, for their provenance.
     held : evidence of the test recordings; None where blocks of time are held out.
     """
-    store, start, fitted = search.store, search.start, search.final
+    evidence, start, fitted = search.evidence, search.start, search.final
     found, rounds, given = search.found, search.rounds, search.start.model
     by_label = {e.label: e for e in fitted.model.effects}
     stages = [start]
     for one in found[:-1]:
         wider = stages[-1].model + by_label[one.score.effect.label]
-        stages.append(fit_evidence(store, wider.with_shapes(fitted.model.effects), stages[-1]))
+        stages.append(fit_evidence(evidence, wider.with_shapes(fitted.model.effects), stages[-1]))
     if found:
         # With its dry friction blunted where that was called for later.
         stages.append(fitted)
     judged = [
-        with_noise_of(on_recordings(held, s), on_recordings(store, s))
+        with_noise_of(on_recordings(held, s), on_recordings(evidence, s))
         if held
-        else on_blocks(store, s)
+        else on_blocks(evidence, s)
         for s in stages
     ]
     rounded = test if test is not None and held is not None else train
@@ -113,24 +111,24 @@ def told(
     )
     contacts = tuple(one.step(given) for one in search.disturbances)
     first_error = contacts[0].test_error_before if contacts else before.error
-    steps = (*contacts, *_advised(steps, Adviser.of(store, stages[-1])))
-    source = noise_source(store, held)
+    steps = (*contacts, *_advised(steps, Adviser.of(evidence, stages[-1])))
+    source = noise_source(evidence, held)
     verdict = verdict_of(before, after, steps, rounds[-1])
-    pushed = contact_candidates(given, store, search.disturbances)
+    pushed = contact_candidates(given, evidence, search.disturbances)
     return Diagnosis(
         verdict,
         source,
         _joint_results(given, before, after),
         TestError(first_error, after.error, after.floor),
         steps,
-        _revealed(_merged(_candidates(rounds[0], before.error, start), pushed), store, start),
+        _revealed(_merged(_candidates(rounds[0], before.error, start), pushed), evidence, start),
         _candidates(rounds[-1], after.error, stages[-1]),
-        _estimate(store, start, train),
-        _estimate(store, stages[-1], train),
+        _estimate(evidence, start, train),
+        _estimate(evidence, stages[-1], train),
         residual_maps(given, before, after),
         _traces(given, before, after),
         (
-            *notes_on(store, held, stages[-1], source),
+            *notes_on(evidence, held, stages[-1], source),
             *rounding_notes(after, given.robot.names),
             *search.notes,
         ),
@@ -149,12 +147,12 @@ def _advised(steps: tuple[Step, ...], adviser: Adviser) -> tuple[Step, ...]:
 
 
 def _revealed(
-    candidates: tuple[Candidate, ...], store: ColumnStore, fitted: EvidenceFit
+    candidates: tuple[Candidate, ...], evidence: Evidence, fitted: EvidenceFit
 ) -> tuple[Candidate, ...]:
     """Say which experiment would show what is absorbed."""
     if not any(one.status == "absorbed" for one in candidates):
         return candidates
-    adviser = Adviser.of(store, fitted)
+    adviser = Adviser.of(evidence, fitted)
     return tuple(
         replace(one, remark=adviser.revealing(one.effect)) if one.status == "absorbed" else one
         for one in candidates
@@ -211,9 +209,9 @@ def _candidates(ranking: Ranking, error: float, fitted: EvidenceFit) -> tuple[Ca
     return tuple(found)
 
 
-def _estimate(store: ColumnStore, fitted: EvidenceFit, train: Dataset) -> Estimate:
+def _estimate(evidence: Evidence, fitted: EvidenceFit, train: Dataset) -> Estimate:
     """The fit of the diagnosis as an `Estimate`."""
-    judged = on_recordings(store, fitted)
+    judged = on_recordings(evidence, fitted)
     model = fitted.model
     # Rows that span what the data tell: directions in which the columns are noise are not told.
     told = fitted.solution.basis.T @ fitted.moments.sums()[1][:-1, :-1]
@@ -231,18 +229,18 @@ def _estimate(store: ColumnStore, fitted: EvidenceFit, train: Dataset) -> Estima
         judged.error,
         float(np.linalg.cond(told[:, kept])),
         fitted.rows,
-        _method(store),
+        _method(evidence),
         "solved",
         (),
         sources_of(train),
     )
 
 
-def _method(store: ColumnStore) -> str:
+def _method(evidence: Evidence) -> str:
     """How the model was fitted, in words."""
-    if store.runs[0].columns_from == "simulation":
+    if evidence.runs[0].columns_from == "simulation":
         return "instrumental variables from the simulated closed loop"
-    return _METHODS[noise_source(store, None)]
+    return _METHODS[noise_source(evidence, None)]
 
 
 def _traces(given: Model, before: HeldOut, after: HeldOut) -> tuple[Trace, ...]:

@@ -20,7 +20,7 @@ from dynident.diagnosis.search.ranking import Ranking, candidates, rank
 from dynident.diagnosis.search.selection import alternatives_only, breaks_its_promise, choose
 from dynident.diagnosis.search.shaped_fit import refitted, shaped
 from dynident.diagnosis.verdict import RESOLUTION
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.runs import gather
@@ -70,32 +70,32 @@ def diagnose(
     test = others[0] if others else None
     progress("reading the motion")
     loop = motion_of_loop(given, train, controller, progress)
-    store = ColumnStore(given, loop.runs or gather(train))
-    held = ColumnStore(given, gather(test)) if test is not None and len(test) else None
+    evidence = Evidence(given, loop.runs or gather(train))
+    held = Evidence(given, gather(test)) if test is not None and len(test) else None
     progress("evaluating every effect")
     everything = [v for effect in candidates(given) for v in effect.variants(given.robot)]
-    store.prepare([*given.effects, *everything])
-    start = with_friction_width(store, shaped(store, given))
+    evidence.prepare([*given.effects, *everything])
+    start = with_friction_width(evidence, shaped(evidence, given))
     progress("looking for contacts")
     if held is not None:
         held.prepare(start.model.effects)
-    contacts = Contacts.leave_out(store, held, start)
+    contacts = Contacts.leave_out(evidence, held, start)
     if contacts.pulses:
-        start = with_friction_width(store, shaped(store, given))
-    grown = _Growth(store, loop, train, start, most, progress).run()
+        start = with_friction_width(evidence, shaped(evidence, given))
+    grown = _Growth(evidence, loop, train, start, most, progress).run()
     fitted, found, rounds = grown.fitted, grown.found, grown.rounds
     if held is not None:
         decide_payload(held, fitted)
-    kept = without_superfluous(store, held, fitted, found, progress)
+    kept = without_superfluous(evidence, held, fitted, found, progress)
     if len(kept.found) < len(found):
-        rounds.append(rank(store, kept.final, len(kept.found), progress))
+        rounds.append(rank(evidence, kept.final, len(kept.found), progress))
     sure = contacts.confirmed(kept.final)
     if sure.pulses != contacts.pulses:
-        start = fit_evidence(store, start.model, start)
-        kept = replace(kept, final=fit_evidence(store, kept.final.model, kept.final))
+        start = fit_evidence(evidence, start.model, start)
+        kept = replace(kept, final=fit_evidence(evidence, kept.final.model, kept.final))
     disturbances = sure.told(start)
     search = Search(
-        store, start, kept.final, tuple(kept.found), tuple(rounds), disturbances, loop.notes
+        evidence, start, kept.final, tuple(kept.found), tuple(rounds), disturbances, loop.notes
     )
     return told(search, train, test, held)
 
@@ -117,7 +117,7 @@ class _Grown:
 class _Growth:
     """What the addition of effects works on; see `diagnose`."""
 
-    store: ColumnStore
+    evidence: Evidence
     loop: SimulatedMotion
     train: Dataset
     start: EvidenceFit
@@ -126,60 +126,60 @@ class _Growth:
 
     def run(self) -> _Grown:
         """Grow a model from the first one, and again if a second look finds what was missed."""
-        before = self.store.runs
-        nothing = _Grown(self.start, [], [rank(self.store, self.start, 0, self.progress)])
+        before = self.evidence.runs
+        nothing = _Grown(self.start, [], [rank(self.evidence, self.start, 0, self.progress)])
         grown = self.grown(nothing)
         if not self.most or self.loop.runs:
             return grown  # simulated motions are renewed as the model grows: there is no way back
-        again = global_search(self.store, nothing.asked, grown.asked, self.progress)
+        again = global_search(self.evidence, nothing.asked, grown.asked, self.progress)
         if again is None:
             return grown
-        runs = self.store.runs
+        runs = self.evidence.runs
         base = grown
         if again.fitted is not grown.fitted:
             # Who carries a payload, and what was kept for a first look, belong to the other branch.
-            base, self.store.runs = nothing, before
-            self.store.renew_screening()
+            base, self.evidence.runs = nothing, before
+            self.evidence.renew_screening()
         other = self.grown(replace(base, rounds=[*base.rounds[:-1], again.ranking]))
         if other.fitted.misfit(self.start) < grown.fitted.misfit(self.start):
             return other
-        self.store.runs = runs
+        self.evidence.runs = runs
         return grown
 
     def grown(self, one: _Grown) -> _Grown:
         """Add the best effect and ask again, until nothing is material any more."""
-        store, fitted = self.store, one.fitted
+        evidence, fitted = self.evidence, one.fitted
         found, rounds = list(one.found), list(one.rounds)
-        while len(found) < self.most and not _resolved(store, fitted, self.train):
-            chosen = choose(store, fitted, rounds[-1])
+        while len(found) < self.most and not _resolved(evidence, fitted, self.train):
+            chosen = choose(evidence, fitted, rounds[-1])
             if chosen is None:
                 break
             self.progress(f"adding {chosen.score.effect.label}")
-            carry(store, chosen.score)
+            carry(evidence, chosen.score)
             wider = with_friction_width(
-                store, refitted(store, fitted.model + chosen.score.effect, fitted)
+                evidence, refitted(evidence, fitted.model + chosen.score.effect, fitted)
             )
             if breaks_its_promise(fitted, wider, chosen.score):
                 break
             found.append(chosen)
             fitted = wider
-            if _has_changed(store, self.start, fitted):
-                store.renew_screening()
-            if self.loop.renew(store, fitted):
-                fitted = with_friction_width(store, refitted(store, fitted.model, fitted))
-            rounds.append(rank(store, fitted, len(found), self.progress))
+            if _has_changed(evidence, self.start, fitted):
+                evidence.renew_screening()
+            if self.loop.renew(evidence, fitted):
+                fitted = with_friction_width(evidence, refitted(evidence, fitted.model, fitted))
+            rounds.append(rank(evidence, fitted, len(found), self.progress))
             found[-1] = alternatives_only(chosen, rounds[-1])
         return _Grown(fitted, found, rounds)
 
 
-def _has_changed(store: ColumnStore, start: EvidenceFit, fitted: EvidenceFit) -> bool:
+def _has_changed(evidence: Evidence, start: EvidenceFit, fitted: EvidenceFit) -> bool:
     """Whether effects have changed the predicted torque enough to look at candidates again."""
-    before, now = (on_recordings(store, one) for one in (start, fitted))
+    before, now = (on_recordings(evidence, one) for one in (start, fitted))
     return now.error < before.error - _ANOTHER
 
 
-def _resolved(store: ColumnStore, fitted: EvidenceFit, train: Dataset) -> bool:
+def _resolved(evidence: Evidence, fitted: EvidenceFit, train: Dataset) -> bool:
     """Whether what is left is what the processing cannot resolve, or what encoders' steps leave."""
-    judged = on_recordings(store, fitted)
+    judged = on_recordings(evidence, fitted)
     small = np.all(judged.residual_rms <= RESOLUTION * judged.torque_rms)
     return bool(small) or nothing_but_rounding(judged, fitted, train)

@@ -7,7 +7,7 @@ import numpy as np
 from dynident.diagnosis.nuisances.friction_width import friction_width_notes
 from dynident.diagnosis.result import Verdict
 from dynident.diagnosis.search.ranking import Ranking
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut
 from dynident.recording.dataset import NoiseSource
@@ -49,15 +49,15 @@ def within_noise(judged: HeldOut) -> bool:
     return not np.any(matters & (systematic > WITHIN_NOISE * judged.noise_std))
 
 
-def noise_source(store: ColumnStore, held: ColumnStore | None) -> NoiseSource:
+def noise_source(evidence: Evidence, held: Evidence | None) -> NoiseSource:
     """Where the noise floor that is reported comes from."""
-    kinds = {run.kind for run in (*store.runs, *(held.runs if held else ()))}
+    kinds = {run.kind for run in (*evidence.runs, *(held.runs if held else ()))}
     if "repeated" in kinds:
         return "replicates"
     return "given" if "noise_augmented" in kinds else "unknown"
 
 
-def notes_on(store, held, fitted: EvidenceFit, source: NoiseSource) -> tuple[str, ...]:
+def notes_on(evidence, held, fitted: EvidenceFit, source: NoiseSource) -> tuple[str, ...]:
     """Return the caveats that belong to a verdict, in plain words."""
     notes = []
     if held is None:
@@ -66,13 +66,13 @@ def notes_on(store, held, fitted: EvidenceFit, source: NoiseSource) -> tuple[str
         notes.append("The test recordings do not repeat: the noise is that of the training ones.")
     if source == "given":
         notes.append("The noise is the study's word, not measured: record a repeated motion.")
-    simulated = store.runs[0].columns_from == "simulation"
-    if noise_source(store, None) == "unknown" and simulated:
+    simulated = evidence.runs[0].columns_from == "simulation"
+    if noise_source(evidence, None) == "unknown" and simulated:
         notes.append(
             "Nothing repeats in the training recordings and no noise is stated: the instruments "
             "are simulated, and there is no noise floor."
         )
-    elif noise_source(store, None) == "unknown":
+    elif noise_source(evidence, None) == "unknown":
         floor = ", and no noise floor" if source == "unknown" else ""
         notes.append(
             "Nothing repeats in the training recordings and no noise is stated: plain least "
@@ -80,7 +80,7 @@ def notes_on(store, held, fitted: EvidenceFit, source: NoiseSource) -> tuple[str
             "repeated motion."
         )
     if any("payload" in effect.needs for effect in fitted.model.effects):
-        payload_recordings = [r.recording.name for r in store.runs if r.recording.payload]
+        payload_recordings = [r.recording.name for r in evidence.runs if r.recording.payload]
         payload_recordings += [
             r.recording.name for r in (held.runs if held else ()) if r.recording.payload
         ]

@@ -8,7 +8,7 @@ from typing import Any
 
 from dynident.closed_loop import Controller
 from dynident.errors import FitError
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.held_out import HeldOut, on_blocks, on_recordings
 from dynident.evidence.maps import residual_maps
@@ -143,9 +143,9 @@ def compare(
     runs = gather(dataset)
     results = []
     for estimate in named.values():
-        store = ColumnStore(estimate.model, runs)
-        store.prepare(estimate.model.effects)
-        results.append(on_recordings(store, estimate))
+        evidence = Evidence(estimate.model, runs)
+        evidence.prepare(estimate.model.effects)
+        results.append(on_recordings(evidence, estimate))
     return Comparison(
         tuple(named),
         tuple(e.model for e in named.values()),
@@ -178,13 +178,13 @@ def compare_models(
     for model in models.values():
         if shaped_effects(model):
             model = refine_shapes(model, train).model
-        store = ColumnStore(model, runs)
-        store.prepare(model.effects)
-        fitted = fit_evidence(store, model)
+        evidence = Evidence(model, runs)
+        evidence.prepare(model.effects)
+        fitted = fit_evidence(evidence, model)
         if held is None:
-            results.append(on_blocks(store, fitted))
+            results.append(on_blocks(evidence, fitted))
         else:
-            judge = ColumnStore(model, held)
+            judge = Evidence(model, held)
             judge.prepare(model.effects)
             results.append(on_recordings(judge, fitted))
         compared.append(model)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynident.evidence.column_store import ColumnStore, joints_of
+from dynident.evidence.columns import Evidence, joints_of
 from dynident.evidence.noise_model import (
     NoiseModel,
     differences,
@@ -78,8 +78,8 @@ class EvidenceFit:
         return float(combination @ self.moments.sums()[1] @ combination)
 
 
-def fit_evidence(store: ColumnStore, model: Model, near: EvidenceFit | None = None) -> EvidenceFit:
-    """Fit a model to the runs of a store.
+def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = None) -> EvidenceFit:
+    """Fit a model to the runs of the evidence.
 
     Parameters
     ----------
@@ -94,40 +94,42 @@ def fit_evidence(store: ColumnStore, model: Model, near: EvidenceFit | None = No
     at = _held(model, _beginning(model, near))
     torque_std = [
         float(
-            np.sqrt(np.mean(np.concatenate([r.replicates[0].tau[:, j] for r in store.runs]) ** 2))
+            np.sqrt(
+                np.mean(np.concatenate([r.replicates[0].tau[:, j] for r in evidence.runs]) ** 2)
+            )
         )
         for j in range(n)
     ]
     noise = tuple(flat_noise(std or 1.0) for std in torque_std) if near is None else near.noise
-    known = any(run.kind != "single" for run in store.runs)
+    known = any(run.kind != "single" for run in evidence.runs)
     columns, values, fixed_point = [], at, FixedPoint()
     for round in range(_PRESENT_ROUNDS if model.needs_values else _ROUNDS):
         if not columns or model.needs_values:
             model = model.at(at)
             columns = [
-                [model_columns(store, model, r, j, at) for j in range(n)]
-                for r in range(len(store.runs))
+                [model_columns(evidence, model, r, j, at) for j in range(n)]
+                for r in range(len(evidence.runs))
             ]
-        values, _ = _solve(_moments(store, model, _whiten(store, columns, noise, values)))
+        values, _ = _solve(_moments(evidence, model, _whiten(evidence, columns, noise, values)))
         if round == 0 and near is None:
             # Along a robot without bodies their columns are rounding errors, and any value fits.
             values = _waiting(model, at, values)
-        noise = tuple(_Left.of(store, columns, values, j).noise for j in range(n))
+        noise = tuple(_Left.of(evidence, columns, values, j).noise for j in range(n))
         change = float(np.linalg.norm(_held(model, values) - at))
         if round >= _ROUNDS - (near is not None) and change <= _PRESENT_TOLERANCE * np.linalg.norm(
             values
         ):
             break
         at = _held(model, fixed_point.following(model, at, values))
-    white = _whiten(store, columns, noise, values)
-    summed = _moments(store, model, white)
+    white = _whiten(evidence, columns, noise, values)
+    summed = _moments(evidence, model, white)
     values, solution = _solve(summed)
     rows = sum(
         part.shape[1] * (1 if run.kind == "noise_augmented" else part.shape[0])
-        for run, joints in zip(store.runs, white, strict=True)
+        for run, joints in zip(evidence.runs, white, strict=True)
         for part in joints
     )
-    left = [_Left.of(store, columns, values, j) for j in range(n)]
+    left = [_Left.of(evidence, columns, values, j) for j in range(n)]
     return EvidenceFit(
         model.at(_held(model, values)),
         values,
@@ -138,7 +140,7 @@ def fit_evidence(store: ColumnStore, model: Model, near: EvidenceFit | None = No
         white,
         summed,
         rows,
-        _signal(store, white, values),
+        _signal(evidence, white, values),
         np.array([one.square for one in left]),
         np.array([one.variance or s**2 or 1.0 for one, s in zip(left, torque_std, strict=True)]),
     )
@@ -176,13 +178,13 @@ def _waiting(model: Model, at: np.ndarray, found: np.ndarray) -> np.ndarray:
 
 
 def model_columns(
-    store: ColumnStore, model: Model, run: int, joint: int, values: np.ndarray | None
+    evidence: Evidence, model: Model, run: int, joint: int, values: np.ndarray | None
 ) -> Signals:
     """Columns of a model and the torque at one joint, (T, p + 1) for each version of a run."""
-    recording = store.runs[run].recording
-    parts = [[rigid[:, joint] for rigid in store.rigid(run)]]
+    recording = evidence.runs[run].recording
+    parts = [[rigid[:, joint] for rigid in evidence.rigid(run)]]
     for effect in model.effects:
-        columns, joints = store.of(effect, run, model, values), joints_of(effect, model)
+        columns, joints = evidence.of(effect, run, model, values), joints_of(effect, model)
         if joint in joints:
             at = [c[:, joints.index(joint)] for c in columns]
         else:
@@ -190,37 +192,37 @@ def model_columns(
         if "payload" in effect.needs:
             at = [c * float(bool(recording.payload)) for c in at]
         parts.append(at)
-    torque = [replicate.tau[:, [joint]] for replicate in store.runs[run].replicates]
+    torque = [replicate.tau[:, [joint]] for replicate in evidence.runs[run].replicates]
     return [np.hstack(pieces) for pieces in zip(*parts, torque, strict=True)]
 
 
-def residuals(store: ColumnStore, model: Model, values: np.ndarray) -> list[np.ndarray]:
+def residuals(evidence: Evidence, model: Model, values: np.ndarray) -> list[np.ndarray]:
     """Torque minus prediction of each run, folded, (P, S, n) in N m or N."""
     combination = np.append(-values, 1.0)
     found = []
-    for r, run in enumerate(store.runs):
+    for r, run in enumerate(evidence.runs):
         joints = [
-            run.fold([c @ combination for c in model_columns(store, model, r, j, values)])
+            run.fold([c @ combination for c in model_columns(evidence, model, r, j, values)])
             for j in range(model.robot.n)
         ]
         found.append(np.stack(joints, axis=-1))
     return found
 
 
-def _whiten(store: ColumnStore, columns, noise, values) -> tuple[tuple[np.ndarray, ...], ...]:
+def _whiten(evidence: Evidence, columns, noise, values) -> tuple[tuple[np.ndarray, ...], ...]:
     return tuple(
         tuple(run.whitened(run.moved(c, values), j, noise[j]) for j, c in enumerate(joints))
-        for run, joints in zip(store.runs, columns, strict=True)
+        for run, joints in zip(evidence.runs, columns, strict=True)
     )
 
 
-def _moments(store: ColumnStore, model: Model, white) -> Moments:
+def _moments(evidence: Evidence, model: Model, white) -> Moments:
     found, time_varying = None, time_varying_mask(model)
-    for r, (run, joints) in enumerate(zip(store.runs, white, strict=True)):
+    for r, (run, joints) in enumerate(zip(evidence.runs, white, strict=True)):
         parts = [run.moments(w, w) for w in joints]
         here = Moments(np.sum([p.signal for p in parts], 0), np.sum([p.total for p in parts], 0))
         if run.kind == "repeated" and time_varying.any():
-            own = [time_varying_columns(store, model, r, w) for w in joints]
+            own = [time_varying_columns(evidence, model, r, w) for w in joints]
             other = np.sum([time_varying_moments(one, one, run.edges) for one in own], axis=0)
             here = here.where(time_varying[:, None] | time_varying[None, :], other)
         found = here if found is None else found + here
@@ -228,24 +230,24 @@ def _moments(store: ColumnStore, model: Model, white) -> Moments:
     return found
 
 
-def _signal(store: ColumnStore, white, values: np.ndarray) -> float:
+def _signal(evidence: Evidence, white, values: np.ndarray) -> float:
     """Squared whitened residual, of what the versions have in common."""
     combination = np.append(-values, 1.0)[:, None]
     return sum(
         float(run.moments(w @ combination, w @ combination).signal.sum())
-        for run, joints in zip(store.runs, white, strict=True)
+        for run, joints in zip(evidence.runs, white, strict=True)
         for w in joints
     )
 
 
 def time_varying_columns(
-    store: ColumnStore, model: Model, run: int, white: np.ndarray
+    evidence: Evidence, model: Model, run: int, white: np.ndarray
 ) -> TimeVarying:
     """Whitened columns of a model and the torque, (P, S, p + 1), with what time does to them."""
     time_factor = np.ones_like(white)
     for effect in model.effects:
         if effect.time_varying:
-            time_factor[:, :, model.slices[effect.label]] = store.time_factor(effect, run)[
+            time_factor[:, :, model.slices[effect.label]] = evidence.time_factor(effect, run)[
                 :, :, None
             ]
     return TimeVarying(white, time_factor, np.arange(white.shape[2]) == model.size)
@@ -282,10 +284,10 @@ class _Left:
     systematic: list[float]
 
     @classmethod
-    def of(cls, store: ColumnStore, columns, values: np.ndarray, joint: int) -> _Left:
+    def of(cls, evidence: Evidence, columns, values: np.ndarray, joint: int) -> _Left:
         combination = np.append(-values, 1.0)
         left = cls([], [], [], [])
-        for run, joints in zip(store.runs, columns, strict=True):
+        for run, joints in zip(evidence.runs, columns, strict=True):
             residual = run.fold([c @ combination for c in joints[joint]])
             if run.kind == "single":
                 left.plain.append(residual[0])

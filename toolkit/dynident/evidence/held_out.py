@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, model_columns
 from dynident.evidence.noise_model import differences, inflation, systematic_square
 from dynident.fitting.estimate import Estimate
@@ -86,29 +86,29 @@ class HeldOut:
         return float(np.linalg.norm(self.noise_std) / np.linalg.norm(self.torque_rms))
 
 
-def on_recordings(store: ColumnStore, fitted: EvidenceFit | Estimate) -> HeldOut:
-    """Judge a fitted model on the recordings of a store, which it has not seen."""
+def on_recordings(evidence: Evidence, fitted: EvidenceFit | Estimate) -> HeldOut:
+    """Judge a fitted model on the recordings of the evidence, which it has not seen."""
     combination = np.append(-fitted.values, 1.0)
     n = fitted.model.robot.n
     runs, folded, doubt = [], [], []
-    for r, run in enumerate(store.runs):
+    for r, run in enumerate(evidence.runs):
         first = run.replicates[0]
-        joints = [model_columns(store, fitted.model, r, j, fitted.values) for j in range(n)]
+        joints = [model_columns(evidence, fitted.model, r, j, fitted.values) for j in range(n)]
         residual = np.stack([c[0] @ combination for c in joints], axis=-1)
         kept, predicted = run.kept, first.tau - residual
         signals = (first.t, first.q, first.v, first.a, first.tau, predicted)
         runs.append(HeldOutRun(run.recording.name, *(x[kept] for x in signals)))
         folded.append(np.stack([run.fold([v @ combination for v in c]) for c in joints], axis=-1))
         doubt.append(np.array([_doubt(c[0], fitted) for c in joints]))
-    return _judged(store, tuple(runs), folded, doubt)
+    return _judged(evidence, tuple(runs), folded, doubt)
 
 
-def on_blocks(store: ColumnStore, fitted: EvidenceFit) -> HeldOut:
+def on_blocks(evidence: Evidence, fitted: EvidenceFit) -> HeldOut:
     """Judge a model on blocks of time, each predicted by the fit to all others."""
     n = fitted.model.robot.n
     runs, folded, doubt, block = [], [], [], 0
-    for r, run in enumerate(store.runs):
-        joints = [model_columns(store, fitted.model, r, j, fitted.values) for j in range(n)]
+    for r, run in enumerate(evidence.runs):
+        joints = [model_columns(evidence, fitted.model, r, j, fitted.values) for j in range(n)]
         columns = np.stack([run.fold(c) for c in joints], axis=2)  # (P, S, n, p + 1)
         residual = np.empty(columns.shape[:3])
         for start, stop in zip(run.edges[:-1], run.edges[1:], strict=True):
@@ -135,7 +135,7 @@ def on_blocks(store: ColumnStore, fitted: EvidenceFit) -> HeldOut:
         )
         folded.append(residual)
         doubt.append(np.array([_doubt(c[0], fitted) for c in joints]))
-    return _judged(store, tuple(runs), folded, doubt)
+    return _judged(evidence, tuple(runs), folded, doubt)
 
 
 def with_noise_of(judged: HeldOut, noise: HeldOut) -> HeldOut:
@@ -189,7 +189,7 @@ def _variance(residual: np.ndarray, kind: Kind) -> float:
 
 
 def _judged(
-    store: ColumnStore,
+    evidence: Evidence,
     runs: tuple[HeldOutRun, ...],
     folded: list[np.ndarray],
     doubt: list[np.ndarray],
@@ -204,7 +204,7 @@ def _judged(
     """
     n = runs[0].measured.shape[1]
     pairs: list[tuple[Kind, np.ndarray]] = [
-        (run.kind, e) for run, e in zip(store.runs, folded, strict=True) if run.kind != "single"
+        (run.kind, e) for run, e in zip(evidence.runs, folded, strict=True) if run.kind != "single"
     ]
     if not pairs:
         return HeldOut(runs, None, None, None, np.ones(n))

@@ -16,7 +16,7 @@ import numpy as np
 from dynident.closed_loop import Controller
 from dynident.effects import Effect
 from dynident.errors import DynidentError
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.runs import Run, gather, resimulated
 from dynident.fitting.history import Ending
@@ -48,19 +48,19 @@ class SimulatedMotion:
     measured: Dataset | None = None
     left_out: tuple[Effect, ...] = ()
 
-    def renew(self, store: ColumnStore, fitted: EvidenceFit) -> bool:
-        """Simulate another model and give its motion to a store.
+    def renew(self, evidence: Evidence, fitted: EvidenceFit) -> bool:
+        """Simulate another model and give its motion to the evidence.
 
         What cannot be simulated is left out, with a note; where nothing can, the motion stays.
 
         Returns
         -------
-        Whether the store has new motions.
+        Whether the evidence has new motions.
         """
         if self.controller is None or self.measured is None:
             return False
         model, values = fitted.model, fitted.values
-        payload_recordings = [run.recording.payload for run in store.runs]
+        payload_recordings = [run.recording.payload for run in evidence.runs]
         recordings = (
             one.replace(payload=carries)
             for one, carries in zip(self.measured.recordings, payload_recordings, strict=True)
@@ -71,7 +71,7 @@ class SimulatedMotion:
             part, own = _without(model, values, effects)
             try:
                 simulated = _simulated(self.controller, part, own, measured)
-                runs = resimulated(store.runs, simulated)
+                runs = resimulated(evidence.runs, simulated)
             except DynidentError as error:
                 problem = problem or str(error)
                 continue
@@ -80,7 +80,7 @@ class SimulatedMotion:
                 self._note(f"Instruments: simulated without {names} ({problem}).")
             self.left_out = effects
             self.runs = runs
-            store.renew(runs)
+            evidence.renew(runs)
             return True
         self._note(f"Instruments: the motion of an earlier model, as {problem}.")
         return False

@@ -9,7 +9,7 @@ import numpy as np
 
 from dynident.closed_loop.trajectories import UNLIMITED, Fourier
 from dynident.effects import Block, Effect
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.model import Model
 
 _EVERY = 5  # samples: rows that are compared
@@ -47,9 +47,9 @@ class Recorded:
         return max(_SESSION, 3.0 * self.span)
 
     @classmethod
-    def of(cls, store: ColumnStore) -> Recorded:
-        """Return the ranges of the recordings in a store."""
-        runs = [run.replicates[0] for run in store.runs]
+    def of(cls, evidence: Evidence) -> Recorded:
+        """Return the ranges of the recordings in the evidence."""
+        runs = [run.replicates[0] for run in evidence.runs]
         starts = [run.recording.start for run in runs]
         ends = [run.recording.start + run.recording.duration for run in runs]
 

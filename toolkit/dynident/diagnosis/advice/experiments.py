@@ -16,7 +16,7 @@ from dynident.diagnosis.advice.candidate_experiments import (
 from dynident.diagnosis.search.scoring import NOT_IDENTIFIABLE
 from dynident.effects import Effect
 from dynident.errors import DynidentError
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.model import Model
 
@@ -39,9 +39,9 @@ class Adviser:
     trials: CandidateExperiments
 
     @classmethod
-    def of(cls, store: ColumnStore, fitted: EvidenceFit) -> Adviser:
-        """Return the adviser for a model as it fits the recordings of a store."""
-        return cls(CandidateExperiments(fitted.model, fitted.values, Recorded.of(store)))
+    def of(cls, evidence: Evidence, fitted: EvidenceFit) -> Adviser:
+        """Return the adviser for a model as it fits the recordings of the evidence."""
+        return cls(CandidateExperiments(fitted.model, fitted.values, Recorded.of(evidence)))
 
     def revealing(self, effect: Effect) -> str:
         """Say which experiment would show an effect that the recordings do not show.

@@ -9,7 +9,7 @@ from dynident.diagnosis.nuisances.pulse_search import DisturbancePulse, find_con
 from dynident.diagnosis.result import Candidate, Step
 from dynident.diagnosis.verdict import RESOLUTION
 from dynident.effects import Effect, catalogue
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.runs import Run
@@ -44,35 +44,33 @@ class Contacts:
 
     Attributes
     ----------
-    store, held : training and test recordings; `held` is None where there are none.
+    evidence, held : training and test recordings; `held` is None where there are none.
     whole, whole_held : their runs with nothing left out.
     bumps, bumps_held : what was found in them.
     """
 
-    store: ColumnStore
-    held: ColumnStore | None
+    evidence: Evidence
+    held: Evidence | None
     whole: tuple[Run, ...]
     whole_held: tuple[Run, ...]
     pulses: tuple[DisturbancePulse, ...]
     pulses_held: tuple[DisturbancePulse, ...]
 
     @classmethod
-    def leave_out(
-        cls, store: ColumnStore, held: ColumnStore | None, fitted: EvidenceFit
-    ) -> Contacts:
-        """Find contacts in the recordings and leave their instants out of both stores.
+    def leave_out(cls, evidence: Evidence, held: Evidence | None, fitted: EvidenceFit) -> Contacts:
+        """Find contacts in the recordings and leave their instants out of both.
 
         Parameters
         ----------
-        store, held : their runs are replaced.
+        evidence, held : their runs are replaced.
         present : the model as it fits the training recordings.
         """
-        whole, whole_held = store.runs, held.runs if held is not None else ()
-        pulses = _resolved(store, fitted, find_contacts(store, fitted))
+        whole, whole_held = evidence.runs, held.runs if held is not None else ()
+        pulses = _resolved(evidence, fitted, find_contacts(evidence, fitted))
         pulses_held = (
             _resolved(held, fitted, find_contacts(held, fitted)) if held is not None else ()
         )
-        found = cls(store, held, whole, whole_held, pulses, pulses_held)
+        found = cls(evidence, held, whole, whole_held, pulses, pulses_held)
         found._leave(pulses, pulses_held)
         return found
 
@@ -85,7 +83,7 @@ class Contacts:
         if not (self.pulses or self.pulses_held):
             return self
         self._leave((), ())
-        again = find_contacts(self.store, fitted) if self.pulses else ()
+        again = find_contacts(self.evidence, fitted) if self.pulses else ()
         again_held = ()
         if self.held is not None and self.pulses_held:
             again_held = find_contacts(self.held, fitted)
@@ -95,7 +93,7 @@ class Contacts:
 
     def told(self, fitted: EvidenceFit) -> tuple[Disturbance, ...]:
         """One disturbance a joint, the clearest, with the error before and after it is left out."""
-        judged = self.held or self.store
+        judged = self.held or self.evidence
         clearest: dict[str, DisturbancePulse] = {}
         for pulse in sorted((*self.pulses, *self.pulses_held), key=lambda one: one.p_value):
             clearest.setdefault(pulse.joint, pulse)
@@ -114,7 +112,7 @@ class Contacts:
     def _leave(
         self, pulses: Sequence[DisturbancePulse], pulses_held: Sequence[DisturbancePulse]
     ) -> None:
-        self.store.runs = _masked(self.store.runs, self.whole, pulses)
+        self.evidence.runs = _masked(self.evidence.runs, self.whole, pulses)
         if self.held is not None:
             self.held.runs = _masked(self.held.runs, self.whole_held, pulses_held)
 
@@ -131,12 +129,12 @@ def _masked(
 
 
 def _resolved(
-    store: ColumnStore, fitted: EvidenceFit, pulses: Sequence[DisturbancePulse]
+    evidence: Evidence, fitted: EvidenceFit, pulses: Sequence[DisturbancePulse]
 ) -> tuple[DisturbancePulse, ...]:
     """Bumps at joints whose residual is more than what differentiation and filters leave."""
     if not pulses:
         return ()
-    judged = on_recordings(store, fitted)
+    judged = on_recordings(evidence, fitted)
     names = fitted.model.robot.names
     matters = judged.residual_rms > RESOLUTION * judged.torque_rms
     return tuple(pulse for pulse in pulses if matters[names.index(pulse.joint)])
@@ -158,10 +156,10 @@ def _common(
 
 
 def contact_candidates(
-    model: Model, store: ColumnStore, found: tuple[Disturbance, ...]
+    model: Model, evidence: Evidence, found: tuple[Disturbance, ...]
 ) -> tuple[Candidate, ...]:
     """Return what is to be said of contacts at every joint."""
-    repeats = any(run.kind == "repeated" for run in store.runs)
+    repeats = any(run.kind == "repeated" for run in evidence.runs)
     by_joint = {one.pulse.joint: one for one in found}
     candidates = []
     for effect in catalogue()["contact"].candidates(model.robot):

@@ -14,7 +14,7 @@ import numpy as np
 
 from dynident.diagnosis.search.ranking import rank
 from dynident.effects import Block, JointEffect, Parameter, ShapeParameter
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 
 _LEAST_SHARE = 0.05  # of a joint's dry friction, to be told
@@ -49,7 +49,7 @@ class FrictionWidthColumn(JointEffect):
         return block.sign(v / self.shape[0]) - block.sign(v)
 
 
-def with_friction_width(store: ColumnStore, fitted: EvidenceFit) -> EvidenceFit:
+def with_friction_width(evidence: Evidence, fitted: EvidenceFit) -> EvidenceFit:
     """Return the fit with dry friction blunted at the joints where the data call for it."""
     model = fitted.model
     dry = [e.joint for e in model.effects if e.name == "coulomb_friction"]
@@ -57,9 +57,9 @@ def with_friction_width(store: ColumnStore, fitted: EvidenceFit) -> EvidenceFit:
     wanted = tuple(effect for effect in wanted if effect not in model)
     if not wanted:
         return fitted
-    for score in rank(store, fitted, 0, only=wanted, least=0.0).material:
+    for score in rank(evidence, fitted, 0, only=wanted, least=0.0).material:
         model = model + score.effect
-    return fitted if model is fitted.model else fit_evidence(store, model)
+    return fitted if model is fitted.model else fit_evidence(evidence, model)
 
 
 def friction_width_notes(fitted: EvidenceFit) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 
 from dynident.diagnosis.nuisances.changes import REACH, Changes, Repeated, changes_of, scanned
 from dynident.diagnosis.nuisances.tails import QUARTER, chance_of, degrees_of_freedom
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, residuals
 from dynident.evidence.runs import Run
 
@@ -62,20 +62,20 @@ class DisturbancePulse:
     p_value: float
 
 
-def find_contacts(store: ColumnStore, fitted: EvidenceFit) -> tuple[DisturbancePulse, ...]:
+def find_contacts(evidence: Evidence, fitted: EvidenceFit) -> tuple[DisturbancePulse, ...]:
     """Find bursts in single repetitions; the most significant first.
 
     Parameters
     ----------
-    store, present : the runs, and the model whose residual is compared; a poor model will do.
+    evidence, present : the runs, and the model whose residual is compared; a poor model will do.
 
     Returns
     -------
     None at all where nothing repeats.
     """
     found = []
-    folded = residuals(store, fitted.model, fitted.values)
-    for r, (run, residual) in enumerate(zip(store.runs, folded, strict=True)):
+    folded = residuals(evidence, fitted.model, fitted.values)
+    for r, (run, residual) in enumerate(zip(evidence.runs, folded, strict=True)):
         if run.kind != "repeated" or len(run.index) < 2:
             continue
         first, recording = run.replicates[0], run.recording

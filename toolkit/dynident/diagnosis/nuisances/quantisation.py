@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from dynident.diagnosis.verdict import WITHIN_NOISE, within_noise
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, model_columns
 from dynident.evidence.held_out import HeldOut
 from dynident.evidence.runs import gather
@@ -84,12 +84,12 @@ def _predicted(
     fitted: EvidenceFit, dataset: Dataset, recordings: list[Recording]
 ) -> list[np.ndarray]:
     """Torque that the model predicts along each recording, (T, n)."""
-    store = ColumnStore(fitted.model, gather(Dataset(tuple(recordings), dataset.filter)))
-    store.prepare(fitted.model.effects)
+    evidence = Evidence(fitted.model, gather(Dataset(tuple(recordings), dataset.filter)))
+    evidence.prepare(fitted.model.effects)
     joints = range(fitted.model.robot.n)
     each = []
     for r in range(len(recordings)):
-        columns = [model_columns(store, fitted.model, r, j, fitted.values)[0] for j in joints]
+        columns = [model_columns(evidence, fitted.model, r, j, fitted.values)[0] for j in joints]
         each.append(np.stack([c[:, :-1] @ fitted.values for c in columns], axis=1))
     return each
 

@@ -18,7 +18,7 @@ from dynident.diagnosis.search.scoring import (
     score,
 )
 from dynident.effects import Effect
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.runs import Signals
 from dynident.model import Model
@@ -38,16 +38,16 @@ class Beside:
     parameters that were fitted without it have taken on a part of it.
     """
 
-    store: ColumnStore
+    evidence: Evidence
     whole: EvidenceFit
 
     def columns(self, effect: Effect, run: int, model: Model, values: np.ndarray) -> Signals:
-        """As `ColumnStore.of`."""
-        return self.store.of(effect, run, self.whole.model, self.whole.values)
+        """As `Evidence.of`."""
+        return self.evidence.of(effect, run, self.whole.model, self.whole.values)
 
 
 def score_at(
-    store: ColumnStore,
+    evidence: Evidence,
     fitted: EvidenceFit,
     effect: Effect,
     like: Score,
@@ -55,25 +55,27 @@ def score_at(
     columns_of: Columns | None = None,
 ) -> Score:
     """Score an effect with other columns; carriers of a payload as in `like`."""
-    (parts,) = candidate_moments(store, fitted, [effect], columns_of)
+    (parts,) = candidate_moments(evidence, fitted, [effect], columns_of)
     if like.payload_recordings is not None:
-        parts = tuple(moments_with_payload(part, store, like.payload_recordings) for part in parts)
+        parts = tuple(
+            moments_with_payload(part, evidence, like.payload_recordings) for part in parts
+        )
     return score(fitted, effect, *parts, grid=grid, payload_recordings=like.payload_recordings)
 
 
 def refined(
-    store: ColumnStore, fitted: EvidenceFit, one: Score, columns_of: Columns | None = None
+    evidence: Evidence, fitted: EvidenceFit, one: Score, columns_of: Columns | None = None
 ) -> Score:
     """Return a score at the shape parameters and secants that fit best."""
     if not one.drop > 0:
         return one
     if not one.effect.shape_parameters(fitted.model.robot):
-        return _at_its_values(store, fitted, one, columns_of) if one.effect.secant else one
+        return _at_its_values(evidence, fitted, one, columns_of) if one.effect.secant else one
     has_slopes = type(one.effect).sensitivities is not Effect.sensitivities
     search = by_gradient if has_slopes else _by_trial
     if one.effect.point:
-        one = _at_best_value(store, fitted, one, columns_of)
-    return _better(one, search(store, fitted, one, columns_of))
+        one = _at_best_value(evidence, fitted, one, columns_of)
+    return _better(one, search(evidence, fitted, one, columns_of))
 
 
 def _better(one: Score, other: Score) -> Score:
@@ -81,7 +83,7 @@ def _better(one: Score, other: Score) -> Score:
 
 
 def _at_its_values(
-    store: ColumnStore, fitted: EvidenceFit, one: Score, columns_of: Columns | None
+    evidence: Evidence, fitted: EvidenceFit, one: Score, columns_of: Columns | None
 ) -> Score:
     """Take secants through the values found, until they settle."""
     for _ in range(_SECANTS):
@@ -92,8 +94,8 @@ def _at_its_values(
         change = np.linalg.norm(np.subtract(effect.point, old))
         if change <= _SETTLED * np.linalg.norm(effect.point):
             break
-        better = score_at(store, fitted, effect, one, grid_of(effect, fitted), columns_of)
-        store.forget(effect)
+        better = score_at(evidence, fitted, effect, one, grid_of(effect, fitted), columns_of)
+        evidence.forget(effect)
         if not better.drop > 0.5 * one.drop:
             break  # the secant has left the range in which the law is what it is
         one = better
@@ -101,7 +103,7 @@ def _at_its_values(
 
 
 def _at_best_value(
-    store: ColumnStore, fitted: EvidenceFit, one: Score, columns_of: Columns | None
+    evidence: Evidence, fitted: EvidenceFit, one: Score, columns_of: Columns | None
 ) -> Score:
     """Seek the value at which the column that is taken there fits best.
 
@@ -112,8 +114,8 @@ def _at_best_value(
     def loss(logarithm: float) -> float:
         nonlocal best
         effect = one.effect.at([float(np.exp(logarithm))])
-        found = score_at(store, fitted, effect, one, grid_of(effect, fitted), columns_of)
-        store.forget(effect)
+        found = score_at(evidence, fitted, effect, one, grid_of(effect, fitted), columns_of)
+        evidence.forget(effect)
         if found.drop_at_point > best.drop_at_point and not impossible(found, fitted.model):
             best = found
         return -found.drop_at_point
@@ -130,15 +132,15 @@ def _within_bounds(one: Score, fitted: EvidenceFit) -> list[float]:
 
 
 def _by_trial(
-    store: ColumnStore, fitted: EvidenceFit, one: Score, columns_of: Columns | None
+    evidence: Evidence, fitted: EvidenceFit, one: Score, columns_of: Columns | None
 ) -> Score:
     shapes = one.effect.shape_parameters(fitted.model.robot)
     grid = grid_of(one.effect, fitted)
 
     def at(shape: np.ndarray) -> Score:
         effect = one.effect.shaped(*np.exp(np.atleast_1d(shape)))
-        result = score_at(store, fitted, effect, one, grid, columns_of)
-        store.forget(effect)
+        result = score_at(evidence, fitted, effect, one, grid, columns_of)
+        evidence.forget(effect)
         return result
 
     def loss(shape: np.ndarray) -> float:
@@ -156,7 +158,7 @@ def _minimum(loss: Callable[[np.ndarray], float], shapes, start) -> np.ndarray:
     return minimize(loss, np.log(start), bounds=bounds, method="Nelder-Mead").x
 
 
-def reshaped(store: ColumnStore, others: EvidenceFit, whole: EvidenceFit, effect: Effect) -> Score:
+def reshaped(evidence: Evidence, others: EvidenceFit, whole: EvidenceFit, effect: Effect) -> Score:
     """Return an effect's score at the shape that fits best near its own.
 
     Parameters
@@ -164,22 +166,22 @@ def reshaped(store: ColumnStore, others: EvidenceFit, whole: EvidenceFit, effect
     others, whole : the model without the effect, and with it.
     effect : as it is in the model.
     """
-    beside = Beside(store, whole).columns
+    beside = Beside(evidence, whole).columns
     blank = Score(effect, None, not_identifiable=False)
-    now = score_at(store, others, effect, blank, grid_of(effect, others), beside)
-    return refined(store, others, now, beside)
+    now = score_at(evidence, others, effect, blank, grid_of(effect, others), beside)
+    return refined(evidence, others, now, beside)
 
 
-def best_shape(store: ColumnStore, fitted: EvidenceFit, effect: Effect) -> Effect:
+def best_shape(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> Effect:
     """Return an effect at the shape at which it explains most; as it is where it explains nothing.
 
     `fitted` is the model without it.
     """
     tried = [effect, *effect.variants(fitted.model.robot)]
-    found = candidate_moments(store, fitted, tried)
+    found = candidate_moments(evidence, fitted, tried)
     scores = (score(fitted, one, *parts, 1) for one, parts in zip(tried, found, strict=True))
     best = max(scores, key=lambda one: one.drop_at_point)
-    return refined(store, fitted, best).effect if best.drop_at_point > 0 else effect
+    return refined(evidence, fitted, best).effect if best.drop_at_point > 0 else effect
 
 
 def _neighbours(shape, value: float) -> tuple[float, float]:

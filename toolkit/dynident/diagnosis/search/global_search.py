@@ -19,7 +19,7 @@ from dynident.diagnosis.search.ranking import ALIKE, Ranking, candidates, joints
 from dynident.diagnosis.search.scoring import Score, candidate_moments, impossible, score
 from dynident.diagnosis.verdict import within_noise
 from dynident.effects import Effect
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, residuals
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.noise_model import systematic_square
@@ -42,7 +42,7 @@ class RankedModel:
 
 
 def global_search(
-    store: ColumnStore,
+    evidence: Evidence,
     start: RankedModel,
     last: RankedModel,
     progress: Callable[[str], None] = lambda _: None,
@@ -53,7 +53,7 @@ def global_search(
 
     Parameters
     ----------
-    store : the evidence.
+    evidence : recordings and their columns.
     start, last : the model before anything was added, and with all that was added.
     tell : told what is being done, for a progress display.
 
@@ -61,22 +61,22 @@ def global_search(
     -------
     That of the two of whose residual it explains the larger share; None for none, or no need.
     """
-    if not last.fitted.noise_known or within_noise(on_recordings(store, last.fitted)):
+    if not last.fitted.noise_known or within_noise(on_recordings(evidence, last.fitted)):
         return None
-    sought = _sought(store, start.fitted.model, last.fitted)
+    sought = _sought(evidence, start.fitted.model, last.fitted)
     if not sought:
         return None
     # An effect that is in the last model with a wrong shape is missing from the first one.
     wrong = sought[0] in last.fitted.model or last.fitted is start.fitted
     bases = (start,) if wrong else (last, start)
-    part, searches = _worst_recording(store, bases[0].fitted), []
+    part, searches = _worst_recording(evidence, bases[0].fitted), []
     if not part[1].error_signal > 0:
         return None
     for effect in sought:
         progress(f"{effect.label}, a second look")
         searches.append(_GlobalSearch.run(*part, effect))
     finals = [
-        _final(store, one.fitted, searches) if one.fitted.error_signal > 0 else None
+        _final(evidence, one.fitted, searches) if one.fitted.error_signal > 0 else None
         for one in bases
     ]
     found = [(one, base) for one, base in zip(finals, bases, strict=True) if one is not None]
@@ -84,25 +84,25 @@ def global_search(
         return None
     one, base = max(found, key=lambda pair: pair[0].fall / pair[1].fitted.error_signal)
     tests = base.ranking.tests + sum(search.tried for search in searches)
-    best, refusal = judged(store, base.fitted, one, tests)
+    best, refusal = judged(evidence, base.fitted, one, tests)
     return None if refusal else RankedModel(base.fitted, _headed(base.ranking, best, tests))
 
 
-def _sought(store: ColumnStore, model: Model, last: EvidenceFit) -> list[Effect]:
+def _sought(evidence: Evidence, model: Model, last: EvidenceFit) -> list[Effect]:
     """Effects of many shapes: those that were added with one that may be wrong, or else all."""
-    below_noise = joints_below_noise(store, last)
+    below_noise = joints_below_noise(evidence, last)
     every = [one for one in candidates(model) if one.sought_in(model.robot)]
     added = [one for one in every if one in last.model]
     return added or [one for one in every if one.joint not in below_noise]
 
 
-def _final(store: ColumnStore, fitted: EvidenceFit, searches: list[_GlobalSearch]) -> Score | None:
+def _final(evidence: Evidence, fitted: EvidenceFit, searches: list[_GlobalSearch]) -> Score | None:
     """The best of what was found on one recording, by all of them; None if it explains little."""
     scores = [
         score
         for search in searches
         if search.finalists
-        for score in _scores(store, fitted, search.finalists)
+        for score in _scores(evidence, fitted, search.finalists)
         if not impossible(score, fitted.model)
         and score.drop_at_point > _LEAST * fitted.error_signal
     ]
@@ -120,18 +120,18 @@ def _headed(ranking: Ranking, best: Score, tests: int) -> Ranking:
     return Ranking((best, *(one for one, _ in others)), tests, ("", *(why for _, why in others)))
 
 
-def _worst_recording(store: ColumnStore, fitted: EvidenceFit) -> tuple[ColumnStore, EvidenceFit]:
+def _worst_recording(evidence: Evidence, fitted: EvidenceFit) -> tuple[Evidence, EvidenceFit]:
     """The recording with most systematic residual over noise, and the model as it alone fits it."""
-    left = residuals(store, fitted.model, fitted.values)
+    left = residuals(evidence, fitted.model, fitted.values)
     sizes = [
         -1.0
         if run.kind == "single"
         else sum(
             systematic_square(e[..., j], run.kind) / fitted.variances[j] for j in range(e.shape[-1])
         )
-        for run, e in zip(store.runs, left, strict=True)
+        for run, e in zip(evidence.runs, left, strict=True)
     ]
-    alone = ColumnStore(store.model, (store.runs[int(np.argmax(sizes))],))
+    alone = Evidence(evidence.model, (evidence.runs[int(np.argmax(sizes))],))
     alone.prepare(fitted.model.effects)
     return alone, fit_evidence(alone, fitted.model, fitted)
 
@@ -140,7 +140,7 @@ def _worst_recording(store: ColumnStore, fitted: EvidenceFit) -> tuple[ColumnSto
 class _GlobalSearch:
     """A search over the shapes of one effect, and over the values at which its column is taken."""
 
-    store: ColumnStore
+    evidence: Evidence
     fitted: EvidenceFit
     effect: Effect
     best: list[Score] = field(default_factory=list)
@@ -148,9 +148,9 @@ class _GlobalSearch:
     generations: int = 0
 
     @classmethod
-    def run(cls, store: ColumnStore, fitted: EvidenceFit, effect: Effect) -> _GlobalSearch:
+    def run(cls, evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> _GlobalSearch:
         """Search through all shapes, until enough is explained or no more is to be hoped for."""
-        search = cls(store, fitted, effect)
+        search = cls(evidence, fitted, effect)
         differential_evolution(
             search.loss,
             np.log(effect.sought_in(fitted.model.robot)),
@@ -179,7 +179,7 @@ class _GlobalSearch:
         """What the shapes in the columns of `logs` (unknowns, V) leave, (V,)."""
         shapes = len(self.effect.shape_parameters(self.fitted.model.robot))
         tried = [self.effect.shaped(*x[:shapes]).at(x[shapes:]) for x in np.exp(logs.T)]
-        scores = _scores(self.store, self.fitted, tried)
+        scores = _scores(self.evidence, self.fitted, tried)
         self.tried += len(tried)
         possible = [one for one in scores if not impossible(one, self.fitted.model)]
         self.best = sorted([*self.best, *possible], key=lambda s: -s.fall)[:_FINALISTS]
@@ -194,10 +194,10 @@ class _GlobalSearch:
         return hopeless or self.explained > _ENOUGH
 
 
-def _scores(store: ColumnStore, fitted: EvidenceFit, tried: list[Effect]) -> list[Score]:
-    parts = candidate_moments(store, fitted, tried)
+def _scores(evidence: Evidence, fitted: EvidenceFit, tried: list[Effect]) -> list[Score]:
+    parts = candidate_moments(evidence, fitted, tried)
     for one in tried:
-        store.forget(one)
+        evidence.forget(one)
     return [
         score(fitted, one, *part, grid=len(tried)) for one, part in zip(tried, parts, strict=True)
     ]

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from dynident.diagnosis.search.scoring import Columns, Score, candidate_moments, impossible, score
 from dynident.effects import Block, Effect, Parameter
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.moments.replicated import Moments
 
@@ -66,7 +66,7 @@ def grid_of(effect: Effect, fitted: EvidenceFit) -> int:
 
 
 def by_gradient(
-    store: ColumnStore, fitted: EvidenceFit, one: Score, columns_of: Columns | None
+    evidence: Evidence, fitted: EvidenceFit, one: Score, columns_of: Columns | None
 ) -> Score:
     """Minimise the residual over the shapes with exact derivatives, linear parameters solved for.
 
@@ -86,8 +86,8 @@ def by_gradient(
         x = np.clip(np.exp(logarithms), *limits)
         trial = effect.shaped(*x[: len(shapes)]).at(x[len(shapes) :].tolist())
         tangent = Tangent.to(trial)
-        ((with_model, with_self),) = candidate_moments(store, fitted, [tangent], columns_of)
-        store.forget(tangent)
+        ((with_model, with_self),) = candidate_moments(evidence, fitted, [tangent], columns_of)
+        evidence.forget(tangent)
         plain = slice(0, k)
         found = score(
             fitted,

@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.diagnosis.search.scoring import Score
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, residuals
 from dynident.evidence.runs import flagged_run
 
 
-def carry(store: ColumnStore, score: Score) -> None:
+def carry(evidence: Evidence, score: Score) -> None:
     """Mark the runs that carry the payload, once that is known."""
     if score.payload_recordings is not None:
-        store.runs = tuple(
+        evidence.runs = tuple(
             flagged_run(run, carries)
-            for run, carries in zip(store.runs, score.payload_recordings, strict=True)
+            for run, carries in zip(evidence.runs, score.payload_recordings, strict=True)
         )
 
 
-def decide_payload(held: ColumnStore, fitted: EvidenceFit) -> None:
+def decide_payload(held: Evidence, fitted: EvidenceFit) -> None:
     """Decide which test recordings carry a payload of known inertia, where the study is silent."""
     if not any("payload" in effect.needs for effect in fitted.model.effects):
         return

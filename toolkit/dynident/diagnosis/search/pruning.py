@@ -10,7 +10,7 @@ import numpy as np
 from dynident.diagnosis.assembly import Found
 from dynident.diagnosis.search.ranking import rank
 from dynident.effects import Effect
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import on_recordings
 
@@ -26,8 +26,8 @@ class Kept:
 
 
 def without_superfluous(
-    store: ColumnStore,
-    held: ColumnStore | None,
+    evidence: Evidence,
+    held: Evidence | None,
     fitted: EvidenceFit,
     found: list[Found],
     progress: Callable[[str], None],
@@ -38,16 +38,16 @@ def without_superfluous(
         if _belongs(one.score.effect, kept):
             continue
         effect = next(e for e in fitted.model.effects if e.label == one.score.effect.label)
-        rest = fit_evidence(store, fitted.model - effect, fitted)
+        rest = fit_evidence(evidence, fitted.model - effect, fitted)
         progress(f"doing without {effect.label}")
-        needed = len(kept) == 1 or rank(store, rest, len(kept) - 1, only=(effect,)).material
+        needed = len(kept) == 1 or rank(evidence, rest, len(kept) - 1, only=(effect,)).material
         if not needed or not _helps(held, rest, fitted):
             kept.remove(one)
             fitted = rest
     return Kept(fitted, kept)
 
 
-def _helps(held: ColumnStore | None, without: EvidenceFit, fitted: EvidenceFit) -> bool:
+def _helps(held: Evidence | None, without: EvidenceFit, fitted: EvidenceFit) -> bool:
     """Whether an effect lowers the residual of the test recordings at any joint.
 
     The whole of it, or what of it repeats: columns that carry noise may take the latter away and

@@ -19,7 +19,7 @@ from dynident.diagnosis.search.scoring import (
     score,
 )
 from dynident.effects import Block, Effect, catalogue
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, residuals
 from dynident.evidence.noise_model import differences, systematic_square
 from dynident.evidence.runs import Run
@@ -80,7 +80,7 @@ def candidates(model: Model) -> list[Effect]:
 
 
 def rank(
-    store: ColumnStore,
+    evidence: Evidence,
     fitted: EvidenceFit,
     added: int,
     progress: Callable[[str], None] = lambda _: None,
@@ -91,22 +91,22 @@ def rank(
 
     Parameters
     ----------
-    store, present : the evidence, and the model as it fits it.
+    evidence, fitted : recordings and their columns, and the model as it fits them.
     added : number of effects added so far; later ones must explain more.
     tell : told what is being done, for a progress display.
     only : candidates, where not the whole catalogue is meant.
     least : share of the squared residual that they must explain; None for `LEAST_SHARE`.
     """
     model, best, tests = fitted.model, [], 0
-    below_noise = joints_below_noise(store, fitted)
-    noisy = all(run.kind == "single" and run.columns_from == "recording" for run in store.runs)
+    below_noise = joints_below_noise(evidence, fitted)
+    noisy = all(run.kind == "single" and run.columns_from == "recording" for run in evidence.runs)
     for effect in only or candidates(model):
         driven = {"body", "whole"} <= effect.needs
         if driven and (noisy or effect.joint in below_noise):
             best.append(Score(effect, None, not_identifiable=False))
             continue
         progress(effect.label)
-        tried = list(_score_variants(store, fitted, effect))
+        tried = list(_score_variants(evidence, fitted, effect))
         tests += len(tried)
         best.append(max(tried, key=lambda s: s.penalised))
     best.sort(key=lambda s: -s.penalised)
@@ -116,11 +116,13 @@ def rank(
         if best[i].p_value * tests > _HOPELESS or best[i].penalised == -np.inf:
             continue
         progress(f"{best[i].effect.label}, cross-validated")
-        best[i] = _confirm(store, fitted, best[i])
+        best[i] = _confirm(evidence, fitted, best[i])
     best.sort(key=lambda s: -s.penalised)
     least = LEAST_SHARE[min(added, 1)] if least is None else least
     scores = tuple(best)
-    refusals = tuple(_unseen(s, noisy) or _refusal(s, store, model, tests, least) for s in scores)
+    refusals = tuple(
+        _unseen(s, noisy) or _refusal(s, evidence, model, tests, least) for s in scores
+    )
     return Ranking(scores, tests, refusals)
 
 
@@ -131,11 +133,11 @@ def _unseen(one: Score, noisy: bool) -> str:
     return _NOISY if noisy else f"nothing is left to explain at {one.effect.joint}"
 
 
-def joints_below_noise(store: ColumnStore, fitted: EvidenceFit) -> frozenset[str]:
+def joints_below_noise(evidence: Evidence, fitted: EvidenceFit) -> frozenset[str]:
     """Joints at which no residual worth a costly search is left; none where noise is unknown."""
     if not fitted.noise_known:
         return frozenset()
-    left = zip(store.runs, residuals(store, fitted.model, fitted.values), strict=True)
+    left = zip(evidence.runs, residuals(evidence, fitted.model, fitted.values), strict=True)
     judged: list[tuple[Kind, np.ndarray]] = [(r.kind, e) for r, e in left if r.kind != "single"]
     found = []
     for j, name in enumerate(fitted.model.robot.names):
@@ -186,12 +188,12 @@ def payload_choices(runs: tuple[Run, ...]) -> list[tuple[bool, ...]]:
     return [c for c in every if any(c) and not all(c)] or [(True,) * len(runs)]
 
 
-def _score_variants(store: ColumnStore, fitted: EvidenceFit, effect: Effect) -> Iterator[Score]:
+def _score_variants(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> Iterator[Score]:
     if "payload" in effect.needs:
-        choices = payload_choices(store.runs)
-        (whole,) = candidate_moments(store, fitted, [effect])
+        choices = payload_choices(evidence.runs)
+        (whole,) = candidate_moments(evidence, fitted, [effect])
         for choice in choices:
-            parts = (moments_with_payload(part, store, choice) for part in whole)
+            parts = (moments_with_payload(part, evidence, choice) for part in whole)
             one = score(fitted, effect, *parts, grid=len(choices), payload_recordings=choice)
             # A load has mass: of two complementary choices only one can be meant.
             yield _possible(one, fitted.model)
@@ -201,7 +203,7 @@ def _score_variants(store: ColumnStore, fitted: EvidenceFit, effect: Effect) -> 
     if effect.point:
         # Found before, where no variant may be near enough.
         shapes = list(dict.fromkeys([*shapes, effect]))
-    found = candidate_moments(store, fitted, shapes, store.screening)
+    found = candidate_moments(evidence, fitted, shapes, evidence.screening)
     for shaped, parts in zip(shapes, found, strict=True):
         yield _possible(score(fitted, shaped, *parts, grid=len(shapes)), fitted.model)
 
@@ -218,24 +220,26 @@ def _seen(fitted: EvidenceFit, effect: Effect) -> Block:
     return fitted.model.ready(effect, block, fitted.values)
 
 
-def judged(store: ColumnStore, fitted: EvidenceFit, one: Score, tests: int) -> tuple[Score, str]:
+def judged(evidence: Evidence, fitted: EvidenceFit, one: Score, tests: int) -> tuple[Score, str]:
     """Return a score refined and cross-validated, and why it is not material; empty if it is."""
-    one = _confirm(store, fitted, one)
-    return one, _refusal(one, store, fitted.model, tests, LEAST_SHARE[0])
+    one = _confirm(evidence, fitted, one)
+    return one, _refusal(one, evidence, fitted.model, tests, LEAST_SHARE[0])
 
 
-def _confirm(store: ColumnStore, fitted: EvidenceFit, one: Score) -> Score:
-    one = refined(store, fitted, one)
-    (parts,) = candidate_moments(store, fitted, [one.effect])
+def _confirm(evidence: Evidence, fitted: EvidenceFit, one: Score) -> Score:
+    one = refined(evidence, fitted, one)
+    (parts,) = candidate_moments(evidence, fitted, [one.effect])
     if one.payload_recordings is not None:
-        parts = tuple(moments_with_payload(part, store, one.payload_recordings) for part in parts)
+        parts = tuple(
+            moments_with_payload(part, evidence, one.payload_recordings) for part in parts
+        )
     without, with_effect = cross_validate(fitted, *parts)
     # Columns taken at a value count as far as that is the value found.
     relaxed = one.penalised - (one.drop - one.drop_at_point)
     return replace(one, penalised=relaxed, losses=with_effect, gains=without - with_effect)
 
 
-def _refusal(one: Score, store: ColumnStore, model: Model, tests: int, least: float) -> str:
+def _refusal(one: Score, evidence: Evidence, model: Model, tests: int, least: float) -> str:
     """Why an effect is not material; empty where it is."""
     if one.not_identifiable:
         return one.effect.advice
@@ -249,7 +253,7 @@ def _refusal(one: Score, store: ColumnStore, model: Model, tests: int, least: fl
         return "explains less than its parameters cost"
     if one.share < least:
         return f"explains only {100 * one.share:.2g} % of the squared residual"
-    unresolved = one.effect.unresolved(one.values, _step(store))
+    unresolved = one.effect.unresolved(one.values, _step(evidence))
     if unresolved:
         return unresolved
     if one.gains is None:
@@ -261,6 +265,6 @@ def _refusal(one: Score, store: ColumnStore, model: Model, tests: int, least: fl
     return ""
 
 
-def _step(store: ColumnStore) -> float:
+def _step(evidence: Evidence) -> float:
     """The longest time between two samples, s."""
-    return max(1.0 / run.recording.rate_hz for run in store.runs)
+    return max(1.0 / run.recording.rate_hz for run in evidence.runs)

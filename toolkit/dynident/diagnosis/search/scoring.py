@@ -9,7 +9,7 @@ import numpy as np
 from scipy import stats
 
 from dynident.effects import Effect
-from dynident.evidence.column_store import ColumnStore, joints_of
+from dynident.evidence.columns import Evidence, joints_of
 from dynident.evidence.evidence_fit import EvidenceFit, time_varying_columns, time_varying_mask
 from dynident.evidence.runs import Signals
 from dynident.model import Model
@@ -22,7 +22,7 @@ _UNSEEN = 1e-3
 """Part of the noise below which a column is not seen."""
 
 Columns = Callable[[Effect, int, Model, np.ndarray], Signals]
-"""Columns of an effect in a run, for a model and its values, as `ColumnStore.of`."""
+"""Columns of an effect in a run, for a model and its values, as `Evidence.of`."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Score:
 
 
 def candidate_moments(
-    store: ColumnStore,
+    evidence: Evidence,
     fitted: EvidenceFit,
     variants: Sequence[Effect],
     columns_of: Columns | None = None,
@@ -84,21 +84,21 @@ def candidate_moments(
     Parameters
     ----------
     variants : one effect at one place, with any number of shapes.
-    columns_of : where columns come from; `ColumnStore.of` by default.
+    columns_of : where columns come from; `Evidence.of` by default.
 
     Returns
     -------
     (B, p + 1, k) and (B, k, k) for each variant
     """
     joints = joints_of(variants[0], fitted.model)
-    look = columns_of or store.of
+    look = columns_of or evidence.of
     time_varying = time_varying_mask(fitted.model)
     mixed = variants[0].time_varying or time_varying.any()
     with_model, with_self = None, None
     width = 0
-    if columns_of is None or columns_of == store.screening:
-        store.together(variants, fitted.model, fitted.values)
-    for r, run in enumerate(store.runs):
+    if columns_of is None or columns_of == evidence.screening:
+        evidence.together(variants, fitted.model, fitted.values)
+    for r, run in enumerate(evidence.runs):
         each = [look(effect, r, fitted.model, fitted.values) for effect in variants]
         width = each[0][0].shape[2]
         signals = [np.concatenate(shapes, axis=2) for shapes in zip(*each, strict=True)]
@@ -110,9 +110,9 @@ def candidate_moments(
             two.append(run.moments(white, white))
             if run.kind == "repeated" and mixed:
                 new = TimeVarying(
-                    white, _time_factors(store, variants, r), np.zeros(white.shape[2], bool)
+                    white, _time_factors(evidence, variants, r), np.zeros(white.shape[2], bool)
                 )
-                old = time_varying_columns(store, fitted.model, r, known)
+                old = time_varying_columns(evidence, fitted.model, r, known)
                 chosen = time_varying[:, None] | np.full(white.shape[2], variants[0].time_varying)
                 one[-1] = one[-1].where(chosen, time_varying_moments(old, new, run.edges))
                 if variants[0].time_varying:
@@ -133,12 +133,12 @@ def candidate_moments(
     ]
 
 
-def _time_factors(store: ColumnStore, variants: Sequence[Effect], run: int) -> np.ndarray:
+def _time_factors(evidence: Evidence, variants: Sequence[Effect], run: int) -> np.ndarray:
     """What the time of the session does to the columns of effects, (P, S, k) over all of them."""
     factors = []
     for effect in variants:
-        count = len(effect.parameters(store.model.robot))
-        factors += [store.time_factor(effect, run)] * count
+        count = len(effect.parameters(evidence.model.robot))
+        factors += [evidence.time_factor(effect, run)] * count
     return np.stack(factors, axis=2)
 
 
@@ -151,12 +151,12 @@ def _block(part: Moments, columns: slice) -> Moments:
 
 
 def moments_with_payload(
-    part: Moments, store: ColumnStore, payload_recordings: tuple[bool, ...]
+    part: Moments, evidence: Evidence, payload_recordings: tuple[bool, ...]
 ) -> Moments:
     """Moments of columns that are zero in the runs which do not carry the payload."""
     blocks = [
         np.full(len(run.edges) - 1, c)
-        for run, c in zip(store.runs, payload_recordings, strict=True)
+        for run, c in zip(evidence.runs, payload_recordings, strict=True)
     ]
     mask = np.concatenate(blocks).astype(float)[:, None, None]
     return Moments(part.signal * mask, part.total * mask)

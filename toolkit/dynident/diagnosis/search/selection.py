@@ -8,7 +8,7 @@ from dynident.diagnosis.assembly import Found
 from dynident.diagnosis.search.ranking import ALIKE, Ranking, indistinguishable
 from dynident.diagnosis.search.scoring import Score
 from dynident.effects import Effect
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 
 _FIRST_SHARE = 0.75  # of the largest drop that a simpler effect must reach, to be named first
@@ -16,7 +16,7 @@ _NEARLY = 0.85  # of the largest drop, from which a rival that is not linear is 
 _LEAST_KEPT = 0.1  # of the drop that an effect promises, that is left when all is fitted with it
 
 
-def choose(store: ColumnStore, fitted: EvidenceFit, ranking: Ranking) -> Found | None:
+def choose(evidence: Evidence, fitted: EvidenceFit, ranking: Ranking) -> Found | None:
     """The best material effect; or the simpler one in it, where that does most of the work."""
     material = ranking.material
     if not material:
@@ -32,7 +32,7 @@ def choose(store: ColumnStore, fitted: EvidenceFit, ranking: Ranking) -> Found |
     if simpler:
         # The column that they share is the same whoever it belongs to: both are named.
         return Found(simpler[0], ranking.corrected(simpler[0]), (best.effect,))
-    alike = {*indistinguishable(ranking, best), *_alike_once_fitted(store, fitted, ranking)}
+    alike = {*indistinguishable(ranking, best), *_alike_once_fitted(evidence, fitted, ranking)}
     among = [s for s in material if s is best or s.effect in alike]
     as_good = [s for s in among if s.drop >= _FIRST_SHARE * best.drop]
     chosen = min(as_good, key=_size)  # the first of the simplest: they stand in order
@@ -41,7 +41,7 @@ def choose(store: ColumnStore, fitted: EvidenceFit, ranking: Ranking) -> Found |
 
 
 def _alike_once_fitted(
-    store: ColumnStore, fitted: EvidenceFit, ranking: Ranking
+    evidence: Evidence, fitted: EvidenceFit, ranking: Ranking
 ) -> tuple[Effect, ...]:
     """Rivals of the best effect that explain the same once each is fitted together with the model.
 
@@ -60,7 +60,7 @@ def _alike_once_fitted(
         return ()
 
     def explained(effect: Effect) -> float:
-        wider = fit_evidence(store, fitted.model + effect, fitted)
+        wider = fit_evidence(evidence, fitted.model + effect, fitted)
         return fitted.misfit(fitted) - wider.misfit(fitted)
 
     most = explained(best.effect)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dynident.diagnosis.search.candidate_shapes import best_shape, reshaped
-from dynident.evidence.column_store import ColumnStore
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.model import Model
 
@@ -12,24 +12,24 @@ _GAINED = 0.02  # share of the systematic square that another refit must take aw
 _NEGLIGIBLE = 0.005  # of the square of the noise, that no refit is worth
 
 
-def shaped(store: ColumnStore, model: Model) -> EvidenceFit:
+def shaped(evidence: Evidence, model: Model) -> EvidenceFit:
     """Fit a model as it was given, each shape parameter sought on its grid."""
-    fitted = fit_evidence(store, model)
+    fitted = fit_evidence(evidence, model)
     for effect in fitted.model.effects:
         if effect.shape_parameters(model.robot):
-            others = fit_evidence(store, fitted.model - effect, fitted)
-            better = best_shape(store, others, effect)
-            fitted = fit_evidence(store, fitted.model.with_shapes((better,)), fitted)
-    return refitted(store, fitted.model, fitted)
+            others = fit_evidence(evidence, fitted.model - effect, fitted)
+            better = best_shape(evidence, others, effect)
+            fitted = fit_evidence(evidence, fitted.model.with_shapes((better,)), fitted)
+    return refitted(evidence, fitted.model, fitted)
 
 
-def refitted(store: ColumnStore, model: Model, near: EvidenceFit | None = None) -> EvidenceFit:
+def refitted(evidence: Evidence, model: Model, near: EvidenceFit | None = None) -> EvidenceFit:
     """Fit a model, each shape parameter refined with the others as they are.
 
     Responses that depend on the bodies are refined again with the bodies that come out, which were
     others while the effect was missing, until nothing is gained.
     """
-    fitted = fit_evidence(store, model, near)
+    fitted = fit_evidence(evidence, model, near)
     with_shapes = [e.label for e in model.effects if e.shape_parameters(model.robot)]
     driven = [e.label for e in model.effects if {"body", "whole"} <= e.needs]
     for again in range(_REFITS if driven else 1):
@@ -37,9 +37,9 @@ def refitted(store: ColumnStore, model: Model, near: EvidenceFit | None = None) 
         before = fitted
         for label in labels:
             effect = next(e for e in fitted.model.effects if e.label == label)
-            others = fit_evidence(store, fitted.model - effect, fitted)
-            better = reshaped(store, others, fitted, effect).effect
-            trial = fit_evidence(store, fitted.model.with_shapes((better,)), fitted)
+            others = fit_evidence(evidence, fitted.model - effect, fitted)
+            better = reshaped(evidence, others, fitted, effect).effect
+            trial = fit_evidence(evidence, fitted.model.with_shapes((better,)), fitted)
             if trial.misfit(fitted) < fitted.misfit(fitted):
                 fitted = trial
         had, has = before.misfit(before), fitted.misfit(before)

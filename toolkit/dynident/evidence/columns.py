@@ -23,7 +23,7 @@ _TOGETHER = 500_000
 
 
 @dataclass
-class ColumnStore:
+class Evidence:
     """Columns of the rigid body and of effects for every run, computed once.
 
     Payload columns are kept as if every recording carried it; `of` applies who does.
@@ -38,10 +38,10 @@ class ColumnStore:
     _blocks: dict[Hashable, Block] = field(default_factory=dict)
     _screened: dict[Hashable, Signals] = field(default_factory=dict)
     _full: dict[Hashable, np.ndarray] = field(default_factory=dict)
-    _simulation: ColumnStore | None = None
+    _simulation: Evidence | None = None
 
     @property
-    def simulation(self) -> ColumnStore | None:
+    def simulation(self) -> Evidence | None:
         """Evidence of the simulated motion alone, which is all that candidates need of it."""
         if any(run.columns_from == "recording" for run in self.runs):
             return None
@@ -50,7 +50,7 @@ class ColumnStore:
             for run in self.runs
         )
         if self._simulation is None:
-            self._simulation = ColumnStore(self.model, runs)
+            self._simulation = Evidence(self.model, runs)
         self._simulation.runs = runs  # who carries the payload may have been found out
         return self._simulation
 
