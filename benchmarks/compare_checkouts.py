@@ -22,7 +22,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 ROOT = Path(__file__).parents[1]
 LINES_SHOWN = 40
@@ -43,7 +43,9 @@ def main() -> None:
     if options.command == "record":
         record_answers(options.checkout.resolve(), options.answers, options.study)
     else:
-        sys.exit(report(*options.answers, options.tolerance, words=options.words))
+        sys.exit(
+            report(options.answers[0], options.answers[1], options.tolerance, words=options.words)
+        )
 
 
 def record_answers(checkout: Path, answers: Path, only: list[str] | None) -> None:
@@ -150,7 +152,7 @@ def differences(
         yield f"{where}: {str(one)[:300]!r} and {str(other)[:300]!r}", sentence
 
 
-def _is_number(value: Any) -> bool:
+def _is_number(value: Any) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
