@@ -1,4 +1,4 @@
-"""What a nonlinear program is made of: variables, residual blocks, costs and constraints.
+"""What a nonlinear program is made of: variables, residuals, costs and constraints.
 
 Expressions are CasADi's. The symbol of a variable is an `MX`: matrices of numbers stay whole in it,
 where an `SX` would write out each of their products and take twenty times as long to differentiate.
@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -26,10 +27,10 @@ class Variable:
     Attributes
     ----------
     name : unique in a program.
-    size : number of entries k.
+    rows : number of entries k.
     unit : of all entries, or one for each.
     lower, upper : (k,) or one number, in the unit; may be infinite. Equal ones fix an entry.
-    start : (k,) or one number, where a solver begins; default: what is nearest to 0 in the bounds.
+    start : (k,) or one number, where a solver begins; moved within the bounds.
     scale : (k,) or one number above 0, the size that is expected: the solver sees entry / scale.
     symbol : casadi.MX (k, 1), to write expressions with; made here.
 
@@ -40,7 +41,7 @@ class Variable:
     """
 
     name: str
-    size: int = 1
+    rows: int = 1
     unit: str | tuple[str, ...] = ""
     lower: Any = -np.inf
     upper: Any = np.inf
@@ -49,196 +50,149 @@ class Variable:
     symbol: Any = None
 
     def __post_init__(self) -> None:
-        import casadi as ca
-
-        where = f"variable {self.name}"
-        if self.size < 1:
-            raise ProgramError(f"has {self.size} entries", where, "give it at least one")
-        lower, upper = _checked_bounds(self.lower, self.upper, self.size, where)
-        start = numbers_of(self.start, self.size, where, "start")
-        scale = _checked_scale(self.scale, self.size, where)
-        unit = (self.unit,) * self.size if isinstance(self.unit, str) else tuple(self.unit)
-        if len(unit) != self.size:
-            raise ProgramError(f"has {self.size} entries and {len(unit)} units", where)
-        symbol = ca.MX.sym(self.name, self.size) if self.symbol is None else self.symbol
-        if tuple(symbol.shape) != (self.size, 1):
-            raise ProgramError(f"has {self.size} entries and a symbol of {symbol.shape}", where)
-        object.__setattr__(self, "unit", unit)
-        object.__setattr__(self, "lower", lower)
-        object.__setattr__(self, "upper", upper)
-        object.__setattr__(self, "start", np.clip(start, lower, upper))
-        object.__setattr__(self, "scale", scale)
-        object.__setattr__(self, "symbol", symbol)
+        rows, where = self.rows, f"variable {self.name}"
+        if rows < 1:
+            raise ProgramError(f"has {rows} entries", where, "give it at least one")
+        unit = (self.unit,) * rows if isinstance(self.unit, str) else tuple(self.unit)
+        if len(unit) != rows:
+            raise ProgramError(f"has {rows} entries and {len(unit)} units", where)
+        lower, upper = _bounds(self.lower, self.upper, rows, where)
+        scale = numbers_of(self.scale, rows, where, "scale")
+        if not np.all((scale > 0) & np.isfinite(scale)):
+            raise ProgramError("scale is not positive", where, "Give the size that is expected")
+        start = np.clip(numbers_of(self.start, rows, where, "start"), lower, upper)
+        symbol = ca.MX.sym(self.name, rows) if self.symbol is None else self.symbol
+        if tuple(symbol.shape) != (rows, 1):
+            raise ProgramError(f"has {rows} entries and a symbol of {symbol.shape}", where)
+        _set(self, unit=unit, lower=lower, upper=upper, start=start, scale=scale, symbol=symbol)
 
 
 @dataclass(frozen=True, eq=False)
-class Residual:
-    """Rows r that enter the objective as 1/2 |r|^2: data, or a quadratic prior.
+class Expression:
+    """A column in the symbols of a program's variables.
 
     Attributes
     ----------
     name : unique in a program.
-    expression : casadi.MX (r, 1).
+    expression : casadi.MX (k, 1).
     unit : of the rows.
-    inner, matrix : the expression is matrix (r, k) times inner (k, 1), and a constant; by default
-        itself. `Residual.linear` gives them: curvature is then that of the inner expression, which
-        depends on few variables an entry, where an entry of the rows depends on all of them.
+    rows : number of rows.
+
+    Raises
+    ------
+    ProgramError
+        If the expression is no column of `MX`, or does not suit what else is given.
     """
 
     name: str
     expression: Any
     unit: str = ""
-    # Not to be given, or `dataclasses.replace` would keep those of another expression.
-    inner: Any = field(init=False, repr=False)
-    matrix: np.ndarray | None = field(init=False, repr=False, default=None)
+    rows: int = field(init=False)
 
     def __post_init__(self) -> None:
-        expression = _expression(self.expression, f"residual {self.name}")
-        object.__setattr__(self, "expression", expression)
-        object.__setattr__(self, "inner", expression)
-        object.__setattr__(self, "matrix", None)
+        where, given = f"{type(self).__name__.lower()} {self.name}", self.expression
+        if isinstance(given, ca.SX):
+            remedy = "Make a casadi.Function of it and call that with the symbols of the variables"
+            raise ProgramError("the expression is an SX", where, remedy)
+        try:
+            column = given if isinstance(given, ca.MX) else ca.MX(given)
+        except (NotImplementedError, TypeError):
+            what = f"{type(given).__name__} is no CasADi expression"
+            raise ProgramError(what, where, "Give an MX") from None
+        if column.shape[1] != 1 or column.shape[0] < 1:
+            what = f"the expression has the shape {tuple(column.shape)}"
+            raise ProgramError(what, where, "Give a column")
+        _set(self, expression=ca.densify(column), rows=int(column.shape[0]))
+        self._check(where)
 
-    @classmethod
-    def linear(
-        cls, name: str, matrix: ArrayLike, expression: Any, target: ArrayLike, unit: str = ""
-    ) -> Residual:
-        """Rows matrix @ expression - target, in as few rows as give the same sum of squares.
+    def _check(self, where: str) -> None:
+        """Check what else is given."""
 
-        The way to pose a matrix of numbers: exact second derivatives are formed without
-        differentiating through it, many times quicker from a hundred unknowns on. A matrix of more
-        rows than columns is replaced by its triangular factor, so that the time of an iteration
-        does not depend on the length of the data; what no expression explains remains as the last
-        row, and the objective is the same number.
 
-        Parameters
-        ----------
-        name : unique in a program.
-        matrix : (r, k).
-        expression : casadi.MX (k, 1).
-        target : (r,).
-        unit : of the rows.
+@dataclass(frozen=True, eq=False)
+class Residual(Expression):
+    """Rows r = matrix @ expression - target that enter the objective as 1/2 |r|^2: data, a prior.
 
-        Raises
-        ------
-        ProgramError
-            If shapes differ, or a number is not finite.
-        """
-        import casadi as ca
+    A matrix of numbers belongs here and not into the expression: exact second derivatives are then
+    formed without differentiating through it, twice as quick from fifty unknowns on. One of more
+    rows than columns is replaced by its triangular factor, so that the time of an iteration does
+    not depend on the length of the data; what no expression explains remains as the last row, and
+    the objective is the same number.
 
-        where = f"residual {name}"
-        A, b = np.asarray(matrix, float), np.asarray(target, float)
-        inner = _expression(expression, where)
-        size = int(inner.shape[0])
-        if A.ndim != 2 or A.shape[1] != size or b.shape != A.shape[:1]:
-            what = f"matrix {A.shape}, expression ({size},) and target {b.shape} do not fit"
+    Attributes
+    ----------
+    matrix, target : (r, k), (r,); default: the rows are the expression itself.
+    residual : casadi.MX (r, 1), the rows.
+    cost : casadi.MX (1, 1), the term of the objective.
+    """
+
+    matrix: Any = field(default=None, kw_only=True)
+    target: Any = field(default=None, kw_only=True)
+
+    def _check(self, where: str) -> None:
+        A = np.eye(self.rows) if self.matrix is None else np.asarray(self.matrix, float)
+        b = np.zeros(len(A)) if self.target is None else np.asarray(self.target, float)
+        if A.shape != (*b.shape, self.rows):
+            what = f"matrix {A.shape}, expression ({self.rows},) and target {b.shape} do not fit"
             raise ProgramError(what, where)
         if not np.all(np.isfinite(A)) or not np.all(np.isfinite(b)):
             raise ProgramError("the matrix or the target is not finite", where)
-        if len(b) > size + 1:
+        if len(b) > self.rows + 1:
             factor = np.asarray(np.linalg.qr(np.column_stack([A, b]), mode="r"))
             A, b = factor[:, :-1], factor[:, -1]
-        residual = cls(name, ca.mtimes(ca.DM(A), inner) - ca.DM(b), unit)
-        object.__setattr__(residual, "inner", inner)
-        object.__setattr__(residual, "matrix", A)
-        return residual
+        _set(self, matrix=A, target=b, rows=len(b))
 
     @property
-    def rows(self) -> int:
-        """Number of rows."""
-        return int(self.expression.shape[0])
-
-    @property
-    def term(self) -> str:
-        """The term of the objective, in words."""
-        return f"1/2 |{self.name}|^2"
+    def residual(self) -> Any:
+        return ca.mtimes(ca.sparsify(ca.DM(self.matrix)), self.expression) - ca.DM(self.target)
 
     @property
     def cost(self) -> Any:
-        """The term of the objective, casadi.MX (1, 1)."""
-        import casadi as ca
-
-        return 0.5 * ca.sumsqr(self.expression)
+        return 0.5 * ca.sumsqr(self.residual)
 
 
 @dataclass(frozen=True, eq=False)
-class Cost:
-    """A scalar that is added to the objective: an entropic prior, say.
+class Cost(Expression):
+    """A scalar that is added to the objective: an entropic prior, say."""
 
-    Attributes
-    ----------
-    name : unique in a program.
-    expression : casadi.MX (1, 1).
-    unit : of the scalar.
-    """
-
-    name: str
-    expression: Any
-    unit: str = ""
-
-    def __post_init__(self) -> None:
-        where = f"cost {self.name}"
-        expression = _expression(self.expression, where)
-        if expression.shape[0] != 1:
-            what = f"has {expression.shape[0]} rows"
+    def _check(self, where: str) -> None:
+        if self.rows != 1:
+            what = f"has {self.rows} rows"
             raise ProgramError(what, where, "add up a scalar, or pose a Residual")
-        object.__setattr__(self, "expression", expression)
-
-    @property
-    def rows(self) -> int:
-        """Number of rows: one."""
-        return 1
-
-    @property
-    def term(self) -> str:
-        """The term of the objective, in words."""
-        return self.name
 
     @property
     def cost(self) -> Any:
-        """The term of the objective, casadi.MX (1, 1)."""
         return self.expression
 
 
 @dataclass(frozen=True, eq=False)
-class Constraint:
+class Constraint(Expression):
     """Rows that must lie between bounds.
 
     Attributes
     ----------
-    name : unique in a program.
-    expression : casadi.MX (r, 1).
     lower, upper : (r,) or one number, in the unit; may be infinite. Equal ones are an equation.
-    unit : of the rows.
-    scale : (r,) or one number above 0, the size of a row that counts as one; default: how much the
-        row changes when a variable changes by its scale, at the start.
     """
 
-    name: str
-    expression: Any
-    lower: Any = -np.inf
-    upper: Any = np.inf
-    unit: str = ""
-    scale: Any = None
+    lower: Any = field(default=-np.inf, kw_only=True)
+    upper: Any = field(default=np.inf, kw_only=True)
 
-    def __post_init__(self) -> None:
-        where = f"constraint {self.name}"
-        expression = _expression(self.expression, where)
-        rows = int(expression.shape[0])
-        lower, upper = _checked_bounds(self.lower, self.upper, rows, where)
-        object.__setattr__(self, "expression", expression)
-        object.__setattr__(self, "lower", lower)
-        object.__setattr__(self, "upper", upper)
-        if self.scale is not None:
-            object.__setattr__(self, "scale", _checked_scale(self.scale, rows, where))
+    def _check(self, where: str) -> None:
+        lower, upper = _bounds(self.lower, self.upper, self.rows, where)
+        _set(self, lower=lower, upper=upper)
 
-    @property
-    def rows(self) -> int:
-        """Number of rows."""
-        return int(self.expression.shape[0])
+
+Block = Variable | Residual | Cost | Constraint
 
 
 def numbers_of(given: ArrayLike, size: int, where: str, what: str) -> np.ndarray:
-    """Numbers as (size,), one number for all entries; none of them NaN.
+    """Numbers as (size,), none of them NaN.
+
+    Parameters
+    ----------
+    given : (size,), or one number for all.
+    size : number of entries.
+    where, what : the block, and which of its numbers they are, for the message.
 
     Raises
     ------
@@ -254,45 +208,23 @@ def numbers_of(given: ArrayLike, size: int, where: str, what: str) -> np.ndarray
         raise ProgramError(f"{what} has the shape {found.shape}", where, remedy)
     found = np.array(np.broadcast_to(found.ravel(), (size,)))
     if np.any(np.isnan(found)):
-        index = int(np.flatnonzero(np.isnan(found))[0])
-        raise ProgramError(f"{what} is NaN", f"{where}, entry {index}")
+        raise ProgramError(f"{what} is NaN", f"{where}, entry {np.argmax(np.isnan(found))}")
     found.setflags(write=False)
     return found
 
 
-def _checked_bounds(
-    lower: ArrayLike, upper: ArrayLike, size: int, where: str
-) -> tuple[np.ndarray, np.ndarray]:
+def _bounds(lower: Any, upper: Any, size: int, where: str) -> tuple[np.ndarray, np.ndarray]:
     low = numbers_of(lower, size, where, "lower bound")
     high = numbers_of(upper, size, where, "upper bound")
     wrong = (low > high) | (low == np.inf) | (high == -np.inf)
     if np.any(wrong):
-        i = int(np.flatnonzero(wrong)[0])
+        i = int(np.argmax(wrong))
         what = f"no number lies between the bounds {low[i]:g} and {high[i]:g}"
         raise ProgramError(what, f"{where}, entry {i}")
     return low, high
 
 
-def _checked_scale(given: ArrayLike, size: int, where: str) -> np.ndarray:
-    scale = numbers_of(given, size, where, "scale")
-    if not np.all((scale > 0) & np.isfinite(scale)):
-        raise ProgramError("scale is not positive", where, "Give the size that is expected")
-    return scale
-
-
-def _expression(given: Any, where: str) -> Any:
-    """An expression as a column of casadi.MX."""
-    import casadi as ca
-
-    if isinstance(given, ca.SX):
-        remedy = "Make a casadi.Function of it and call that with the symbols of the variables"
-        raise ProgramError("the expression is an SX", where, remedy)
-    try:
-        expression = given if isinstance(given, ca.MX) else ca.MX(given)
-    except (NotImplementedError, TypeError):
-        kind = type(given).__name__
-        raise ProgramError(f"{kind} is no CasADi expression", where, "Give an MX") from None
-    if expression.shape[1] != 1 or expression.shape[0] < 1:
-        what = f"the expression has the shape {tuple(expression.shape)}"
-        raise ProgramError(what, where, "Give a column")
-    return ca.densify(expression)
+def _set(block: Variable | Expression, **checked: Any) -> None:
+    """Put checked values in the place of those given to a frozen block."""
+    for name, value in checked.items():
+        object.__setattr__(block, name, value)

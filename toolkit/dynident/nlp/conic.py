@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dynident.inertia import pseudo_inertia
+from dynident.nlp.duality import Multipliers
+from dynident.nlp.polish import polished
 from dynident.nlp.problem import Problem, pseudo_basis
 from dynident.nlp.status import Status
 
@@ -23,22 +25,6 @@ if TYPE_CHECKING:
 # Below this Clarabel stops short ("almost solved"); the bound is computed from what it hands on.
 _TOLERANCE = 1e-9
 _WORDS = {"Solved": "solved", "AlmostSolved": "inaccurate", "MaxIterations": "iteration limit"}
-
-
-@dataclass(frozen=True, eq=False)
-class Multipliers:
-    """Lagrange multipliers of a problem's constraints, in parameters in units of their size.
-
-    Attributes
-    ----------
-    bodies : (n, d, d) symmetric matrices, positive semidefinite at an optimum.
-    linear : (k,) positive at a lower bound that holds x up, negative at an upper one.
-    cones : one vector per second-order cone, in that cone at an optimum.
-    """
-
-    bodies: np.ndarray
-    linear: np.ndarray
-    cones: tuple[np.ndarray, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +149,7 @@ def pose_conic(problem: Problem) -> ConicProgram:
     free, at = np.full(len(A), np.inf), linear.A @ origin
     cones = [
         program.AddLorentzConeConstraint(rows_, value, z)
-        for rows_, value in zip(cone_rows(problem), cone_values(problem, origin), strict=True)
+        for rows_, value in zip(problem.cone_rows, problem.cone_values(origin), strict=True)
     ]
     return ConicProgram(
         program,
@@ -176,22 +162,6 @@ def pose_conic(problem: Problem) -> ConicProgram:
         rows(equal, linear.lower - at, linear.upper - at),
         cones,
     )
-
-
-def _cone_rows(A: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Rows of a cone in parameters in units of their size, with entries near one."""
-    return A * scale / np.max(np.abs(A) * scale)
-
-
-def cone_values(problem: Problem, x: np.ndarray) -> list[np.ndarray]:
-    """Return each second-order cone's vector at x, as the conic program has it."""
-    scale = problem.space.scale
-    return [_cone_rows(c.A, scale) @ (x / scale) for c in problem.cones]
-
-
-def cone_rows(problem: Problem) -> list[np.ndarray]:
-    """Return each second-order cone's rows on the parameters in units of their size."""
-    return [_cone_rows(c.A, problem.space.scale) for c in problem.cones]
 
 
 def _add_objective(program: Any, z: np.ndarray, problem: Problem, origin: np.ndarray) -> None:
@@ -239,7 +209,9 @@ def solve_conic(problem: Problem) -> ConicSolution:
     FitError
         If the metric leaves directions free.
     """
-    from dynident.nlp.polish import polished
-
     posed = pose_conic(problem)
-    return polished(posed.problem, posed.solve())
+    found = posed.solve()
+    if found.multipliers is None:
+        return found
+    x, multipliers = polished(posed.problem, found.x, found.multipliers)
+    return replace(found, x=x, multipliers=multipliers)

@@ -1,26 +1,27 @@
-"""The solution of a nonlinear program by Ipopt, from one or several starts."""
+"""The solution of a scaled program by Ipopt, from one or several starts.
+
+`casadi.nlpsol` solves. `casadi.Opti` above it was tried and makes this no shorter: it knows neither
+names nor units, counts bounds of variables among the constraints, changes in place, and raises
+where a start fails. Ours is what neither has: scales that follow from the program, an end that is
+checked in plain arithmetic at the point that Ipopt hands on, and a Ctrl-C that arrives.
+"""
 
 from __future__ import annotations
 
 import signal
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import Any
 
+import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike
 
-from dynident.errors import ProgramError
-from dynident.nlp.compiled import Compiled, array_of, ipopt_solver
-from dynident.nlp.solution import Attempt, ProgramSolution
+from dynident.nlp.scaled import ScaledProgram
 from dynident.nlp.status import Status
 from dynident.threads import single_threaded
-
-if TYPE_CHECKING:
-    from dynident.nlp.program import Program
 
 _WORDS = {
     "Solve_Succeeded": "solved",
@@ -37,6 +38,190 @@ _STALLED = {
 }
 _NEAR = 1e-6  # relative stationarity, violation and complementarity of a solution
 _FAR = 1e-2  # relative stationarity where the objective merely became flat, on its way to infinity
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Attempt:
+    """Where one start ended.
+
+    Attributes
+    ----------
+    start : (k,) all variables where it began, in their units.
+    status : how the solver ended.
+    x : (k,) all variables in their units; the last iterate where it failed.
+    terms : (t,) of the objective.
+    objective : their sum; NaN where the start has none.
+    violation : of the worst constraint or bound, in units of its scale; 0 where all hold.
+    stationarity : largest entry of the Lagrangian's gradient, in units of the variables' scales and
+        relative to the objective's largest gradient or curvature there: about the step, in scales,
+        that is still missing.
+    complementarity : largest product of a multiplier and its distance from the bound, relative
+        likewise.
+    of_bounds, of_rows : (k,), (m,) multipliers of the variables' bounds and of the constraints:
+        what the objective grows by per unit that a bound grows.
+    """
+
+    start: np.ndarray
+    status: Status
+    x: np.ndarray
+    terms: np.ndarray
+    objective: float
+    violation: float
+    stationarity: float
+    complementarity: float
+    of_bounds: np.ndarray
+    of_rows: np.ndarray
+
+    @property
+    def rank(self) -> tuple[bool, bool, float]:
+        """Solutions first, then what comes near the constraints, then the lowest objective."""
+        objective = self.objective if np.isfinite(self.objective) else np.inf
+        return not self.status.ok, not self.violation <= _NEAR, objective
+
+
+@single_threaded
+def solve_scaled(
+    program: ScaledProgram, starts: Sequence[np.ndarray], tolerance: float, max_iterations: int
+) -> tuple[Attempt, ...]:
+    """Solve a program from each start; a start that fails raises nothing.
+
+    Parameters
+    ----------
+    program : to solve.
+    starts : of all variables, (k,) in their units and within their bounds.
+    tolerance : Ipopt's, on the scaled program.
+    max_iterations : of each start.
+    """
+    with _interruptible():
+        points = [program.at(start / program.scale) for start in starts]
+        undefined = [program.undefined(point) for point in points]
+        # All starts under one scaling, or the tolerance would mean another thing for each.
+        scales = program.scales(points[undefined.index("") if "" in undefined else 0])
+        solver = _ipopt(program, tolerance, max_iterations)
+        return tuple(
+            _nowhere(program, start, point.terms, name)
+            if name
+            else _attempt(program, solver, scales, tolerance, start)
+            for start, point, name in zip(starts, points, undefined, strict=True)
+        )
+
+
+def _nowhere(program: ScaledProgram, start: np.ndarray, terms: np.ndarray, name: str) -> Attempt:
+    """A start from which there is no way."""
+    return Attempt(
+        start=start,
+        status=Status("Ipopt", "failed", f"{name} is not finite at the start", 0, 0.0),
+        x=start,
+        terms=terms,
+        objective=np.nan,
+        violation=np.nan,
+        stationarity=np.nan,
+        complementarity=np.nan,
+        of_bounds=np.full(len(start), np.nan),
+        of_rows=np.full(len(program.row_lower), np.nan),
+    )
+
+
+def _attempt(
+    program: ScaledProgram, solver: Any, scales: np.ndarray, tolerance: float, start: np.ndarray
+) -> Attempt:
+    found = _run(program, solver, scales, start)
+    # A start far away has gradients so large that its scale makes the tolerance loose: once more.
+    scale = program.at(found.x / program.scale).scale
+    if found.status.ok and found.stationarity > tolerance and scale < 0.1 * scales[0]:
+        again = _run(program, solver, np.append(scale, scales[1:]), found.x)
+        if again.status.ok and again.stationarity < found.stationarity:
+            return replace(again, start=start, status=again.status.after(found.status))
+    return found
+
+
+def _run(program: ScaledProgram, solver: Any, scales: np.ndarray, start: np.ndarray) -> Attempt:
+    lower, upper, size = program.row_lower, program.row_upper, scales[1:]
+    began = time.perf_counter()
+    with _interruptible():
+        result = solver(
+            x0=start / program.scale,
+            p=scales,
+            lbx=program.lower,
+            ubx=program.upper,
+            lbg=lower / size,
+            ubg=upper / size,
+        )
+    seconds, stats = time.perf_counter() - began, solver.stats()
+    z, of_bounds, of_rows = (result[name].full().ravel() for name in ("x", "lam_x", "lam_g"))
+    z = np.clip(z, program.lower, program.upper)
+    here = program.at(z)
+    # CasADi adds multipliers times constraints to the objective; here the objective grows by them.
+    of_rows = 0.0 - scales[0] * of_rows / size
+    remaining = here.gradient - here.jacobian.T @ of_rows
+    fixed = program.lower == program.upper
+    of_bounds = np.where(fixed, remaining, 0.0 - scales[0] * of_bounds)
+    products = np.concatenate(
+        [
+            _products(of_bounds, z, program.lower, program.upper),
+            _products(of_rows, here.rows, lower, upper),
+        ]
+    )
+    violation = _largest(np.maximum(lower - here.rows, here.rows - upper) / size)
+    stationarity = _largest(np.abs(remaining - of_bounds)) / here.scale
+    complementarity = _largest(products) / here.scale
+    message = str(stats["return_status"])
+    word = _word(message, stationarity, max(violation, stationarity, complementarity))
+    return Attempt(
+        start=start,
+        status=Status("Ipopt", word, message.replace("_", " "), int(stats["iter_count"]), seconds),
+        x=z * program.scale,
+        terms=here.terms,
+        objective=float(np.sum(here.terms)),
+        violation=violation,
+        stationarity=stationarity,
+        complementarity=complementarity,
+        of_bounds=of_bounds / program.scale,
+        of_rows=of_rows,
+    )
+
+
+def _word(message: str, stationarity: float, worst: float) -> str:
+    """How it ended: Ipopt's word, checked against what was computed here at its last point."""
+    word = _WORDS.get(message, "failed")
+    if message in _STALLED and worst <= _NEAR:
+        return "inaccurate"
+    if word == "solved" and worst > _NEAR:
+        return "inaccurate" if stationarity <= _FAR else "failed"
+    return word
+
+
+def _products(
+    multipliers: np.ndarray, at: np.ndarray, lower: np.ndarray, upper: np.ndarray
+) -> np.ndarray:
+    """Products of multipliers and the distance from the bound that they belong to."""
+    distance = np.where(multipliers > 0, at - lower, upper - at)
+    # A free entry has a multiplier of rounding only, and no distance.
+    return np.abs(multipliers) * np.where(np.isfinite(distance), np.abs(distance), 0.0)
+
+
+def _largest(values: np.ndarray) -> float:
+    return float(np.max(values, initial=0.0))
+
+
+def _ipopt(program: ScaledProgram, tolerance: float, max_iterations: int) -> Any:
+    """Ipopt, silent, with exact Hessian."""
+    options = {
+        "print_time": False,
+        "show_eval_warnings": False,  # a step into nowhere is shortened, nothing to report
+        "calc_lam_p": False,
+        "hess_lag": program.hessian,
+        "ipopt": {
+            "print_level": 0,
+            "sb": "yes",
+            "tol": tolerance,
+            "max_iter": max_iterations,
+            "nlp_scaling_method": "none",
+            "bound_relax_factor": min(1e-8, tolerance),
+            "honor_original_bounds": "yes",
+        },
+    }
+    return ca.nlpsol("solver", "ipopt", program.nlp, options)
 
 
 @contextmanager
@@ -65,145 +250,3 @@ def _interruptible() -> Iterator[None]:
         signal.signal(signal.SIGINT, handler)
         if caught:
             raise caught[0]
-
-
-@single_threaded
-@_interruptible()
-def solve(
-    program: Program,
-    starts: Sequence[Mapping[str, ArrayLike]] | None,
-    tolerance: float,
-    max_iterations: int,
-) -> ProgramSolution:
-    """Solve a program from each of its starts; see `Program.solve`."""
-    if not 0 < tolerance < 1:
-        raise ProgramError(f"tolerance = {tolerance:g}", program.title, "choose it within 0 and 1")
-    compiled = program.compiled
-    points = [program.point(start) for start in ([{}] if starts is None else starts)]
-    if not points:
-        raise ProgramError("there is no start", program.title, "give one, or None")
-    undefined = [compiled.undefined(point) for point in points]
-    # All starts under one scaling, or the tolerance would mean another thing for each.
-    first = next((i for i, name in enumerate(undefined) if name is None), 0)
-    scales = compiled.scales(points[first])
-    solver = ipopt_solver(compiled.nlp, compiled.hessian, tolerance, max_iterations)
-    attempts = tuple(
-        _attempt(compiled, solver, scales, tolerance, point) if name is None else _none(point, name)
-        for point, name in zip(points, undefined, strict=True)
-    )
-    best = min(attempts, key=_rank)
-    parts = array_of(compiled.terms(compiled.flat(best.values)))
-    names = (term.name for term in program.terms)
-    return ProgramSolution(
-        program, best, attempts, dict(zip(names, map(float, parts), strict=True))
-    )
-
-
-def _none(point: dict[str, np.ndarray], name: str) -> Attempt:
-    """A start from which there is no way."""
-    status = Status("Ipopt", "failed", f"{name} is not finite at the start", 0, 0.0)
-    return Attempt(point, point, status, np.nan, np.nan, np.nan, np.nan, {})
-
-
-def _attempt(
-    compiled: Compiled,
-    solver: Any,
-    scales: np.ndarray,
-    tolerance: float,
-    point: dict[str, np.ndarray],
-) -> Attempt:
-    found = _run(compiled, solver, scales, point, point)
-    # A start far away has gradients so large that its scale makes the tolerance loose: once more.
-    scale = compiled.objective_scale(compiled.flat(found.values))
-    if found.status.ok and found.stationarity > tolerance and scale < 0.1 * scales[0]:
-        again = _run(compiled, solver, np.append(scale, scales[1:]), point, found.values)
-        if again.status.ok and again.stationarity < found.stationarity:
-            before, after = found.status, again.status
-            together = replace(
-                after,
-                iterations=before.iterations + after.iterations,
-                seconds=before.seconds + after.seconds,
-            )
-            return replace(again, status=together)
-    return found
-
-
-def _run(
-    compiled: Compiled,
-    solver: Any,
-    scales: np.ndarray,
-    start: dict[str, np.ndarray],
-    at: dict[str, np.ndarray],
-) -> Attempt:
-    size, began = scales[1:], time.perf_counter()
-    with _interruptible():
-        result = solver(
-            x0=compiled.flat(at),
-            p=scales,
-            lbx=compiled.lower,
-            ubx=compiled.upper,
-            lbg=compiled.constraint_lower / size,
-            ubg=compiled.constraint_upper / size,
-        )
-    seconds = time.perf_counter() - began
-    stats = solver.stats()
-    message, values = str(stats["return_status"]), compiled.split(array_of(result["x"]))
-    z = compiled.flat(values)
-    objective, gradient = compiled.objective_gradient(z)
-    rows, jacobian = compiled.constraint_jacobian(z)
-    # CasADi adds multipliers times constraints to the objective; here the objective grows by them.
-    of_rows = 0.0 - scales[0] * array_of(result["lam_g"]) / size
-    remaining = gradient - jacobian.T @ of_rows
-    fixed = compiled.lower == compiled.upper
-    of_bounds = np.where(fixed, remaining, 0.0 - scales[0] * array_of(result["lam_x"]))
-    relative = compiled.objective_scale(z)
-    gaps = np.concatenate(
-        [
-            _gaps(of_bounds, z, compiled.lower, compiled.upper),
-            _gaps(of_rows, rows, compiled.constraint_lower, compiled.constraint_upper),
-        ]
-    )
-    broken = np.maximum(compiled.constraint_lower - rows, rows - compiled.constraint_upper) / size
-    violation = _largest(broken)
-    stationarity = _largest(np.abs(remaining - of_bounds)) / relative
-    complementarity = _largest(gaps) / relative
-    word = _word(message, violation, stationarity, complementarity)
-    return Attempt(
-        start,
-        values,
-        Status("Ipopt", word, message.replace("_", " "), int(stats["iter_count"]), seconds),
-        objective,
-        violation,
-        stationarity,
-        complementarity,
-        compiled.by_name(of_bounds / compiled.scale, of_rows),
-    )
-
-
-def _word(message: str, violation: float, stationarity: float, complementarity: float) -> str:
-    """How it ended: Ipopt's word, checked against what was computed here at its last point."""
-    word, near = _WORDS.get(message, "failed"), max(violation, stationarity, complementarity)
-    if message in _STALLED and near <= _NEAR:
-        return "inaccurate"
-    if word == "solved" and near > _NEAR:
-        return "inaccurate" if stationarity <= _FAR else "failed"
-    return word
-
-
-def _gaps(
-    multipliers: np.ndarray, at: np.ndarray, lower: np.ndarray, upper: np.ndarray
-) -> np.ndarray:
-    """Products of multipliers and the distance from the bound that they belong to."""
-    distance = np.where(multipliers > 0, at - lower, upper - at)
-    # A free entry has a multiplier of rounding only, and no distance.
-    return np.abs(multipliers) * np.where(np.isfinite(distance), np.abs(distance), 0.0)
-
-
-def _rank(attempt: Attempt) -> tuple[bool, bool, float]:
-    """Solutions first, then what comes near the constraints, then the lowest objective."""
-    objective = attempt.objective if np.isfinite(attempt.objective) else np.inf
-    return (not attempt.status.ok, not attempt.violation <= _NEAR, objective)
-
-
-def _largest(values: np.ndarray) -> float:
-    return float(np.max(values, initial=0.0))

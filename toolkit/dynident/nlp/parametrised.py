@@ -8,7 +8,7 @@ starts, and the conic bound beside the answer; but a program that can be extende
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -24,9 +24,10 @@ from dynident.inertia import (
     virtual,
     virtual_entries,
 )
+from dynident.nlp.blocks import Constraint, Cost, Residual, Variable
 from dynident.nlp.nearest import nearest_body
 from dynident.nlp.problem import TOLERANCE, Problem, pseudo_basis
-from dynident.nlp.program import Constraint, Cost, Program, ProgramSolution, Residual, Variable
+from dynident.nlp.program import Program, ProgramSolution
 from dynident.nlp.status import Status
 
 _AGREE = 1e-6  # of the objective: starts that end as near as this have found the same
@@ -108,9 +109,7 @@ class PosedProgram:
 
     def standard(self, values: dict[str, np.ndarray]) -> np.ndarray:
         """Standard parameters (s,) of the program's variables."""
-        symbols = [variable.symbol for variable in self.program.variables]
-        function = ca.Function("x", symbols, [self.x])
-        return np.array(function(*(values[v.name] for v in self.program.variables))).ravel()
+        return self.program.evaluate(self.x, values)
 
     def start(self, x: np.ndarray) -> dict[str, np.ndarray]:
         """The variables' values at, or a little inside of, standard parameters x (s,)."""
@@ -173,9 +172,12 @@ def pose(problem: Problem) -> PosedProgram:
         parts.append(variable.symbol)
     x = ca.vertcat(*parts)
     # Numbers of the size of one before they meet the rows: sums of squares keep their digits.
-    rows = problem.A * space.scale
-    program = program + Residual.linear(
-        "data and prior", rows, x / space.scale, problem.b, unit="noise"
+    program = program + Residual(
+        "data and prior",
+        x / space.scale,
+        "noise",
+        matrix=problem.A * space.scale,
+        target=problem.b,
     )
     if problem.entropy is not None:
         program = program + Cost("entropic prior", _entropy(problem, x))
@@ -190,8 +192,10 @@ def _constrained(program: Program, problem: Problem, x: Any) -> Program:
     rows = range(own, len(linear.A))
     if rows:
         value = ca.DM(linear.A[rows]) @ x
-        bounds = linear.lower[rows], linear.upper[rows]
-        program = program + Constraint("linear constraints", value, *bounds, unit="size")
+        lower, upper = linear.lower[rows], linear.upper[rows]
+        program = program + Constraint(
+            "linear constraints", value, "size", lower=lower, upper=upper
+        )
     for number, cone in enumerate(problem.cones, start=1):
         size = float(np.max(np.abs(cone.A) * problem.space.scale))
         vector = ca.DM(cone.A / size) @ x
@@ -259,11 +263,7 @@ def solve_nonlinear(problem: Problem, seed: int = 0) -> NonlinearSolution:
         found.append(posed.program.solve([posed.start(_random_start(posed.problem, random))]))
     # Where the solver stopped early the point may still be the best one: the certificate tells.
     best = min(found, key=_rank)
-    status = replace(
-        best.status,
-        iterations=sum(s.status.iterations for s in found),
-        seconds=sum(s.status.seconds for s in found),
-    )
+    status = best.status.after(*(s.status for s in found if s is not best))
     return NonlinearSolution(
         posed.standard(best.values),
         status,
@@ -286,16 +286,16 @@ def _agree(found: list[ProgramSolution]) -> bool:
 
 def _first_starts(problem: Problem) -> list[np.ndarray]:
     space = problem.space
-    given, mended = np.array(space.reference), np.array(problem.origin)
+    given, repaired = np.array(space.reference), np.array(problem.origin)
     for k, reference in enumerate(space.references):
         part = slice(10 * k, 10 * k + 10)
         _, length = _size(reference)
         # The entropy is one of mass distributions, whatever set it is used with.
         consistency = "full" if problem.entropy else problem.within.consistency
-        nearest = nearest_body(mended[part], length, consistency, float(reference[0]))
-        mended[part] = (1 - _INWARD) * nearest + _INWARD * reference
+        nearest = nearest_body(repaired[part], length, consistency, float(reference[0]))
+        repaired[part] = (1 - _INWARD) * nearest + _INWARD * reference
     given[space.rigid :] = problem.origin[space.rigid :]
-    return [given, mended]
+    return [given, repaired]
 
 
 def _random_start(problem: Problem, random: np.random.Generator) -> np.ndarray:

@@ -8,15 +8,14 @@ complement: Shapiro and Fan, "On eigenvalue optimization", SIAM J. Optim. 1995).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
 from dynident.inertia import distance_rows
-from dynident.nlp.certificate import Bound, lower_bound
-from dynident.nlp.conic import ConicSolution, Multipliers, cone_rows
+from dynident.nlp.duality import Bound, Multipliers, lower_bound
 from dynident.nlp.problem import Problem
 
 _STEPS = 6
@@ -63,25 +62,32 @@ class _Tangent:
     normals: tuple[np.ndarray, ...]
 
 
-def polished(problem: Problem, solution: ConicSolution) -> ConicSolution:
-    """Return the solution with more digits, or as it is where Newton's method brings none."""
-    if solution.multipliers is None:
-        return solution
-    pattern = _pattern(problem, solution.x, solution.multipliers)
-    best = current = solution
-    bound, excess = _proof(problem, solution)
-    excess = max(excess, _ROUNDING * problem.objective(solution.x))
+def polished(
+    problem: Problem, x: np.ndarray, multipliers: Multipliers
+) -> tuple[np.ndarray, Multipliers]:
+    """Return an optimum with more digits, or as it is where Newton's method brings none.
+
+    Parameters
+    ----------
+    problem : that was solved.
+    x : (s,) what a conic solver found.
+    multipliers : its own.
+    """
+    pattern = _pattern(problem, x, multipliers)
+    best = current = x, multipliers
+    bound, excess = _proof(problem, *current)
+    excess = max(excess, _ROUNDING * problem.objective(x))
     in_vain = 0
     for _ in range(_STEPS):
         try:
-            current = _step(problem, current, pattern)
+            current = _step(problem, *current, pattern)
         except np.linalg.LinAlgError:  # no tangent: the step led out of the entropy, or to a tip
             break
-        found, more = _proof(problem, current)
+        found, more = _proof(problem, *current)
         if (
             found.stationarity < bound.stationarity
             and found.dual_feasibility >= -_ROUNDING
-            and _violation(problem, current.x) <= _ROUNDING
+            and _violation(problem, current[0]) <= _ROUNDING
             and more <= excess
         ):
             best, bound, in_vain = current, found, 0
@@ -92,11 +98,10 @@ def polished(problem: Problem, solution: ConicSolution) -> ConicSolution:
     return best
 
 
-def _proof(problem: Problem, solution: ConicSolution) -> tuple[Bound, float]:
-    """The bound that a solution's multipliers prove, and how far its objective is from it."""
-    assert solution.multipliers is not None
-    x = problem.retracted(solution.x)
-    bound = lower_bound(problem, x, solution.multipliers)
+def _proof(problem: Problem, x: np.ndarray, multipliers: Multipliers) -> tuple[Bound, float]:
+    """The bound that multipliers prove, and how far the objective is from it."""
+    x = problem.retracted(x)
+    bound = lower_bound(problem, x, multipliers)
     return bound, abs(problem.objective(x) - bound.value)
 
 
@@ -122,17 +127,17 @@ def _pattern(problem: Problem, x: np.ndarray, multipliers: Multipliers) -> _Patt
     held = np.flatnonzero((linear.lower == linear.upper) | active)
     at = np.where(below <= above, linear.lower, linear.upper)[held]
     cones = []
-    for k, dual in enumerate(multipliers.cones):
-        value = cone_rows(problem)[k] @ (x / problem.space.scale)
+    for k, (dual, value) in enumerate(zip(multipliers.cones, problem.cone_values(x), strict=True)):
         if dual[0] / unit > value[0] - np.linalg.norm(value[1:]):
             cones.append(k)
     return _Pattern(tuple(flat), held, at, tuple(cones))
 
 
-def _step(problem: Problem, solution: ConicSolution, pattern: _Pattern) -> ConicSolution:
+def _step(
+    problem: Problem, x: np.ndarray, before: Multipliers, pattern: _Pattern
+) -> tuple[np.ndarray, Multipliers]:
     """One step: the quadratic model of the Lagrangian on the active constraints' tangent."""
-    scale, x, before = problem.space.scale, solution.x, solution.multipliers
-    assert before is not None
+    scale = problem.space.scale
     tangent = _tangent(problem, x, before, pattern)
     rows, rest = [problem.A * scale], [problem.b - problem.A @ x]
     if problem.entropy is not None:
@@ -153,8 +158,7 @@ def _step(problem: Problem, solution: ConicSolution, pattern: _Pattern) -> Conic
     d = start + free @ solve_triangular(R, Q.T @ (r - H @ start))
     # The gradient after the step is a combination of the constraints' gradients.
     factors = inverse.T @ (H.T @ (H @ d - r))
-    after = _unpacked(before, factors, tangent, pattern)
-    return replace(solution, x=x + scale * d, multipliers=after)
+    return x + scale * d, _unpacked(before, factors, tangent, pattern)
 
 
 def _tangent(
@@ -182,7 +186,7 @@ def _tangent(
         curvature.append(np.zeros((len(bend), len(x))))
         curvature[-1][:, part] = bend
     for k in pattern.cones:
-        rows = cone_rows(problem)[k]
+        rows = problem.cone_rows[k]
         value = rows @ (x / scale)
         norm = float(np.linalg.norm(value[1:]))
         if norm < _APEX:

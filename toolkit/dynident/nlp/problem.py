@@ -115,6 +115,16 @@ class Problem:
         return tuple(c for c in self._constraints if isinstance(c, SecondOrder))
 
     @cached_property
+    def cone_rows(self) -> list[np.ndarray]:
+        """Each second-order cone's rows, on parameters in units of their size; entries near one."""
+        scale = self.space.scale
+        return [c.A * scale / np.max(np.abs(c.A) * scale) for c in self.cones]
+
+    def cone_values(self, x: np.ndarray) -> list[np.ndarray]:
+        """Each second-order cone's vector at x."""
+        return [rows @ (x / self.space.scale) for rows in self.cone_rows]
+
+    @cached_property
     def _constraints(self) -> tuple[Linear | SecondOrder, ...]:
         return tuple(c for one in self.within.sets for c in one.on(self.space))
 
@@ -172,8 +182,7 @@ class Problem:
         if len(linear.A):
             value = linear.A @ x
             worst = max(worst, *(linear.lower - value), *(value - linear.upper))
-        for cone in self.cones:
-            value = cone.A @ x / np.max(np.abs(cone.A) * self.space.scale)
+        for value in self.cone_values(x):
             worst = max(worst, float(np.linalg.norm(value[1:]) - value[0]))
         return float(worst)
 
@@ -195,7 +204,7 @@ class Problem:
         return (relative[:, 0] <= _ROUNDING) & (relative[:, 4:].max(axis=1) > _ROUNDING)
 
     def retracted(self, x: np.ndarray) -> np.ndarray:
-        """X with what a solver left outside the consistent bodies mended, (s,).
+        """Return x with what a solver left outside the consistent bodies moved inside, (s,).
 
         Each body gets as much of its reference body as it takes to be the inset inside, no less:
         then no answer is better than the bound. The change is of the size of the solver's error.

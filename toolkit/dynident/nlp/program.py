@@ -1,4 +1,4 @@
-"""A nonlinear program that can be printed, inspected, extended and solved."""
+"""A nonlinear program that can be printed, inspected, extended and solved, and its solution."""
 
 from __future__ import annotations
 
@@ -7,21 +7,45 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynident.errors import ProgramError
-from dynident.nlp.blocks import Constraint, Cost, Residual, Variable, numbers_of
-from dynident.nlp.compiled import Compiled
-from dynident.nlp.ipopt import solve
-from dynident.nlp.solution import ProgramSolution
+from dynident.errors import FitError, ProgramError
+from dynident.nlp.blocks import Block, Constraint, Cost, Residual, Variable, numbers_of
+from dynident.nlp.ipopt import Attempt, solve_scaled
+from dynident.nlp.scaled import ScaledProgram
 from dynident.tables import Table, number, print_tables
 
-Block = Variable | Residual | Cost | Constraint
+_AT_BOUND = 1e-6  # of a variable's scale: nearer to a bound it is printed as being there
+_REMEDIES = {
+    "infeasible": "Loosen the constraints, or start nearer to a point that fulfils them",
+    "unbounded": "Add bounds or a prior",
+    "iteration limit": "Allow more iterations, or give scales and a start nearer to the solution",
+    "failed": "Give scales and a start nearer to the solution",
+}
+
+
+class _Printed:
+    """What is printed as tables."""
+
+    def tables(self) -> tuple[Table, ...]:
+        """All that it holds, as it is to be read."""
+        raise NotImplementedError
+
+    def show(self) -> None:
+        """Print the tables to the terminal."""
+        print_tables(*self.tables())
+
+    def __str__(self) -> str:
+        return "\n".join(str(table) for table in self.tables())
+
+    def _repr_html_(self) -> str:
+        return "".join(table._repr_html_() for table in self.tables())
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
+class Program(_Printed):
     """Minimise 1/2 sum |residual|^2 + sum of costs over named variables, under constraints.
 
     A sum: `program + block` is a new program with a block more, and leaves the other as it was.
@@ -48,14 +72,12 @@ class Program:
     blocks: tuple[Block, ...] = ()
 
     def __post_init__(self) -> None:
-        import casadi as ca
-
-        names = [block.name for block in self.blocks]
-        known = set()
+        names, known = set(), set()
         for block in self.blocks:
-            if names.count(block.name) > 1:
+            if block.name in names:
                 remedy = "Name it otherwise, or put it in place by `program.replacing(block)`"
                 raise ProgramError(f"{block.name} is in the program twice", self.title, remedy)
+            names.add(block.name)
             if isinstance(block, Variable):
                 known.add(block.symbol.__hash__())
                 continue
@@ -77,16 +99,13 @@ class Program:
 
     def replacing(self, block: Block) -> Program:
         """Return the program with a block in place of the one of the same name."""
-        self[block.name]
-        return replace(
-            self, blocks=tuple(block if b.name == block.name else b for b in self.blocks)
-        )
+        old = self[block.name]
+        return replace(self, blocks=tuple(block if b is old else b for b in self.blocks))
 
     def without(self, *names: str) -> Program:
         """Return the program without the blocks of these names."""
-        for name in names:
-            self[name]
-        return replace(self, blocks=tuple(b for b in self.blocks if b.name not in names))
+        gone = [self[name] for name in names]
+        return replace(self, blocks=tuple(b for b in self.blocks if b not in gone))
 
     # --- inspection ----------------------------------------------------------------------------
 
@@ -116,83 +135,68 @@ class Program:
         return tuple(b for b in self.blocks if isinstance(b, Constraint))
 
     @property
-    def size(self) -> int:
-        """Number of unknown numbers."""
-        return sum(v.size for v in self.variables)
-
-    @property
     def objective(self) -> str:
         """The objective, in words."""
-        return "minimise " + (" + ".join(t.term for t in self.terms) or "nothing: any such point")
+        words = (f"1/2 |{t.name}|^2" if isinstance(t, Residual) else t.name for t in self.terms)
+        return "minimise " + (" + ".join(words) or "nothing: any such point")
 
-    def point(self, values: Mapping[str, ArrayLike] | None = None) -> dict[str, np.ndarray]:
-        """Values of all variables: those given, moved within the bounds; the others at their start.
+    def point(self, values: Mapping[str, ArrayLike] | None = None) -> np.ndarray:
+        """Values of all variables (k,): those given, within the bounds; the others at their start.
 
         Raises
         ------
         ProgramError
             If a name is unknown, a shape is wrong, or a number is missing.
         """
-        given = dict(values or {})
-        found = {}
-        for variable in self.variables:
-            value = given.pop(variable.name, variable.start)
-            where = f"variable {variable.name}"
-            numbers = numbers_of(value, variable.size, where, "start")
+        given, found = dict(values or {}), [np.zeros(0)]
+        for v in self.variables:
+            where = f"variable {v.name}"
+            numbers = numbers_of(given.pop(v.name, v.start), v.rows, where, "start")
             if not np.all(np.isfinite(numbers)):
                 raise ProgramError("start is infinite", where)
-            found[variable.name] = np.clip(numbers, variable.lower, variable.upper)
+            found.append(np.clip(numbers, v.lower, v.upper))
         if given:
             there = ", ".join(v.name for v in self.variables)
             what = f"{next(iter(given))} is no variable"
             raise ProgramError(what, self.title, f"There is: {there}")
-        return found
+        return np.concatenate(found)
 
     def evaluate(
         self, expression: Any, values: Mapping[str, ArrayLike] | None = None
     ) -> np.ndarray:
         """An expression of the program's symbols at given values (default: at the start)."""
-        import casadi as ca
-
-        at = self.point(values)
-        symbols = [v.symbol for v in self.variables]
-        function: Any = ca.Function("evaluate", symbols, [ca.MX(expression)])
-        result = np.array(function(*(at[v.name] for v in self.variables)).full())
+        symbols = ca.vertcat(*(v.symbol for v in self.variables))
+        function: Any = ca.Function("evaluate", [symbols], [ca.MX(expression)])
+        result = np.array(function(self.point(values)).full())
         return result[:, 0] if result.shape[1] == 1 else result
 
     def tables(self) -> tuple[Table, ...]:
         """Variables, objective and constraints, as they are to be read."""
-        variables = tuple(_variable_row(v) for v in self.variables)
-        columns = ("variable", "size", "unit", "bounds", "start", "scale")
-        terms = tuple((t.name, _kind(t), str(t.rows), t.unit or "-") for t in self.terms)
-        shown = [
-            Table(f"{self.title}: {self.size} unknowns", columns, variables),
-            Table("Objective", ("term", "kind", "rows", "unit"), terms, (self.objective,)),
-        ]
-        if self.constraints:
-            rows = tuple(
-                (c.name, str(c.rows), c.unit or "-", _bounds(c.lower, c.upper))
-                for c in self.constraints
-            )
-            shown.append(Table("Constraints", ("constraint", "rows", "unit", "bounds"), rows))
-        return tuple(shown)
-
-    def show(self) -> None:
-        """Print the program to the terminal."""
-        print_tables(*self.tables())
-
-    def __str__(self) -> str:
-        return "\n".join(str(table) for table in self.tables())
-
-    def _repr_html_(self) -> str:
-        return "".join(table._repr_html_() for table in self.tables())
+        variables = tuple(
+            (*_head(v), _between(v), _range(v.start), _range(v.scale)) for v in self.variables
+        )
+        terms = tuple((*_head(t), type(t).__name__.lower()) for t in self.terms)
+        constraints = tuple((*_head(c), _between(c)) for c in self.constraints)
+        size = sum(v.rows for v in self.variables)
+        shown = (
+            Table(
+                f"{self.title}: {size} unknowns",
+                ("variable", "size", "unit", "bounds", "start", "scale"),
+                variables,
+            ),
+            Table("Objective", ("term", "rows", "unit", "kind"), terms, (self.objective,)),
+            Table("Constraints", ("constraint", "rows", "unit", "bounds"), constraints),
+        )
+        return shown if constraints else shown[:2]
 
     # --- solution ------------------------------------------------------------------------------
 
     @cached_property
-    def compiled(self) -> Compiled:
+    def scaled(self) -> ScaledProgram:
         """The program in the solver's variables; made once, whatever the starts."""
-        return Compiled.of(self)
+        if not self.variables:
+            raise ProgramError("has no variables", self.title)
+        return ScaledProgram(self.variables, self.terms, self.constraints)
 
     def solve(
         self,
@@ -216,39 +220,155 @@ class Program:
         ProgramError
             If there is no variable, or a start does not suit the variables.
         """
-        return solve(self, starts, tolerance, max_iterations)
+        if not 0 < tolerance < 1:
+            raise ProgramError(f"tolerance = {tolerance:g}", self.title, "choose it within 0 and 1")
+        points = [self.point(start) for start in ([{}] if starts is None else starts)]
+        if not points:
+            raise ProgramError("there is no start", self.title, "give one, or None")
+        attempts = solve_scaled(self.scaled, points, tolerance, max_iterations)
+        best = min(attempts, key=lambda one: one.rank)
+        return ProgramSolution(**vars(best), program=self, starts=attempts)
 
 
-def _kind(term: Residual | Cost) -> str:
-    return "residual" if isinstance(term, Residual) else "cost"
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ProgramSolution(Attempt, _Printed):
+    """The best of the starts: one with a solution before one without, then the lowest objective.
+
+    Attributes
+    ----------
+    program : what was solved.
+    starts : all that were tried, in their order.
+    """
+
+    program: Program
+    starts: tuple[Attempt, ...]
+
+    @property
+    def parts(self) -> dict[str, float]:
+        """Contribution of each term to the objective, by name."""
+        names = [term.name for term in self.program.terms]
+        return dict(zip(names, map(float, self.terms), strict=True))
+
+    @property
+    def values(self) -> dict[str, np.ndarray]:
+        """Values of the variables by name, in their units; the last iterate where it failed."""
+        return _split(self.program.variables, self.x)
+
+    @property
+    def multipliers(self) -> dict[str, np.ndarray]:
+        """What the objective grows by per unit that a bound grows, by constraint or variable.
+
+        Positive at a lower bound that holds, negative at an upper one, of either sign at an
+        equation, nearly 0 elsewhere. At an optimum the objective's gradient is the sum, over
+        constraints and variables, of their gradients times these.
+        """
+        blocks = (*self.program.variables, *self.program.constraints)
+        return _split(blocks, np.concatenate([self.of_bounds, self.of_rows]))
+
+    def evaluate(self, expression: Any) -> np.ndarray:
+        """An expression of the program's symbols at the solution."""
+        return self.program.evaluate(expression, self.values)
+
+    def require(self) -> ProgramSolution:
+        """Return the solution itself, if there is one.
+
+        Raises
+        ------
+        FitError
+            If no start reached a solution.
+        """
+        if self.status.ok:
+            return self
+        tried = f"; none of {len(self.starts)} starts did better" if len(self.starts) > 1 else ""
+        what = f"the program was not solved ({self.status}){tried}"
+        raise FitError(what, self.program.title, _REMEDIES.get(self.status.word))
+
+    def tables(self) -> tuple[Table, ...]:
+        """Values, parts of the objective, constraints and starts, as they are to be read."""
+        program = self.program
+        variables = [
+            (name, number(value, 6), unit, _at_bound(value, *bounds))
+            for v in program.variables
+            for (name, unit), value, *bounds in zip(
+                _cells(v), self.values[v.name], v.lower, v.upper, v.scale, strict=True
+            )
+        ]
+        parts = [(name, number(part, 6)) for name, part in self.parts.items()]
+        proof = (
+            f"stationarity {self.stationarity:.1e}, violation {self.violation:.1e}, "
+            f"complementarity {self.complementarity:.1e}"
+        )
+        constraints = [
+            (name, number(value, 6), unit, number(multiplier))
+            for c in program.constraints
+            for (name, unit), value, multiplier in zip(
+                _cells(c), self.evaluate(c.expression), self.multipliers[c.name], strict=True
+            )
+        ]
+        starts = [
+            (str(i), number(s.objective, 8), s.status.word, str(s.status.iterations))
+            for i, s in enumerate(self.starts)
+        ]
+        shown = [
+            Table(program.title, ("variable", "value", "unit", "bound"), tuple(variables)),
+            Table(
+                "Objective",
+                ("term", "value"),
+                (*parts, ("sum", number(self.objective, 6))),
+                (str(self.status), proof),
+            ),
+        ]
+        if constraints:
+            columns = ("constraint", "value", "unit", "multiplier")
+            shown.append(Table("Constraints", columns, tuple(constraints)))
+        if len(starts) > 1:
+            columns = ("start", "objective", "status", "iterations")
+            shown.append(Table("Starts", columns, tuple(starts)))
+        return tuple(shown)
 
 
-def _variable_row(variable: Variable) -> tuple[str, ...]:
-    return (
-        variable.name,
-        str(variable.size),
-        ", ".join(dict.fromkeys(variable.unit)) or "-",
-        _bounds(variable.lower, variable.upper),
-        _range(variable.start),
-        _range(variable.scale),
-    )
+def _split(blocks: Sequence[Block], numbers: np.ndarray) -> dict[str, np.ndarray]:
+    """Numbers of all rows by the name of the block that they belong to."""
+    parts = np.split(numbers, np.cumsum([block.rows for block in blocks])[:-1])
+    return {block.name: part for block, part in zip(blocks, parts, strict=True)}
 
 
-def _bounds(lower: np.ndarray, upper: np.ndarray) -> str:
+def _units(block: Block) -> tuple[str, ...]:
+    units = block.unit if isinstance(block, Variable) else (block.unit,) * block.rows
+    return tuple(unit or "-" for unit in units)
+
+
+def _head(block: Block) -> tuple[str, str, str]:
+    """Cells of a block's name, its number of rows and its units."""
+    return block.name, str(block.rows), ", ".join(dict.fromkeys(_units(block)))
+
+
+def _cells(block: Block) -> list[tuple[str, str]]:
+    """Cells of the name and the unit of each row."""
+    names = [f"{block.name}[{i}]" if block.rows > 1 else block.name for i in range(block.rows)]
+    return list(zip(names, _units(block), strict=True))
+
+
+def _between(block: Variable | Constraint) -> str:
     """Bounds in a cell; those of several entries by their extremes."""
-    if np.all(lower == upper):
-        return f"= {_range(lower)}"
-    low, high = float(lower.min()), float(upper.max())
+    if np.all(block.lower == block.upper):
+        return f"= {_range(block.lower)}"
+    low, high = float(block.lower.min()), float(block.upper.max())
     if low == -np.inf and high == np.inf:
-        free = np.all(np.isinf(lower) & np.isinf(upper))
+        free = np.all(np.isinf(block.lower) & np.isinf(block.upper))
         return "free" if free else "some entries bounded"
     if high == np.inf:
         return f">= {number(low)}"
-    if low == -np.inf:
-        return f"<= {number(high)}"
-    return f"{number(low)} to {number(high)}"
+    return f"<= {number(high)}" if low == -np.inf else f"{number(low)} to {number(high)}"
 
 
 def _range(values: np.ndarray) -> str:
     low, high = number(float(values.min())), number(float(values.max()))
     return low if low == high else f"{low} to {high}"
+
+
+def _at_bound(value: float, lower: float, upper: float, scale: float) -> str:
+    if lower == upper:
+        return "fixed"
+    near = _AT_BOUND * scale
+    return "lower" if value - lower <= near else "upper" if upper - value <= near else "-"

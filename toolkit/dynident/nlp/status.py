@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,14 @@ class Status:
     def ok(self) -> bool:
         """Whether there is a solution."""
         return self.word in ("solved", "inaccurate")
+
+    def after(self, *others: Status) -> Status:
+        """The same end with the iterations and the time of others before it."""
+        return replace(
+            self,
+            iterations=self.iterations + sum(other.iterations for other in others),
+            seconds=self.seconds + sum(other.seconds for other in others),
+        )
 
     def __str__(self) -> str:
         return f"{self.solver}: {self.word} ({self.message}) in {self.iterations} iterations"
