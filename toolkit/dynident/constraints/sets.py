@@ -1,7 +1,4 @@
-"""Constraint sets on standard parameters: each is linear or a second-order cone, hence convex.
-
-Every set says the same to a nonlinear and to a conic program. A new one is a class with `on`.
-"""
+"""Constraint sets on standard parameters: each is linear or a second-order cone, hence convex."""
 
 from __future__ import annotations
 

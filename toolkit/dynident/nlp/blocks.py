@@ -16,10 +16,32 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynident.errors import ProgramError
+from dynident.tables import number
+
+
+class _Rows:
+    """What has a name, and rows with units."""
+
+    name: str
+    rows: int
+    unit: str | tuple[str, ...]
+
+    @property
+    def head(self) -> tuple[str, str, str]:
+        """Its name, its number of rows and its units, as cells of a table."""
+        units = dict.fromkeys(unit for _, unit in self.cells)
+        return self.name, str(self.rows), ", ".join(units)
+
+    @property
+    def cells(self) -> list[tuple[str, str]]:
+        """The name and the unit of each row, as cells of a table."""
+        units = (self.unit,) * self.rows if isinstance(self.unit, str) else self.unit
+        names = [f"{self.name}[{i}]" if self.rows > 1 else self.name for i in range(self.rows)]
+        return [(name, unit or "-") for name, unit in zip(names, units, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
-class Variable:
+class Variable(_Rows):
     """A vector of unknowns.
 
     `dataclasses.replace(variable, upper=...)` keeps its symbol, so that expressions stay valid.
@@ -68,7 +90,7 @@ class Variable:
 
 
 @dataclass(frozen=True, eq=False)
-class Expression:
+class Expression(_Rows):
     """A column in the symbols of a program's variables.
 
     Attributes
@@ -211,6 +233,25 @@ def numbers_of(given: ArrayLike, size: int, where: str, what: str) -> np.ndarray
         raise ProgramError(f"{what} is NaN", f"{where}, entry {np.argmax(np.isnan(found))}")
     found.setflags(write=False)
     return found
+
+
+def between(lower: np.ndarray, upper: np.ndarray) -> str:
+    """Bounds in a cell; those of several rows by their extremes."""
+    if np.all(lower == upper):
+        return f"= {spread(lower)}"
+    low, high = float(lower.min()), float(upper.max())
+    if low == -np.inf and high == np.inf:
+        free = np.all(np.isinf(lower) & np.isinf(upper))
+        return "free" if free else "some entries bounded"
+    if high == np.inf:
+        return f">= {number(low)}"
+    return f"<= {number(high)}" if low == -np.inf else f"{number(low)} to {number(high)}"
+
+
+def spread(values: np.ndarray) -> str:
+    """Numbers in a cell, by their extremes."""
+    low, high = number(float(values.min())), number(float(values.max()))
+    return low if low == high else f"{low} to {high}"
 
 
 def _bounds(lower: Any, upper: Any, size: int, where: str) -> tuple[np.ndarray, np.ndarray]:

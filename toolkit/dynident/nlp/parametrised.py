@@ -37,7 +37,7 @@ _RANDOM = 4  # random starts at most, where the first ones do not agree
 _SPREAD = 0.5  # of a random start about the reference, in units of a body's size
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Parametrisation:
     """Ten free numbers of a body for which every value is allowed.
 
@@ -72,20 +72,20 @@ def _virtual_sizes(mass: float, length: float) -> np.ndarray:
 
 
 VIRTUAL = Parametrisation(
-    "virtual parameters",
-    "h",
-    ("kg^0.5", *("m",) * 3, *("kg^0.5 m",) * 6),
-    _virtual_forward,
-    lambda phi: virtual(phi, 0.0)[:10],
-    _virtual_sizes,
+    name="virtual parameters",
+    symbol="h",
+    units=("kg^0.5", *("m",) * 3, *("kg^0.5 m",) * 6),
+    forward=_virtual_forward,
+    inverse=lambda phi: virtual(phi, 0.0)[:10],
+    sizes=_virtual_sizes,
 )
 LOG_CHOLESKY = Parametrisation(
-    "log-Cholesky parameters",
-    "eta",
-    ("1", "1", "1", "1", *("m",) * 6),
-    lambda eta: log_cholesky_entries(eta, ca.exp),
-    log_cholesky,
-    lambda mass, length: np.array([1.0, 1.0, 1.0, 1.0, *[length] * 6]),
+    name="log-Cholesky parameters",
+    symbol="eta",
+    units=(*("1",) * 4, *("m",) * 6),
+    forward=lambda eta: log_cholesky_entries(eta, ca.exp),
+    inverse=log_cholesky,
+    sizes=lambda mass, length: np.array([1.0, 1.0, 1.0, 1.0, *[length] * 6]),
 )
 PARAMETRISATIONS = {"semi": VIRTUAL, "full": LOG_CHOLESKY}
 
@@ -116,13 +116,11 @@ class PosedProgram:
         space, found = self.problem.space, {}
         inside = x - self.problem.inset
         for k, body in enumerate(space.bodies):
-            phi = inside[10 * k : 10 * k + 10]
             # Off the boundary, where the parameters of a flat body are infinite.
-            phi = phi + _OFF * space.references[k]
+            phi = inside[10 * k : 10 * k + 10] + _OFF * space.references[k]
             found[f"{self.parametrisation.symbol}.{body}"] = self.parametrisation.inverse(phi)
         if space.size > space.rigid:
-            bounded = np.clip(x, space.lower, space.upper)
-            found["effects"] = bounded[space.rigid :]
+            found["effects"] = np.clip(x, space.lower, space.upper)[space.rigid :]
         return found
 
 
@@ -224,7 +222,7 @@ def _size(reference: np.ndarray) -> tuple[float, float]:
     return mass, float(np.sqrt((reference[4] + reference[6] + reference[9]) / (2 * mass)))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class NonlinearSolution:
     """What the nonlinear program found.
 
@@ -265,11 +263,11 @@ def solve_nonlinear(problem: Problem, seed: int = 0) -> NonlinearSolution:
     best = min(found, key=_rank)
     status = best.status.after(*(s.status for s in found if s is not best))
     return NonlinearSolution(
-        posed.standard(best.values),
-        status,
-        posed.parametrisation.name,
-        tuple(float(s.objective) for s in found),
-        best,
+        x=posed.standard(best.values),
+        status=status,
+        program=posed.parametrisation.name,
+        objectives=tuple(s.objective for s in found),
+        solution=best,
     )
 
 

@@ -12,7 +12,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynident.errors import FitError, ProgramError
-from dynident.nlp.blocks import Block, Constraint, Cost, Residual, Variable, numbers_of
+from dynident.nlp.blocks import (
+    Block,
+    Constraint,
+    Cost,
+    Residual,
+    Variable,
+    between,
+    numbers_of,
+    spread,
+)
 from dynident.nlp.ipopt import Attempt, solve_scaled
 from dynident.nlp.scaled import ScaledProgram
 from dynident.tables import Table, number, print_tables
@@ -173,17 +182,15 @@ class Program(_Printed):
     def tables(self) -> tuple[Table, ...]:
         """Variables, objective and constraints, as they are to be read."""
         variables = tuple(
-            (*_head(v), _between(v), _range(v.start), _range(v.scale)) for v in self.variables
+            (*v.head, between(v.lower, v.upper), spread(v.start), spread(v.scale))
+            for v in self.variables
         )
-        terms = tuple((*_head(t), type(t).__name__.lower()) for t in self.terms)
-        constraints = tuple((*_head(c), _between(c)) for c in self.constraints)
+        terms = tuple((*t.head, type(t).__name__.lower()) for t in self.terms)
+        constraints = tuple((*c.head, between(c.lower, c.upper)) for c in self.constraints)
         size = sum(v.rows for v in self.variables)
+        columns = ("variable", "size", "unit", "bounds", "start", "scale")
         shown = (
-            Table(
-                f"{self.title}: {size} unknowns",
-                ("variable", "size", "unit", "bounds", "start", "scale"),
-                variables,
-            ),
+            Table(f"{self.title}: {size} unknowns", columns, variables),
             Table("Objective", ("term", "rows", "unit", "kind"), terms, (self.objective,)),
             Table("Constraints", ("constraint", "rows", "unit", "bounds"), constraints),
         )
@@ -252,7 +259,9 @@ class ProgramSolution(Attempt, _Printed):
     @property
     def values(self) -> dict[str, np.ndarray]:
         """Values of the variables by name, in their units; the last iterate where it failed."""
-        return _split(self.program.variables, self.x)
+        found = _split(self.program.variables, self.x)
+        # To the bit: what was multiplied by its scale may lie a rounding outside.
+        return {v.name: np.clip(found[v.name], v.lower, v.upper) for v in self.program.variables}
 
     @property
     def multipliers(self) -> dict[str, np.ndarray]:
@@ -290,7 +299,7 @@ class ProgramSolution(Attempt, _Printed):
             (name, number(value, 6), unit, _at_bound(value, *bounds))
             for v in program.variables
             for (name, unit), value, *bounds in zip(
-                _cells(v), self.values[v.name], v.lower, v.upper, v.scale, strict=True
+                v.cells, self.values[v.name], v.lower, v.upper, v.scale, strict=True
             )
         ]
         parts = [(name, number(part, 6)) for name, part in self.parts.items()]
@@ -298,29 +307,25 @@ class ProgramSolution(Attempt, _Printed):
             f"stationarity {self.stationarity:.1e}, violation {self.violation:.1e}, "
             f"complementarity {self.complementarity:.1e}"
         )
-        constraints = [
+        rows = [
             (name, number(value, 6), unit, number(multiplier))
             for c in program.constraints
             for (name, unit), value, multiplier in zip(
-                _cells(c), self.evaluate(c.expression), self.multipliers[c.name], strict=True
+                c.cells, self.evaluate(c.expression), self.multipliers[c.name], strict=True
             )
         ]
         starts = [
             (str(i), number(s.objective, 8), s.status.word, str(s.status.iterations))
             for i, s in enumerate(self.starts)
         ]
+        total, notes = ("sum", number(self.objective, 6)), (str(self.status), proof)
         shown = [
             Table(program.title, ("variable", "value", "unit", "bound"), tuple(variables)),
-            Table(
-                "Objective",
-                ("term", "value"),
-                (*parts, ("sum", number(self.objective, 6))),
-                (str(self.status), proof),
-            ),
+            Table("Objective", ("term", "value"), (*parts, total), notes),
         ]
-        if constraints:
+        if rows:
             columns = ("constraint", "value", "unit", "multiplier")
-            shown.append(Table("Constraints", columns, tuple(constraints)))
+            shown.append(Table("Constraints", columns, tuple(rows)))
         if len(starts) > 1:
             columns = ("start", "objective", "status", "iterations")
             shown.append(Table("Starts", columns, tuple(starts)))
@@ -331,40 +336,6 @@ def _split(blocks: Sequence[Block], numbers: np.ndarray) -> dict[str, np.ndarray
     """Numbers of all rows by the name of the block that they belong to."""
     parts = np.split(numbers, np.cumsum([block.rows for block in blocks])[:-1])
     return {block.name: part for block, part in zip(blocks, parts, strict=True)}
-
-
-def _units(block: Block) -> tuple[str, ...]:
-    units = block.unit if isinstance(block, Variable) else (block.unit,) * block.rows
-    return tuple(unit or "-" for unit in units)
-
-
-def _head(block: Block) -> tuple[str, str, str]:
-    """Cells of a block's name, its number of rows and its units."""
-    return block.name, str(block.rows), ", ".join(dict.fromkeys(_units(block)))
-
-
-def _cells(block: Block) -> list[tuple[str, str]]:
-    """Cells of the name and the unit of each row."""
-    names = [f"{block.name}[{i}]" if block.rows > 1 else block.name for i in range(block.rows)]
-    return list(zip(names, _units(block), strict=True))
-
-
-def _between(block: Variable | Constraint) -> str:
-    """Bounds in a cell; those of several entries by their extremes."""
-    if np.all(block.lower == block.upper):
-        return f"= {_range(block.lower)}"
-    low, high = float(block.lower.min()), float(block.upper.max())
-    if low == -np.inf and high == np.inf:
-        free = np.all(np.isinf(block.lower) & np.isinf(block.upper))
-        return "free" if free else "some entries bounded"
-    if high == np.inf:
-        return f">= {number(low)}"
-    return f"<= {number(high)}" if low == -np.inf else f"{number(low)} to {number(high)}"
-
-
-def _range(values: np.ndarray) -> str:
-    low, high = number(float(values.min())), number(float(values.max()))
-    return low if low == high else f"{low} to {high}"
 
 
 def _at_bound(value: float, lower: float, upper: float, scale: float) -> str:
