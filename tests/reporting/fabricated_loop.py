@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynident.validation.loop_run import LoopRun, Signals, Skipped
-from dynident.validation.loop_validation import Validation
+from dynident.validation.loop_errors import LoopRun, Signals
+from dynident.validation.validation_result import Skipped, Validation
 
 
 def _signals(t: np.ndarray, q: np.ndarray, torque: np.ndarray) -> Signals:
@@ -37,27 +37,28 @@ def validation(
         lag = 0.05 * np.cos(np.outer(t, w)) @ (amplitude * w[:, None])
         law = 20.0 * reference + 5.0 * lag
         tiny = 1e-5 * rng.normal(size=lag.shape)
+        noisy = law + 0.05 * rng.normal(size=lag.shape)
         found.append(
             LoopRun(
-                f"run{k + 5}.csv",
-                t,
-                _signals(t, reference - lag + tiny, law + 0.05 * rng.normal(size=lag.shape)),
-                _signals(t, reference - (1 + share) * lag, law * (1 + 0.1 * share)),
-                _signals(t, reference, law),
-                np.outer([1e-5, 5e-4, 0.02, 0.05], np.ones(n)) if noise else None,
-                np.where(np.arange(n) == 0, 0.02 * (k == 0), 0.0),
-                np.full(n, 5.0),
-                np.full(n, 1e-5),
+                name=f"run{k + 5}.csv",
+                t=t,
+                measured=_signals(t, reference - lag + tiny, noisy),
+                simulated=_signals(t, reference - (1 + share) * lag, law * (1 + 0.1 * share)),
+                reference=_signals(t, reference, law),
+                noise=np.outer([1e-5, 5e-4, 0.02, 0.05], np.ones(n)) if noise else None,
+                saturated=np.where(np.arange(n) == 0, 0.02 * (k == 0), 0.0),
+                law_terms=np.full(n, 5.0),
+                encoder_noise=np.full(n, 1e-5),
             )
         )
     return Validation(
-        "bench arm",
-        joints,
-        ("rad",) * n,
-        ("N m",) * n,
-        "PD controller at 250 Hz",
-        tuple(found),
-        skipped,
-        0.5 if found else float("nan"),
-        "given" if noise and found else "unknown",
+        robot="bench arm",
+        joints=joints,
+        units=("rad",) * n,
+        torque_units=("N m",) * n,
+        controller="PD controller at 250 Hz",
+        runs=tuple(found),
+        skipped=skipped,
+        settling=0.5 if found else float("nan"),
+        noise_source="given" if noise and found else "unknown",
     )

@@ -18,11 +18,11 @@ from dynident.reporting.html import page
 from dynident.reporting.loop_content import loop_trace
 from dynident.reporting.loop_page import loop_section
 from dynident.reporting.pictures.convergence import convergence
-from dynident.reporting.pictures.loop_pictures import simulated_loop as moving
-from dynident.reporting.pictures.loop_plots import simulated_loop as still
+from dynident.reporting.pictures.loop_pictures import loop_quantity
+from dynident.reporting.pictures.loop_plots import simulated_loop
 from dynident.reporting.pictures.plots import save
-from dynident.validation.loop_run import QUANTITIES, Skipped
-from dynident.validation.loop_validation import Unsimulated, Validation
+from dynident.validation.loop_errors import QUANTITIES
+from dynident.validation.validation_result import Skipped, Unsimulated, Validation
 from reporting.fabricated import diagnosis
 from reporting.fabricated_loop import validation
 
@@ -51,34 +51,32 @@ def test_thinning_keeps_the_extremes_of_the_differences(found):
 
 
 def test_moving_picture(found):
-    figure = moving(found, "elbow", "run6.csv", ("position", "torque"))
-    titles = [axis.title.text for axis in figure.select_yaxes()]
-    assert titles == [
-        "position (rad)",
-        "difference (rad)",
-        "torque (N m)",
-        "difference (N m)",
-    ]
-    drawn: Any = figure.data
-    names = [trace.name for trace in drawn if trace.showlegend]
-    assert names == ["measured", "reference", "simulated", "by the control law"]
+    for quantity, unit, yardstick in (
+        ("position", "rad", "reference"),
+        ("torque", "N m", "by the control law"),
+    ):
+        figure = loop_quantity(loop_trace(found, found.runs[1], 1, quantity))
+        titles = [axis.title.text for axis in figure.select_yaxes()]
+        assert titles == [f"{quantity} ({unit})", f"difference ({unit})"]
+        drawn: Any = figure.data
+        names = [trace.name for trace in drawn if trace.showlegend is not False]
+        assert names == ["measured", yardstick, "simulated", "noise (2 rms)"]
 
 
 def test_still_picture(tmp_path):
-    figure = still(validation(("<i>", "a$b$"), samples=60), joints=("a$b$",))
+    figure = simulated_loop(validation(("<i>", "a$b$"), samples=60), joints=("a$b$",))
     assert isinstance(figure, Figure)
     assert save(figure, tmp_path / "loop.png").stat().st_size > 1000
-    assert still(validation(samples=60, noise=False), "run6.csv").axes
+    assert simulated_loop(validation(samples=60, noise=False), "run6.csv").axes
 
 
-@pytest.mark.parametrize("draw", [lambda v, r: moving(v, "elbow", r), still])
-def test_recordings_that_are_not_there(found, draw):
+def test_recordings_that_are_not_there(found):
     with pytest.raises(DynidentError, match=r"run5\.csv, run6\.csv"):
-        draw(found, "old.csv")
+        simulated_loop(found, "old.csv")
     with pytest.raises(DynidentError, match="no loop was simulated"):
-        draw(replace(found, runs=()), None)
+        simulated_loop(replace(found, runs=()))
     with pytest.raises(DynidentError, match="shoulder, elbow"):
-        moving(found, "wrist")
+        simulated_loop(found, joints=("wrist",))
 
 
 def test_the_report_has_the_section_where_there_is_a_loop(found):

@@ -56,9 +56,8 @@ def test_an_unknown_floor_is_said(unknown, found):
 
 
 def test_axes_have_units(found):
-    figure = pictures.residual_maps(found, "elbow")
-    titles = [axis.title.text for axis in figure.select_xaxes()]
-    assert titles == [
+    figures = [pictures.residual_map(found, one) for one in found.maps if one.joint == "elbow"]
+    assert [figure.layout.xaxis.title.text for figure in figures] == [
         "velocity (rad/s)",
         "position (rad)",
         "acceleration (rad/s\u00b2)",
@@ -66,35 +65,32 @@ def test_axes_have_units(found):
         "time (s)",
         "cycles per revolution",
     ]
-    assert {axis.title.text for axis in figure.select_yaxes()} == {
+    assert {figure.layout.yaxis.title.text for figure in figures} == {
         "mean residual (N m)",
         "amplitude (N m)",
     }
-    legend = [trace.name for trace in traces(figure) if trace.showlegend is not False]
+    legend = [trace.name for trace in traces(figures[0])]
     assert legend == ["noise band", "model as given", "with stribeck friction at elbow added"]
 
 
 def test_without_noise_there_is_no_band(unknown):
-    figure = pictures.residual_maps(unknown, "slide")
-    assert {trace.name for trace in traces(figure)} == {"model as given"}
+    for one in unknown.maps:
+        assert {t.name for t in traces(pictures.residual_map(unknown, one))} == {"model as given"}
 
 
 def test_torques_of_a_recording(found):
-    first = traces(pictures.measured_and_predicted(found, "elbow"))
-    second = traces(pictures.measured_and_predicted(found, "elbow", RECORDINGS[1]))
-    trace = next(t for t in found.traces if (t.recording, t.joint) == (RECORDINGS[1], "elbow"))
-    assert np.allclose(second[0].y, trace.measured, atol=1e-5)
-    assert not np.allclose(first[0].y, second[0].y)
+    first, second = (t for t in found.traces if t.joint == "elbow")
+    assert (first.recording, second.recording) == RECORDINGS
+    drawn = [traces(pictures.measured_and_predicted(found, one)) for one in (first, second)]
+    assert np.allclose(drawn[1][0].y, second.measured, atol=1e-5)
+    assert not np.allclose(drawn[0][0].y, drawn[1][0].y)
 
 
-@pytest.mark.parametrize("draw", [pictures.residual_maps, plots.residual_maps])
-def test_unknown_joints_and_recordings_list_the_valid_ones(found, draw):
+def test_unknown_joints_list_the_valid_ones(found):
     with pytest.raises(DynidentError, match="shoulder, elbow"):
-        draw(found, "wrist")
+        plots.residual_maps(found, "wrist")
     with pytest.raises(DynidentError, match="no residual map"):
-        draw(replace(found, maps=()), "elbow")
-    with pytest.raises(DynidentError, match=RECORDINGS[1]):
-        pictures.measured_and_predicted(found, "elbow", "run9.csv")
+        plots.residual_maps(replace(found, maps=()), "elbow")
 
 
 def test_thinning_keeps_every_extreme(found):
@@ -138,5 +134,5 @@ def test_static_pictures(names, tmp_path):
 
 
 def test_figures_are_plotly_figures(found):
-    for figure in (pictures.waterfall(found), pictures.residual_maps(found, "elbow")):
+    for figure in (pictures.waterfall(found), pictures.residual_map(found, found.maps[0])):
         assert isinstance(figure, go.Figure)

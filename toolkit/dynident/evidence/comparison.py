@@ -19,10 +19,8 @@ from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.tables import Table, finite, percent, print_tables
 from dynident.threads import single_threaded
-from dynident.validation.loop_columns import loop_columns
-from dynident.validation.loop_json import loop_json
-from dynident.validation.loop_validation import Unsimulated, Validation
 from dynident.validation.replay import Judged, loop_of
+from dynident.validation.validation_result import Loop, loop_table
 
 
 @dataclass(frozen=True)
@@ -41,7 +39,7 @@ class Comparison:
     names: tuple[str, ...]
     models: tuple[Model, ...]
     results: tuple[HeldOut, ...]
-    loops: tuple[Validation | Unsimulated | None, ...] = ()
+    loops: tuple[Loop, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON of `compare --json`."""
@@ -57,7 +55,7 @@ class Comparison:
                         {"name": joint, "error": finite(float(error))}
                         for joint, error in zip(robot.names, result.joint_errors, strict=True)
                     ],
-                    **({} if loop is None else {"closed_loop": loop_json(loop)}),
+                    **({} if loop is None else {"closed_loop": loop.brief_dict()}),
                 }
                 for name, model, result, loop in zip(
                     self.names, self.models, self.results, self._loops, strict=True
@@ -74,7 +72,7 @@ class Comparison:
         }
 
     @property
-    def _loops(self) -> tuple[Validation | Unsimulated | None, ...]:
+    def _loops(self) -> tuple[Loop, ...]:
         return self.loops or (None,) * len(self.names)
 
     def tables(self) -> tuple[Table | str, ...]:
@@ -92,7 +90,7 @@ class Comparison:
         notes = () if last.floor is not None else ("The noise floor is unknown.",)
         columns = ("joint", *self.names, "noise floor")
         errors = Table("Relative torque error on held-out recordings", columns, tuple(rows), notes)
-        loops = loop_columns(self.names, self._loops, robot.names)
+        loops = loop_table(self.names, self._loops, robot.names)
         if loops and len(self.names) == 1:
             # One table: the simulated loop beside what the regression leaves.
             pairs = zip(errors.rows, loops.rows, strict=True)

@@ -86,37 +86,13 @@ def maps_of(diagnosis: Diagnosis, joint: str) -> tuple[ResidualMap, ...]:
     DynidentError
         If the diagnosis has no such joint, or no map of it.
     """
-    _check_joint(diagnosis, joint)
+    known = [one.name for one in diagnosis.joints]
+    if joint not in known:
+        raise DynidentError(f"no joint '{joint}'", remedy=f"joints: {', '.join(known)}")
     found = tuple(one for one in diagnosis.maps if one.joint == joint)
     if not found:
         raise DynidentError("the diagnosis has no residual map of it", f"joint '{joint}'")
     return found
-
-
-def trace_of(diagnosis: Diagnosis, joint: str, recording: str | None = None) -> Trace:
-    """Measured and predicted torque of a joint, in a recording (the first without its name).
-
-    Raises
-    ------
-    DynidentError
-        If the diagnosis has no such joint, or no such trace of it.
-    """
-    _check_joint(diagnosis, joint)
-    found = [one for one in diagnosis.traces if one.joint == joint]
-    for trace in found:
-        if recording is None or trace.recording == recording:
-            return trace
-    if not found:
-        raise DynidentError("the diagnosis has no torques of it", f"joint '{joint}'")
-    valid = ", ".join(trace.recording for trace in found)
-    where = f"joint '{joint}', recording '{recording}'"
-    raise DynidentError("no such recording", where, f"recordings: {valid}")
-
-
-def _check_joint(diagnosis: Diagnosis, joint: str) -> None:
-    known = [one.name for one in diagnosis.joints]
-    if joint not in known:
-        raise DynidentError(f"no joint '{joint}'", remedy=f"joints: {', '.join(known)}")
 
 
 def noise_of(diagnosis: Diagnosis, joint: str) -> float | None:

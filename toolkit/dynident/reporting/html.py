@@ -30,8 +30,8 @@ from dynident.reporting.next_steps import next_steps, summary
 from dynident.reporting.packing import packed
 from dynident.reporting.pictures import diagnosis_pictures as pictures
 from dynident.tables import Table, number, percent
-from dynident.validation.loop_run import QUANTITIES
-from dynident.validation.loop_validation import Unsimulated, Validation
+from dynident.validation.loop_errors import QUANTITIES
+from dynident.validation.validation_result import Unsimulated, Validation
 
 _TRACE_BYTES = 600_000
 """What all torque traces together may take in the page."""
@@ -131,7 +131,7 @@ def _diagnosis_page(
     if ranked(diagnosis):
         figures["ranking"] = pictures.ranking(diagnosis)
     for name, trace in zip(names, diagnosis.traces, strict=True):
-        figures[name] = pictures.torques(diagnosis, trace, points)
+        figures[name] = pictures.measured_and_predicted(diagnosis, trace, points)
     for group in joint_maps:
         for name, one in group.maps:
             # The page has one legend for all of them.

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dynident.errors import DynidentError
 from dynident.reporting.content import kept_of
-from dynident.validation.loop_run import QUANTITIES, LoopRun, Quantity
-from dynident.validation.loop_validation import Validation
+from dynident.validation.loop_errors import QUANTITIES, LoopRun, Quantity
+from dynident.validation.validation_result import Validation
 
 REFERENCE_COLOUR = "#2e8b57"
 MEASURED = "measured"
 SIMULATED = "simulated"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class LoopTrace:
     """One quantity of one joint in one recording, (T,) each, SI units.
 
@@ -42,20 +41,20 @@ class LoopTrace:
         """The same picture with about so many samples at most; extremes are kept."""
         differences = (self.measured - self.simulated, self.measured - self.yardstick)
         kept = kept_of((self.measured, *differences), points)
-        return LoopTrace(
-            self.quantity,
-            self.unit,
-            self.t[kept],
-            self.measured[kept],
-            self.simulated[kept],
-            self.yardstick[kept],
-            self.yardstick_name,
-            self.noise,
-        )
+        names = ("t", "measured", "simulated", "yardstick")
+        return replace(self, **{name: getattr(self, name)[kept] for name in names})
 
 
 def loop_trace(validation: Validation, run: LoopRun, joint: int, quantity: Quantity) -> LoopTrace:
-    """Return what is drawn of one quantity."""
+    """Return what is drawn of one quantity.
+
+    Parameters
+    ----------
+    validation : for the units.
+    run : one of its recordings.
+    joint : place of the joint.
+    quantity : "position", "velocity", "acceleration" or "torque".
+    """
     unit = validation.units[joint]
     units = {
         "position": unit,
@@ -65,43 +64,12 @@ def loop_trace(validation: Validation, run: LoopRun, joint: int, quantity: Quant
     }
     noise = None if run.noise is None else float(run.noise[QUANTITIES.index(quantity), joint])
     return LoopTrace(
-        quantity,
-        units[quantity],
-        run.t,
-        run.measured.of(quantity)[:, joint],
-        run.simulated.of(quantity)[:, joint],
-        run.reference.of(quantity)[:, joint],
-        "by the control law" if quantity == "torque" else "reference",
-        noise,
+        quantity=quantity,
+        unit=units[quantity],
+        t=run.t,
+        measured=run.measured.of(quantity)[:, joint],
+        simulated=run.simulated.of(quantity)[:, joint],
+        yardstick=run.reference.of(quantity)[:, joint],
+        yardstick_name="by the control law" if quantity == "torque" else "reference",
+        noise=noise,
     )
-
-
-def run_of(validation: Validation, recording: str | None = None) -> LoopRun:
-    """Return the run of a recording; the first without its name.
-
-    Raises
-    ------
-    DynidentError
-        If the loop of no recording, or not of this one, was simulated.
-    """
-    if not validation.runs:
-        raise DynidentError("no loop was simulated, so that there is nothing to draw")
-    for run in validation.runs:
-        if recording in (None, run.name):
-            return run
-    valid = ", ".join(run.name for run in validation.runs)
-    raise DynidentError("was not simulated", f"recording '{recording}'", f"recordings: {valid}")
-
-
-def joint_of(validation: Validation, joint: str) -> int:
-    """Return the place of a joint.
-
-    Raises
-    ------
-    DynidentError
-        If there is no such joint.
-    """
-    if joint not in validation.joints:
-        valid = ", ".join(validation.joints)
-        raise DynidentError(f"no joint '{joint}'", remedy=f"joints: {valid}")
-    return validation.joints.index(joint)

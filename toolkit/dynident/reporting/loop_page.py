@@ -10,8 +10,8 @@ import plotly.graph_objects as go
 from dynident.reporting.loop_content import loop_trace
 from dynident.reporting.pictures.loop_pictures import loop_quantity
 from dynident.tables import Table
-from dynident.validation.loop_run import QUANTITIES, Quantity
-from dynident.validation.loop_validation import Unsimulated, Validation
+from dynident.validation.loop_errors import QUANTITIES, Quantity
+from dynident.validation.validation_result import Unsimulated, Validation
 
 _BYTES = 450_000
 """What all pictures together may take in the page."""

@@ -3,7 +3,7 @@
 In: an estimate, recordings and a controller. Out: a `Validation`.
 """
 
-from dynident.validation.loop_validation import Validation
 from dynident.validation.replay import validate
+from dynident.validation.validation_result import Validation
 
 __all__ = ["Validation", "validate"]

@@ -15,7 +15,7 @@ from dynident.fitting.sampling import LEAST_ROWS, Sampled, sample
 from dynident.model import Model
 from dynident.recording import Dataset, Noise, Recording, away_from_edges, mismatch, periods, within
 from dynident.validation.control_law import law_torque
-from dynident.validation.loop_run import QUANTITIES, LoopRun, Signals
+from dynident.validation.loop_errors import QUANTITIES, LoopRun, Signals
 
 if TYPE_CHECKING:
     from dynident.closed_loop.retrace import Retraced
@@ -48,15 +48,15 @@ def filtered_run(
     kept = _inside(measured)
     noise = _noise(recording, dataset, kept, lambda one: law_torque(one, controller, model.robot))
     return LoopRun(
-        recording.name,
-        measured.t[kept],
-        _signals(measured, kept),
-        _signals(simulated, kept),
-        _signals(reference, kept),
-        noise,
-        np.asarray(again.saturated, dtype=float),
-        _law_terms(recording, law, controller, model, dataset, kept),
-        _encoder_noise(recording, again.recording, dataset, kept),
+        name=recording.name,
+        t=measured.t[kept],
+        measured=_signals(measured, kept),
+        simulated=_signals(simulated, kept),
+        reference=_signals(reference, kept),
+        noise=noise,
+        saturated=np.asarray(again.saturated, dtype=float),
+        law_terms=_law_terms(recording, law, controller, model, dataset, kept),
+        encoder_noise=_encoder_noise(recording, again.recording, dataset, kept),
     )
 
 

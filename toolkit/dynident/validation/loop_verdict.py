@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Literal
 
 import numpy as np
 
 from dynident.tables import percent
+from dynident.validation.loop_errors import LoopErrors
 
-if TYPE_CHECKING:
-    from dynident.validation.loop_validation import Validation
+Verdict = Literal["follows", "no_nearer", "other_controller", "not_simulated"]
 
 ORIENTATION = (
     "For orientation: a two-link robot that was identified well came within 0.5 % of the position, "
@@ -31,132 +31,138 @@ _LAW_NOISE = 3.0
 """Relative error, and multiple of the noise, up to which the stated control law may have run."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Judgement:
     """Joints by what is the matter with them, (n,) bool each.
 
     Attributes
     ----------
+    joints, errors : names, and the errors that were judged.
     unlike : the control law's torque for the recorded positions is not the recorded torque.
     foreign : it is not by far: by more than a share of the terms that the law adds up. Where
         these nearly cancel (a law without reference velocity), 1 % of a gain may be 20 % of the
         torque; that alone accuses no controller.
     lost : the simulated position is further from the measured one than the reference.
-    untold : it is neither further nor nearer, or both distances may be noise.
-    lacking : the simulated torque is off by more than noise, and materially.
+    undecided : it is neither further nor nearer, or both distances may be noise.
+    lacking : the simulated torque is off by more than noise, and significantly so.
     """
 
+    joints: tuple[str, ...]
+    errors: LoopErrors
     unlike: np.ndarray
     foreign: np.ndarray
     lost: np.ndarray
-    untold: np.ndarray
+    undecided: np.ndarray
     lacking: np.ndarray
 
+    @staticmethod
+    def of(joints: tuple[str, ...], errors: LoopErrors) -> Judgement:
+        """Return what is the matter with each joint of simulated loops."""
+        own, reference = errors.own.joints, errors.without_model.joints
+        noise = errors.noise.joints[3] if errors.noise is not None else np.zeros(len(joints))
+        unlike = reference[3] > np.maximum(_LAW_HOLDS, _LAW_NOISE * noise)
+        terms = np.fmax(errors.law_terms, 1.0)
+        encoder = errors.position_noise
+        # Measured less simulated, and measured less reference: both hold the encoder's noise.
+        far, near = (np.sqrt(np.fmax(x[0] ** 2 - encoder**2, 0.0)) for x in (own, reference))
+        beyond = own[0] > _SAME_AS_NOISE * encoder
+        lost = beyond & (far > _FURTHER * near)
+        excess = np.sqrt(np.fmax(own[3] ** 2 - noise**2, 0.0))
+        return Judgement(
+            joints=joints,
+            errors=errors,
+            unlike=unlike,
+            foreign=unlike & (reference[3] > _LAW_HOLDS * terms),
+            lost=lost,
+            undecided=~lost & ~(far < near),
+            lacking=(noise > 0) & (own[3] > _BEYOND_NOISE * noise) & (excess > _MATERIAL),
+        )
 
-def judge(found: Validation) -> Judgement:
-    """Return what is the matter with each joint of simulated loops."""
-    own, reference = found.errors.joints, found.without_model.joints
-    noise = found.noise.joints[3] if found.noise is not None else np.zeros(len(found.joints))
-    unlike = reference[3] > np.maximum(_LAW_HOLDS, _LAW_NOISE * noise)
-    terms = np.fmax(found.law_terms, 1.0)
-    encoder = found.position_noise
-    # Measured less simulated, and measured less reference: both hold the encoder's noise.
-    far, near = (np.sqrt(np.fmax(x[0] ** 2 - encoder**2, 0.0)) for x in (own, reference))
-    beyond = own[0] > _SAME_AS_NOISE * encoder
-    lost = beyond & (far > _FURTHER * near)
-    excess = np.sqrt(np.fmax(own[3] ** 2 - noise**2, 0.0))
-    return Judgement(
-        unlike=unlike,
-        foreign=unlike & (reference[3] > _LAW_HOLDS * terms),
-        lost=lost,
-        untold=~lost & ~(far < near),
-        lacking=(noise > 0) & (own[3] > _BEYOND_NOISE * noise) & (excess > _MATERIAL),
-    )
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the loop is the recorded one, and says more of the motion than its reference."""
+        if self.foreign.any():
+            return "other_controller"
+        return "no_nearer" if self.lost.any() else "follows"
 
-
-def sentence(found: Validation) -> str:
-    """The verdict in plain words."""
-    if not found.runs:
-        return "No loop could be simulated."
-    said = found.judgement
-    match found.verdict:
-        case "other_controller":
+    @property
+    def sentence(self) -> str:
+        """The verdict in plain words."""
+        match self.verdict:
+            case "other_controller":
+                return (
+                    f"At {self._names(self.foreign)} the stated controller is not the one that "
+                    "ran, or torque or reference are not what they are said to be."
+                )
+            case "no_nearer":
+                cause = "the model is poor"
+                if (self.lost & self.unlike).any():
+                    cause += ", or controller or torque are not quite what they are said to be"
+                return (
+                    f"At {self._names(self.lost)} the simulated loop is no nearer to the "
+                    f"measurement than the reference: {cause}."
+                )
+        off = f"its torque is {percent(self.errors.own.of('torque'))} off."
+        if self.undecided.any():
             return (
-                f"At {_names(found, said.foreign)} the stated controller is not the one that "
-                "ran, or torque or reference are not what they are said to be."
+                f"At {self._names(self.undecided)} it cannot be told whether the simulated loop is "
+                "nearer to the measurement than the reference: they are about equally near, or "
+                f"within the noise; {off}"
             )
-        case "no_nearer":
-            cause = "the model is poor"
-            if (said.lost & said.unlike).any():
-                cause += ", or controller or torque are not quite what they are said to be"
-            return (
-                f"At {_names(found, said.lost)} the simulated loop is no nearer to the "
-                f"measurement than the reference: {cause}."
-            )
-    off = f"its torque is {percent(found.errors.of('torque'))} off."
-    if said.untold.any():
         return (
-            f"At {_names(found, said.untold)} it cannot be told whether the simulated loop is "
-            "nearer to the measurement than the reference: they are about equally near, or within "
-            f"the noise; {off}"
+            "At every joint the simulated loop is nearer to the measurement than the reference is; "
+            + off
         )
-    return (
-        "At every joint the simulated loop is nearer to the measurement than the reference is; "
-        + off
-    )
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the verdict rests on, joint by joint, in plain words."""
+        numbered = enumerate(self.joints)
+        return tuple(f"{joint}: {one}" for j, joint in numbered for one in self._of_joint(j))
 
-def notes(found: Validation) -> tuple[str, ...]:
-    """The sentence, and what it rests on, in plain words."""
-    lines = [sentence(found)]
-    for j in range(len(found.joints) if found.runs else 0):
-        lines += [f"{found.joints[j]}: {one}" for one in _of_joint(found, j)]
-    return (*lines, *((ORIENTATION,) if found.runs else ()), *found.remarks)
-
-
-def _of_joint(found: Validation, j: int) -> list[str]:
-    said, lines = found.judgement, []
-    law = percent(float(found.without_model.joints[3, j]), 1)
-    if said.foreign[j]:
-        lines.append(
-            "the stated control law, fed with the recorded positions, does not give the recorded "
-            f"torque ({law} off): check gains, rate_hz, delay_s, limit, and the units of torque "
-            "and reference."
-        )
-    elif said.lost[j]:
-        own, reference = (e.joints[0, j] for e in (found.errors, found.without_model))
-        line = (
-            f"the simulated position is {percent(own, 3)} off the measured one, the reference "
-            f"{percent(reference, 3)}."
-        )
-        if not said.unlike[j]:
-            line += (
-                f" The stated control law gives the recorded torque ({law} off): the model does "
-                "not respond as the robot does."
+    def _of_joint(self, j: int) -> list[str]:
+        errors, lines = self.errors, []
+        law = percent(float(errors.without_model.joints[3, j]), 1)
+        if self.foreign[j]:
+            lines.append(
+                "the stated control law, fed with the recorded positions, does not give the "
+                f"recorded torque ({law} off): check gains, rate_hz, delay_s, limit, and the units "
+                "of torque and reference."
             )
-        lines.append(line)
-    if said.unlike[j] and not said.foreign[j]:
-        share = percent(float(found.without_model.joints[3, j] / found.law_terms[j]), 1)
-        lines.append(
-            f"the stated control law misses the recorded torque by {law} of it. The law's terms "
-            f"nearly cancel, and that is {share} of them: a gain that is a little off may be "
-            "behind it, or a torque in another unit."
-        )
-    if found.saturated[j] > 0:
-        lines.append(
-            f"the simulated command is at its limit for {percent(float(found.saturated[j]), 1)} "
-            "of the samples; there the torque says nothing of the model."
-        )
-    if said.lacking[j] and found.noise is not None:
-        off = found.errors.joints[3, j]
-        lines.append(
-            f"the torque of the simulated loop is {percent(float(off), 1)} off, "
-            f"{off / found.noise.joints[3, j]:.3g} times the noise: the model lacks "
-            "something (`dynident diagnose` looks for what), or the stated loop is not quite the "
-            "recorded one."
-        )
-    return lines
+        elif self.lost[j]:
+            own, reference = (e.joints[0, j] for e in (errors.own, errors.without_model))
+            line = (
+                f"the simulated position is {percent(own, 3)} off the measured one, the reference "
+                f"{percent(reference, 3)}."
+            )
+            if not self.unlike[j]:
+                line += (
+                    f" The stated control law gives the recorded torque ({law} off): the model "
+                    "does not respond as the robot does."
+                )
+            lines.append(line)
+        if self.unlike[j] and not self.foreign[j]:
+            share = percent(float(errors.without_model.joints[3, j] / errors.law_terms[j]), 1)
+            lines.append(
+                f"the stated control law misses the recorded torque by {law} of it. The law's "
+                f"terms nearly cancel, and that is {share} of them: a gain that is a little off "
+                "may be behind it, or a torque in another unit."
+            )
+        if errors.saturated[j] > 0:
+            share = percent(float(errors.saturated[j]), 1)
+            lines.append(
+                f"the simulated command is at its limit for {share} of the samples; there the "
+                "torque says nothing of the model."
+            )
+        if self.lacking[j] and errors.noise is not None:
+            off = errors.own.joints[3, j]
+            lines.append(
+                f"the torque of the simulated loop is {percent(float(off), 1)} off, "
+                f"{off / errors.noise.joints[3, j]:.3g} times the noise: the model lacks "
+                "something (`dynident diagnose` looks for what), or the stated loop is not quite "
+                "the recorded one."
+            )
+        return lines
 
-
-def _names(found: Validation, which: np.ndarray) -> str:
-    return ", ".join(found.joints[j] for j in np.flatnonzero(which))
+    def _names(self, which: np.ndarray) -> str:
+        return ", ".join(self.joints[j] for j in np.flatnonzero(which))

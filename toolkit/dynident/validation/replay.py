@@ -18,9 +18,9 @@ from dynident.recording import Dataset, Recording, uniform
 from dynident.recording.dataset import NoiseSource
 from dynident.threads import single_threaded
 from dynident.validation.control_law import time_constant
-from dynident.validation.loop_run import LoopRun, Skipped
+from dynident.validation.loop_errors import LoopRun
 from dynident.validation.loop_signals import filtered_run
-from dynident.validation.loop_validation import Unsimulated, Validation
+from dynident.validation.validation_result import Skipped, Unsimulated, Validation
 
 if TYPE_CHECKING:
     from dynident.closed_loop.retrace import Retraced
@@ -133,20 +133,20 @@ def simulate_again(
         raise SimulationError(what, where, remedy)
     usable = [uniform(r) for r in dataset.recordings if r.q_ref is not None]
     nothing = Validation(
-        robot.name,
-        robot.names,
-        robot.units,
-        robot.torque_units,
-        _words(controller),
-        (),
-        tuple(
+        robot=robot.name,
+        joints=robot.names,
+        units=robot.units,
+        torque_units=robot.torque_units,
+        controller=_words(controller),
+        runs=(),
+        skipped=tuple(
             Skipped(r.name, "no_reference", f"it has no column {_column(robot)}")
             for r in dataset.recordings
             if r.q_ref is None
         ),
-        np.nan,
-        "unknown",
-        sources_of(Dataset(tuple(usable), dataset.filter)),
+        settling=np.nan,
+        noise_source="unknown",
+        sources=sources_of(Dataset(tuple(usable), dataset.filter)),
     )
     free = [robot.names[j] for j in np.flatnonzero(controller.feedback().position == 0)]
     if free:

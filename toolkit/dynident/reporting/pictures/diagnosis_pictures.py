@@ -1,4 +1,4 @@
-"""Plotly pictures of a diagnosis, for the report and for notebooks."""
+"""Plotly pictures of a diagnosis, for the page."""
 
 from __future__ import annotations
 
@@ -18,11 +18,9 @@ from dynident.reporting.content import (
     bars,
     first_set,
     is_spectrum,
-    maps_of,
     noise_of,
     ranked,
     thinned,
-    trace_of,
     wrapped,
     x_title,
     y_title,
@@ -141,57 +139,15 @@ def residual_map(diagnosis: Diagnosis, one: ResidualMap) -> go.Figure:
     return dressed(go.Figure(_map_traces(diagnosis, one), layout), 300, top=22)
 
 
-def residual_maps(diagnosis: Diagnosis, joint: str) -> go.Figure:
-    """All residual maps of a joint side by side.
-
-    Raises
-    ------
-    DynidentError
-        If the diagnosis has no such joint, or no map of it.
-    """
-    maps = maps_of(diagnosis, joint)
-    columns = min(len(maps), 3)
-    count = -(-len(maps) // columns)
-    figure = make_subplots(
-        rows=count,
-        cols=columns,
-        horizontal_spacing=0.24 / columns,
-        vertical_spacing=0.3 / count,
-    )
-    for i, one in enumerate(maps):
-        row, col = i // columns + 1, i % columns + 1
-        for trace in _map_traces(diagnosis, one):
-            trace.showlegend = trace.showlegend is not False and i == 0
-            figure.add_trace(trace.update(legendgroup=trace.name), row=row, col=col)
-        figure.update_xaxes(title=x_title(one), row=row, col=col)
-        figure.update_yaxes(title=y_title(one), row=row, col=col, **_map_zero(one))
-    return dressed(figure, 90 + 260 * count)
-
-
-def measured_and_predicted(
-    diagnosis: Diagnosis, joint: str, recording: str | None = None, points: int = 4000
-) -> go.Figure:
+def measured_and_predicted(diagnosis: Diagnosis, trace: Trace, points: int = 4000) -> go.Figure:
     """Torque of a joint in a test recording, measured and predicted, and the residuals below.
 
     Parameters
     ----------
-    diagnosis : Diagnosis
-    joint : str
-    recording : str, optional
-        Its name; by default the first.
-    points : int
-        About how many samples are drawn; the extremes are kept.
-
-    Raises
-    ------
-    DynidentError
-        If there is no such joint or recording.
+    diagnosis : for the names of its models and the noise.
+    trace : one of `Diagnosis.traces`.
+    points : about how many samples are drawn; the extremes are kept.
     """
-    return torques(diagnosis, trace_of(diagnosis, joint, recording), points)
-
-
-def torques(diagnosis: Diagnosis, trace: Trace, points: int) -> go.Figure:
-    """`measured_and_predicted` of a given trace."""
     kept = thinned(trace, points)
     t, measured = _small(trace.t[kept]), trace.measured[kept]
     models = [(GIVEN, trace.before[kept], BEFORE_COLOUR, "dash")]

@@ -1,10 +1,9 @@
-"""Plotly pictures of a simulated loop, for the report and for notebooks."""
+"""Plotly pictures of a simulated loop, for the page."""
 
 from __future__ import annotations
 
 import numpy as np
 import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from dynident.reporting.content import AFTER_COLOUR, GREY
 from dynident.reporting.loop_content import (
@@ -12,56 +11,10 @@ from dynident.reporting.loop_content import (
     REFERENCE_COLOUR,
     SIMULATED,
     LoopTrace,
-    joint_of,
-    loop_trace,
-    run_of,
 )
-from dynident.reporting.pictures.look import FAINT, dressed, look, plain
-from dynident.validation.loop_run import QUANTITIES, Quantity
-from dynident.validation.loop_validation import Validation
+from dynident.reporting.pictures.look import FAINT, look, plain
 
 _NOISE = "noise (2 rms)"
-
-
-def simulated_loop(
-    validation: Validation,
-    joint: str,
-    recording: str | None = None,
-    quantities: tuple[Quantity, ...] = QUANTITIES,
-    points: int = 4000,
-) -> go.Figure:
-    """Quantities of a joint, measured, simulated and as the reference has them; differences beside.
-
-    Parameters
-    ----------
-    validation : as `validate` returns it.
-    joint : name.
-    recording : name; by default the first.
-    quantities : "position", "velocity", "acceleration", "torque".
-    points : about how many samples are drawn of each; the extremes are kept.
-
-    Raises
-    ------
-    DynidentError
-        If there is no such joint, or the recording's loop was not simulated.
-    """
-    run, j = run_of(validation, recording), joint_of(validation, joint)
-    count = len(quantities)
-    figure = make_subplots(
-        rows=count, cols=2, shared_xaxes=True, vertical_spacing=0.05, horizontal_spacing=0.1
-    )
-    for row, quantity in enumerate(quantities, 1):
-        trace = loop_trace(validation, run, j, quantity).thinned(points)
-        for line in _signals(trace):
-            # One legend for all rows; the torque's yardstick is another one.
-            shown = row == 1 or line["name"] not in (MEASURED, SIMULATED, "reference")
-            figure.add_trace({**line, "showlegend": shown}, row=row, col=1)
-        for line in _differences(trace):
-            figure.add_trace({**line, "showlegend": False}, row=row, col=2)
-        figure.update_yaxes(title=f"{quantity} ({trace.unit})", row=row, col=1)
-        figure.update_yaxes(title=f"difference ({trace.unit})", row=row, col=2)
-    figure.update_xaxes(title="time (s)", row=count)
-    return dressed(figure, 90 + 190 * count, top=40)
 
 
 def loop_quantity(trace: LoopTrace) -> go.Figure:

@@ -1,24 +1,23 @@
-"""Matplotlib pictures of a simulated loop, where a picture must stand still: pages, papers."""
+"""Matplotlib pictures of a simulated loop, for `--plot`, notebooks and papers."""
 
 from __future__ import annotations
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from dynident.errors import DynidentError
 from dynident.reporting.content import AFTER_COLOUR, GREY
 from dynident.reporting.loop_content import (
     MEASURED,
     REFERENCE_COLOUR,
     SIMULATED,
     LoopTrace,
-    joint_of,
     loop_trace,
-    run_of,
 )
 from dynident.reporting.pictures.plots import Picture, plain
 from dynident.tables import percent
-from dynident.validation.loop_run import QUANTITIES
-from dynident.validation.loop_validation import Validation
+from dynident.validation.loop_errors import QUANTITIES, LoopRun
+from dynident.validation.validation_result import Validation
 
 
 def simulated_loop(
@@ -41,8 +40,8 @@ def simulated_loop(
     DynidentError
         If there is no such joint, or the recording's loop was not simulated.
     """
-    run = run_of(validation, recording)
-    shown = [joint_of(validation, joint) for joint in joints or validation.joints]
+    run = _run_of(validation, recording)
+    shown = [_joint_of(validation, joint) for joint in joints or validation.joints]
     # A fixed grid: laying out the text of a seven-joint arm would take longer than drawing it.
     width, height = 14.0, 1.2 + 3.6 * len(shown)
     figure = Picture(figsize=(width, height))
@@ -100,3 +99,22 @@ def _draw_differences(axes: Axes, trace: LoopTrace) -> None:
 def _yardstick(axes: Axes, trace: LoopTrace, values) -> None:
     dash = {"color": REFERENCE_COLOUR, "linewidth": 1.0, "linestyle": "--"}
     axes.plot(trace.t, values, label=trace.yardstick_name, **dash)
+
+
+def _run_of(validation: Validation, recording: str | None = None) -> LoopRun:
+    """Return the run of a recording; the first without its name."""
+    if not validation.runs:
+        raise DynidentError("no loop was simulated, so that there is nothing to draw")
+    for run in validation.runs:
+        if recording in (None, run.name):
+            return run
+    valid = ", ".join(run.name for run in validation.runs)
+    raise DynidentError("was not simulated", f"recording '{recording}'", f"recordings: {valid}")
+
+
+def _joint_of(validation: Validation, joint: str) -> int:
+    """Return the place of a joint."""
+    if joint not in validation.joints:
+        valid = ", ".join(validation.joints)
+        raise DynidentError(f"no joint '{joint}'", remedy=f"joints: {valid}")
+    return validation.joints.index(joint)

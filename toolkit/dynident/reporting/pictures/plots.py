@@ -1,4 +1,4 @@
-"""Matplotlib pictures of a diagnosis, where a picture must stand still: pages, papers."""
+"""Matplotlib pictures of a diagnosis, for notebooks and papers; what all still pictures share."""
 
 from __future__ import annotations
 
@@ -38,9 +38,14 @@ class Picture(Figure):
 
 def waterfall(diagnosis: Diagnosis) -> Figure:
     """Held-out torque error as effects are added, down to the noise floor."""
+    figure = Picture(figsize=(7.0, 1.1 + 0.55 * len(bars(diagnosis))), layout="constrained")
+    draw_waterfall(figure.subplots(), diagnosis)
+    return figure
+
+
+def draw_waterfall(axes: Axes, diagnosis: Diagnosis) -> None:
+    """`waterfall` on given axes."""
     rows = bars(diagnosis)
-    figure = Picture(figsize=(7.0, 1.1 + 0.55 * len(rows)), layout="constrained")
-    axes = figure.subplots()
     for i, row in enumerate(rows):
         added = row.kind == "added"
         axes.barh(
@@ -66,7 +71,6 @@ def waterfall(diagnosis: Diagnosis) -> Figure:
     axes.set_xlabel("held-out torque error (%)")
     axes.set_xlim(0.0, 1.18 * max(axes.get_xlim()[1], 1e-9))
     axes.spines[["top", "right"]].set_visible(False)
-    return figure
 
 
 def residual_maps(diagnosis: Diagnosis, joint: str, given: str = GIVEN) -> Figure:
@@ -90,13 +94,24 @@ def residual_maps(diagnosis: Diagnosis, joint: str, given: str = GIVEN) -> Figur
     for axes in grid[len(maps) :]:
         axes.set_visible(False)
     for axes, one in zip(grid, maps, strict=False):
-        _draw(axes, diagnosis, one, given)
+        draw_residual_map(axes, diagnosis, one, given)
     handles, labels = grid[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper left", ncols=3, frameon=False)
     return figure
 
 
-def _draw(axes: Axes, diagnosis: Diagnosis, one: ResidualMap, given: str) -> None:
+def draw_residual_map(
+    axes: Axes, diagnosis: Diagnosis, one: ResidualMap, given: str = GIVEN
+) -> None:
+    """Mean residual against one quantity, before and after, with the noise band, on given axes.
+
+    Parameters
+    ----------
+    axes : of matplotlib.
+    diagnosis : for the name of its final model.
+    one : one of `Diagnosis.maps`.
+    given : what the legend calls the model that was diagnosed.
+    """
     marks = ("", "") if is_spectrum(one) else ("o", "D")
     if np.isfinite(one.band).any():
         lower = np.zeros_like(one.band) if is_spectrum(one) else -one.band

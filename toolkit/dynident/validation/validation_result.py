@@ -10,11 +10,11 @@ import numpy as np
 
 from dynident.fitting.estimate import DataSource
 from dynident.recording.dataset import NoiseSource
-from dynident.tables import Table, number, percent, print_tables
-from dynident.validation.loop_run import QUANTITIES, Errors, LoopRun, Signals, Skipped
-from dynident.validation.loop_verdict import Judgement, judge, notes, sentence
+from dynident.tables import Table, finite, number, percent, print_tables
+from dynident.validation.loop_errors import QUANTITIES, Errors, LoopErrors, LoopRun
+from dynident.validation.loop_verdict import ORIENTATION, Judgement, Verdict
 
-Verdict = Literal["follows", "no_nearer", "other_controller", "not_simulated"]
+Status = Literal["no_reference", "too_short", "failed"]
 
 
 @dataclass(frozen=True)
@@ -23,8 +23,29 @@ class Unsimulated:
 
     reason: str
 
+    def brief_dict(self) -> dict[str, Any]:
+        """The JSON of `compare --json`, as `Validation.brief_dict`."""
+        return {"verdict": "not_simulated", "reason": self.reason, "error": None, "joints": None}
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True)
+class Skipped:
+    """A recording whose loop was not simulated, and why.
+
+    Attributes
+    ----------
+    name : of the recording.
+    status : "no_reference" (it has no column q_ref), "too_short" (the loop settles after its end)
+        or "failed" (the loop cannot be simulated).
+    reason : in words.
+    """
+
+    name: str
+    status: Status
+    reason: str
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Validation:
     """A model in the closed loop in which it was measured.
 
@@ -54,97 +75,59 @@ class Validation:
     sources: tuple[DataSource, ...] = ()
     remarks: tuple[str, ...] = ()
 
-    # --- numbers -------------------------------------------------------------------------------
-
     @cached_property
+    def _numbers(self) -> LoopErrors:
+        return LoopErrors.of(self.runs, self.units)
+
+    @property
     def errors(self) -> Errors:
         """The simulated loop against the measurement."""
-        return self._errors([(r.simulated, r.measured) for r in self.runs])
+        return self._numbers.own
 
-    @cached_property
+    @property
     def without_model(self) -> Errors:
-        """What no model is needed for, against the measurement.
+        """The reference, and the torque of the control law, against the measurement."""
+        return self._numbers.without_model
 
-        The reference in the place of the motion; in the place of the torque what the control law
-        gives for the recorded positions.
-        """
-        return self._errors([(r.reference, r.measured) for r in self.runs])
-
-    @cached_property
+    @property
     def tracking(self) -> Errors:
         """The simulated loop against the reference (torque: against that of the control law)."""
-        return self._errors([(r.simulated, r.reference) for r in self.runs])
+        return self._numbers.tracking
 
-    @cached_property
+    @property
     def noise(self) -> Errors | None:
         """Noise of the measurement over the measurement; None where it is unknown."""
-        if not self.runs or any(run.noise is None for run in self.runs):
-            return None
-        square = sum(len(r.t) * np.asarray(r.noise) ** 2 for r in self.runs)
-        return self._relative(np.asarray(square), self._power())
+        return self._numbers.noise
 
-    @cached_property
-    def law_terms(self) -> np.ndarray:
-        """Terms that the control law adds up over the measured torque, (n,)."""
-        return self._mean(np.array([run.law_terms for run in self.runs]), 3)
-
-    @cached_property
-    def position_noise(self) -> np.ndarray:
-        """Noise of the measured position over the position, (n,).
-
-        That of the encoder alone, measured, where no noise is known.
-        """
-        if self.noise is not None:
-            return self.noise.joints[0]
-        return self._mean(np.array([run.encoder_noise for run in self.runs]), 0)
-
-    def _mean(self, rms: np.ndarray, quantity: int) -> np.ndarray:
-        """Root mean square over the recordings of (runs, n), over the measurement, (n,)."""
-        square = np.zeros((len(QUANTITIES), len(self.joints)))
-        for run, one in zip(self.runs, rms, strict=True):
-            square[quantity] += len(run.t) * one**2
-        return self._relative(square, self._power()).joints[quantity]
-
-    @cached_property
+    @property
     def saturated(self) -> np.ndarray:
         """Share of all samples at which each joint's simulated command was at its limit, (n,)."""
-        if not self.runs:
-            return np.zeros(len(self.joints))
-        shares = [run.saturated for run in self.runs]
-        return np.average(shares, axis=0, weights=[len(run.t) for run in self.runs])
+        return self._numbers.saturated
 
     def error_of(self, run: LoopRun) -> Errors:
         """The simulated loop against the measurement, in one recording."""
-        return self._errors([(run.simulated, run.measured)])
+        return Errors.between([(run.simulated, run.measured)], self.units)
 
-    def _errors(self, pairs: list[tuple[Signals, Signals]]) -> Errors:
-        square, power = np.zeros((2, len(QUANTITIES), len(self.joints)))
-        for i, quantity in enumerate(QUANTITIES):
-            for found, wanted in pairs:
-                square[i] += np.sum((found.of(quantity) - wanted.of(quantity)) ** 2, axis=0)
-                power[i] += np.sum(wanted.of(quantity) ** 2, axis=0)
-        return self._relative(square, power)
+    @cached_property
+    def judgement(self) -> Judgement:
+        """What is the matter with each joint."""
+        return Judgement.of(self.joints, self._numbers)
 
-    def _power(self) -> np.ndarray:
-        power = np.zeros((len(QUANTITIES), len(self.joints)))
-        for run in self.runs:
-            power += [np.sum(run.measured.of(one) ** 2, axis=0) for one in QUANTITIES]
-        return power
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the loop is the recorded one, and says more of the motion than its reference."""
+        return self.judgement.verdict if self.runs else "not_simulated"
 
-    def _relative(self, square: np.ndarray, power: np.ndarray) -> Errors:
-        """Errors from sums of squares, (4, n) each."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            joints = np.where(power > 0, np.sqrt(square / power), np.nan)
-            together = np.sqrt(square.sum(axis=1) / power.sum(axis=1))
-        together = np.where(power.sum(axis=1) > 0, together, np.nan)
-        if len(set(self.units)) > 1:
-            known = np.isfinite(joints)
-            count = np.maximum(known.sum(axis=1), 1)
-            mean = np.where(known, joints, 0.0) ** 2
-            together = np.where(known.any(axis=1), np.sqrt(mean.sum(axis=1) / count), np.nan)
-        return Errors(joints, together)
+    @property
+    def sentence(self) -> str:
+        """The verdict in plain words."""
+        return self.judgement.sentence if self.runs else "No loop could be simulated."
 
-    # --- words ---------------------------------------------------------------------------------
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The sentence, and what it rests on, in plain words."""
+        rests_on = (*self.judgement.notes, ORIENTATION) if self.runs else ()
+        return (self.sentence, *rests_on, *self.remarks)
 
     def tables(self) -> tuple[Table | str, ...]:
         """Everything that `show` prints, in its order."""
@@ -219,36 +202,106 @@ class Validation:
         )
         return Table("Recordings", ("recording", "status", *QUANTITIES), tuple(rows), notes)
 
-    @property
-    def verdict(self) -> Verdict:
-        """Whether the loop is the recorded one, and tells more of the motion than its reference."""
-        if not self.runs:
-            return "not_simulated"
-        if self.judgement.foreign.any():
-            return "other_controller"
-        return "no_nearer" if self.judgement.lost.any() else "follows"
-
-    @cached_property
-    def judgement(self) -> Judgement:
-        """What is the matter with each joint."""
-        return judge(self)
-
-    @property
-    def sentence(self) -> str:
-        """The verdict in plain words."""
-        return sentence(self)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """The sentence, and what it rests on, in plain words."""
-        return notes(self)
-
     def to_dict(self) -> dict[str, Any]:
         """The JSON of `simulate --json`; numbers that are not known are null."""
-        # Imported where it is used: that module knows this class.
-        from dynident.validation.loop_json import validation_json
+        without, tracking, noise = self.without_model, self.tracking, self.noise
+        known = bool(self.runs)
+        return {
+            "verdict": self.verdict,
+            "controller": self.controller,
+            "settling_s": finite(self.settling),
+            "noise": {
+                "source": self.noise_source,
+                "error": noise.to_dict() if noise else None,
+            },
+            "error": self.errors.to_dict() if known else None,
+            "without_model": without.to_dict() if known else None,
+            "tracking": tracking.to_dict() if known else None,
+            "joints": [
+                {
+                    "name": joint,
+                    "error": self.errors.at(j),
+                    "without_model": without.at(j),
+                    "tracking": tracking.at(j),
+                    "noise": noise.at(j) if noise else None,
+                    "saturated": float(self.saturated[j]),
+                }
+                for j, joint in enumerate(self.joints if known else ())
+            ],
+            "recordings": [
+                *(
+                    {
+                        "name": run.name,
+                        "status": "simulated",
+                        "reason": None,
+                        "error": self.error_of(run).to_dict(),
+                        "saturated": [float(x) for x in run.saturated],
+                    }
+                    for run in self.runs
+                ),
+                *(
+                    {
+                        "name": one.name,
+                        "status": one.status,
+                        "reason": one.reason,
+                        "error": None,
+                        "saturated": None,
+                    }
+                    for one in self.skipped
+                ),
+            ],
+            "notes": list(self.notes),
+        }
 
-        return validation_json(self)
+    def brief_dict(self) -> dict[str, Any]:
+        """The JSON of `compare --json`: verdict and errors."""
+        return {
+            "verdict": self.verdict,
+            "reason": None,
+            "error": self.errors.to_dict(),
+            "joints": [{"name": name, **self.errors.at(j)} for j, name in enumerate(self.joints)],
+        }
+
+
+Loop = Validation | Unsimulated | None
+"""Of one of several models; None where there is no loop to simulate."""
+
+
+def loop_table(
+    names: tuple[str, ...], loops: tuple[Loop, ...], joints: tuple[str, ...]
+) -> Table | None:
+    """Errors of torque and position of each model in closed loop; None where there is no loop."""
+    if all(loop is None for loop in loops):
+        return None
+    alone = len(names) == 1
+    columns = ["joint"]
+    for name in names:
+        prefix = "in loop" if alone else f"{name}"
+        columns += [f"{prefix}: torque", f"{prefix}: position"]
+    rows = []
+    for j, joint in enumerate((*joints, "all")):
+        cells = [joint]
+        for loop in loops:
+            if not isinstance(loop, Validation):
+                cells += ["-", "-"]
+                continue
+            errors = loop.errors.overall if j == len(joints) else loop.errors.joints[:, j]
+            cells += [percent(float(errors[3])), percent(float(errors[0]), 3)]
+        rows.append(tuple(cells))
+    return Table("Simulated in closed loop", tuple(columns), tuple(rows), _notes(names, loops))
+
+
+def _notes(names: tuple[str, ...], loops: tuple[Loop, ...]) -> tuple[str, ...]:
+    found = []
+    for name, loop in zip(names, loops, strict=True):
+        whose = "In loop" if len(names) == 1 else name
+        if isinstance(loop, Unsimulated):
+            found.append(f"{whose}: not simulated. {loop.reason}.")
+        elif loop is not None:
+            if loop.verdict != "follows":
+                found.append(f"{whose}: {loop.sentence}")
+            found += [f"{whose}: {one.name} left out: {one.reason}." for one in loop.skipped]
+    return tuple(found)
 
 
 def _percents(values: np.ndarray) -> tuple[str, ...]:

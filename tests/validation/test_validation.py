@@ -144,7 +144,7 @@ def test_a_gain_that_is_a_little_off_accuses_nobody(factor: float) -> None:
     made = recordings(UNFOLLOWED)[0]
     stated = replace(UNFOLLOWED, kp=tuple(factor * x for x in UNFOLLOWED.kp))
     found = validate(estimate(), dataset(made), stated)
-    assert np.all(found.law_terms > 5.0)
+    assert np.all(found.judgement.errors.law_terms > 5.0)
     assert np.all(found.without_model.joints[3] > 5.0 * abs(factor - 1))
     slight = 0.9 < factor < 1.2
     assert found.verdict == ("follows" if slight else "other_controller")
