@@ -112,7 +112,10 @@ def missing_effect(diagnosis: di.diagnosis.Diagnosis) -> None:
     (one,) = (m for m in diagnosis.maps if (m.joint, m.against) == (JOINT, "velocity"))
     draw_residual_map(left, diagnosis, one)
     left.set_title("Where the model fails", loc="left", weight="bold")
-    left.legend(loc="best", frameon=False)
+    left.set_xlabel(f"velocity of the {JOINT} ({one.unit})")
+    low, high = left.get_ylim()
+    left.set_ylim(low, high + 0.4 * (high - low))  # room for the legend
+    left.legend(loc="upper left", frameon=False)
     draw_waterfall(right, diagnosis)
     right.set_title(f"What is missing ({right.get_title(loc='left')})", loc="left", weight="bold")
     figure.savefig(HERE / "hidden_effect.png", dpi=150, facecolor="white")

@@ -14,16 +14,12 @@ from typing import NoReturn
 
 import click
 
-# Imported for what they add to the group, in the order of the help.
-from dynident.cli import studies  # isort: skip
-from dynident.cli import loops  # isort: skip
-from dynident.cli import pages  # isort: skip
-from dynident.cli import robots  # isort: skip
+from dynident.cli import fits, loops, robots, studies  # which add their commands to the group
 from dynident.cli.group import commands
 from dynident.cli.output import ReaderGone
 from dynident.errors import DynidentError, DynidentWarning
 
-__all__ = ["commands", "loops", "main", "pages", "robots", "studies"]
+__all__ = ["commands", "fits", "loops", "main", "robots", "studies"]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

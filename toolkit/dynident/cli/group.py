@@ -1,13 +1,23 @@
-"""The command `dynident`, to which the modules beside this one add their commands."""
+"""The command `dynident`, and what its commands have in common: answers, and options in groups."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, fields
+from functools import wraps
+from typing import Any
+
 import click
+
+from dynident.cli.output import print_json, say, show
+
+_ORDER = ("explain", "diagnose", "fit", "compare", "add", "simulate", "report", "demo", "check")
+"""Commands in the order of use, not of the alphabet; others come after them."""
 
 
 class _Group(click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(self.commands)  # in the order of use, not of the alphabet
+        return sorted(self.commands, key=lambda name: (*_ORDER, name).index(name))
 
 
 @click.group(
@@ -19,3 +29,60 @@ def commands() -> None:
 
     Example: dynident explain study.toml --report report.html
     """
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """What a command has to say, worked out in the form that is asked for.
+
+    Attributes
+    ----------
+    content : makes the JSON object.
+    parts : makes the tables and sentences.
+    lines : printed after them as they are, whatever the width of the terminal.
+    status : exit status.
+    """
+
+    content: Callable[[], dict[str, Any]]
+    parts: Callable[[], Iterable[Any]] = tuple
+    lines: tuple[str, ...] = ()
+    status: int = 0
+
+
+def answered(command: Callable[..., Answer]) -> Callable[..., int]:
+    """Give a command the option --json, and print the `Answer` that it returns."""
+
+    @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+    @wraps(command)
+    def run(*args: Any, as_json: bool, **options: Any) -> int:
+        answer = command(*args, **options)
+        if as_json:
+            print_json(answer.content())
+        else:
+            show(*answer.parts())
+            say(*answer.lines)
+        return answer.status
+
+    return run
+
+
+def collected(**kinds: type) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Hand a command its options in groups.
+
+    Parameters
+    ----------
+    kinds : dataclasses by the name of the argument; their fields are names of options.
+    """
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(command)
+        def run(*args: Any, **options: Any) -> Any:
+            groups = {
+                name: kind(**{field.name: options.pop(field.name) for field in fields(kind)})
+                for name, kind in kinds.items()
+            }
+            return command(*args, **groups, **options)
+
+        return run
+
+    return decorate

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from dynident import files
-from dynident.cli.group import commands
+from dynident.cli.group import Answer, answered, commands
 from dynident.cli.methods import Chosen, method_options, require_rate
-from dynident.cli.output import JSON, print_json, progress, say, show
+from dynident.cli.output import progress
 from dynident.cli.work import command_line, load_study, require_picture, require_places
 from dynident.errors import StudyError
 
@@ -36,19 +36,16 @@ _OF_STUDIES = {"filter", "noise", "columns"}
 @click.option("--plot", type=_PATH, help="Also write this picture (.png, .svg or .pdf).")
 @click.option("--out", type=_PATH, help="Of an experiment: folder for what is written.")
 @method_options
-@JSON
-@click.pass_context
+@answered
 def simulate(
-    context: click.Context,
     file: Path,
     estimate: Path | None,
     recording: str | None,
     report: Path | None,
     plot: Path | None,
     out: Path | None,
-    as_json: bool,
     chosen: Chosen,
-) -> None:
+) -> Answer:
     """Simulate the identified robot in the loop that was recorded, and compare the motion.
 
     STUDY needs a [controller], and recordings with their reference (q_ref). Errors of position,
@@ -69,8 +66,7 @@ def simulate(
             raise click.UsageError(f"--{given[0]} is for a study, and {file} is an experiment")
         if out is None:
             raise click.UsageError(f"{file} is an experiment: name a folder with --out")
-        _make(file, out, as_json)
-        return
+        return _make(file, out)
     if out is not None:
         raise click.UsageError(
             f"--out is for an experiment, and {file} is a study (no recording has a duration)"
@@ -84,26 +80,24 @@ def simulate(
     controller = _controller(study, recordings)
     found = _validation(_estimate(study, estimate, chosen), recordings, controller)
     _write(found, report, plot)
-    if as_json:
-        print_json({"recordings_used": used, **found.to_dict()})
-    else:
-        words = {"train": "No recording is for testing: these are the training recordings."}
-        show(*found.tables(), *([words[used]] if used in words else []))
+    words = {"train": ("No recording is for testing: these are the training recordings.",)}
     failed = any(one.status != "no_reference" for one in found.skipped)
-    context.exit(1 if failed or found.verdict != "follows" else 0)
+    return Answer(
+        content=lambda: {"recordings_used": used, **found.to_dict()},
+        parts=lambda: (*found.tables(), *words.get(used, ())),
+        status=1 if failed or found.verdict != "follows" else 0,
+    )
 
 
-def _make(file: Path, out: Path, as_json: bool) -> None:
+def _make(file: Path, out: Path) -> Answer:
     """Make virtual measurements."""
     from dynident.closed_loop import load_experiment, write_experiment
 
     loaded = load_experiment(file)
     with progress("simulating") as show_progress:
         written = write_experiment(loaded, out, progress=show_progress)
-    if as_json:
-        print_json({"written": [str(path) for path in written]})
-    else:
-        say(*map(str, written))
+    paths = tuple(map(str, written))
+    return Answer(content=lambda: {"written": list(paths)}, lines=paths)
 
 
 def _kind(path: Path) -> Literal["study", "experiment"]:

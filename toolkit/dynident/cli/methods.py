@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
-from functools import wraps
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from dynident.cli.group import collected
 from dynident.errors import DynidentError, StudyError
 
 if TYPE_CHECKING:
@@ -142,37 +142,37 @@ def require_rate(study: Study, controller: Controller) -> None:
         raise StudyError(error.what, f"{study.path}: {error.where}", error.remedy) from None
 
 
-def method_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command the options that choose the method; it gets them as `chosen`."""
-
-    @click.option(
+_METHOD_OPTIONS = (
+    click.option(
         "--method",
         type=click.Choice(["least-squares", "iv", *REGRESSIONS]),
         default="least-squares",
         show_default=True,
         help="iv: instrumental variables, right although the positions are noisy. corrected: least "
         "squares less a known input noise. bayes: joint factor analysis. The rest to compare with.",
-    )
-    @click.option(
+    ),
+    click.option(
         "--input-noise",
         type=click.Choice(["repeats", "encoders"]),
         help="Of corrected, factors and bayes: measured on repetitions, or carried from [noise].",
-    )
-    @click.option(
+    ),
+    click.option(
         "--instruments",
         type=click.Choice(["loop", "periods", "filtered"]),
         help="Of iv: the simulated loop (default), other periods, or filtered measurements.",
-    )
-    @click.option("--cutoff", type=click.FloatRange(0, min_open=True), help="Of these filters, Hz.")
-    @click.option(
+    ),
+    click.option("--cutoff", type=click.FloatRange(0, min_open=True), help="Of these filters, Hz."),
+    click.option(
         "--start",
         type=click.Choice(["least_squares", "description", "regular"]),
         help="Where iv begins to iterate; default: least_squares.",
-    )
-    @wraps(command)
-    def run(*args: Any, **options: Any) -> Any:
-        names = [field.name for field in fields(Chosen)]
-        chosen = Chosen(**{name: options.pop(name) for name in names})
-        return command(*args, chosen=chosen, **options)
+    ),
+)
 
-    return run
+
+def method_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the options that choose the method; it gets them as `chosen`."""
+    command = collected(chosen=Chosen)(command)
+    for option in reversed(_METHOD_OPTIONS):
+        command = option(command)
+    return command

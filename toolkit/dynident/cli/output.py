@@ -11,8 +11,6 @@ from typing import Any
 
 import click
 
-JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-
 
 def show(*parts: Any) -> None:
     """Print tables and sentences."""

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 
 from dynident import files
-from dynident.cli.group import commands
-from dynident.cli.output import JSON, print_json, progress, show
+from dynident.cli.group import Answer, answered, collected, commands
+from dynident.cli.output import progress
+
+if TYPE_CHECKING:
+    from dynident.fitting import Prior
+    from dynident.refitting import RefitSubject
+    from dynident.robot import Robot
+    from dynident.study import Study
 
 _PATH = click.Path(path_type=Path)
 
@@ -18,9 +24,8 @@ _PATH = click.Path(path_type=Path)
 @commands.command()
 @click.argument("robot", metavar="ROBOT|ESTIMATE", type=_PATH)
 @click.option("--all", "every_rule", is_flag=True, help="Print the margin of every rule, too.")
-@JSON
-@click.pass_context
-def check(context: click.Context, robot: Path, every_rule: bool, as_json: bool) -> None:
+@answered
+def check(robot: Path, every_rule: bool) -> Answer:
     """Say whether a robot can exist: the margin of every rule, link by link, worst first.
 
     ROBOT is a robot description (URDF, SDF or MJCF), ESTIMATE a saved estimate. Exit status 1 if a
@@ -32,11 +37,52 @@ def check(context: click.Context, robot: Path, every_rule: bool, as_json: bool) 
 
     with progress("checking"):
         found = check_robot(robot)
-    if as_json:
-        print_json(found.to_dict())
-    else:
-        show(*((found.margin_table(),) if every_rule else ()), *found.tables())
-    context.exit(0 if found.consistent else 1)
+    return Answer(
+        content=found.to_dict,
+        parts=lambda: (*((found.margin_table(),) if every_rule else ()), *found.tables()),
+        status=0 if found.consistent else 1,
+    )
+
+
+@dataclass(frozen=True)
+class _Inputs:
+    """What says which parameters are refitted, and to which recordings."""
+
+    study: Path | None
+    robot: Path | None
+    order: str | None
+
+    def read(self, what: Path) -> tuple[RefitSubject, Study | None, Robot]:
+        """Return the given parameters, the recordings, and the description that is the prior."""
+        from dynident.refitting import aligned, read_subject
+        from dynident.robot import Robot
+        from dynident.study import load
+
+        loaded = load(self.study) if self.study else None
+        prior = Robot.from_file(self.robot) if self.robot else None
+        if prior and loaded:
+            prior = aligned(prior, loaded.robot, str(self.robot))
+        # Whose parameters a CSV has, and the effects that may be among them.
+        model = loaded.model if loaded else None
+        if prior:
+            model = replace(model, robot=prior) if model else prior
+        subject = read_subject(what, model, self.order)
+        return subject, loaded, prior or (loaded.robot if loaded else subject.described)
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """How near to the prior, among which robots, and who solves that."""
+
+    consistency: Literal["full", "semi"]
+    distance: Literal["quadratic", "entropic"]
+    spread: float
+    solver: Literal["conic", "nlp"]
+
+    def prior(self, centre: Robot) -> Prior:
+        from dynident.fitting import Prior
+
+        return Prior(centre, self.distance, self.spread)
 
 
 @commands.command()
@@ -59,19 +105,9 @@ def check(context: click.Context, robot: Path, every_rule: bool, as_json: bool) 
 )
 @click.option("--spread", default=0.3, show_default=True, help="Relative doubt about it.")
 @click.option("--solver", type=click.Choice(["conic", "nlp"]), default="conic", show_default=True)
-@JSON
-def refit(
-    what: Path,
-    out: Path,
-    study: Path | None,
-    robot: Path | None,
-    order: str | None,
-    consistency: Literal["full", "semi"],
-    distance: Literal["quadratic", "entropic"],
-    spread: float,
-    solver: Literal["conic", "nlp"],
-    as_json: bool,
-) -> None:
+@answered
+@collected(inputs=_Inputs, problem=_Problem)
+def refit(what: Path, out: Path, inputs: _Inputs, problem: _Problem) -> Answer:
     """Write the nearest robot that can exist, and the proof that it is the nearest.
 
     ROBOT is a robot description (URDF, SDF or MJCF), ESTIMATE a saved estimate, CSV a list of
@@ -84,33 +120,19 @@ def refit(
     Example: dynident refit robot.urdf --out mended.urdf
     """
     from dynident.constraints import Within
-    from dynident.fitting import Prior
-    from dynident.refitting import aligned, read_subject
     from dynident.refitting import refit as refit_robot
-    from dynident.robot import Robot
     from dynident.robot.verify import require_format
-    from dynident.study import load
 
     files.require_place(out)
     with progress("reading"):
-        loaded = load(study) if study else None
-        believed = Robot.from_file(robot) if robot else None
-        if believed and loaded:
-            believed = aligned(believed, loaded.robot, str(robot))
-        # Whose parameters a CSV has, and the effects that may be among them.
-        model = loaded.model if loaded else None
-        if believed:
-            model = replace(model, robot=believed) if model else believed
-        subject = read_subject(what, model, order)
+        subject, loaded, centre = inputs.read(what)
     require_format(subject.robot, out)
     with progress("refitting"):
-        centre = believed or (loaded.robot if loaded else subject.described)
-        prior = Prior(centre, distance, spread)
-        found = refit_robot(subject, loaded, prior, Within(consistency), solver)
+        within = Within(problem.consistency)
+        found = refit_robot(subject, loaded, problem.prior(centre), within, problem.solver)
     with progress("verifying"):
         verified = found.write_robot(out)
-    if as_json:
-        content = {"out": str(out), "verified": verified.to_dict(), **found.to_dict()}
-        print_json(content)
-    else:
-        show(*found.tables(), *verified.sentences)
+    return Answer(
+        content=lambda: {"out": str(out), "verified": verified.to_dict(), **found.to_dict()},
+        parts=lambda: (*found.tables(), *verified.sentences),
+    )
