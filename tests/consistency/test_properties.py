@@ -13,7 +13,7 @@ import dynident as di
 from broken_robots import Fore, text, urdf
 from dynident.inertia import from_com, margins
 from dynident.robot import Robot
-from dynident.robot.rotations import from_rpy
+from dynident.robot.formats.elements import from_rpy
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -21,7 +21,7 @@ from dynident.fitting import Prior, project
 from dynident.inertia import frame_change
 from dynident.recording import Recording
 from dynident.robot import Robot
-from dynident.robot.rotations import from_rpy
+from dynident.robot.formats.elements import from_rpy
 
 # --- what it does not depend on ------------------------------------------------------------------
 

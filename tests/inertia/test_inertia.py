@@ -15,7 +15,7 @@ from dynident.inertia import (
     pseudo_inertia,
     to_com,
 )
-from dynident.robot.rotations import from_rpy
+from dynident.robot.formats.elements import from_rpy
 from inertia.bodies import bodies
 
 seeds = st.integers(0, 2**32 - 1)

@@ -17,7 +17,7 @@ from dynident.inertia import frame_change, from_com, to_com
 from dynident.reporting.pictures.ellipsoids import inertia_ellipsoids, inertia_sections
 from dynident.reporting.pictures.solids import poses, solid
 from dynident.robot import Robot
-from dynident.robot.rotations import from_rpy
+from dynident.robot.formats.elements import from_rpy
 
 R = from_rpy(np.array([0.4, -0.7, 1.1]))
 P = np.array([0.3, -0.2, 0.5])

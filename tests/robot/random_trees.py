@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dynident.robot.rotations import from_rpy
+from dynident.robot.formats.elements import from_rpy
 
 
 def text(values):

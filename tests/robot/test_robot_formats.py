@@ -7,7 +7,7 @@ from random_trees import joint_names, mjcf, random_tree, sdf, urdf
 from dynident.errors import RobotError
 from dynident.inertia import from_com
 from dynident.robot import Robot
-from dynident.robot.rotations import from_rpy
+from dynident.robot.formats.elements import from_rpy
 
 WRITERS = {"urdf": urdf, "sdf": sdf, "mjcf": mjcf}
 

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from broken_robots import WRITERS, Fore, text
 from dynident.errors import FileError
 from dynident.robot import Description
+from dynident.robot.formats.elements import from_rpy
 from dynident.robot.geometry import LinkGeometry, link_geometry
 from dynident.robot.hull import Hull
 from dynident.robot.meshes import find_mesh, mesh_points
-from dynident.robot.rotations import from_rpy
 
 P, RPY = np.array([0.1, -0.2, 0.3]), np.array([0.4, -0.5, 0.6])
 R = from_rpy(RPY)

@@ -9,10 +9,9 @@ import numpy as np
 from dynident.consistency.rules import Array, Body
 from dynident.inertia import LARGEST, to_com
 from dynident.robot import Description, Link, Robot
-from dynident.robot.broken_numbers import broken_numbers
+from dynident.robot.formats.reading import broken_numbers, joint_dynamics
 from dynident.robot.geometry import LinkGeometry, link_geometry
 from dynident.robot.hull import Hull
-from dynident.robot.joint_dynamics import carries_rotor, joint_dynamics
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +70,11 @@ def of_links(
     broken: dict[str, tuple[str, ...]] = {}
     if description is not None:
         geometry, broken = link_geometry(description), broken_numbers(description)
-        rotors = rotors | carries_rotor(joint_dynamics(description))
+        rotors |= {
+            one.joint
+            for one in joint_dynamics(description)
+            if one.quantity == "rotor inertia" and 0.0 < one.value < np.inf
+        }
     reaches = _reaches(robot) if robot is not None else {}
     hulls = {name: Hull(one.points) for name, one in geometry.items() if len(one.points)}
     known = [hull.extent for hull in hulls.values()] or [x for x in reaches.values() if x > 0.0]

@@ -17,8 +17,7 @@ from dynident.consistency.remedy import remedy
 from dynident.consistency.rules import TITLES, judge
 from dynident.errors import RobotError, UnsupportedError
 from dynident.robot import Description, Link, Robot
-from dynident.robot.joint_dynamics import joint_dynamics
-from dynident.robot.lone_links import lone_links
+from dynident.robot.formats.reading import joint_dynamics, lone_links
 
 if TYPE_CHECKING:
     from dynident.fitting import Estimate

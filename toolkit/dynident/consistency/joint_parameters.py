@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dynident.robot.joint_dynamics import JointDynamics
+from dynident.robot.formats.format import JointDynamics
 
 if TYPE_CHECKING:
     from dynident.effects import Parameter

@@ -10,8 +10,8 @@ from dynident.consistency.rules import Array, Body, judge
 from dynident.consistency.spread import second_moment, spread_of, worst_spread
 from dynident.errors import DynidentError
 from dynident.inertia import frame_change, from_com, to_com
+from dynident.robot.formats.tree_assembly import quiet
 from dynident.robot.hull import Hull
-from dynident.robot.kinematics import quiet
 
 NAMES = ("mass", "com x", "com y", "com z", "ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _UNITS = ("kg", *("m",) * 3, *("kg m^2",) * 6)

@@ -199,14 +199,14 @@ def _basis(given: BasisPart, model: Model, where: str) -> BaseParameters:
     if not np.all(kept > 0.0) or (np.any(dropped) and not dropped[0] > 0.0):
         raise _refusal("basis.diagonal", "is zero where a parameter was kept", where)
     return BaseParameters(
-        tuple(given.names),
-        tuple(given.independent),
-        tuple(given.dependent),
-        _matrix(given.K, (rank, p - rank), "basis.K", where),
-        tuple(given.expressions),
-        np.array(given.scale, dtype=float),
-        diagonal,
-        given.tolerance,
+        names=tuple(given.names),
+        independent=tuple(given.independent),
+        dependent=tuple(given.dependent),
+        K=_matrix(given.K, (rank, p - rank), "basis.K", where),
+        expressions=tuple(given.expressions),
+        scale=np.array(given.scale, dtype=float),
+        diagonal=diagonal,
+        tolerance=given.tolerance,
     )
 
 

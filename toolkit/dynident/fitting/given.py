@@ -23,14 +23,14 @@ def given_estimate(robot: Robot, model: Model | None = None) -> Estimate:
     model = replace(model, robot=robot) if model else Model(robot)
     p, n = model.size, robot.n
     unit = BaseParameters(
-        model.names,
-        tuple(range(p)),
-        (),
-        np.zeros((p, 0)),
-        model.names,
-        np.ones(p),
-        np.ones(p),
-        0.0,
+        names=model.names,
+        independent=tuple(range(p)),
+        dependent=(),
+        K=np.zeros((p, 0)),
+        expressions=model.names,
+        scale=np.ones(p),
+        diagonal=np.ones(p),
+        tolerance=0.0,
     )
     unknown = np.full(n, np.nan)
     values = model.given_values()

@@ -23,7 +23,7 @@ from dynident.inertia import LARGEST, PAPER_ORDER, PARAMETERS
 from dynident.model import Model
 from dynident.recording.formats.csv_file import is_number
 from dynident.robot import Robot
-from dynident.robot.xmltree import closest
+from dynident.robot.formats.xmltree import closest
 
 ORDERS = {"dynident": PARAMETERS, "paper": PAPER_ORDER}
 """Orders of the ten parameters of a body: ours, and that of the papers (m, mcx, mcy, mcz, I11,

@@ -1,7 +1,11 @@
 """Robot descriptions in and out, the regressor, and base parameters."""
 
-from dynident.robot.base_parameters import BaseParameters, base_parameters, structural_base
-from dynident.robot.lift import nearest_parameters
+from dynident.robot.base_parameters import (
+    BaseParameters,
+    base_parameters,
+    nearest_parameters,
+    structural_base,
+)
 from dynident.robot.robot import Robot
 from dynident.robot.tree import Description, Joint, Link
 

@@ -8,17 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import qr, solve_triangular
 
 from dynident.errors import FitError
+from dynident.robot.robot import Robot
 from dynident.robot.tree import Array
-
-if TYPE_CHECKING:
-    from dynident.robot.robot import Robot
 
 # A column this much smaller than the largest is rounding around zero, not a measurement.
 _ZERO = 1e-13
@@ -26,9 +24,13 @@ _ZERO = 1e-13
 _NEGLIGIBLE = 1e-8
 # How much the first of two equal columns is preferred as a pivot.
 _FAVOUR = 1e-6
+# Weight of a mass against the other parameters: where no torque shows it, it stays as described.
+_MASS_STAYS = 1e-3
+# Share of the typical mass below which a described mass cannot carry a first moment.
+_NEXT_TO_NOTHING = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class BaseParameters:
     """A basis of the identifiable combinations of parameters.
 
@@ -105,19 +107,34 @@ class BaseParameters:
         used = np.any(self.K != 0.0, axis=0)
         return theta[list(self.independent)] + self.K[:, used] @ dependent[used]
 
-    def lift(self, base_values: ArrayLike, theta_prior: ArrayLike) -> Array:
+    def lift(
+        self, base_values: ArrayLike, theta_prior: ArrayLike, mobility: ArrayLike = 1.0
+    ) -> Array:
         """Return the standard parameters (p,) nearest to a prior that have these base values.
 
         Nearest in the norm that weights each parameter with the torque that a unit of it makes
         (`scale`), so the choice does not depend on units. What no torque depends on keeps its
         prior value.
+
+        Parameters
+        ----------
+        base_values : (r,) array_like
+        theta_prior : (p,) array_like
+        mobility : float or (p,) array_like
+            Divides the weight of each parameter: the smaller it is, the nearer to the prior.
+
+        Raises
+        ------
+        FitError
+            If a shape does not fit.
         """
         values = self._vector(base_values, self.rank, "base_values")
         prior = self._vector(theta_prior, len(self.names), "theta_prior")
-        weight = np.divide(1.0, self.scale, out=np.zeros_like(self.scale), where=self.scale > 0)
+        norm = np.divide(1.0, self.scale, out=np.zeros_like(self.scale), where=self.scale > 0)
+        weight = norm * mobility
         B = self.combination * weight
         correction = np.linalg.lstsq(B, values - self.coordinates(prior), rcond=None)[0]
-        theta = prior + weight * correction
+        theta = np.asarray(prior + weight * correction, dtype=float)
         # One step of refinement puts what rounding is left into the independent parameters.
         theta[list(self.independent)] += values - self.coordinates(theta)
         return theta
@@ -224,3 +241,34 @@ def _expression(name: str, coefficients: Array, others: list[str]) -> str:
             size = f"{abs(value):.6g}"
             text += f" {sign} {other}" if size == "1" else f" {sign} {size} {other}"
     return text
+
+
+def nearest_parameters(base: BaseParameters, given: Array, wanted: Array) -> Array:
+    """Return the standard parameters nearest to a description, masses kept where they can be.
+
+    The bodies need not be physically possible: every base value is kept. A body without a mass gets
+    one, so that it can carry a first moment.
+
+    Parameters
+    ----------
+    base : BaseParameters
+        Of the robot.
+    given : (10 n,) ndarray
+        The description's parameters of the moving bodies.
+    wanted : (b,) ndarray
+        Base values.
+
+    Returns
+    -------
+    (10 n,) ndarray
+        Parameters of the moving bodies, each in its joint's frame.
+    """
+    theta = np.array(given)
+    masses = theta[0::10]
+    known = masses[np.isfinite(masses) & (masses > 0)]
+    typical = float(np.median(known)) if known.size else 1.0
+    theta[0::10] = np.where(masses > _NEXT_TO_NOTHING * typical, masses, typical)
+    theta = np.where(np.isfinite(theta), theta, 0.0)
+    mobility = np.ones(len(theta))
+    mobility[0::10] = _MASS_STAYS
+    return base.lift(wanted, theta, mobility)

@@ -5,39 +5,26 @@ Pinocchio is given joints and inertias by us, never a file: its parsers change b
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import lazy_loader
 import numpy as np
-import pinocchio
 
 from dynident.inertia import to_pinocchio
-from dynident.robot.tree import Array
+from dynident.robot.tree import Array, Joint
 
-if TYPE_CHECKING:
-    from dynident.robot.robot import Robot
-
-# The bindings carry no types.
-pin: Any = pinocchio
-
-_AXES = np.eye(3)
-_ALIGNED = {
-    "revolute": (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ),
-    "prismatic": (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ),
-}
-_TILTED = {
-    "revolute": pin.JointModelRevoluteUnaligned,
-    "prismatic": pin.JointModelPrismaticUnaligned,
-}
+# Slow to load, and not needed to read or check a description; the bindings carry no types.
+pin: Any = lazy_loader.load("pinocchio")
 
 
-def _kinematics(robot: Robot) -> tuple[Any, list[int]]:
-    """Return a massless model and, for each of its joints, the index in `robot.joints`."""
+def _kinematics(joints: Sequence[Joint], gravity: Array) -> tuple[Any, list[int]]:
+    """Return a massless model and, for each of its joints, the index in `joints`."""
     model = pin.Model()
-    model.name = robot.name
-    model.gravity = pin.Motion(np.asarray(robot.gravity), np.zeros(3))
+    model.gravity = pin.Motion(np.asarray(gravity), np.zeros(3))
     children: dict[int, list[int]] = {}
-    for index, joint in enumerate(robot.joints):
+    for index, joint in enumerate(joints):
         children.setdefault(joint.parent, []).append(index)
     ids = {-1: 0}
     order: list[int] = []
@@ -45,7 +32,7 @@ def _kinematics(robot: Robot) -> tuple[Any, list[int]]:
     waiting = children.get(-1, [])[::-1]
     while waiting:
         index = waiting.pop()
-        joint = robot.joints[index]
+        joint = joints[index]
         placement = pin.SE3(np.array(joint.R), np.array(joint.p))
         ids[index] = model.addJoint(
             ids[joint.parent], _joint_model(joint.kind, joint.axis), placement, joint.name
@@ -55,23 +42,37 @@ def _kinematics(robot: Robot) -> tuple[Any, list[int]]:
     return model, order
 
 
-def _joint_model(kind: str, axis: Array):
-    for aligned, unit in zip(_ALIGNED[kind], _AXES, strict=True):
+def _joint_model(kind: str, axis: Array) -> Any:
+    for letter, unit in zip("XYZ", np.eye(3), strict=True):
         if np.array_equal(axis, unit):
-            return aligned()
-    return _TILTED[kind](np.array(axis))
+            return getattr(pin, f"JointModel{kind[0].upper()}{letter}")()
+    return getattr(pin, f"JointModel{kind.capitalize()}Unaligned")(np.array(axis))
 
 
-def _inertia(phi: Array) -> Any:
-    return pin.Inertia.FromDynamicParameters(np.array(phi))
+def pinocchio_model(
+    joints: Sequence[Joint], gravity: Array, theta: Array, bodies: Sequence[str]
+) -> Any:
+    """Return the Pinocchio model of a robot; see `Robot.pinocchio`.
 
+    Parameters
+    ----------
+    joints : sequence of Joint
+    gravity : (3,) ndarray
+        m/s^2.
+    theta : (10 n,) ndarray
+        Parameters of the moving bodies.
+    bodies : sequence of str
+        Their names, for messages.
 
-def pinocchio_model(robot: Robot, theta: Array) -> Any:
-    """Return the Pinocchio model of a robot; see `Robot.pinocchio`."""
-    model, order = _kinematics(robot)
+    Raises
+    ------
+    RobotError
+        If Pinocchio cannot hold a body.
+    """
+    model, order = _kinematics(joints, gravity)
     for pin_id, index in enumerate(order, start=1):
         phi = theta[10 * index : 10 * index + 10]
-        model.inertias[pin_id] = to_pinocchio(phi, f"body '{robot.bodies[index]}'")
+        model.inertias[pin_id] = to_pinocchio(phi, f"body '{bodies[index]}'")
     return model
 
 
@@ -94,13 +95,15 @@ class Dynamics:
 
     Parameters
     ----------
-    robot : Robot
+    joints : sequence of Joint
+    gravity : (3,) ndarray
+        m/s^2, in the world's axes.
     """
 
-    def __init__(self, robot: Robot) -> None:
-        self.model, order = _kinematics(robot)
+    def __init__(self, joints: Sequence[Joint], gravity: Array) -> None:
+        self.model, order = _kinematics(joints, gravity)
         self.data = self.model.createData()
-        self.n = robot.n
+        self.n = len(joints)
         # q_pin = q[:, order]; a permutation is applied only where the order differs.
         self.order = None if order == list(range(self.n)) else np.array(order)
         # A simulation asks for one sample at a time, of parameters that stay the same.
@@ -176,7 +179,11 @@ class Dynamics:
         order = range(self.n) if self.order is None else self.order
         for pin_id, index in enumerate(order, start=1):
             body = phi[index]
-            self.model.inertias[pin_id] = _inertia(body) if np.any(body) else pin.Inertia.Zero()
+            self.model.inertias[pin_id] = (
+                pin.Inertia.FromDynamicParameters(np.array(body))
+                if np.any(body)
+                else pin.Inertia.Zero()
+            )
         self._held = phi.copy()
 
     def _rnea(self, q: Array, v: Array, a: Array, phi: Array) -> Array:

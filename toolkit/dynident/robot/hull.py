@@ -1,10 +1,12 @@
-"""Points whose convex hull holds a shape, and what can be said of mass inside a hull."""
+"""Points whose convex hull holds a shape, and what can be said of mass inside a hull.
+
+Qhull (SciPy) makes the hulls. `trimesh` would add the moments of a solid, which are ten lines here.
+"""
 
 from __future__ import annotations
 
 from functools import cache, cached_property
 from itertools import product
-from typing import Any
 
 import numpy as np
 from scipy.optimize import nnls
@@ -16,25 +18,20 @@ _SIDES = 32
 _THIN = 1e-6
 
 
-def circumscribed(shape: Any) -> Array | None:
-    """Return points (k, 3) whose convex hull holds a Drake shape; None for other shapes.
+def circumscribed(kind: str, sizes: tuple[float, ...]) -> Array:
+    """Return points (k, 3) whose convex hull holds a shape; see `formats.format.Shape`.
 
     The hull of a round shape is a little larger than the shape (below 1 % for a cylinder, 4 % for
     a ball), never smaller.
     """
-    from pydrake.geometry import Box, Capsule, Cylinder, Ellipsoid, Sphere
-
-    if isinstance(shape, Box):
-        return 0.5 * np.array(list(product((-1, 1), repeat=3))) * shape.size()
-    if isinstance(shape, Sphere):
-        return shape.radius() * _ball()
-    if isinstance(shape, Ellipsoid):
-        return _ball() * [shape.a(), shape.b(), shape.c()]
-    if isinstance(shape, Cylinder | Capsule):
-        ring = shape.radius() * (_circle() if isinstance(shape, Cylinder) else _ball())
-        end = np.array([0.0, 0.0, 0.5 * shape.length()])
-        return np.vstack([ring - end, ring + end])
-    return None
+    if kind == "box":
+        return 0.5 * np.array(list(product((-1, 1), repeat=3))) * sizes
+    if kind in ("sphere", "ellipsoid"):
+        return _ball() * sizes
+    radius, length = sizes
+    ring = radius * (_circle() if kind == "cylinder" else _ball())
+    end = np.array([0.0, 0.0, 0.5 * length])
+    return np.vstack([ring - end, ring + end])
 
 
 @cache
@@ -122,16 +119,13 @@ class Hull:
     @cached_property
     def second_moment(self) -> Array:
         """Second moment of a uniform filling about its own centre, by mass, (3, 3) m^2."""
-        middle = self.points.mean(axis=0)
-        total, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
-        for corners in self._all[self._facets] - middle:
-            # A tetrahedron with its fourth corner in the middle (the origin here).
-            volume = abs(float(np.linalg.det(corners))) / 6.0
-            whole = corners.sum(axis=0)
-            total += volume
-            first += volume * whole / 4.0
-            second += volume * (corners.T @ corners + np.outer(whole, whole)) / 20.0
-        if total <= 0.0:
+        # Tetrahedra on the facets, with their fourth corner in the middle (the origin here).
+        corners = self._all[self._facets] - self.points.mean(axis=0)
+        volume = np.abs(np.linalg.det(corners)) / 6.0
+        if not np.sum(volume) > 0.0:
             return np.zeros((3, 3))
-        first = first / total
-        return second / total - np.outer(first, first)
+        share, whole = volume / np.sum(volume), corners.sum(axis=1)
+        first = share @ whole / 4.0
+        second = np.einsum("t,tki,tkj->ij", share, corners, corners)
+        second += np.einsum("t,ti,tj->ij", share, whole, whole)
+        return second / 20.0 - np.outer(first, first)

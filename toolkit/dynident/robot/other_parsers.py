@@ -10,24 +10,23 @@ from __future__ import annotations
 
 from copy import deepcopy
 from typing import Any
-from xml.etree import ElementTree
 
+import lazy_loader
 import numpy as np
 
 from dynident.errors import RobotError
 from dynident.inertia import from_drake
-from dynident.robot.contents import Contents, to_text
-from dynident.robot.kinematics import WORLD, quiet
-from dynident.robot.reading import take_apart
+from dynident.robot.formats.reading import Opened, open_description
+from dynident.robot.formats.tree_assembly import WORLD, drake_bodies, drake_plant, quiet
+from dynident.robot.formats.xmltree import Element, to_text
 from dynident.robot.robot import Robot
 from dynident.robot.tree import Array
-from dynident.robot.xmltree import Element
 
+pin: Any = lazy_loader.load("pinocchio")  # as in `dynamics`
 _SAME = 1e-9  # of a link's largest parameter: what a parser's own arithmetic may change
 _TORQUE = 1e-8  # likewise, of the torque
 _SAMPLES = 20
 _DURATION = 0.1  # s of passive motion
-_LIMITS = {"lower": "-1e9", "upper": "1e9", "velocity": "1e9", "effort": "1e9"}
 
 
 def simulate_in_drake(robot: Robot, text: str, where: str) -> float:
@@ -35,13 +34,17 @@ def simulate_in_drake(robot: Robot, text: str, where: str) -> float:
 
     Parameters
     ----------
-    robot : as our reader understands the text; its joints and gravity.
-    text : the description.
-    where : names it in messages.
+    robot : Robot
+        As our reader understands the text; its joints and gravity.
+    text : str
+        The description.
+    where : str
+        Names it in messages.
 
     Returns
     -------
-    Seconds that were simulated.
+    float
+        Seconds that were simulated.
 
     Raises
     ------
@@ -49,18 +52,13 @@ def simulate_in_drake(robot: Robot, text: str, where: str) -> float:
         If Drake refuses the description, takes another inertia than the one that is written, or
         cannot simulate it.
     """
-    from pydrake.multibody.parsing import Parser
-    from pydrake.multibody.plant import MultibodyPlant
-
-    _, format_, contents = take_apart(text, where)
-    for link in robot.links if format_ == "mjcf" else ():
+    opened = open_description(text, where)
+    for link in () if opened.format.takes_massless else robot.links:
         if link.source == "inertial element" and link.phi[0] == 0.0:
             what, remedy = "states a mass of zero, which Drake and MuJoCo refuse", "give it a mass"
             raise RobotError(what, f"{where}: link '{link.name}'", remedy)
-    plant: Any = MultibodyPlant(0.0)
     try:
-        with quiet():
-            Parser(plant).AddModelsFromString(_copy(contents, format_), contents.suffix)
+        plant = drake_plant(_with_inertias(opened), opened.format.drake)
     except (Exception, SystemExit) as error:  # the bindings raise whatever Drake throws
         raise RobotError(f"Drake refuses it: {_first(error)}", where) from None
     for link in robot.links:
@@ -72,15 +70,32 @@ def simulate_in_drake(robot: Robot, text: str, where: str) -> float:
 
 
 def passive_motion(plant: Any, robot: Robot, where: str) -> float:
-    """Finalize a Drake plant that holds a robot and let it fall for a moment; see above."""
-    from pydrake.multibody.tree import BodyIndex
+    """Finalize a Drake plant that holds a robot and let it fall for a moment.
+
+    Parameters
+    ----------
+    plant : pydrake.multibody.plant.MultibodyPlant
+    robot : Robot
+        Its gravity and limits.
+    where : str
+        The file, for messages.
+
+    Returns
+    -------
+    float
+        Seconds that were simulated.
+
+    Raises
+    ------
+    RobotError
+        If Drake cannot simulate it, or the motion is not finite.
+    """
     from pydrake.systems.analysis import Simulator
 
-    bodies = [plant.get_body(BodyIndex(i)) for i in range(plant.num_bodies())]
     joints = [plant.get_joint(i) for i in plant.GetJointIndices()]
-    attached = {joint.child_body().index() for joint in joints}
-    for body in bodies:
-        if body.index() != plant.world_body().index() and body.index() not in attached:
+    attached = {joint.child_body().name() for joint in joints}
+    for name, body in drake_bodies(plant).items():
+        if name not in attached:
             pose = plant.GetDefaultFloatingBaseBodyPose(body)
             plant.WeldFrames(plant.world_frame(), body.body_frame(), pose)
     plant.mutable_gravity_field().set_gravity_vector(np.array(robot.gravity))
@@ -106,9 +121,19 @@ def passive_motion(plant: Any, robot: Robot, where: str) -> float:
 def require_pinocchio(robot: Robot, text: str, where: str) -> bool:
     """Let Pinocchio compute the dynamics of a description; a URDF is read by its own parser.
 
+    Parameters
+    ----------
+    robot : Robot
+        As our reader understands the text.
+    text : str
+        The description.
+    where : str
+        Names it in messages.
+
     Returns
     -------
-    Whether its own parser read the description.
+    bool
+        Whether its own parser read the description.
 
     Raises
     ------
@@ -116,14 +141,13 @@ def require_pinocchio(robot: Robot, text: str, where: str) -> bool:
         If Pinocchio refuses the description, its inverse dynamics differs from ours, or the
         forward dynamics is not finite.
     """
-    import pinocchio
-
-    pin: Any = pinocchio
-    _, format_, contents = take_apart(text, where)
-    model = robot.pinocchio()
-    if format_ == "urdf":
+    opened = open_description(text, where)
+    model, complete = robot.pinocchio(), opened.format.for_pinocchio
+    if complete is not None:
+        copy = _with_inertias(opened)
+        complete(copy)
         try:
-            model = pin.buildModelFromXML(_for_urdfdom(_copy(contents, format_)))
+            model = pin.buildModelFromXML(to_text(copy))
         except Exception as error:  # as above
             raise RobotError(f"Pinocchio refuses it: {_first(error)}", where) from None
         model.gravity.linear = np.array(robot.gravity)
@@ -147,39 +171,22 @@ def require_pinocchio(robot: Robot, text: str, where: str) -> bool:
             raise RobotError(what, where, "give the last link of each chain a mass")
     if not np.max(np.abs(found - torque)) <= _TORQUE * np.max(np.abs(torque)):
         raise RobotError("Pinocchio's inverse dynamics of it is another", where)
-    return format_ == "urdf"
+    return complete is not None
 
 
-def _copy(contents: Contents, format_: str) -> str:
-    """The harmless copy of a description with the inertial elements that it states."""
-    root = ElementTree.fromstring(contents.copy)
-    for element in root.iter("body" if format_ == "mjcf" else "link"):
-        for harmless in element.findall("inertial"):
-            element.remove(harmless)
+def _with_inertias(opened: Opened) -> Element:
+    """Return the sanitised copy of a description with the inertial elements that it states."""
+    contents, root = opened.contents, deepcopy(opened.contents.copy)
+    for element in root.iter(opened.format.link):
+        for inertial in element.findall("inertial"):
+            element.remove(inertial)
         name = element.get("name") or ""
         stated = contents.inertials.get(name)
         if stated is not None and stated.source == "inertial element":
             own = contents.elements[name].find("inertial")
             assert own is not None
             element.insert(0, deepcopy(own))
-    return to_text(root)
-
-
-def _for_urdfdom(copy: str) -> str:
-    """What this parser demands and others do not: all limits, and a link for the world."""
-    root = ElementTree.fromstring(copy)
-    for joint in root.findall("joint"):
-        limit = joint.find("limit")
-        if limit is None and joint.get("type") in ("revolute", "prismatic"):
-            limit = ElementTree.SubElement(joint, "limit")
-        if limit is not None:
-            for key, value in _LIMITS.items():
-                limit.attrib.setdefault(key, value)
-    named = {link.get("name") for link in root.findall("link")}
-    parents = {parent.get("link") for parent in root.iter("parent")}
-    if "world" in parents - named:
-        root.append(Element("link", {"name": "world"}))
-    return to_text(root)
+    return root
 
 
 def _require_same(phi: Array, found: Array, source: str, where: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,17 +9,17 @@ import numpy as np
 from dynident import files
 from dynident.errors import RobotError
 from dynident.inertia import MassProperties, to_com
-from dynident.robot.reading import take_apart
+from dynident.robot.formats.reading import open_description
+from dynident.robot.formats.xmltree import Document, Element
 from dynident.robot.robot import Robot
 from dynident.robot.tree import Link
-from dynident.robot.xmltree import Document, Element
 
 # What a reloaded body may differ by, relative to its largest parameter.
 _ROUND_TRIP = 1e-11
 
 
 def write(robot: Robot, path: str | Path) -> Path:
-    """Write the description of a robot with its present inertial parameters.
+    """Write the description of a robot with its current inertial parameters.
 
     Comments, geometry and formatting stay as they are; only the inertial elements of links whose
     parameters changed are replaced (or added, where there was none). Reloading the file gives
@@ -59,7 +58,8 @@ def patched(robot: Robot) -> str:
             "start from Robot.from_file",
         )
     text, where = robot.description.text, robot.description.path
-    document, format_, contents = take_apart(text, where)
+    opened = open_description(text, where)
+    document = opened.document
     given = {link.name: link for link in Robot.from_text(text, where, robot.names).links}
     patches = []
     for link in robot.links:
@@ -67,17 +67,15 @@ def patched(robot: Robot) -> str:
         if old is not None and np.array_equal(link.phi, old.phi, equal_nan=True):
             continue
         place = f"{where}: link '{link.name}'"
-        element = contents.elements.get(link.name)
+        element = opened.contents.elements.get(link.name)
         if element is None:
             raise RobotError(
                 "stands for no element of the description, so its inertia cannot be written",
                 place,
                 "give each joint a link of its own",
             )
-        properties = _writable(link, place)
-        if format_ == "mjcf":
-            _refuse_geometry_only(document.root, place)
-        patches.append(_patch(document, element, _FORMATS[format_](properties)))
+        lines = opened.format.inertial_lines(_writable(link, place), document.root, place)
+        patches.append(_patch(document, element, lines))
     data = document.data
     for begin, end, new in sorted(patches, reverse=True):
         data = data[:begin] + new + data[end:]
@@ -98,15 +96,6 @@ def _writable(link: Link, where: str) -> MassProperties:
             "(BaseParameters.lift with the description as prior)",
         )
     return to_com(link.phi)
-
-
-def _refuse_geometry_only(root: Element, where: str) -> None:
-    if any(c.get("inertiafromgeom") == "true" for c in root.findall("compiler")):
-        raise RobotError(
-            'cannot state an inertia under compiler inertiafromgeom="true"',
-            where,
-            "remove inertiafromgeom",
-        )
 
 
 def _check_round_trip(robot: Robot, text: str, where: str) -> None:
@@ -152,50 +141,3 @@ def _indent(data: bytes, position: int) -> str:
 
 def _join(lines: list[str], indent: str, newline: str) -> bytes:
     return (newline + indent).join(lines).encode("utf-8")
-
-
-def _numbers(properties: MassProperties) -> tuple[str, str, dict[str, str]]:
-    """Return mass, centre of mass and the six moments with all their digits."""
-    inertia = properties.inertia_com
-    entries = {
-        f"i{'xyz'[i]}{'xyz'[j]}": repr(float(inertia[i, j])) for i in range(3) for j in range(i, 3)
-    }
-    return repr(properties.mass), " ".join(repr(float(x)) for x in properties.com), entries
-
-
-def _urdf(properties: MassProperties) -> list[str]:
-    mass, com, entries = _numbers(properties)
-    moments = " ".join(f'{name}="{value}"' for name, value in entries.items())
-    return [
-        "<inertial>",
-        f'  <origin xyz="{com}" rpy="0 0 0"/>',
-        f'  <mass value="{mass}"/>',
-        f"  <inertia {moments}/>",
-        "</inertial>",
-    ]
-
-
-def _sdf(properties: MassProperties) -> list[str]:
-    mass, com, entries = _numbers(properties)
-    return [
-        "<inertial>",
-        f"  <pose>{com} 0 0 0</pose>",
-        f"  <mass>{mass}</mass>",
-        "  <inertia>",
-        *(f"    <{name}>{value}</{name}>" for name, value in entries.items()),
-        "  </inertia>",
-        "</inertial>",
-    ]
-
-
-def _mjcf(properties: MassProperties) -> list[str]:
-    mass, com, entries = _numbers(properties)
-    full = " ".join(entries[name] for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
-    return [f'<inertial pos="{com}" mass="{mass}" fullinertia="{full}"/>']
-
-
-_FORMATS: dict[str, Callable[[MassProperties], list[str]]] = {
-    "urdf": _urdf,
-    "sdf": _sdf,
-    "mjcf": _mjcf,
-}

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,13 +14,9 @@ from numpy.typing import ArrayLike
 from dynident import files
 from dynident.errors import RobotError
 from dynident.inertia import PARAMETERS, UNITS, frame_change
-from dynident.robot.motion import random_motion
-from dynident.robot.tree import Array, Description, Joint, Link, frozen
-
-if TYPE_CHECKING:
-    from dynident.robot.dynamics import Dynamics, TorqueDerivatives
-
-GRAVITY = (0.0, 0.0, -9.81)
+from dynident.robot.dynamics import Dynamics, TorqueDerivatives, pinocchio_model
+from dynident.robot.formats.reading import read_tree
+from dynident.robot.tree import GRAVITY, Array, Description, Joint, Link, frozen, random_motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,9 +111,17 @@ class Robot:
         gravity: ArrayLike | None = None,
     ) -> Robot:
         """Read a robot description from its text; `where` names it in messages. See `from_file`."""
-        from dynident.robot.reading import read
-
-        return read(text, where, joints, gravity)
+        opened, tree = read_tree(text, where, None if joints is None else tuple(joints))
+        if gravity is None:
+            gravity = GRAVITY if opened.contents.gravity is None else opened.contents.gravity
+        return Robot(
+            name=opened.contents.name,
+            joints=tree.joints,
+            links=tree.links,
+            gravity=gravity,  # type: ignore[arg-type]
+            description=Description(where, opened.format.name, text),
+            locked=tree.locked,
+        )
 
     @property
     def n(self) -> int:
@@ -221,7 +225,7 @@ class Robot:
                         raise RobotError(
                             "has inertial values that are not finite",
                             f"link '{link.name}'",
-                            "mend its inertial element first",
+                            "fix its inertial element first",
                         )
                     rest -= moved(link)
             link = links[driven]
@@ -269,16 +273,13 @@ class Robot:
             If a moving body has no mass but a first moment, or is not finite: Pinocchio cannot
             hold it (`regressor` and `inverse_dynamics` can).
         """
-        from dynident.robot.dynamics import pinocchio_model
-
-        return pinocchio_model(self, self.theta)
+        model = pinocchio_model(self.joints, self.gravity, self.theta, self.bodies)
+        model.name = self.name
+        return model
 
     @cached_property
     def _dynamics(self) -> Dynamics:
-        # Imported where it is used: Pinocchio is slow to load.
-        from dynident.robot.dynamics import Dynamics
-
-        return Dynamics(self)
+        return Dynamics(self.joints, self.gravity)
 
     def regressor(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
         """Return Y (T, n, 10 n) with tau = Y theta.

@@ -16,6 +16,8 @@ import numpy as np
 from dynident import files
 from dynident.errors import DynidentError, FileError, RobotError
 from dynident.inertia import margins
+from dynident.robot.drake import add_to_plant
+from dynident.robot.formats.reading import FORMATS
 from dynident.robot.other_parsers import passive_motion, require_pinocchio, simulate_in_drake
 from dynident.robot.patching import patched
 from dynident.robot.robot import Robot
@@ -23,23 +25,28 @@ from dynident.robot.tree import Link
 
 _SAMPLES = 50
 _TOLERANCE = 1e-10  # of the largest torque
-_FILES = {"urdf": (".urdf",), "sdf": (".sdf", ".world"), "mjcf": (".mjcf",)}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Verification:
     """What was found true of a robot description after it was read back.
 
     Attributes
     ----------
-    path : the file.
-    links : number of links, all of which are consistent.
-    semi_only : links that are no more than semi-consistent: they break the triangle inequality.
-    difference : of the inverse dynamics from that of the robot, relative to the largest torque.
-    simulated : s of passive motion in Drake.
-    drake, pinocchio : "own parser", where that program's parser read joints and inertias from
-        the file; "our tree", where it was given them by us.
-    unchanged : whether the file is the description that was given, to the byte.
+    path : str
+        The file.
+    links : int
+        Number of links, all of which are consistent.
+    semi_only : tuple of str
+        Links that are no more than semi-consistent: they break the triangle inequality.
+    difference : float
+        Of the inverse dynamics from that of the robot, relative to the largest torque.
+    simulated : float
+        Seconds of passive motion in Drake.
+    drake, pinocchio : "own parser" or "our tree"
+        Whether that program's parser read joints and inertias from the file, or was given them.
+    unchanged : bool
+        Whether the file is the description that was given, to the byte.
     """
 
     path: str
@@ -104,8 +111,8 @@ def require_format(robot: Robot, path: str | Path) -> None:
     if Path(path).is_file() and files.read_bytes(path).removeprefix(BOM_UTF8).lstrip()[:1] != b"<":
         raise FileError("is not a robot description", str(path), "write to another file")
     suffix, own = Path(path).suffix.lower(), robot.description and robot.description.format
-    for format_, suffixes in _FILES.items():
-        if own is not None and suffix in suffixes and format_ != own:
+    for other in FORMATS.values():
+        if own is not None and suffix in other.files and other.name != own:
             remedy = "name the file accordingly: a description is patched, not converted"
             raise FileError(f"the description is of the format {own.upper()}", str(path), remedy)
 
@@ -120,11 +127,15 @@ def write_verified(
 
     Parameters
     ----------
-    robot : read from a description, and perhaps changed since; see `robot.write.write`.
-    path : in the same format as the description; may be the description's own file.
-    consistency : what every link must satisfy: "full", or "semi" (the triangle inequality may be
-        broken; then Drake's own parser, which does not take such links, is left out).
-    source : the file that the robot was read from, whose bytes are copied if nothing changed.
+    robot : Robot
+        Read from a description, and perhaps changed since; see `robot.patching.write`.
+    path : str or Path
+        In the same format as the description; may be the description's own file.
+    consistency : "full" or "semi"
+        What every link must satisfy: with "semi" the triangle inequality may be broken; then
+        Drake's own parser, which does not take such links, is left out.
+    source : str or Path, optional
+        The file that the robot was read from, whose bytes are copied if nothing changed.
 
     Raises
     ------
@@ -167,14 +178,14 @@ def _verify(
         )
         raise RobotError(f"the new description fails: {error.what}", error.where, remedy) from None
     return Verification(
-        where,
-        len(reloaded.links),
-        semi_only,
-        difference,
-        simulated,
-        "our tree" if semi_only else "own parser",
-        "own parser" if by_parser else "our tree",
-        unchanged,
+        path=where,
+        links=len(reloaded.links),
+        semi_only=semi_only,
+        difference=difference,
+        simulated=simulated,
+        drake="our tree" if semi_only else "own parser",
+        pinocchio="own parser" if by_parser else "our tree",
+        unchanged=unchanged,
     )
 
 
@@ -203,8 +214,6 @@ def _difference(one: Robot, other: Robot) -> float:
 
 def _simulate_our_tree(robot: Robot, where: str) -> float:
     from pydrake.multibody.plant import MultibodyPlant
-
-    from dynident.robot.drake import add_to_plant
 
     plant = MultibodyPlant(0.0)
     add_to_plant(robot, plant)

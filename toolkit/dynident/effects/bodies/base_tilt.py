@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from dynident.effects.effect import Block, Forceless, Parameter
-from dynident.robot.rotations import from_axis_angle
 
 _NEXT_TO_NOTHING = 1e-4  # rad: below it the series of the sinc is exact to rounding
 
@@ -73,6 +73,4 @@ def _sine_and_cosine(angle: float) -> tuple[float, float]:
 
 def _rotation(values) -> np.ndarray:
     """Rotation matrix of the rotation vector (rx, ry, 0)."""
-    r = np.array([values[0], values[1], 0.0])
-    angle = float(np.linalg.norm(r))
-    return from_axis_angle(r, angle) if angle > 0 else np.eye(3)
+    return Rotation.from_rotvec([values[0], values[1], 0.0]).as_matrix()

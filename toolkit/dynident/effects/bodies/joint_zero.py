@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from dynident.effects.effect import Block, Forceless, Parameter, motion_unit
-from dynident.robot.rotations import from_axis_angle
 
 _NEXT_TO_NOTHING = 1e-5
 """Offset in rad or m below which a difference has fewer digits than the derivative in the middle
@@ -54,5 +54,6 @@ class JointZero(Forceless):
         if joint.kind == "prismatic":
             moved = replace(joint, p=joint.p + joint.R @ joint.axis * values[0])
         else:
-            moved = replace(joint, R=joint.R @ from_axis_angle(joint.axis, values[0]))
+            turn = Rotation.from_rotvec(values[0] * joint.axis).as_matrix()
+            moved = replace(joint, R=joint.R @ turn)
         return replace(robot, joints=(*robot.joints[:index], moved, *robot.joints[index + 1 :]))

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from dynident.inertia import margins, to_com
 from dynident.robot import Robot
-from dynident.robot.rotations import from_axis_angle
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +102,7 @@ def poses(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             R, p = pose(joint.parent)
             p, R = p + R @ joint.p, R @ joint.R
             if joint.kind == "revolute":
-                R = R @ from_axis_angle(joint.axis, float(q[index]))
+                R = R @ Rotation.from_rotvec(q[index] * joint.axis).as_matrix()
             else:
                 p = p + R @ joint.axis * q[index]
             found[index] = R, p

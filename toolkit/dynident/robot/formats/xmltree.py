@@ -1,6 +1,7 @@
 """A small, safe XML reader that knows where in the text each element stands.
 
-The positions let a description be patched in place. Documents that declare a DOCTYPE are
+The positions let a description be patched in place; they come from expat, since `ElementTree` and
+`defusedxml` keep none and `lxml` keeps lines only. Documents that declare a DOCTYPE are
 refused before any of it is expanded: robot descriptions need none, and attacks on XML readers do.
 Namespace prefixes stay part of the tag, so that an undeclared prefix (common in URDF) is no error.
 """
@@ -8,6 +9,7 @@ Namespace prefixes stay part of the tag, so that an undeclared prefix (common in
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from xml.etree import ElementTree
@@ -20,6 +22,8 @@ from dynident.errors import RobotError
 
 Element = ElementTree.Element
 
+# Up to the end of a tag; quoted values may hold a ">".
+_TAG = re.compile(rb"""(?:"[^"]*"|'[^']*'|[^>"']++)*+>""")
 # Far deeper than any robot, far shallower than what would exhaust a recursive walk.
 _DEPTH = 200
 
@@ -66,28 +70,18 @@ class _Reader:
         begin = self.parser.CurrentByteIndex
         if len(self.open) >= _DEPTH:
             raise RobotError(f"nests more than {_DEPTH} elements in each other", self.where)
-        self.open.append((self.builder.start(tag, attributes), begin, tag_end(self.data, begin)))
+        self.open.append((self.builder.start(tag, attributes), begin, self._tag_end(begin)))
 
     def _end(self, tag: str) -> None:
         self.builder.end(tag)
         element, begin, inner = self.open.pop()
         closes_itself = self.data[inner - 2 : inner] == b"/>"
-        end = inner if closes_itself else tag_end(self.data, self.parser.CurrentByteIndex)
+        end = inner if closes_itself else self._tag_end(self.parser.CurrentByteIndex)
         self.spans[id(element)] = (begin, inner, end)
 
-
-def tag_end(data: bytes, begin: int) -> int:
-    """Return the position just after the '>' of the tag that begins at `begin`."""
-    quote = 0
-    for position in range(begin, len(data)):
-        byte = data[position]
-        if quote:
-            quote = 0 if byte == quote else quote
-        elif byte in b"\"'":
-            quote = byte
-        elif byte == ord(">"):
-            return position + 1
-    return len(data)
+    def _tag_end(self, begin: int) -> int:
+        tag = _TAG.match(self.data, begin)
+        return tag.end() if tag else len(self.data)
 
 
 def parse(text: str, where: str) -> Document:
@@ -111,6 +105,11 @@ def parse(text: str, where: str) -> Document:
     return Document(reader.builder.close(), data, reader.spans)
 
 
+def to_text(root: Element) -> str:
+    """Return the text of an element tree."""
+    return ElementTree.tostring(root, encoding="unicode")
+
+
 def only(element: Element, tag: str, where: str) -> Element | None:
     """Return the child of that name, None if absent; two are an error."""
     found = element.findall(tag)
@@ -127,16 +126,16 @@ def reals(text: str | None, count: int, what: str, where: str) -> NDArray[np.flo
     RobotError
         If the text is missing, is no number, or has another count.
     """
-    words = (text or "").split()
-    try:
-        values = np.array([float(word) for word in words])
-    except ValueError:
-        bad = next(word for word in words if not _is_real(word))
-        raise RobotError(f"{what} = '{bad}' is not a number", where) from None
-    if len(words) != count:
+    values: list[float] = []
+    for word in (text or "").split():
+        try:
+            values.append(float(word))
+        except ValueError:
+            raise RobotError(f"{what} = '{word}' is not a number", where) from None
+    if len(values) != count:
         needs = "1 number is" if count == 1 else f"{count} numbers are"
-        raise RobotError(f"{what} has {len(words)} numbers where {needs} needed", where)
-    return values
+        raise RobotError(f"{what} has {len(values)} numbers where {needs} needed", where)
+    return np.array(values)
 
 
 def finite(text: str | None, count: int, what: str, where: str) -> NDArray[np.float64]:
@@ -154,27 +153,10 @@ def attribute(element: Element, name: str, what: str, where: str) -> float:
     return float(reals(element.get(name), 1, f"{what} {name}", where)[0])
 
 
-def require_unique(names: Iterable[str], what: str, where: str) -> None:
-    """Refuse a name that is given twice."""
-    seen: set[str] = set()
-    for name in names:
-        if name in seen:
-            raise RobotError(f"has two {what}s named '{name}'", where, "rename one of them")
-        seen.add(name)
-
-
 def closest(name: str, valid: Iterable[str]) -> str:
-    """Return a mend for a misspelt name: the nearest valid one, and the list."""
+    """Return a remedy for a misspelt name: the nearest valid one, and the list."""
     valid = list(valid)
     near = difflib.get_close_matches(name, valid, n=1)
     listed = ", ".join(valid) if valid else "none"
     hint = f"did you mean '{near[0]}'? " if near else ""
     return f"{hint}Valid names: {listed}"
-
-
-def _is_real(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
