@@ -68,7 +68,9 @@ UNIT: dict[str, tuple[tuple[float, ...], tuple[tuple[float, float], ...]]] = {
 FOREIGN = PositionDependentViscosity.name
 """The effect that is in no catalogue."""
 
-CONTROLLER = Controller("pd", 1000.0, (1500.0, 600.0), (80.0, 30.0), derivative_cutoff_hz=80.0)
+CONTROLLER = Controller(
+    kind="pd", rate_hz=1000.0, kp=(1500.0, 600.0), kd=(80.0, 30.0), derivative_cutoff_hz=80.0
+)
 SENSORS = Sensors(position_std=2e-5, torque_std=0.1)
 PERIOD, DURATION, RUNS, TESTS = 8.0, 16.0, 4, 2
 
@@ -135,14 +137,23 @@ def _recordings(
 ) -> tuple[Recording, ...]:
     made = tuple(
         ExperimentRun(
-            Fourier.random(robot, PERIOD, [case.seed, r], amplitude=[1.6, 1.8], speed=[2.5, 3.0]),
-            DURATION,
-            f"run{r + 1}.csv",
+            trajectory=Fourier.random(
+                robot, PERIOD, [case.seed, r], amplitude=[1.6, 1.8], speed=[2.5, 3.0]
+            ),
+            duration=DURATION,
+            file=f"run{r + 1}.csv",
             payload=r % 2 == 1,
         )
         for r in range(runs)
     )
-    return Experiment(robot, CONTROLLER, made, tuple(truth), SENSORS, seed=case.seed).run()
+    return Experiment(
+        robot=robot,
+        controller=CONTROLLER,
+        runs=made,
+        effects=tuple(truth),
+        sensors=SENSORS,
+        seed=case.seed,
+    ).run()
 
 
 def _scaled(case: Case, robot: Robot, known: list[TrueEffect], hidden: TrueEffect) -> TrueEffect:

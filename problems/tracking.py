@@ -174,8 +174,8 @@ def tracked(
     settings, robot = one.published["controller"], one.experiment.robot
     w, damping = 2 * np.pi * settings["natural_frequency_hz"], settings["damping"]
     controller = di.closed_loop.Controller(
-        "computed_torque",
-        one.experiment.controller.rate_hz,
+        kind="computed_torque",
+        rate_hz=one.experiment.controller.rate_hz,
         kp=(w**2,) * robot.n,
         kd=(2 * damping * w,) * robot.n,
         derivative_cutoff_hz=settings["derivative_cutoff_hz"],

@@ -37,11 +37,15 @@ def recordings() -> tuple[Recording, ...]:
     robot = arm()
     truth = TrueEffect.of("viscous_friction@shoulder", robot, [2.0])
     runs = [
-        ExperimentRun(Fourier.random(robot, 2.0, seed, harmonics=3), 4.0, name)
+        ExperimentRun(
+            trajectory=Fourier.random(robot, 2.0, seed, harmonics=3), duration=4.0, file=name
+        )
         for seed, name in enumerate(("train.csv", "test.csv"))
     ]
-    controller = Controller("pd", 250.0, (400.0, 120.0), (50.0, 8.0))
-    return Experiment(robot, controller, tuple(runs), truth, lead_in=1.0).run()
+    controller = Controller(kind="pd", rate_hz=250.0, kp=(400.0, 120.0), kd=(50.0, 8.0))
+    return Experiment(
+        robot=robot, controller=controller, runs=tuple(runs), effects=truth, lead_in=1.0
+    ).run()
 
 
 def write_loop_study(folder: Path, text: str = LOOP_STUDY, *, reference: bool = True) -> Path:

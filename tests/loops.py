@@ -37,7 +37,7 @@ def controller(factor: float = 1.0) -> Controller:
     inertia = np.array([1.36, 0.0621]) * factor
     w = 2 * np.pi * np.array(FREQUENCY_HZ)
     kp, kd = tuple(inertia * w**2), tuple(2 * inertia * w)
-    return Controller("pd", RATE, kp=kp, kd=kd, velocity_reference=False)
+    return Controller(kind="pd", rate_hz=RATE, kp=kp, kd=kd, velocity_reference=False)
 
 
 def model(*, coulomb: bool) -> Model:
@@ -70,10 +70,15 @@ def experiment(
         if coulomb:
             effects += TrueEffect.of(f"coulomb_friction@{joint}", arm, (COULOMB[j],))
     motion = Fourier.random(arm, 10.0, 3, amplitude=1.0, speed=3.0)
-    runs = tuple(ExperimentRun(motion, seconds, f"run{k}.npz") for k in range(motions))
+    runs = tuple(
+        ExperimentRun(trajectory=motion, duration=seconds, file=f"run{k}.npz")
+        for k in range(motions)
+    )
     sensors = Sensors(position_std=position_std)
     loop = controller or LOOP
-    return Experiment(arm, loop, runs, tuple(effects), sensors, seed)
+    return Experiment(
+        robot=arm, controller=loop, runs=runs, effects=tuple(effects), sensors=sensors, seed=seed
+    )
 
 
 LOOP = controller()

@@ -120,15 +120,15 @@ class Plan:
         carried = case.payload or "payload" in hidden
         return tuple(
             ExperimentRun(
-                Fourier.random(
+                trajectory=Fourier.random(
                     made.robot,
                     PERIOD,
                     [case.seed, case.number, r],
                     amplitude=made.amplitude,  # type: ignore[arg-type]
                     speed=made.speed,  # type: ignore[arg-type]
                 ),
-                PERIOD * self.repetitions,
-                f"run{r + 1}.npz",
+                duration=PERIOD * self.repetitions,
+                file=f"run{r + 1}.npz",
                 use="train" if r < self.runs else "test",
                 start=PAUSE * r,
                 payload=always or (carried and r % 2 == 1),
@@ -144,7 +144,7 @@ class Plan:
             made.controller,
             runs,
             (*self.known, *hidden),
-            Sensors(case.position_std, case.position_resolution),
+            Sensors(position_std=case.position_std, position_resolution=case.position_resolution),
             seed=case.seed * 10007 + case.number,
             friction_width=case.width,
             nominal=made.nominal,

@@ -68,10 +68,10 @@ def specimen(joints: int, rate_hz: float, rng: np.random.Generator) -> Specimen:
     kp = bandwidth**2 * (inertia + rotor)
     kd = 2 * bandwidth * (inertia + rotor)
     controller = Controller(
-        "pd",
-        rate_hz,
-        tuple(float(f"{x:.3g}") for x in kp),
-        tuple(float(f"{x:.3g}") for x in kd),
+        kind="pd",
+        rate_hz=rate_hz,
+        kp=tuple(float(f"{x:.3g}") for x in kp),
+        kd=tuple(float(f"{x:.3g}") for x in kd),
         derivative_cutoff_hz=min(80.0, rate_hz / 5),
     )
     # Scaling a whole body leaves it one that can exist.

@@ -27,9 +27,10 @@ from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from dynident.regression.joint_factors import BayesianFactorRegression, JointFactorRegression
+from dynident.regression.bayesian_factors import BayesianFactorRegression
+from dynident.regression.joint_factors import JointFactorRegression
 from dynident.regression.stepwise import StepwiseRegression
-from dynident.regression.truncated import TruncatedLeastSquares
+from dynident.regression.ordinary import TruncatedLeastSquares
 from dynident.tables import Table, print_tables
 from dynident.threads import single_threaded
 

@@ -47,18 +47,24 @@ def one_joint(controller: Controller, q_ref: float, samples: int) -> Drive:
 def test_pd() -> None:
     kp, kd = np.array([10.0, 20.0]), np.array([1.0, 2.0])
     expected = kp * (Q_REF - Q) + kd * (V_REF - SPEED)
-    pd = Controller("pd", RATE, (10.0, 20.0), (1.0, 2.0))
+    pd = Controller(kind="pd", rate_hz=RATE, kp=(10.0, 20.0), kd=(1.0, 2.0))
     np.testing.assert_allclose(second_command(pd), expected, rtol=1e-12)
     np.testing.assert_allclose(
         second_command(pd, np.array([2.0, 0.5])), [2.0, 0.5] * expected, rtol=1e-12
     )
-    amplified = Controller("pd", RATE, (1.0, 10.0), (0.1, 1.0), drive_gain=(10.0, 2.0))
+    amplified = Controller(
+        kind="pd", rate_hz=RATE, kp=(1.0, 10.0), kd=(0.1, 1.0), drive_gain=(10.0, 2.0)
+    )
     np.testing.assert_allclose(second_command(amplified), expected, rtol=1e-12)
 
 
 def test_pd_without_reference_velocity() -> None:
     kp, kd = np.array([10.0, 20.0]), np.array([1.0, 2.0])
-    u = second_command(Controller("pd", RATE, (10.0, 20.0), (1.0, 2.0), velocity_reference=False))
+    u = second_command(
+        Controller(
+            kind="pd", rate_hz=RATE, kp=(10.0, 20.0), kd=(1.0, 2.0), velocity_reference=False
+        )
+    )
     np.testing.assert_allclose(u, kp * (Q_REF - Q) - kd * SPEED, rtol=1e-12)
 
 
@@ -66,15 +72,17 @@ def test_cascade_of_the_paper() -> None:
     """tau = g (kp kv (q_ref - q) - kv v)."""
     kp, kv, g = np.array([10.0, 20.0]), np.array([1.0, 2.0]), np.array([3.0, 4.0])
     expected = g * (kp * kv * (Q_REF - Q) - kv * SPEED)
-    u = second_command(Controller("cascade", RATE, (10.0, 20.0), kv=(1.0, 2.0), drive_gain=(3, 4)))
+    u = second_command(
+        Controller(kind="cascade", rate_hz=RATE, kp=(10.0, 20.0), kv=(1.0, 2.0), drive_gain=(3, 4))
+    )
     np.testing.assert_allclose(u, expected, rtol=1e-12)
-    u = second_command(Controller("cascade", RATE, (10.0, 20.0), kv=(3.0, 8.0)))
+    u = second_command(Controller(kind="cascade", rate_hz=RATE, kp=(10.0, 20.0), kv=(3.0, 8.0)))
     np.testing.assert_allclose(u, expected, rtol=1e-12)
 
 
 def test_computed_torque_is_the_inverse_dynamics_of_the_wanted_acceleration() -> None:
     kp, kd = np.array([10.0, 20.0]), np.array([1.0, 2.0])
-    controller = Controller("computed_torque", RATE, (10.0, 20.0), (1.0, 2.0))
+    controller = Controller(kind="computed_torque", rate_hz=RATE, kp=(10.0, 20.0), kd=(1.0, 2.0))
     for factor in (1.0, 0.5):
         wanted = A_REF + factor * (kp * (Q_REF - Q) + kd * (V_REF - SPEED))
         (expected,) = arm().inverse_dynamics(Q[None], SPEED[None], wanted[None])
@@ -85,7 +93,7 @@ def test_computed_torque_is_the_inverse_dynamics_of_the_wanted_acceleration() ->
 
 
 def test_feed_forward_adds_the_torque_along_the_reference() -> None:
-    pd = Controller("pd", RATE, (10.0, 20.0), (1.0, 2.0))
+    pd = Controller(kind="pd", rate_hz=RATE, kp=(10.0, 20.0), kd=(1.0, 2.0))
     (along,) = arm().inverse_dynamics(Q_REF[None], V_REF[None], A_REF[None])
     for scale in (np.ones(2), np.array([0.5, 2.0])):
         added = second_command(replace(pd, feedforward=True), scale) - second_command(pd, scale)
@@ -95,7 +103,7 @@ def test_feed_forward_adds_the_torque_along_the_reference() -> None:
 def test_robots_side_by_side_are_driven_by_their_own_models() -> None:
     light = arm()
     heavy = light.with_theta(2.0 * light.theta)
-    controller = Controller("computed_torque", RATE, (10.0, 20.0), (1.0, 2.0))
+    controller = Controller(kind="computed_torque", rate_hz=RATE, kp=(10.0, 20.0), kd=(1.0, 2.0))
     both = constant(1, np.tile(Q_REF, 3), np.tile(V_REF, 3), np.tile(A_REF, 3))
     u = Drive(controller, both, [light, heavy, light]).command(0, np.tile(Q, 3))
     np.testing.assert_allclose(u[2:4], 2.0 * u[:2], rtol=1e-12)
@@ -105,10 +113,10 @@ def test_robots_side_by_side_are_driven_by_their_own_models() -> None:
 def test_pid_integrates_and_stops_at_the_limit() -> None:
     gains: dict[str, Any] = {"kp": (1.0,), "ki": (10.0,), "kd": (0.0,)}
     zero, one = np.zeros(1), np.ones(1)
-    drive = one_joint(Controller("pid", RATE, **gains), 1.0, 20)
+    drive = one_joint(Controller(kind="pid", rate_hz=RATE, **gains), 1.0, 20)
     found = [float(drive.command(k, zero)[0]) for k in range(20)]
     np.testing.assert_allclose(found, 1.0 + 0.1 * np.arange(1, 21))
-    drive = one_joint(Controller("pid", RATE, **gains, limit=(1.45,)), 1.0, 1001)
+    drive = one_joint(Controller(kind="pid", rate_hz=RATE, **gains, limit=(1.45,)), 1.0, 1001)
     held = [float(drive.command(k, zero)[0]) for k in range(1000)]
     assert max(held) == 1.45
     assert drive.saturated.all()
@@ -121,7 +129,7 @@ def test_an_integral_may_begin_settled() -> None:
     gains: dict[str, Any] = {"kp": (1.0,), "ki": (10.0,), "kd": (2.0,)}
     reference = constant(2, [1.0], [3.0])
     for feedforward in (False, True):
-        controller = Controller("pid", RATE, **gains, feedforward=feedforward)
+        controller = Controller(kind="pid", rate_hz=RATE, **gains, feedforward=feedforward)
         nominal = Robot.from_text(PENDULUM)
         drive = Drive(controller, reference, [nominal], None, np.array([7.0]))
         np.testing.assert_allclose(drive.command(0, reference.q[0]), [7.0], rtol=1e-12)
@@ -129,14 +137,16 @@ def test_an_integral_may_begin_settled() -> None:
 
 def test_limit_binds_both_ways() -> None:
     for sign in (1, -1):
-        controller = Controller("pd", RATE, (1e4, 1e4), (0.0, 0.0), limit=(3.0, 5.0))
+        controller = Controller(
+            kind="pd", rate_hz=RATE, kp=(1e4, 1e4), kd=(0.0, 0.0), limit=(3.0, 5.0)
+        )
         drive = Drive(controller, constant(1, sign * np.ones(2), 0.0), [arm()])
         u = drive.command(0, np.zeros(2))
         np.testing.assert_array_equal(u, sign * np.array([3.0, 5.0]))
 
 
 def test_filtered_derivative_of_a_ramp_settles_on_its_slope() -> None:
-    controller = Controller("pd", RATE, (0.0,), (1.0,), derivative_cutoff_hz=5.0)
+    controller = Controller(kind="pd", rate_hz=RATE, kp=(0.0,), kd=(1.0,), derivative_cutoff_hz=5.0)
     drive = one_joint(controller, 0.0, 200)
     u = [float(drive.command(k, np.array([0.02 * k]))[0]) for k in range(200)][1:]
     assert u[0] == pytest.approx(-2.0 * (1 - np.exp(-2 * np.pi * 5.0 / RATE)))

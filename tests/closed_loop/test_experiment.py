@@ -81,12 +81,18 @@ def small(**changes: Any) -> Experiment:
     robot = arm()
     settings: dict[str, Any] = {
         "robot": robot,
-        "controller": Controller("pd", RATE, (300.0, 100.0), (40.0, 5.0)),
+        "controller": Controller(kind="pd", rate_hz=RATE, kp=(300.0, 100.0), kd=(40.0, 5.0)),
         "runs": tuple(
-            ExperimentRun(Fourier.random(robot, 0.5, k, speed=2.0), 1.0, f"run{k}.csv")
+            ExperimentRun(
+                trajectory=Fourier.random(robot, 0.5, k, speed=2.0),
+                duration=1.0,
+                file=f"run{k}.csv",
+            )
             for k in range(2)
         ),
-        "sensors": Sensors(2e-5, 1e-5, 0.05, 1e-3),
+        "sensors": Sensors(
+            position_std=2e-5, position_resolution=1e-5, torque_std=0.05, torque_resolution=1e-3
+        ),
         "seed": 1,
         "lead_in": 0.5,
     }
@@ -106,7 +112,12 @@ def test_seeds_reproduce_and_recordings_differ() -> None:
 
 
 def test_the_noise_is_as_stated() -> None:
-    sensors = Sensors((1e-4, 2e-4), 0.0, (0.5, 0.1), 0.0)
+    sensors = Sensors(
+        position_std=(1e-4, 2e-4),
+        position_resolution=0.0,
+        torque_std=(0.5, 0.1),
+        torque_resolution=0.0,
+    )
     experiment = small(sensors=sensors, runs=small().runs[:1])
     (rollout,), (recording,) = experiment.rollouts(), experiment.run()
     noise = recording.q - rollout.q, recording.tau - rollout.u
@@ -116,7 +127,11 @@ def test_the_noise_is_as_stated() -> None:
 
 
 def test_resolution_is_seen_in_the_record() -> None:
-    (recording, _) = small(sensors=Sensors(0.0, (1e-3, 0.0), 0.0, 0.5)).run()
+    (recording, _) = small(
+        sensors=Sensors(
+            position_std=0.0, position_resolution=(1e-3, 0.0), torque_std=0.0, torque_resolution=0.5
+        )
+    ).run()
     steps = recording.q / 1e-3
     np.testing.assert_allclose(steps[:, 0], np.round(steps[:, 0]), atol=1e-9)
     assert np.abs(steps[:, 1] - np.round(steps[:, 1])).max() > 0.1
@@ -141,7 +156,7 @@ def test_a_drive_gain_is_seen_in_the_record_only() -> None:
     gain = TrueEffect.of("drive_gain", arm(), [0.25])
     with_gain, without = small(sensors=Sensors(), effects=gain), small(sensors=Sensors())
     # The controller's gains see a plant that is 1.25 times as heavy: give it the equivalent.
-    stiffer = Controller("pd", RATE, (375.0, 125.0), (50.0, 6.25))
+    stiffer = Controller(kind="pd", rate_hz=RATE, kp=(375.0, 125.0), kd=(50.0, 6.25))
     found = replace(with_gain, controller=stiffer).run()[0]
     np.testing.assert_allclose(found.q, without.run()[0].q, atol=1e-6)
     np.testing.assert_allclose(found.tau, 1.25 * without.run()[0].tau, atol=1e-3)
@@ -170,13 +185,17 @@ def test_progress_reaches_its_end() -> None:
 @pytest.mark.parametrize(
     "controller",
     [
-        Controller("computed_torque", RATE, (100.0, 100.0), (20.0, 20.0), delay_s=0.001),
-        Controller("cascade", RATE, (8.0, 8.0), kv=(4.0, 0.5), drive_gain=(10.0, 10.0)),
         Controller(
-            "pid",
-            RATE,
-            (300.0, 100.0),
-            (40.0, 5.0),
+            kind="computed_torque", rate_hz=RATE, kp=(100.0, 100.0), kd=(20.0, 20.0), delay_s=0.001
+        ),
+        Controller(
+            kind="cascade", rate_hz=RATE, kp=(8.0, 8.0), kv=(4.0, 0.5), drive_gain=(10.0, 10.0)
+        ),
+        Controller(
+            kind="pid",
+            rate_hz=RATE,
+            kp=(300.0, 100.0),
+            kd=(40.0, 5.0),
             ki=(10.0, 10.0),
             velocity_reference=False,
             limit=(150.0, 50.0),
@@ -194,7 +213,7 @@ def test_the_study_states_the_controller_as_it_is(tmp_path: Path, controller: Co
 def test_a_feed_forward_knows_the_nominal_robot_only() -> None:
     robot = arm()
     lighter = robot.with_theta(0.7 * robot.theta)
-    fed = Controller("pd", RATE, (300.0, 100.0), (40.0, 5.0), feedforward=True)
+    fed = Controller(kind="pd", rate_hz=RATE, kp=(300.0, 100.0), kd=(40.0, 5.0), feedforward=True)
     errors = []
     for nominal in (None, lighter):
         found = small(controller=fed, nominal=nominal, sensors=Sensors()).run()[0]
@@ -274,7 +293,7 @@ def test_the_nominal_robot_is_what_the_user_gets(file: Path) -> None:
 
 
 def test_a_failed_simulation_writes_nothing(tmp_path: Path) -> None:
-    wild = Controller("pd", RATE, (3000.0, 3000.0), (400.0, 400.0))
+    wild = Controller(kind="pd", rate_hz=RATE, kp=(3000.0, 3000.0), kd=(400.0, 400.0))
     with pytest.raises(SimulationError, match=r"run[01]\.csv, t = "):
         write_experiment(small(controller=wild), tmp_path / "out")
     assert not (tmp_path / "out").exists()

@@ -32,7 +32,7 @@ SLIDER = """<robot name="slider"><link name="base"/>
     <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
   <joint name="slide" type="prismatic"><parent link="base"/><child link="mass"/>
     <axis xyz="1 0 0"/><limit lower="-1" upper="1" velocity="2" effort="50"/></joint></robot>"""
-PD = Controller("pd", 500.0, (800.0, 200.0), (60.0, 12.0))
+PD = Controller(kind="pd", rate_hz=500.0, kp=(800.0, 200.0), kd=(60.0, 12.0))
 NATIVE = ("viscous_friction", "coulomb_friction", "asymmetric_friction", "joint_spring")
 PLACES = {"joint or robot": "", "joint": "@elbow", "pair": "@elbow:shoulder", "robot": ""}
 
@@ -125,8 +125,10 @@ def test_terms_are_the_force(name: str) -> None:
     if effect.simulated_terms(values, robot) is None:
         assert name not in NATIVE
         return
-    body = Mechanism(robot, (TrueEffect(effect, values),), 0.1)
-    other = Mechanism(robot, (TrueEffect(effect, tuple(-2.0 * x for x in values)),), 0.2)
+    body = Mechanism(robot, (TrueEffect(effect, values),), friction_width=0.1)
+    other = Mechanism(
+        robot, (TrueEffect(effect, tuple(-2.0 * x for x in values)),), friction_width=0.2
+    )
     bodies = Bodies((body, other), (0.0, 0.0), np.array([2, 0, 1, 3]))
     found = evaluated(Terms.of(bodies), states := rng.normal(size=(20, 8)) * [[0.1]])
     for k, one in enumerate(bodies.mechanisms):
@@ -183,7 +185,9 @@ def test_a_delayed_command_acts_when_it_arrives(late: float) -> None:
     """A mass under sampled PD with a delay of any length, against the exact recursion."""
     mass, rate, kp, kd, limit = 2.0, 100.0, 100.0, 20.0, 4.0
     reference = Fourier.random(Robot.from_text(SLIDER), 2.0, 1)
-    controller = Controller("pd", rate, (kp,), (kd,), limit=(limit,), delay_s=late / rate)
+    controller = Controller(
+        kind="pd", rate_hz=rate, kp=(kp,), kd=(kd,), limit=(limit,), delay_s=late / rate
+    )
     body = Mechanism.of(Robot.from_text(SLIDER))
     loop = ClosedLoop(accuracy=1e-8)
     (run,) = loop.simulate([Task(body, reference, 1.0)], controller, lead_in=0.0)
@@ -216,8 +220,8 @@ def test_a_right_model_makes_the_loop_follow_and_a_wrong_one_less() -> None:
     heavy = robot.with_theta(1.5 * robot.theta)
     motion = task(Mechanism.of(robot), duration=1.0)
     gains: Any = {"kp": (400.0, 400.0), "kd": (40.0, 40.0)}
-    computed = Controller("computed_torque", 1000.0, **gains)
-    plain = Controller("pd", 1000.0, (200.0, 60.0), (20.0, 6.0))
+    computed = Controller(kind="computed_torque", rate_hz=1000.0, **gains)
+    plain = Controller(kind="pd", rate_hz=1000.0, kp=(200.0, 60.0), kd=(20.0, 6.0))
     errors = {}
     for name, controller, nominal in (
         ("right", computed, None),
@@ -239,7 +243,9 @@ def test_a_loop_with_an_integral_begins_where_it_would_have_settled() -> None:
     robot = arm()
     load = TrueEffect.of("joint_spring", robot, [3.0, 1.0])
     still = SampledReference(np.array([0.0, 1.0]), np.full((2, 2), [0.3, 0.2]))
-    pid = Controller("pid", 500.0, (400.0, 100.0), (30.0, 6.0), ki=(100.0, 100.0))
+    pid = Controller(
+        kind="pid", rate_hz=500.0, kp=(400.0, 100.0), kd=(30.0, 6.0), ki=(100.0, 100.0)
+    )
     (run,) = simulate([Task(Mechanism.of(robot, load), still, 0.5)], pid, lead_in=0.0)
     np.testing.assert_allclose(run.q, run.q_ref, atol=1e-6)
 
@@ -295,7 +301,7 @@ def test_an_inertia_that_is_lost_on_the_way_is_noticed() -> None:
     theta = robot.theta.copy()
     theta[robot.parameter_names.index("Izz.upper")] = -0.22
     still = SampledReference(np.array([0.0, 5.0]), np.full((2, 2), [0.0, np.pi / 2]))
-    free = Controller("pd", 500.0, (0.0, 0.0), (0.0, 0.0))
+    free = Controller(kind="pd", rate_hz=500.0, kp=(0.0, 0.0), kd=(0.0, 0.0))
     lost = Task(Mechanism.of(robot.with_theta(theta)), still, 4.0)
     with pytest.raises(
         SimulationError, match=r"t = .* not positive where the motion went"
@@ -305,7 +311,7 @@ def test_an_inertia_that_is_lost_on_the_way_is_noticed() -> None:
 
 
 def test_unstable_loops_say_so() -> None:
-    wild = Controller("pd", 100.0, (5000.0, 5000.0), (900.0, 900.0))
+    wild = Controller(kind="pd", rate_hz=100.0, kp=(5000.0, 5000.0), kd=(900.0, 900.0))
     with pytest.raises(SimulationError, match=r"diverges|integrated") as caught:
         simulate([task(Mechanism.of(arm()), duration=5.0)], wild, lead_in=0.0)
     assert caught.value.reason == "unstable"
@@ -351,7 +357,10 @@ for seed in range(150):
         values[rng.integers(model.size)] = rng.choice([np.nan, np.inf, 1e300, -1e-300])
     gains = 10.0 ** rng.uniform(-6, 12, 4)
     kind = str(rng.choice(["pd", "computed_torque"]))
-    controller = Controller(kind, 500.0, gains[:2], gains[2:], delay_s=0.0013 * (seed % 2))
+    delay = 0.0013 * (seed % 2)
+    controller = Controller(
+        kind=kind, rate_hz=500.0, kp=gains[:2], kd=gains[2:], delay_s=delay
+    )
     try:
         body = Mechanism.of_model(model, values, theta)
         reference = Fourier.random(robot, 2.0, seed)

@@ -25,7 +25,7 @@ from dynident.errors import SimulationError
 from dynident.recording import Recording
 
 RATE = 250.0
-PD = Controller("pd", RATE, (300.0, 100.0), (40.0, 5.0))
+PD = Controller(kind="pd", rate_hz=RATE, kp=(300.0, 100.0), kd=(40.0, 5.0))
 FRICTION = {"viscous_friction": [0.5], "coulomb_friction": [0.3]}
 LOAD = {"mass": 0.8, "mx": 0.2, "Ixx": 0.01, "Iyy": 0.1, "Izz": 0.1}
 
@@ -38,7 +38,10 @@ def experiment(**changes: Any) -> Experiment:
         "controller": PD,
         "runs": tuple(
             ExperimentRun(
-                Fourier.random(robot, 2.0, k, speed=2.0), 1.0 + k, f"run{k}.csv", start=5.0 * k
+                trajectory=Fourier.random(robot, 2.0, k, speed=2.0),
+                duration=1.0 + k,
+                file=f"run{k}.csv",
+                start=5.0 * k,
             )
             for k in range(2)
         ),
@@ -105,7 +108,9 @@ def test_unfit_references_are_refused(t: Any, q: Any, reason: str) -> None:
 @pytest.mark.parametrize("delay", [0.0, 0.4, 1.0])
 def test_the_true_robot_makes_the_recording_again(torque: Any, delay: float) -> None:
     """Two recordings of different length, one with a payload, in one plant."""
-    gentle = Controller("pd", RATE, (150.0, 30.0), (25.0, 2.0), delay_s=delay / RATE)
+    gentle = Controller(
+        kind="pd", rate_hz=RATE, kp=(150.0, 30.0), kd=(25.0, 2.0), delay_s=delay / RATE
+    )
     truth = experiment(torque=torque, controller=gentle)
     runs = tuple(replace(run, payload=k == 1) for k, run in enumerate(truth.runs))
     truth = replace(truth, runs=runs)

@@ -24,9 +24,19 @@ STARTS = (0.0, 100.0)
 def experiment(*effects: TrueEffect, **changes: Any) -> Experiment:
     robot = Robot.from_text(ARM)
     trajectory = Fourier.random(robot, 1.0, 1, harmonics=2, speed=2.0)
-    runs = [ExperimentRun(trajectory, 2.0, f"run{k}.csv", start=s) for k, s in enumerate(STARTS)]
-    controller = Controller("pd", RATE, (100.0,), (5.0,))
-    return Experiment(robot, controller, tuple(runs), effects, lead_in=1.0, **changes)
+    runs = [
+        ExperimentRun(trajectory=trajectory, duration=2.0, file=f"run{k}.csv", start=s)
+        for k, s in enumerate(STARTS)
+    ]
+    controller = Controller(kind="pd", rate_hz=RATE, kp=(100.0,), kd=(5.0,))
+    return Experiment(
+        robot=robot,
+        controller=controller,
+        runs=tuple(runs),
+        effects=effects,
+        lead_in=1.0,
+        **changes,
+    )
 
 
 def true(label: str, values, shape=()) -> TrueEffect:

@@ -12,9 +12,17 @@ from scipy.linalg import expm
 from scipy.special import ellipk
 from tests.synthetic import arm
 
-from dynident.closed_loop import Controller, Fourier, Mechanism, Rollout, Sensors, Task, TrueEffect
+from dynident.closed_loop import (
+    Controller,
+    Fourier,
+    Mechanism,
+    Rollout,
+    Sensors,
+    Task,
+    TrueEffect,
+    simulate,
+)
 from dynident.closed_loop.plant.point_force import Bodies, PlainForce, TracedForce, point_force
-from dynident.closed_loop.simulator import simulate
 from dynident.effects import Effect, catalogue, effects_of
 from dynident.errors import SimulationError
 from dynident.model import Model
@@ -40,7 +48,9 @@ def still(position: float, period: float = 1.0) -> Fourier:
 def test_a_free_pendulum_keeps_its_energy_and_its_period() -> None:
     start = 2.0
     task = Task(Mechanism.of(Robot.from_text(PENDULUM)), still(start), 10.0)
-    (run,) = simulate([task], Controller("pd", 200.0, **FREE), lead_in=0.0, accuracy=1e-7)
+    (run,) = simulate(
+        [task], Controller(kind="pd", rate_hz=200.0, **FREE), lead_in=0.0, accuracy=1e-7
+    )
     inertia, weight = 0.1 + 2 * 0.5**2, 2 * 9.81 * 0.5
     energy = inertia * run.v[:, 0] ** 2 / 2 - weight * np.cos(run.q[:, 0])
     np.testing.assert_allclose(energy, energy[0], atol=1e-4 * weight)
@@ -56,7 +66,9 @@ def test_a_damped_mass_under_sampled_pd_moves_as_the_exact_recursion() -> None:
     friction = TrueEffect.of("viscous_friction@slide", robot, [damping])
     trajectory = Fourier.random(robot, 2.0, 1)
     task = Task(Mechanism.of(robot, friction), trajectory, 4.0)
-    (run,) = simulate([task], Controller("pd", rate, (kp,), (kd,)), lead_in=0.0, accuracy=1e-8)
+    (run,) = simulate(
+        [task], Controller(kind="pd", rate_hz=rate, kp=(kp,), kd=(kd,)), lead_in=0.0, accuracy=1e-8
+    )
 
     step = expm(np.array([[0, 1, 0], [0, -damping / mass, 1 / mass], [0, 0, 0]]) / rate)
     q_ref, v_ref, _ = (x[:, 0] for x in trajectory.at(np.arange(len(run.t)) / rate))
@@ -75,7 +87,7 @@ def test_friction_stops_a_mass_where_the_law_says() -> None:
     truth = TrueEffect.of("coulomb_friction@slide", robot, [4.0])
     moving = Fourier(1.0, np.zeros(1), np.array([[0.5 / (2 * np.pi)]]), np.zeros((1, 1)))
     task = Task(Mechanism.of(robot, truth), moving, 0.5)
-    (run,) = simulate([task], Controller("pd", 1000.0, **FREE), lead_in=0.0)
+    (run,) = simulate([task], Controller(kind="pd", rate_hz=1000.0, **FREE), lead_in=0.0)
     exact = solve_ivp(
         lambda _, x: [x[1], -2.0 * np.tanh(x[1] / 0.01)],
         (0, 0.5),
@@ -113,7 +125,7 @@ def truth_of(name: str, robot: Robot) -> tuple[TrueEffect, ...]:
 
 def followed(robot: Robot, truth: tuple[TrueEffect, ...], **settings: Any) -> Rollout:
     mechanism = Mechanism.of(robot, truth, WIDTH, carries_payload=True)
-    controller = Controller("pd", RATE, (2000.0, 800.0), (150.0, 40.0))
+    controller = Controller(kind="pd", rate_hz=RATE, kp=(2000.0, 800.0), kd=(150.0, 40.0))
     task = Task(mechanism, Fourier.random(robot, 2.0, 5, harmonics=3, speed=2.0), 2.0)
     (run,) = simulate([task], controller, lead_in=0.1, **settings)
     return run
@@ -162,7 +174,11 @@ def test_compiled_force_is_the_effects_force(name: str) -> None:
 
     def bodies(*factors: float) -> Bodies:
         scaled = [
-            Mechanism(robot, (replace(one, values=tuple(f * x for x in one.values)),), WIDTH)
+            Mechanism(
+                robot,
+                (replace(one, values=tuple(f * x for x in one.values)),),
+                friction_width=WIDTH,
+            )
             for f in factors
         ]
         return Bodies(tuple(scaled), starts, place)
@@ -210,7 +226,7 @@ def test_motions_side_by_side_are_those_alone() -> None:
         )
         for seed in range(3)
     ]
-    controller = Controller("pd", 500.0, (800.0, 200.0), (60.0, 12.0))
+    controller = Controller(kind="pd", rate_hz=500.0, kp=(800.0, 200.0), kd=(60.0, 12.0))
     together = simulate(tasks, controller, lead_in=0.2)
     for task, run in zip(tasks, together, strict=True):
         (alone,) = simulate([task], controller, lead_in=0.2)
@@ -229,7 +245,7 @@ def test_joint_order_does_not_matter() -> None:
     runs = []
     for body, reference, order in ((robot, trajectory, 1), (turned, mirrored, -1)):
         truth = TrueEffect.of(*coupling[:1], body, coupling[1])
-        controller = Controller("pd", 500.0, kp[::order], kd[::order])
+        controller = Controller(kind="pd", rate_hz=500.0, kp=kp[::order], kd=kd[::order])
         runs += simulate([Task(Mechanism.of(body, truth), reference, 0.5)], controller, lead_in=0.1)
     np.testing.assert_allclose(runs[1].u[:, ::-1], runs[0].u, atol=1e-6)
 
@@ -241,7 +257,7 @@ def test_accuracy_is_what_is_stated() -> None:
         *TrueEffect.of("stribeck_friction@elbow", robot, [0.5], [0.1]),
     )
     task = Task(Mechanism.of(robot, truth), Fourier.random(robot, 4.0, 1), 1.0)
-    controller = Controller("pd", 1000.0, (800.0, 300.0), (80.0, 20.0))
+    controller = Controller(kind="pd", rate_hz=1000.0, kp=(800.0, 300.0), kd=(80.0, 20.0))
     (run,) = simulate([task], controller, lead_in=0.5)
     (tight,) = simulate([task], controller, lead_in=0.5, accuracy=1e-8)
     np.testing.assert_allclose(run.q, tight.q, atol=2e-6)
@@ -255,13 +271,17 @@ def test_a_diverging_loop_is_noticed_with_its_time() -> None:
     robot = arm()
     task = Task(Mechanism.of(robot), Fourier.random(robot, 2.0, 1), 20.0, name="run7.csv")
     with pytest.raises(SimulationError, match=r"run7\.csv, t = .* s: the loop .*lower the"):
-        simulate([task], Controller("pd", 100.0, (5000.0, 5000.0), (900.0, 900.0)))
+        simulate(
+            [task], Controller(kind="pd", rate_hz=100.0, kp=(5000.0, 5000.0), kd=(900.0, 900.0))
+        )
 
 
 def test_a_loop_that_chatters_at_its_limit_is_noticed() -> None:
     robot = arm()
     task = Task(Mechanism.of(robot), Fourier.random(robot, 2.0, 1), 5.0)
-    controller = Controller("pd", 100.0, (500.0, 500.0), (99.0, 99.0), limit=(50.0, 50.0))
+    controller = Controller(
+        kind="pd", rate_hz=100.0, kp=(500.0, 500.0), kd=(99.0, 99.0), limit=(50.0, 50.0)
+    )
     with pytest.raises(SimulationError, match="oscillates from sample to sample: joint 'elbow'"):
         simulate([task], controller)
 
@@ -271,7 +291,7 @@ def test_a_joint_that_only_holds_still_is_no_chatter() -> None:
     moving = Fourier.random(robot, 2.0, 1)
     still_elbow = Fourier(2.0, moving.centre, moving.sine * [[1], [0]], moving.cosine * [[1], [0]])
     task = Task(Mechanism.of(robot), still_elbow, 1.0, rng=np.random.default_rng(0))
-    controller = Controller("pd", 500.0, (800.0, 200.0), (60.0, 12.0))
+    controller = Controller(kind="pd", rate_hz=500.0, kp=(800.0, 200.0), kd=(60.0, 12.0))
     simulate([task], controller, Sensors(position_std=2e-5))
 
 
@@ -282,7 +302,7 @@ def test_bodies_without_positive_inertia_are_refused(changes: dict[str, float]) 
     for name, value in changes.items():
         theta[robot.parameter_names.index(name)] = value
     task = Task(Mechanism.of(robot.with_theta(theta)), Fourier.random(robot, 2.0, 1), 1.0)
-    controller = Controller("pd", 500.0, (8.0, 2.0), (0.6, 0.1))
+    controller = Controller(kind="pd", rate_hz=500.0, kp=(8.0, 2.0), kd=(0.6, 0.1))
     with pytest.raises(SimulationError, match="joint-space inertia is not positive"):
         simulate([task], controller)
 
@@ -292,16 +312,16 @@ def test_a_coupling_inertia_that_makes_the_whole_singular_is_refused() -> None:
     truth = TrueEffect.of("joint_coupling@elbow:shoulder", robot, {"ca": 1e3})
     task = Task(Mechanism.of(robot, truth), Fourier.random(robot, 2.0, 1), 1.0)
     with pytest.raises(SimulationError, match="joint-space inertia is not positive"):
-        simulate([task], Controller("pd", 500.0, (8.0, 2.0), (0.6, 0.1)))
+        simulate([task], Controller(kind="pd", rate_hz=500.0, kp=(8.0, 2.0), kd=(0.6, 0.1)))
 
 
 def test_settings_that_do_not_fit_are_refused() -> None:
     robot = arm()
     trajectory = Fourier.random(robot, 2.0, 1)
-    pd = Controller("pd", 500.0, (8.0, 2.0), (0.6, 0.1))
+    pd = Controller(kind="pd", rate_hz=500.0, kp=(8.0, 2.0), kd=(0.6, 0.1))
     fits = Task(Mechanism.of(robot), trajectory, 1.0)
     cases: list[tuple[Task, Controller, dict[str, Any], str]] = [
-        (fits, Controller("pd", 500.0, (8.0,), (0.6,)), {}, "controller of 1"),
+        (fits, Controller(kind="pd", rate_hz=500.0, kp=(8.0,), kd=(0.6,)), {}, "controller of 1"),
         (Task(Mechanism.of(robot), still(0.0), 1.0), pd, {}, "trajectory of 1 joints"),
         (Task(Mechanism.of(robot), trajectory, 0.0), pd, {}, "duration"),
         (Task(Mechanism.of(robot), trajectory, np.nan), pd, {}, "duration"),

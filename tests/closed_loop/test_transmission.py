@@ -114,7 +114,9 @@ def run(mechanism: Mechanism, controller: Controller, duration: float = 0.5) -> 
     return found
 
 
-PD = Controller("pd", 1000.0, (800.0, 200.0), (60.0, 12.0), derivative_cutoff_hz=80.0)
+PD = Controller(
+    kind="pd", rate_hz=1000.0, kp=(800.0, 200.0), kd=(60.0, 12.0), derivative_cutoff_hz=80.0
+)
 
 
 def test_a_stiff_transmission_is_the_rigid_robot() -> None:
@@ -155,7 +157,12 @@ def test_what_depends_on_the_past_is_no_function_of_the_motion() -> None:
 
 def test_an_integral_starts_although_something_gives_way() -> None:
     pid = Controller(
-        "pid", 1000.0, (800.0, 200.0), (60.0, 12.0), ki=(500.0, 100.0), derivative_cutoff_hz=80.0
+        kind="pid",
+        rate_hz=1000.0,
+        kp=(800.0, 200.0),
+        kd=(60.0, 12.0),
+        ki=(500.0, 100.0),
+        derivative_cutoff_hz=80.0,
     )
     found = run(elastic(arm(), 15.0, 0.1, "elbow", 0.05), pid, 0.2)
     assert np.abs(found.q - found.q_ref).max() < 0.1

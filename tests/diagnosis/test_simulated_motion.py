@@ -17,7 +17,9 @@ from dynident.model import Model
 from dynident.recording import Dataset
 from synthetic import arm
 
-CONTROLLER = Controller("pd", 500.0, (400.0, 40.0), (30.0, 2.5), derivative_cutoff_hz=80.0)
+CONTROLLER = Controller(
+    kind="pd", rate_hz=500.0, kp=(400.0, 40.0), kd=(30.0, 2.5), derivative_cutoff_hz=80.0
+)
 FRICTION = {"viscous_friction": (1.2, 0.5), "coulomb_friction": (1.0, 0.6)}
 NOISY = Sensors(position_std=1e-3, torque_std=0.05)
 
@@ -37,11 +39,20 @@ def recordings(seed: int, count: int, hidden: tuple[TrueEffect, ...] = ()) -> Da
     robot = arm()
     motions = tuple(
         Motion(
-            Fourier.random(robot, 9.7 + r, [seed, r], amplitude=1.6, speed=3.0), 9.0, f"run{r}.csv"
+            trajectory=Fourier.random(robot, 9.7 + r, [seed, r], amplitude=1.6, speed=3.0),
+            duration=9.0,
+            file=f"run{r}.csv",
         )
         for r in range(count)
     )
-    made = Experiment(robot, CONTROLLER, motions, (*known(), *hidden), NOISY, seed=seed).run()
+    made = Experiment(
+        robot=robot,
+        controller=CONTROLLER,
+        runs=motions,
+        effects=(*known(), *hidden),
+        sensors=NOISY,
+        seed=seed,
+    ).run()
     return Dataset(tuple(one.replace(period=None) for one in made))
 
 

@@ -19,7 +19,9 @@ from dynident.effects.transmissions.backlash import Backlash
 ROBOT = arm()
 ROTORS = (0.1, 0.07)
 KNOWN = {"viscous_friction": (1.2, 0.5), "coulomb_friction": (1.5, 0.6), "rotor_inertia": ROTORS}
-PD = Controller("pd", 1000.0, (1500.0, 600.0), (80.0, 30.0), derivative_cutoff_hz=80.0)
+PD = Controller(
+    kind="pd", rate_hz=1000.0, kp=(1500.0, 600.0), kd=(80.0, 30.0), derivative_cutoff_hz=80.0
+)
 RATE = 1000.0
 
 

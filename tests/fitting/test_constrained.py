@@ -93,7 +93,7 @@ def test_it_is_fitting_first_and_projecting_under_the_metric(
     factors = factorise(rows(model, data))
     std = np.sqrt(np.mean(free.torque_std**2))
     R = factors.pooled(np.full(3, 1 / std))[: model.size, : model.size]
-    later = project(free, prior, Metric(R, model.names, factors.rows, "X'X"), within)
+    later = project(free, prior, Metric(R, model.names, rows=factors.rows, source="X'X"), within)
     size = later.space.scale
     np.testing.assert_allclose(links_of(direct) / size[:30], later.x[:30] / size[:30], atol=1e-8)
     np.testing.assert_allclose(direct.values, later.values, rtol=1e-7, atol=1e-9)

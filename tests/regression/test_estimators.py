@@ -15,13 +15,14 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from dynident.errors import DynidentWarning, FitError
+from dynident.regression.bayesian_factors import BayesianFactorRegression
 from dynident.regression.corrected import CorrectedLeastSquares
-from dynident.regression.joint_factors import BayesianFactorRegression, JointFactorRegression
+from dynident.regression.joint_factors import JointFactorRegression
+from dynident.regression.ordinary import TruncatedLeastSquares
 from dynident.regression.statistics import Statistics
 from dynident.regression.statistics_regressor import StatisticsRegressor
 from dynident.regression.stepwise import StepwiseRegression
 from dynident.regression.total import TotalLeastSquares
-from dynident.regression.truncated import TruncatedLeastSquares
 
 EVERY = [
     TruncatedLeastSquares(),

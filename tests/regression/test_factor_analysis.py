@@ -49,7 +49,14 @@ def test_golden_case() -> None:
     wz = np.array([0.6241129877, 0.2125492585, -0.0408715201])
     same, none = np.ones(3), np.zeros(3)
     weights = Loadings(
-        wz, 0.894427191 * same, none, none, none, 0.1008179203 * same, 0.2 * same, 0.3024537609
+        wz=wz,
+        wx=0.894427191 * same,
+        wz_var=none,
+        wx_var=none,
+        relevance=none,
+        pz=0.1008179203 * same,
+        px=0.2 * same,
+        py=0.3024537609,
     )
     start = begun(weights, statistics.count, prior)
     known = np.zeros(3, dtype=bool)

@@ -7,15 +7,16 @@ import pytest
 from sklearn.exceptions import NotFittedError
 
 from dynident.errors import FitError
+from dynident.regression.bayesian_factors import BayesianFactorRegression
 from dynident.regression.corrected import CorrectedLeastSquares
 from dynident.regression.identifiability import (
     StartSensitivity,
     reliability_profile,
     start_sensitivity,
 )
-from dynident.regression.joint_factors import BayesianFactorRegression, JointFactorRegression
+from dynident.regression.joint_factors import JointFactorRegression
+from dynident.regression.ordinary import TruncatedLeastSquares
 from dynident.regression.statistics import Statistics
-from dynident.regression.truncated import TruncatedLeastSquares
 
 TRUE = np.array([1.0, -2.0, 0.5, 0.0])
 NOISE = 0.25
@@ -176,13 +177,13 @@ def test_bounds_are_other_optima_only_where_they_converged() -> None:
         k = len(converged)
         words = tuple("converged" if one else "not converged" for one in converged)
         found = StartSensitivity(
-            ("a",),
-            np.linspace(0.5, 0.9, k),
-            np.ones((k, 1)),
-            np.ones(1),
-            -10.0 * np.arange(k),
-            words,
-            np.array(converged),
+            names=("a",),
+            reliabilities=np.linspace(0.5, 0.9, k),
+            coef_true=np.ones((k, 1)),
+            sizes=np.ones(1),
+            bounds=-10.0 * np.arange(k),
+            endings=words,
+            converged=np.array(converged),
         )
         return " ".join(str(found.table()).split())
 

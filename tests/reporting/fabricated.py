@@ -63,19 +63,19 @@ def fitted(model: Model, tau: np.ndarray, block) -> Estimate:
     covariance[np.ix_(kept, kept)] = residual.var() * np.linalg.inv(X.T @ X)
     source = DataSource("data/run1.csv", "ab12" * 16, "position 40 Hz, all 18 Hz, at 50 Hz")
     return Estimate(
-        model,
-        values,
-        covariance,
-        basis,
-        residual.std(axis=0),
-        np.linalg.norm(residual, axis=0) / np.linalg.norm(tau, axis=0),
-        float(np.linalg.norm(residual) / np.linalg.norm(tau)),
-        42.0,
-        residual.size,
-        "least squares",
-        "solved",
-        ("sigma of Ixx.link2 is large: move the elbow faster",),
-        (source,),
+        model=model,
+        values=values,
+        covariance=covariance,
+        basis=basis,
+        torque_std=residual.std(axis=0),
+        joint_errors=np.linalg.norm(residual, axis=0) / np.linalg.norm(tau, axis=0),
+        error=float(np.linalg.norm(residual) / np.linalg.norm(tau)),
+        condition_number=42.0,
+        rows=residual.size,
+        method="least squares",
+        status="solved",
+        notes=("sigma of Ixx.link2 is large: move the elbow faster",),
+        sources=(source,),
     )
 
 

@@ -116,12 +116,32 @@ def test_many_joints_stay_small():
 
 def history(rounds: int = 3, names: tuple[str, ...] = ("m$1$", "Fv@elbow")) -> Convergence:
     p = len(names)
-    done = tuple(Round(np.full(p, 2.0 - 0.1**k), 0.1, 0.5 * 0.1**k, 0.9) for k in range(rounds))
+    done = tuple(
+        Round(
+            values=np.full(p, 2.0 - 0.1**k),
+            error_measured=0.1,
+            error_simulated=0.5 * 0.1**k,
+            correlation=0.9,
+        )
+        for k in range(rounds)
+    )
     nothing = np.full(p, np.nan)
     return Convergence(
-        names, ("kg", "N m s/rad")[:p], np.zeros(p), "regular", done, Ending.CONVERGED, "",
-        np.array([0.1, np.nan])[:p], nothing, nothing, nothing, np.zeros(1), np.zeros(1), "given",
-    )  # fmt: skip
+        names=names,
+        units=("kg", "N m s/rad")[:p],
+        start=np.zeros(p),
+        start_name="regular",
+        rounds=done,
+        ending=Ending.CONVERGED,
+        message="",
+        sigma=np.array([0.1, np.nan])[:p],
+        textbook_sigma=nothing,
+        expected_bias=nothing,
+        sampling_bias=nothing,
+        position_std=np.zeros(1),
+        torque_std=np.zeros(1),
+        noise_source="given",
+    )
 
 
 def test_every_parameter_over_the_iterations():

@@ -33,7 +33,7 @@ from dynident.validation.loop_signals import _noise
 from synthetic import arm
 
 GAINS: dict[str, Any] = {"kp": (400.0, 120.0), "kd": (50.0, 8.0)}
-CONTROLLER = Controller("pd", 250.0, **GAINS)
+CONTROLLER = Controller(kind="pd", rate_hz=250.0, **GAINS)
 FRICTION = (1.5, 0.7)
 
 
@@ -53,11 +53,22 @@ def recordings(
         for one in TrueEffect.of(f"viscous_friction@{joint}", robot, [value])
     ]
     runs = [
-        ExperimentRun(Fourier.random(robot, 2.0, seed, harmonics=3), 4.0, f"run{seed}.csv")
+        ExperimentRun(
+            trajectory=Fourier.random(robot, 2.0, seed, harmonics=3),
+            duration=4.0,
+            file=f"run{seed}.csv",
+        )
         for seed in (1, 2)
     ]
     sensors = Sensors(position_std=noise, torque_std=1e3 * noise)
-    experiment = Experiment(robot, controller, tuple(runs), tuple(truth), sensors, torque=torque)
+    experiment = Experiment(
+        robot=robot,
+        controller=controller,
+        runs=tuple(runs),
+        effects=tuple(truth),
+        sensors=sensors,
+        torque=torque,
+    )
     first, second = experiment.run()
     return first, second
 
@@ -93,13 +104,22 @@ def test_the_true_model_in_its_own_loop_moves_as_measured() -> None:
 @pytest.mark.parametrize("kind", ["pid", "cascade", "computed_torque", "late", "measured"])
 def test_every_controller_is_simulated_and_recognised(kind: str) -> None:
     controller = {
-        "pid": Controller("pid", 250.0, **GAINS, ki=(200.0, 60.0)),
-        "cascade": Controller("cascade", 250.0, (8.0, 15.0), kv=(50.0, 8.0)),
-        "computed_torque": Controller("computed_torque", 250.0, (150.0, 150.0), (25.0, 25.0)),
-        "late": Controller(
-            "pd", 250.0, (300.0, 60.0), (35.0, 4.0), delay_s=0.003, feedforward=True
+        "pid": Controller(kind="pid", rate_hz=250.0, **GAINS, ki=(200.0, 60.0)),
+        "cascade": Controller(kind="cascade", rate_hz=250.0, kp=(8.0, 15.0), kv=(50.0, 8.0)),
+        "computed_torque": Controller(
+            kind="computed_torque", rate_hz=250.0, kp=(150.0, 150.0), kd=(25.0, 25.0)
         ),
-        "measured": Controller("pd", 250.0, (300.0, 60.0), (35.0, 4.0), delay_s=0.001),
+        "late": Controller(
+            kind="pd",
+            rate_hz=250.0,
+            kp=(300.0, 60.0),
+            kd=(35.0, 4.0),
+            delay_s=0.003,
+            feedforward=True,
+        ),
+        "measured": Controller(
+            kind="pd", rate_hz=250.0, kp=(300.0, 60.0), kd=(35.0, 4.0), delay_s=0.001
+        ),
     }[kind]
     made = recordings(controller, torque="measured" if kind == "measured" else "held_command")
     found = validate(estimate(), dataset(made[0]), controller)
@@ -125,7 +145,7 @@ def test_a_poor_model_is_told_from_a_wrong_controller() -> None:
     assert poor.verdict == "no_nearer"
     assert poor.sentence.endswith("the model is poor.")
     assert "gives the recorded torque" in poor.notes[1]
-    soft = Controller("pd", 250.0, (150.0, 40.0), (20.0, 4.0))
+    soft = Controller(kind="pd", rate_hz=250.0, kp=(150.0, 40.0), kd=(20.0, 4.0))
     foreign = validate(estimate(), dataset(), soft)
     assert foreign.verdict == "other_controller"
     assert "the stated controller is not the one that ran" in foreign.sentence
@@ -285,7 +305,7 @@ def test_settings_that_cannot_be_simulated_are_refused_at_once() -> None:
     with pytest.raises(SimulationError, match="rate"):
         validate(estimate(), dataset(), replace(CONTROLLER, rate_hz=None))
     with pytest.raises(SimulationError, match="a controller of 1 joints for a robot of 2"):
-        validate(estimate(), dataset(), Controller("pd", 250.0, (1.0,), (1.0,)))
+        validate(estimate(), dataset(), Controller(kind="pd", rate_hz=250.0, kp=(1.0,), kd=(1.0,)))
 
 
 def test_what_cannot_be_simulated_leaves_the_others_standing() -> None:
@@ -302,7 +322,7 @@ def test_what_cannot_be_simulated_leaves_the_others_standing() -> None:
 
 
 def test_an_unstable_loop_is_a_status_not_an_error() -> None:
-    wild = Controller("pd", 250.0, (4e4, 2e4), (50.0, 8.0))
+    wild = Controller(kind="pd", rate_hz=250.0, kp=(4e4, 2e4), kd=(50.0, 8.0))
     found = validate(estimate(), dataset(), wild)
     assert found.verdict == "not_simulated" and found.runs == ()
     assert {one.status for one in found.skipped} == {"failed"}
@@ -342,7 +362,9 @@ def test_a_limit_that_is_reached_is_said() -> None:
 
 def test_the_window_and_the_time_constant_are_heeded() -> None:
     mechanism = Experiment(
-        arm(), CONTROLLER, (ExperimentRun(Fourier.random(arm(), 2.0, 1), 1.0),)
+        robot=arm(),
+        controller=CONTROLLER,
+        runs=(ExperimentRun(trajectory=Fourier.random(arm(), 2.0, 1), duration=1.0),),
     ).mechanism()
     slowest = time_constant(CONTROLLER, mechanism, recordings()[0].q)
     found = validate(estimate(), dataset(), CONTROLLER)
@@ -366,12 +388,14 @@ SLIDER = """<robot name="slider"><link name="base"/>
     <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
   <joint name="slide" type="prismatic"><parent link="base"/><child link="mass"/>
     <axis xyz="1 0 0"/><limit lower="-1" upper="1" velocity="2" effort="50"/></joint></robot>"""
-SLOW = Controller("pd", 250.0, (400.0,), (80.0,))
+SLOW = Controller(kind="pd", rate_hz=250.0, kp=(400.0,), kd=(80.0,))
 
 
 def mechanism_of(robot: Robot, controller: Controller) -> Mechanism:
     return Experiment(
-        robot, controller, (ExperimentRun(Fourier.random(robot, 2.0, 1), 1.0),)
+        robot=robot,
+        controller=controller,
+        runs=(ExperimentRun(trajectory=Fourier.random(robot, 2.0, 1), duration=1.0),),
     ).mechanism()
 
 

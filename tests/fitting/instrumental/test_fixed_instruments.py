@@ -10,7 +10,7 @@ import pytest
 import dynident as di
 from dynident.errors import DynidentError, FitError
 from dynident.fitting import IV, Filtered, LeastSquares, SwappedPeriods, rows
-from dynident.fitting.instrumental.source import FixedInstruments
+from dynident.fitting.instrumental.measured_instruments import FixedInstruments
 from dynident.model import Model
 from dynident.recording import Dataset, Filter, Recording
 from synthetic import arm, synthetic
@@ -43,7 +43,7 @@ class Oracle:
     def prepare(self, model, dataset, guess):
         cut = tuple(r.replace(window=r.window or INNER) for r in (*dataset.recordings, self.true))
         own, other = (replace(dataset, recordings=(one,)) for one in cut)
-        return FixedInstruments(own, other, (), 1.0)
+        return FixedInstruments(measured=own, instruments=other, notes=(), noise_share=1.0)
 
 
 def error(values: np.ndarray, truth: np.ndarray) -> float:

@@ -205,9 +205,9 @@ def test_every_controller_keeps_its_poles(kind):
     inertia = np.array([1.36, 0.0621])
     if kind == "cascade":
         kp, kv = tuple(w / 2), tuple(2 * inertia * w)
-        controller = Controller("cascade", loops.RATE, kp=kp, kv=kv)
+        controller = Controller(kind="cascade", rate_hz=loops.RATE, kp=kp, kv=kv)
     elif kind == "computed_torque":
-        controller = Controller(kind, loops.RATE, tuple(w**2), tuple(2 * w))
+        controller = Controller(kind=kind, rate_hz=loops.RATE, kp=tuple(w**2), kd=tuple(2 * w))
     else:
         kp, kd = (tuple(np.array(k) / 5) for k in (loops.LOOP.kp, loops.LOOP.kd))
         controller = replace(loops.LOOP, kp=kp, kd=kd, drive_gain=(5.0, 5.0))
@@ -235,7 +235,9 @@ def test_the_bias_of_sampling_is_foreseen(settings):
 
 def test_good_tracking_within_the_noise_is_not_doubted():
     """Reference, motion and simulation differ by less than the encoder's noise."""
-    stiff = Controller("computed_torque", loops.RATE, kp=(3600.0, 3600.0), kd=(90.0, 90.0))
+    stiff = Controller(
+        kind="computed_torque", rate_hz=loops.RATE, kp=(3600.0, 3600.0), kd=(90.0, 90.0)
+    )
     dataset = loops.dataset(loops.experiment(3, 3e-4, controller=stiff))
     found = di.fit(loops.model(coulomb=False), dataset, IV(stiff))
     assert found.history is not None and found.history.ending is Ending.CONVERGED
@@ -245,7 +247,10 @@ def test_half_of_the_bandwidth_keeps_the_damping():
     from dynident.fitting.instrumental.gains import retuned
 
     ratio = np.array([0.5, 2.0])
-    for one in (loops.LOOP, Controller("cascade", 200.0, kp=(10.0, 20.0), kv=(3.0, 4.0))):
+    for one in (
+        loops.LOOP,
+        Controller(kind="cascade", rate_hz=200.0, kp=(10.0, 20.0), kv=(3.0, 4.0)),
+    ):
         before, after = one.feedback(), retuned(one, ratio).feedback()
         np.testing.assert_allclose(after.position, before.position * ratio**2)
         np.testing.assert_allclose(after.speed, before.speed * ratio)

@@ -10,26 +10,13 @@ import click
 
 from dynident.cli.group import collected
 from dynident.errors import DynidentError, StudyError
+from dynident.regression.names import REGRESSIONS, WITH_INPUT_NOISE
 
 if TYPE_CHECKING:
     from dynident.closed_loop import Controller
     from dynident.fitting import IV, Method
     from dynident.regression.identifiability import ReliabilityProfile, StartSensitivity
     from dynident.study import Study
-
-
-REGRESSIONS = (
-    "truncated",
-    "ridge",
-    "lasso",
-    "pls",
-    "stepwise",
-    "total",
-    "corrected",
-    "factors",
-    "bayes",
-)
-"""Names of `fit.regression`, which the command line cannot ask for without loading it."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +39,7 @@ class Chosen:
     input_noise: Literal["repeats", "encoders"] | None = None
 
     def __post_init__(self) -> None:
-        if self.input_noise is not None and self.method not in ("corrected", "factors", "bayes"):
+        if self.input_noise is not None and self.method not in WITH_INPUT_NOISE:
             raise click.UsageError("--input-noise goes with --method corrected, factors or bayes")
         if self.method == "corrected" and self.input_noise is None:
             raise click.UsageError("--method corrected needs --input-noise repeats or encoders")

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dynident.closed_loop.controllers import Controller
-from dynident.closed_loop.mechanism import Mechanism
 from dynident.closed_loop.rollout import LEAD_IN, Rollout, Task
 from dynident.closed_loop.sensors import Sensors, rounded
 from dynident.errors import SimulationError
@@ -110,7 +109,7 @@ class ClosedLoop:
             return ()
         sensors = sensors or Sensors()
         for task in tasks:
-            _check(task, tasks[0].mechanism.robot.n, controller)
+            task.require_fit(controller.n, tasks[0].mechanism.robot.n)
         scale = _scale(feedback_scale, controller.n)
         rate = controller.simulated_rate()
         before = _samples(lead_in, rate, "lead_in", 0)
@@ -195,6 +194,20 @@ class ClosedLoop:
         return plant
 
 
+def simulate(
+    tasks: Sequence[Task],
+    controller: Controller,
+    sensors: Sensors | None = None,
+    *,
+    lead_in: float = LEAD_IN,
+    accuracy: float = ACCURACY,
+    progress: Progress | None = None,
+) -> tuple[Rollout, ...]:
+    """Simulate on a fresh `ClosedLoop`; for the parameters and what is raised see there."""
+    loop = ClosedLoop(accuracy=accuracy)
+    return loop.simulate(tasks, controller, sensors, lead_in=lead_in, progress=progress)
+
+
 def _rollout(
     motion: SteppedMotion,
     reference,
@@ -230,26 +243,6 @@ def _rollout(
         mechanism=task.mechanism,
         past=None if motion.past is None else motion.past.of(rows, columns, memory),
     )
-
-
-def _check(task: Task, n: int, controller: Controller) -> None:
-    robot = task.mechanism.robot
-    counts = [("robot", robot.n), ("trajectory", task.trajectory.n)]
-    nominal = task.nominal.robot if isinstance(task.nominal, Mechanism) else task.nominal
-    if nominal is not None:
-        counts.append(("nominal robot", nominal.n))
-    for what, count in counts:
-        if count != controller.n or count != n:
-            what = f"a {what} of {count} joints under a controller of {controller.n}"
-            raise SimulationError(what, task.name or None, "give each as many joints as the robot")
-    for one in (robot, nominal or robot):
-        if not np.isfinite(one.theta).all():
-            remedy = "mend the inertial elements of its description"
-            raise SimulationError("has inertial values that are not finite", one.name, remedy)
-    for one in task.mechanism.effects:
-        if not np.isfinite(one.values).all():
-            values = ", ".join(f"{x:g}" for x in one.values)
-            raise SimulationError(f"values {values}", one.effect.label, "give finite values")
 
 
 def _scale(given: np.ndarray | None, n: int) -> np.ndarray:

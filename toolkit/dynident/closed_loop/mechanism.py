@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -49,6 +49,7 @@ class Mechanism:
 
     robot: Robot
     effects: tuple[TrueEffect, ...] = ()
+    _: KW_ONLY
     friction_width: float = FRICTION_WIDTH
     carries_payload: bool = False
     number: int = 0
@@ -81,7 +82,9 @@ class Mechanism:
             values = ordered(effect, robot, one.values)
             acting.append(TrueEffect(effect, values, one.hidden))
             robot = effect.simulated_robot(values, robot)
-        made = cls(robot, tuple(acting), friction_width, carries_payload)
+        made = cls(
+            robot, tuple(acting), friction_width=friction_width, carries_payload=carries_payload
+        )
         made._check_gain()
         return made
 
@@ -130,7 +133,12 @@ class Mechanism:
             own = tuple(float(x) for x in values[model.slices[effect.label]])
             acting.append(TrueEffect(effect, own))
             robot = effect.simulated_robot(own, robot)
-        made = cls(robot, tuple(acting), model.friction_width, carries_payload)
+        made = cls(
+            robot,
+            tuple(acting),
+            friction_width=model.friction_width,
+            carries_payload=carries_payload,
+        )
         made._check_gain()
         return made
 

@@ -84,10 +84,10 @@ def retrace(
                 mechanism.numbered(recording.number),
                 reference,
                 samples / rate,
-                recording.start,
-                None,
-                recording.name or recording.where,
-                nominal,
+                start=recording.start,
+                rng=None,
+                name=recording.name or recording.where,
+                nominal=nominal,
             )
         )
     try:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 
 import numpy as np
 
 from dynident.closed_loop.mechanism import Mechanism, Past
 from dynident.closed_loop.references import Reference
+from dynident.errors import SimulationError
 from dynident.robot import Robot
 
 LEAD_IN = 2.0
@@ -34,13 +35,47 @@ class Task:
     mechanism: Mechanism
     trajectory: Reference
     duration: float
+    _: KW_ONLY
     start: float = 0.0
     rng: np.random.Generator | None = None
     name: str = ""
     nominal: Robot | Mechanism | None = None
 
+    def require_fit(self, controlled: int, n: int) -> None:
+        """Refuse what cannot be simulated.
 
-@dataclass(frozen=True, eq=False)
+        Parameters
+        ----------
+        controlled : number of the controller's joints.
+        n : number of joints of the robots beside it.
+
+        Raises
+        ------
+        SimulationError
+            If a number of joints differs from these, or a value is not finite.
+        """
+        robot = self.mechanism.robot
+        counts = [("robot", robot.n), ("trajectory", self.trajectory.n)]
+        nominal = self.nominal.robot if isinstance(self.nominal, Mechanism) else self.nominal
+        if nominal is not None:
+            counts.append(("nominal robot", nominal.n))
+        for what, count in counts:
+            if count != controlled or count != n:
+                what = f"a {what} of {count} joints under a controller of {controlled}"
+                raise SimulationError(
+                    what, self.name or None, "give each as many joints as the robot"
+                )
+        for one in (robot, nominal or robot):
+            if not np.isfinite(one.theta).all():
+                remedy = "fix the inertial elements of its description"
+                raise SimulationError("has inertial values that are not finite", one.name, remedy)
+        for one in self.mechanism.effects:
+            if not np.isfinite(one.values).all():
+                values = ", ".join(f"{x:g}" for x in one.values)
+                raise SimulationError(f"values {values}", one.effect.label, "give finite values")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Rollout:
     """A simulated motion, at the controller's samples.
 

@@ -12,7 +12,7 @@ from dynident.errors import SimulationError
 PerJoint = float | Sequence[float]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Sensors:
     """Noise and resolution of position and torque; a single number stands for every joint.
 

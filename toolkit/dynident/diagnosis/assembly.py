@@ -220,19 +220,19 @@ def _estimate(evidence: Evidence, fitted: EvidenceFit, train: Dataset) -> Estima
     covariance = np.zeros((model.size, model.size))
     covariance[np.ix_(kept, kept)] = combination @ fitted.covariance @ combination.T
     return Estimate(
-        model,
-        basis.lift(basis.coordinates(fitted.values), model.given_values()),
-        covariance,
-        basis,
-        judged.residual_rms,
-        judged.joint_errors,
-        judged.error,
-        float(np.linalg.cond(told[:, kept])),
-        fitted.rows,
-        _method(evidence),
-        "solved",
-        (),
-        sources_of(train),
+        model=model,
+        values=basis.lift(basis.coordinates(fitted.values), model.given_values()),
+        covariance=covariance,
+        basis=basis,
+        torque_std=judged.residual_rms,
+        joint_errors=judged.joint_errors,
+        error=judged.error,
+        condition_number=float(np.linalg.cond(told[:, kept])),
+        rows=fitted.rows,
+        method=_method(evidence),
+        status="solved",
+        notes=(),
+        sources=sources_of(train),
     )
 
 

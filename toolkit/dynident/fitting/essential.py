@@ -20,7 +20,7 @@ from dynident.tables import Table, number, percent
 LARGEST_RELATIVE_SIGMA = 0.3
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class EssentialParameters:
     """What is left when parameters with a large relative standard deviation are dropped.
 
@@ -77,12 +77,12 @@ def essential_parameters(
     everything = np.zeros(model.size)
     everything[kept] = values
     return EssentialParameters(
-        tuple(model.names[i] for i in kept),
-        values,
-        sigma,
-        tuple(dropped),
-        float(np.linalg.norm(factors.residual_norms(full.values))) / norm,
-        float(np.linalg.norm(factors.residual_norms(everything))) / norm,
+        names=tuple(model.names[i] for i in kept),
+        values=values,
+        sigma=sigma,
+        dropped=tuple(dropped),
+        error_before=float(np.linalg.norm(factors.residual_norms(full.values))) / norm,
+        error_after=float(np.linalg.norm(factors.residual_norms(everything))) / norm,
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from dynident import files
 from dynident.errors import FitError
+from dynident.fitting.estimate_schema import FORMAT, basis_part, model_part
 from dynident.fitting.history import Convergence
 from dynident.inertia import margins
 from dynident.model import Model
@@ -30,7 +31,7 @@ class DataSource:
     filter: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Estimate:
     """Identified parameters of a model.
 
@@ -216,11 +217,37 @@ class Estimate:
     # --- files ---------------------------------------------------------------------------------
 
     def to_dict(self) -> dict[str, Any]:
-        """The estimate as JSON holds it."""
-        # Imported where it is used: the file's module knows the estimate.
-        from dynident.fitting.estimate_file import to_dict
-
-        return to_dict(self)
+        """The estimate as JSON holds it, with the robot description in it."""
+        model, sigma = self.model, self.sigma
+        return {
+            "format": FORMAT,
+            "method": self.method,
+            "status": self.status,
+            "parameters": [
+                {
+                    "name": name,
+                    "value": float(self.values[i]),
+                    "sigma": float(sigma[i]) if np.isfinite(sigma[i]) else None,
+                    "unit": model.units[i],
+                    "expression": model.expressions[i],
+                }
+                for i, name in enumerate(self.names)
+            ],
+            "covariance": self.covariance.tolist(),
+            "basis": basis_part(self.basis),
+            "torque_std": self.torque_std.tolist(),
+            "joint_errors": self.joint_errors.tolist(),
+            "error": self.error,
+            "condition_number": self.condition_number,
+            "rows": self.rows,
+            "notes": list(self.notes),
+            "sigma_words": self.words_of_sigma,
+            "recordings": [vars(source) for source in self.sources],
+            "links": self.links and {name: phi.tolist() for name, phi in self.links.items()},
+            "certificate": self.certificate and self.certificate.to_dict(),
+            "iterations": self.history and self.history.to_dict(),
+            "model": model_part(model),
+        }
 
     def save(self, path: str | Path) -> Path:
         """Write the estimate as JSON, with the robot description in it.

@@ -1,4 +1,8 @@
-"""Estimates as JSON: written, and read back only if every number can be what it stands for."""
+"""Estimates read back from JSON, only if every number can be what it stands for.
+
+In: a file that `Estimate.save` wrote. Out: the `Estimate`, or a refusal that names the first key
+that is wrong.
+"""
 
 from __future__ import annotations
 
@@ -18,71 +22,9 @@ from dynident.inertia import PARAMETERS
 from dynident.model import Model
 from dynident.robot import BaseParameters, Robot
 
-FORMAT = "dynident-estimate-1"
-
-_MEND = "save one with Estimate.save"
+_REMEDY = "save one with Estimate.save"
 # Of the standard deviations: what rounding makes of a symmetric matrix is far less.
 _SKEW = 1e-6
-
-
-def to_dict(estimate: Estimate) -> dict[str, Any]:
-    """Return an estimate as JSON holds it, with the robot description in it."""
-    model, basis = estimate.model, estimate.basis
-    description = model.robot.description
-    sigma, links, certificate = estimate.sigma, estimate.links, estimate.certificate
-    return {
-        "format": FORMAT,
-        "method": estimate.method,
-        "status": estimate.status,
-        "parameters": [
-            {
-                "name": name,
-                "value": float(estimate.values[i]),
-                "sigma": float(sigma[i]) if np.isfinite(sigma[i]) else None,
-                "unit": model.units[i],
-                "expression": model.expressions[i],
-            }
-            for i, name in enumerate(estimate.names)
-        ],
-        "covariance": estimate.covariance.tolist(),
-        "basis": {
-            "names": list(basis.names),
-            "independent": list(basis.independent),
-            "dependent": list(basis.dependent),
-            "expressions": list(basis.expressions),
-            "K": basis.K.tolist(),
-            "scale": basis.scale.tolist(),
-            "diagonal": basis.diagonal.tolist(),
-            "tolerance": basis.tolerance,
-        },
-        "torque_std": estimate.torque_std.tolist(),
-        "joint_errors": estimate.joint_errors.tolist(),
-        "error": estimate.error,
-        "condition_number": estimate.condition_number,
-        "rows": estimate.rows,
-        "notes": list(estimate.notes),
-        "sigma_words": estimate.words_of_sigma,
-        "recordings": [vars(source) for source in estimate.sources],
-        "links": links and {name: phi.tolist() for name, phi in links.items()},
-        "certificate": certificate and certificate.to_dict(),
-        "iterations": estimate.history and estimate.history.to_dict(),
-        "model": {
-            "robot": description.text if description else None,
-            "joints": list(model.robot.names),
-            "gravity": [float(g) for g in model.robot.gravity],
-            "friction_width": model.friction_width,
-            "effects": [
-                {
-                    "effect": effect.name,
-                    "joint": effect.joint,
-                    "source": effect.source,
-                    "shape": list(effect.shape),
-                    "point": list(effect.point),
-                }
-                for effect in model.effects
-            ],
-        },
-    }
 
 
 def load_estimate(path: str | Path) -> Estimate:
@@ -103,7 +45,7 @@ def load_estimate(path: str | Path) -> Estimate:
     where = str(path)
     text = files.read_text(path)
     if not text.strip():
-        raise FitError("is empty: not a dynident estimate", where, _MEND)
+        raise FitError("is empty: not a dynident estimate", where, _REMEDY)
     try:
         read = json.loads(text)
         # Half a surrogate pair is text to JSON, and to nothing that would print it.
@@ -140,20 +82,20 @@ def _estimate(content: EstimateFile, model: Model, where: str) -> Estimate:
     if content.links is not None:
         links = {name: np.array(phi, dtype=float) for name, phi in content.links.items()}
     return Estimate(
-        model,
-        np.array([parameter.value for parameter in content.parameters]),
-        square,
-        _basis(content.basis, model, where),
-        np.array(content.torque_std),
-        np.array(content.joint_errors),
-        content.error,
-        content.condition_number,
-        content.rows,
-        content.method,
-        content.status,
-        tuple(content.notes),
-        tuple(DataSource(one.file, one.sha256, one.filter) for one in content.recordings),
-        links,
+        model=model,
+        values=np.array([parameter.value for parameter in content.parameters]),
+        covariance=square,
+        basis=_basis(content.basis, model, where),
+        torque_std=np.array(content.torque_std),
+        joint_errors=np.array(content.joint_errors),
+        error=content.error,
+        condition_number=content.condition_number,
+        rows=content.rows,
+        method=content.method,
+        status=content.status,
+        notes=tuple(content.notes),
+        sources=tuple(DataSource(one.file, one.sha256, one.filter) for one in content.recordings),
+        links=links,
         sigma_words=content.sigma_words,
     )
 
@@ -215,7 +157,7 @@ def _basis(given: BasisPart, model: Model, where: str) -> BaseParameters:
 
 def _refusal(key: str, what: str, where: str) -> FitError:
     line = " ".join(f"{key}: {what}".split())
-    return FitError(f"is not a dynident estimate ({line})", where, _MEND)
+    return FitError(f"is not a dynident estimate ({line})", where, _REMEDY)
 
 
 def _first(error: ValidationError) -> tuple[str, str]:

@@ -1,6 +1,8 @@
-"""What the JSON file of an estimate holds: the kind and the range of every value.
+"""What the JSON file of an estimate holds: its parts as written, and the kind and range of values.
 
-How the sizes of its arrays belong together is for `estimate_file` to say, which knows the model.
+In: the basis and the model of an estimate, or JSON. Out: tables of plain values, or parts whose
+every value is one that it may be. How the sizes of arrays belong together is for `estimate_file`
+to say, which knows the model.
 """
 
 from __future__ import annotations
@@ -10,13 +12,18 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
 from dynident.inertia import LARGEST
+from dynident.model import Model
+from dynident.robot import BaseParameters
+
+FORMAT = "dynident-estimate-1"
+"""Name and version of the file's format."""
 
 
 def _not_null(value: object) -> object:
     return float("nan") if value is None else value
 
 
-def _told(value: float) -> float:
+def _reported(value: float) -> float:
     if value < 0.0 or LARGEST <= value < float("inf"):
         raise ValueError(f"a size is not negative, and below {LARGEST:g}")
     return value
@@ -28,7 +35,7 @@ _Number = Annotated[float, Field(gt=-LARGEST, lt=LARGEST)]
 _Size = Annotated[float, Field(ge=0.0, lt=LARGEST)]
 _Positive = Annotated[float, Field(gt=0.0, lt=LARGEST)]
 # What nobody computes with: unknown (NaN, null) where nothing was fitted.
-_Told = Annotated[float, BeforeValidator(_not_null), AfterValidator(_told)]
+_Reported = Annotated[float, BeforeValidator(_not_null), AfterValidator(_reported)]
 _Index = Annotated[int, Field(ge=0)]
 
 
@@ -90,10 +97,10 @@ class EstimateFile(_Part):
     parameters: list[_Parameter]
     covariance: list[list[_Square]]
     basis: BasisPart
-    torque_std: list[_Told]
-    joint_errors: list[_Told]
-    error: _Told
-    condition_number: _Told
+    torque_std: list[_Reported]
+    joint_errors: list[_Reported]
+    error: _Reported
+    condition_number: _Reported
     rows: Annotated[int, Field(ge=0, le=10**15)]
     notes: list[str]
     sigma_words: str = ""
@@ -102,3 +109,38 @@ class EstimateFile(_Part):
     certificate: dict[str, Any] | None = None
     iterations: dict[str, Any] | None = None
     model: ModelPart
+
+
+def basis_part(basis: BaseParameters) -> dict[str, Any]:
+    """Return what the data identify as JSON holds it."""
+    return {
+        "names": list(basis.names),
+        "independent": list(basis.independent),
+        "dependent": list(basis.dependent),
+        "expressions": list(basis.expressions),
+        "K": basis.K.tolist(),
+        "scale": basis.scale.tolist(),
+        "diagonal": basis.diagonal.tolist(),
+        "tolerance": basis.tolerance,
+    }
+
+
+def model_part(model: Model) -> dict[str, Any]:
+    """Return a model as JSON holds it, with the robot description in it."""
+    description = model.robot.description
+    return {
+        "robot": description.text if description else None,
+        "joints": list(model.robot.names),
+        "gravity": [float(g) for g in model.robot.gravity],
+        "friction_width": model.friction_width,
+        "effects": [
+            {
+                "effect": effect.name,
+                "joint": effect.joint,
+                "source": effect.source,
+                "shape": list(effect.shape),
+                "point": list(effect.point),
+            }
+            for effect in model.effects
+        ],
+    }

@@ -35,17 +35,17 @@ def given_estimate(robot: Robot, model: Model | None = None) -> Estimate:
     unknown = np.full(n, np.nan)
     values = model.given_values()
     return Estimate(
-        model,
-        values,
-        np.zeros((p, p)),
-        unit,
-        unknown,
-        unknown,
-        float("nan"),
-        float("nan"),
-        0,
-        "as given",
-        "not fitted",
+        model=model,
+        values=values,
+        covariance=np.zeros((p, p)),
+        basis=unit,
+        torque_std=unknown,
+        joint_errors=unknown,
+        error=float("nan"),
+        condition_number=float("nan"),
+        rows=0,
+        method="as given",
+        status="not fitted",
         links={link.name: link.phi for link in robot.links if link.source != "absent"},
     )
 

@@ -35,7 +35,7 @@ class Way:
     projected: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Round:
     """One iteration.
 
@@ -55,7 +55,7 @@ class Round:
     way: Way = field(default_factory=lambda: Way(1.0))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Convergence:
     """The iterations of an instrumental variable estimate.
 

@@ -74,7 +74,7 @@ class LeastSquares:
         return model.at(solution.values), factors, solution
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class LinearSolution:
     """Weighted least squares on factors; see `Estimate` for the attributes."""
 
@@ -132,12 +132,12 @@ def _solve(model: Model, factors: TriangularFactors, weights: np.ndarray) -> Lin
             f"own, only in combination: {lost}.",
         )
     return LinearSolution(
-        values,
-        covariance,
-        basis,
-        np.zeros(len(factors.counts)),
-        float(np.linalg.cond(triangle)),
-        notes,
+        values=values,
+        covariance=covariance,
+        basis=basis,
+        torque_std=np.zeros(len(factors.counts)),
+        condition_number=float(np.linalg.cond(triangle)),
+        notes=notes,
     )
 
 
@@ -162,19 +162,19 @@ def estimate_of(
     residuals = factors.residual_norms(solution.values)
     words = "ordinary" if weighting == "none" else "weighted per joint"
     return Estimate(
-        model,
-        solution.values,
-        solution.covariance,
-        solution.basis,
-        solution.torque_std,
-        residuals / np.where(norms > 0, norms, np.nan),
-        float(np.linalg.norm(residuals) / np.linalg.norm(norms)),
-        solution.condition_number,
-        factors.rows,
-        f"{name}, {words}",
-        "solved",
-        solution.notes,
-        sources_of(dataset),
+        model=model,
+        values=solution.values,
+        covariance=solution.covariance,
+        basis=solution.basis,
+        torque_std=solution.torque_std,
+        joint_errors=residuals / np.where(norms > 0, norms, np.nan),
+        error=float(np.linalg.norm(residuals) / np.linalg.norm(norms)),
+        condition_number=solution.condition_number,
+        rows=factors.rows,
+        method=f"{name}, {words}",
+        status="solved",
+        notes=solution.notes,
+        sources=sources_of(dataset),
     )
 
 

@@ -84,7 +84,9 @@ def refit(
     factors = factorise(rows(model, study.train, free.values))
     R, p = factors.pooled(1.0 / free.torque_std), model.size
     start = replace(given_estimate(model.robot, model), values=_values(subject, model, R))
-    metric = Metric(R[:p, :p], model.names, factors.rows, "X'X of the training recordings")
+    metric = Metric(
+        R[:p, :p], model.names, rows=factors.rows, source="X'X of the training recordings"
+    )
     found = project(start, prior, metric, within, solver)
     judges = study.test if len(study.test) else study.train
     three = {"as given": start, "least squares": free, "refit": found.estimate}

@@ -1,11 +1,11 @@
+from .bayesian_factors import BayesianFactorRegression as BayesianFactorRegression
 from .corrected import CorrectedLeastSquares as CorrectedLeastSquares
 from .identifiability import ReliabilityProfile as ReliabilityProfile
 from .identifiability import StartSensitivity as StartSensitivity
 from .identifiability import reliability_profile as reliability_profile
 from .identifiability import start_sensitivity as start_sensitivity
-from .joint_factors import BayesianFactorRegression as BayesianFactorRegression
 from .joint_factors import JointFactorRegression as JointFactorRegression
+from .ordinary import TruncatedLeastSquares as TruncatedLeastSquares
 from .statistics import Statistics as Statistics
 from .stepwise import StepwiseRegression as StepwiseRegression
 from .total import TotalLeastSquares as TotalLeastSquares
-from .truncated import TruncatedLeastSquares as TruncatedLeastSquares

@@ -22,11 +22,14 @@ LEAST_VARIANCE = 1e-9
 """Variance that none falls below, in units of the input's or the output's own: below it the bound
 of a million samples would be rounding."""
 
+LEAST_RELIABILITY = 0.5
+"""Least reliability that the Bayesian form unfolds b_true with where the noise is not known."""
+
 _ROUNDING = 10 * float(np.finfo(float).eps)
 _DEPENDENT = 1e-13  # eigenvalue over the largest, below which inputs are combinations of others
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Loadings:
     """The factors' posterior and the variances, (d,) each but py.
 
@@ -94,7 +97,11 @@ def start_of(
     wz = found / wx
     pz = np.full(d, max(left / (2 * max(d, 1)), LEAST_VARIANCE))
     px, py = np.maximum(1.0 - rho, LEAST_VARIANCE), max(left / 2, LEAST_VARIANCE)
-    return begun(Loadings(wz, wx, wx * 0, wx * 0, wx * 0, pz, px, py), N, prior)
+    return begun(
+        Loadings(wz=wz, wx=wx, wz_var=wx * 0, wx_var=wx * 0, relevance=wx * 0, pz=pz, px=px, py=py),
+        N,
+        prior,
+    )
 
 
 def begun(factors: Loadings, count: int, prior: Gamma | None) -> Loadings:
@@ -193,4 +200,13 @@ class Posterior:
         py = max(shrink**2 * self.R / N + self.s * shrink, LEAST_VARIANCE)
         pz = np.maximum((zz - 2 * wz * zt + Ez * tt) / N, LEAST_VARIANCE)
         px = np.maximum((Gd - 2 * wx * xt + Ex * tt) / N, LEAST_VARIANCE)
-        return Loadings(wz, wx, wz_var, wx_var, relevance, pz, np.where(known, f.px, px), float(py))
+        return Loadings(
+            wz=wz,
+            wx=wx,
+            wz_var=wz_var,
+            wx_var=wx_var,
+            relevance=relevance,
+            pz=pz,
+            px=np.where(known, f.px, px),
+            py=float(py),
+        )

@@ -24,7 +24,7 @@ _RELIABILITIES = (0.5, 0.8, 0.95)
 _WORST = 3  # inputs that are shown
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class StartSensitivity:
     """Estimates from several starts of the reliability.
 
@@ -94,7 +94,7 @@ class StartSensitivity:
         return Table("Sensitivity of b_true to the start", columns, rows, (words,))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ReliabilityProfile:
     """Log-likelihood along the reliability: flat where the data do not tell it.
 
@@ -179,13 +179,13 @@ def start_sensitivity(
         for rho in reliabilities
     ]
     return StartSensitivity(
-        tuple(regression.input_names()),
-        np.array(reliabilities, dtype=float),
-        np.array([one.coef_true_ for one in each]),
-        _used(regression).scale[:-1],
-        np.array([one.bounds_[-1] for one in each]),
-        tuple(one.ending_ for one in each),
-        np.array([one.converged_ for one in each]),
+        names=tuple(regression.input_names()),
+        reliabilities=np.array(reliabilities, dtype=float),
+        coef_true=np.array([one.coef_true_ for one in each]),
+        sizes=_used(regression).scale[:-1],
+        bounds=np.array([one.bounds_[-1] for one in each]),
+        endings=tuple(one.ending_ for one in each),
+        converged=np.array([one.converged_ for one in each]),
     )
 
 
@@ -238,11 +238,11 @@ def reliability_profile(
         likelihoods.append(plain.bounds_[-1])
         converged.append(plain.converged_ or plain.left_ < TOLD / 10)
     return ReliabilityProfile(
-        np.array(reliabilities, dtype=float),
-        np.array(likelihoods),
-        np.array(bounds),
-        np.array(converged),
-        _correlation(_used(regression)),
+        reliabilities=np.array(reliabilities, dtype=float),
+        likelihoods=np.array(likelihoods),
+        bounds=np.array(bounds),
+        converged=np.array(converged),
+        correlation=_correlation(_used(regression)),
     )
 
 

@@ -42,7 +42,7 @@ class AnalysisEnding(Enum):
     ROUNDS_EXHAUSTED = "not converged"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Analysis:
     """Where the iterations ended.
 
@@ -136,7 +136,15 @@ def analyse(
             flat = left > _LITTLE and drift > _STILL
             ending = AnalysisEnding.FLAT if flat else AnalysisEnding.CONVERGED
             break
-    return Analysis(here.factors, here.b, used, np.array(bounds), ending, left, drift)
+    return Analysis(
+        factors=here.factors,
+        coefficients=here.b,
+        rounds=used,
+        bounds=np.array(bounds),
+        ending=ending,
+        left=left,
+        drift=drift,
+    )
 
 
 def _ahead(here: Posterior, prior: Gamma | None, known: np.ndarray) -> Posterior:

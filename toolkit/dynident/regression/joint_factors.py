@@ -12,20 +12,15 @@ from sklearn.utils.validation import check_is_fitted
 from dynident.errors import FitError
 from dynident.regression.corrected import CorrectedLeastSquares
 from dynident.regression.factor_analysis import Gamma, start_of
+from dynident.regression.factor_tables import factor_tables
 from dynident.regression.given_noise import variances_of
 from dynident.regression.iterations import Analysis, AnalysisEnding, analyse
+from dynident.regression.ordinary import identified, ordinary
 from dynident.regression.statistics import Statistics
 from dynident.regression.statistics_regressor import StatisticsRegressor
-from dynident.regression.truncated import squared_tolerance
-from dynident.robot import BaseParameters, base_parameters
 
 RELIABILITIES = (1e-3, 1.0 - 1e-6)
 """Least and largest that the iterations may start from, or be held at."""
-LEAST_RELIABILITY = 0.5
-"""Least reliability that the Bayesian form unfolds b_true with where the noise is not known."""
-_EXPLAINS = 2.0
-"""Standard errors of an input alone, below which its coefficient explains no more than noise."""
-_DEPENDENT = 1e-7  # share of an input that the others leave, below which it is their combination
 
 
 class JointFactorRegression(StatisticsRegressor):
@@ -128,10 +123,7 @@ class JointFactorRegression(StatisticsRegressor):
     def summary(self) -> str:
         """Return inputs, coefficients and caveats as text."""
         check_is_fitted(self)
-        # Imported where it is used: the tables know the estimator.
-        from dynident.regression.summary import summary
-
-        return "\n".join(str(part) for part in summary(self))
+        return "\n".join(str(part) for part in factor_tables(self))
 
     def _solve(self, unit: Statistics, inputs: np.ndarray) -> None:
         self._check()
@@ -174,7 +166,6 @@ class JointFactorRegression(StatisticsRegressor):
         self.coef_true_ = self._in_units(self._unfolded(analysis, unit, inputs), inputs)
         self.intercept_noisy_ = self._intercept(self.coef_noisy_)
         self.intercept_true_ = self._intercept(self.coef_true_)
-        self.basis_ = self._basis(unit, inputs)
         self._least_squares(unit, inputs)
         self._correct(unit)
         self._set(self.coef_noisy_ if self.queries == "noisy" else self.coef_true_)
@@ -184,31 +175,19 @@ class JointFactorRegression(StatisticsRegressor):
         wz, wx = analysis.factors.wz, analysis.factors.wx
         return np.divide(wz, wx, out=np.zeros_like(wz), where=wx != 0)
 
-    def _basis(self, unit: Statistics, inputs: np.ndarray) -> BaseParameters | None:
-        names = tuple(self.input_names()[m] for m in inputs)
-        values, vectors = np.linalg.eigh(unit.gram)
-        root = np.sqrt(np.clip(values, 0.0, None))[:, None] * vectors.T
-        # Eigenvalues have the rounding of the largest, which its square root makes visible.
-        hidden = np.sqrt(squared_tolerance(unit, 0.0) * values.max(initial=0.0) / unit.count)
-        return base_parameters(root, names, max(_DEPENDENT, hidden)) if len(names) else None
-
     def _least_squares(self, unit: Statistics, inputs: np.ndarray) -> None:
         """Set ordinary least squares, with its standard deviations and degrees of freedom."""
+        self.basis_ = identified(unit, tuple(self.input_names()[m] for m in inputs))
+        self.freedom_ = self._freedom(unit, self.basis_.rank if self.basis_ else 0)
         d = len(self._scale) - 1
         self.least_squares_, self.sigma_noisy_ = np.full(d, np.nan), np.full(d, np.nan)
-        kept = [] if self.basis_ is None else list(self.basis_.independent)
-        self.freedom_ = self._freedom(unit, len(kept))
         if self.basis_ is None or self.freedom_ <= 0:
             return
-        G, c = unit.gram[np.ix_(kept, kept)], unit.cross[kept]
-        found = np.linalg.solve(G, c)
-        variance = max(unit.power - c @ found, 0.0) / self.freedom_
-        # What is a combination of others has no value of its own, nor have those its parts.
-        alone = [not np.any(self.basis_.K[i]) for i in range(len(kept))]
-        own = inputs[kept][alone]
+        found = ordinary(unit, self.basis_, self.freedom_)
+        own = inputs[found.inputs]
         units = self._scale[-1] / self._scale[own]
-        self.least_squares_[own] = found[alone] * units
-        self.sigma_noisy_[own] = np.sqrt(variance * np.diag(np.linalg.inv(G)))[alone] * units
+        self.least_squares_[own] = found.values * units
+        self.sigma_noisy_[own] = found.sigma * units
 
     def _correct(self, unit: Statistics) -> None:
         """Set corrected least squares, and what it says of b_true."""
@@ -225,68 +204,3 @@ class JointFactorRegression(StatisticsRegressor):
         except FitError:
             return
         self.sigma_true_ = np.hypot(regression.sigma_, self.coef_true_ - regression.coef_)
-
-
-class BayesianFactorRegression(JointFactorRegression):
-    """Bayesian joint factor analysis: as its parent, and inputs that do not matter are pruned.
-
-    One relevance for both weights of an input, with a Gamma prior, takes inputs out that explain
-    little. It also speaks against the reliability of the rest: where `input_noise` is not given,
-    b_true is what start and prior say, and `start_sensitivity` shows how much. It is held at
-    twice b_noise there, and at zero where an input explains no more than noise does.
-
-    Parameters
-    ----------
-    input_noise, reliability, queries, max_iter, tol, fit_intercept :
-        as of `JointFactorRegression`.
-    relevance_shape, relevance_rate : of the Gamma prior; near zero they say next to nothing.
-
-    Attributes
-    ----------
-    relevance_ : (d,) precision of the prior of each input's standardised weights: large where the
-        input is switched off; infinite for constants.
-    """
-
-    def __init__(
-        self,
-        input_noise: ArrayLike | None = None,
-        reliability: float = 0.8,
-        queries: Literal["noisy", "noiseless"] = "noisy",
-        max_iter: int = 20_000,
-        tol: float = 0.01,
-        relevance_shape: float = 1e-8,
-        relevance_rate: float = 1e-8,
-        *,
-        fit_intercept: bool = True,
-    ) -> None:
-        super().__init__(
-            input_noise, reliability, queries, max_iter, tol, fit_intercept=fit_intercept
-        )
-        self.relevance_shape = relevance_shape
-        self.relevance_rate = relevance_rate
-
-    words = "Bayesian regression with input noise"
-
-    def prior(self) -> Gamma:
-        """Return the prior of the inputs' relevance."""
-        return Gamma(self.relevance_shape, self.relevance_rate)
-
-    def _check(self) -> None:
-        super()._check()
-        for setting in ("relevance_shape", "relevance_rate"):
-            self._require(setting, 1e-300, 1e300)
-
-    def _unfolded(self, analysis: Analysis, unit: Statistics, inputs: np.ndarray) -> np.ndarray:
-        low = (analysis.factors.reliability < LEAST_RELIABILITY) & ~self.known_[inputs]
-        b = analysis.coefficients
-        alone = np.sqrt(unit.residual(b) / unit.count / np.diag(unit.gram))
-        self.pruned_[inputs] = low & (np.abs(b) < _EXPLAINS * alone)
-        true = super()._unfolded(analysis, unit, inputs)
-        # Where nothing but the prior speaks of a reliability, it may not blow a coefficient up.
-        true = np.where(low, analysis.factors.noisy / LEAST_RELIABILITY, true)
-        return np.where(self.pruned_[inputs], 0.0, true)
-
-    def _keep(self, analysis: Analysis, unit: Statistics, inputs: np.ndarray) -> None:
-        super()._keep(analysis, unit, inputs)
-        self.relevance_ = np.full(len(self._scale) - 1, np.inf)
-        self.relevance_[inputs] = analysis.factors.relevance

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.errors import FitError
+from dynident.regression.ordinary import squared_tolerance
 from dynident.regression.statistics import Statistics
 from dynident.regression.statistics_regressor import StatisticsRegressor
-from dynident.regression.truncated import squared_tolerance
 
 _NO_OUTPUT = 1e-8  # part of the output in the null direction, below which there is no solution
 

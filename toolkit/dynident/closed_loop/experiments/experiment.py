@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from dynident.closed_loop.controllers import Controller
+from dynident.closed_loop.loop import SIDE_BY_SIDE, simulate
 from dynident.closed_loop.mechanism import Mechanism, TrueEffect
 from dynident.closed_loop.rollout import LEAD_IN, Rollout, Task
 from dynident.closed_loop.sensors import Sensors, delayed, rounded
@@ -23,12 +24,10 @@ from dynident.robot import Robot
 Progress = Callable[[str, float, float], None]
 """(what is being done, how much is done, how much there is to do)."""
 
-_SIDE_BY_SIDE = 8
-"""Motions simulated in one plant; beyond that their reversals shorten each other's steps."""
 _SUFFIXES = (".csv", ".npz", ".mat", ".parquet")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ExperimentRun:
     """One recording to be made.
 
@@ -60,7 +59,7 @@ class ExperimentRun:
             raise SimulationError(f"start = {self.start}", self.file, "give a time in s")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Experiment:
     """A robot as it truly is, and the recordings to be made of it.
 
@@ -139,10 +138,8 @@ class Experiment:
         Raises
         ------
         SimulationError
-            See `dynident.closed_loop.simulator.simulate`.
+            See `ClosedLoop.simulate`.
         """
-        from dynident.closed_loop.simulator import simulate
-
         bodies = {
             carries: self.mechanism(carries_payload=carries)
             for carries in {run.payload for run in self.runs}
@@ -152,14 +149,14 @@ class Experiment:
                 bodies[run.payload].numbered(index + 1),
                 run.trajectory,
                 run.duration,
-                run.start,
-                self._stream(index, 0),
-                run.file,
-                self.nominal or self.robot,
+                start=run.start,
+                rng=self._stream(index, 0),
+                name=run.file,
+                nominal=self.nominal or self.robot,
             )
             for index, run in enumerate(self.runs)
         ]
-        groups = [tasks[k : k + _SIDE_BY_SIDE] for k in range(0, len(tasks), _SIDE_BY_SIDE)]
+        groups = [tasks[k : k + SIDE_BY_SIDE] for k in range(0, len(tasks), SIDE_BY_SIDE)]
         lengths = [self.lead_in + max(task.duration for task in group) for group in groups]
         found: list[Rollout] = []
         before = 0.0

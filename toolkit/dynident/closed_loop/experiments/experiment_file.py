@@ -102,16 +102,16 @@ def load_experiment(path: str | Path) -> Experiment:
     runs = [_run(entry, said, path, robot, k) for k, entry in enumerate(said.recordings)]
     try:
         return Experiment(
-            robot,
-            controller,
-            tuple(runs),
-            tuple(effects),
-            Sensors(**said.sensors.model_dump()),
-            said.seed,
-            said.friction_width,
-            nominal,
-            said.torque,
-            said.lead_in,
+            robot=robot,
+            controller=controller,
+            runs=tuple(runs),
+            effects=tuple(effects),
+            sensors=Sensors(**said.sensors.model_dump()),
+            seed=said.seed,
+            friction_width=said.friction_width,
+            nominal=nominal,
+            torque=said.torque,
+            lead_in=said.lead_in,
         )
     except DynidentError as error:
         raise _at(error, path) from None
@@ -131,7 +131,12 @@ def _run(
     try:
         trajectory = Fourier.random(robot, entry.period, seeds, **settings)
         return ExperimentRun(
-            trajectory, entry.duration, entry.file, entry.use, entry.start, entry.payload
+            trajectory=trajectory,
+            duration=entry.duration,
+            file=entry.file,
+            use=entry.use,
+            start=entry.start,
+            payload=entry.payload,
         )
     except DynidentError as error:
         raise _at(error, path, f"recordings.{number}") from None

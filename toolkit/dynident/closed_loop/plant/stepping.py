@@ -38,7 +38,7 @@ class Measurement:
     resolution: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class SteppedMotion:
     """What came of it, (T, N) each.
 
@@ -162,14 +162,16 @@ class Stepper:
                 self._check_chatter(time[k], states[k + 1 - _WINDOW : k + 1], reference.v)
             if k % every == 0 or k + 1 == total:
                 progress((k + 1) / rate)
+        acting, mean = self._arrived(commands)
         return SteppedMotion(
-            states[:, place],
-            states[:, plant.speeds],
-            measured,
-            commands,
-            *self._arrived(commands),
-            saturated,
-            plant.past(states) if plant.remembers else None,
+            q=states[:, place],
+            v=states[:, plant.speeds],
+            measured=measured,
+            u=commands,
+            acting=acting,
+            mean=mean,
+            saturated=saturated,
+            past=plant.past(states) if plant.remembers else None,
         )
 
     def _start(self, time: float, reference: ReferenceSamples) -> tuple[Any, Any, Any]:

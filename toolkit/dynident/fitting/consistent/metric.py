@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -40,6 +40,7 @@ class Metric:
 
     R: np.ndarray
     names: tuple[str, ...]
+    _: KW_ONLY
     rows: int
     source: str
     irrelevant: tuple[str, ...] = ()
@@ -77,7 +78,7 @@ class Metric:
             raise FitError(what, remedy=remedy)
         if not 0 < noise_std < np.inf:
             raise FitError(f"noise_std = {noise_std:g}", remedy="choose it above 0")
-        return Metric(root / noise_std, tuple(names), rows, "given matrix")
+        return Metric(root / noise_std, tuple(names), rows=rows, source="given matrix")
 
     @staticmethod
     def of_estimate(estimate: Estimate) -> Metric:
@@ -101,7 +102,7 @@ class Metric:
         values = np.maximum(values, _NOTHING * values[-1])
         information = (vectors / np.sqrt(values)).T / std
         R = information @ estimate.basis.combination
-        return Metric(R, estimate.names, estimate.rows, "covariance of the estimate")
+        return Metric(R, estimate.names, rows=estimate.rows, source="covariance of the estimate")
 
     @staticmethod
     @single_threaded
@@ -116,7 +117,7 @@ class Metric:
         solution = solve_factors(model, factors)
         p = model.size
         R = factors.pooled(1.0 / solution.torque_std)[:p, :p]
-        return Metric(R, model.names, factors.rows, "X'X of the recordings")
+        return Metric(R, model.names, rows=factors.rows, source="X'X of the recordings")
 
     @cached_property
     def matrix(self) -> np.ndarray:

@@ -27,7 +27,7 @@ from dynident.tables import Table, number, print_tables
 from dynident.threads import single_threaded
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Projection:
     """The nearest estimate within a set.
 
@@ -260,13 +260,13 @@ def _projection(
         certificate=answer.certificate,
     )
     return Projection(
-        estimate,
-        before,
-        problem,
-        x,
-        x_hat,
-        answer.certificate,
-        metric,
-        prior,
-        (*notes, *told),
+        estimate=estimate,
+        before=before,
+        problem=problem,
+        x=x,
+        x_before=x_hat,
+        certificate=answer.certificate,
+        metric=metric,
+        prior=prior,
+        notes=(*notes, *told),
     )

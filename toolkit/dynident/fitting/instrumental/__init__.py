@@ -2,10 +2,9 @@
 
 from dynident.fitting.history import Convergence, Ending, Round
 from dynident.fitting.instrumental.estimator import IV
-from dynident.fitting.instrumental.filtered import Filtered
+from dynident.fitting.instrumental.measured_instruments import Filtered, SwappedPeriods
 from dynident.fitting.instrumental.simulated_loop import SimulatedLoop
 from dynident.fitting.instrumental.source import Instruments
-from dynident.fitting.instrumental.swapped_periods import SwappedPeriods
 
 __all__ = [
     "IV",

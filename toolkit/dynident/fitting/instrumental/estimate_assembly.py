@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,15 +10,13 @@ from dynident.fitting.estimate import Estimate
 from dynident.fitting.history import Convergence
 from dynident.fitting.instrumental.bias import ExpectedBias, expected_bias
 from dynident.fitting.instrumental.covariance import carried_covariance, textbook_covariance
+from dynident.fitting.instrumental.iv_iterations import Iterations
 from dynident.fitting.instrumental.noise_level import NoiseLevel, position_noise, torque_noise
 from dynident.fitting.instrumental.normal_equations import residual_std
 from dynident.fitting.instrumental.source import InstrumentSource
 from dynident.fitting.least_squares import sources_of
 from dynident.model import Model
 from dynident.tables import number
-
-if TYPE_CHECKING:
-    from dynident.fitting.instrumental.estimator import IV, Iterations
 
 _SURE = 10.0
 """Standard errors from which an expected bias is told: the 99.5 % quantile of Student's t with the
@@ -29,11 +27,9 @@ _WEAK = 0.02
 """Canonical correlation below which instruments and regressor hardly have to do with each other."""
 
 
-def assemble(
-    method: IV, source: InstrumentSource, iterations: Iterations, start_name: str
-) -> Estimate:
-    """Return the estimate of finished iterations; `start_name` is in words."""
-    model = iterations.model
+def assemble(method: str, iterations: Iterations) -> Estimate:
+    """Return the estimate of finished iterations; `method` is in words."""
+    model, source = iterations.model, iterations.source
     found, solution, values = iterations.found, iterations.solution, iterations.values
     noise, bias = _noise(model, source, iterations)
     covariance = carried_covariance(model, values, iterations.instruments, solution, noise)
@@ -46,7 +42,7 @@ def assemble(
         names=model.names,
         units=model.units,
         start=iterations.start,
-        start_name=start_name,
+        start_name=iterations.start_name,
         rounds=tuple(iterations.rounds),
         ending=iterations.ending,
         message=iterations.message,
@@ -59,19 +55,19 @@ def assemble(
         noise_source=noise.source,
     )
     return Estimate(
-        model,
-        values,
-        covariance,
-        solution.basis,
-        residual_std(found, solution),
-        norms / np.where(torques > 0, torques, np.nan),
-        found.relative(norms),
-        solution.condition_number,
-        found.factors.rows,
-        f"{method.name}, {method.chosen.name}",
-        history.sentence,
-        (*_notes(model, solution, history, bias), *source.notes),
-        sources_of(source.measured),
+        model=model,
+        values=values,
+        covariance=covariance,
+        basis=solution.basis,
+        torque_std=residual_std(found, solution),
+        joint_errors=norms / np.where(torques > 0, torques, np.nan),
+        error=found.relative(norms),
+        condition_number=solution.condition_number,
+        rows=found.factors.rows,
+        method=method,
+        status=history.sentence,
+        notes=(*_notes(model, solution, history, bias), *source.notes),
+        sources=sources_of(source.measured),
         history=history,
     )
 
@@ -154,8 +150,6 @@ def _sure(bias: ExpectedBias) -> np.ndarray:
 
 def _is_dry(model: Model, label: str) -> bool:
     """Whether an effect's columns depend on the width of the friction law."""
-    from dataclasses import replace
-
     effect = next(e for e in model.effects if e.label == label)
     if "whole" in effect.needs:
         return False

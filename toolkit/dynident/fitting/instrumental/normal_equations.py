@@ -74,7 +74,7 @@ def _rows(
             start = stop
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class InstrumentalSolution:
     """What the factors give.
 
@@ -161,13 +161,13 @@ def _solve(
     values = np.linalg.solve(across, Q.T @ R[:p, 2 * p])
     inverse = np.linalg.inv(across)
     return InstrumentalSolution(
-        basis.lift(values, given),
-        basis,
-        inverse @ solve_triangular(Rv.T, np.eye(len(kept)), lower=True),
-        Rv.T @ Rv,
-        weights,
-        _condition(Rv.T @ across),
-        _least_correlation(across, Rw),
+        values=basis.lift(values, given),
+        basis=basis,
+        gain=inverse @ solve_triangular(Rv.T, np.eye(len(kept)), lower=True),
+        crossed=Rv.T @ Rv,
+        weights=weights,
+        condition_number=_condition(Rv.T @ across),
+        correlation=_least_correlation(across, Rw),
     )
 
 

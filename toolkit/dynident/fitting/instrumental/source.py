@@ -128,22 +128,3 @@ def _away_from_ends(recording: Recording, settings: Filter | None) -> Recording:
         )
         raise RecordingError(what, recording.where, remedy)
     return recording.replace(window=(first, last))
-
-
-@dataclass(frozen=True, eq=False)
-class FixedInstruments:
-    """Instruments that do not depend on the estimate; see `Source`."""
-
-    measured: Dataset
-    instruments: Dataset
-    notes: tuple[str, ...]
-    noise_share: float
-    iterates: bool = False
-
-    def at(self, values: np.ndarray) -> Dataset:
-        """Return the instruments."""
-        return self.instruments
-
-    def verdict(self) -> str:
-        """Return nothing: there is no loop to doubt."""
-        return ""

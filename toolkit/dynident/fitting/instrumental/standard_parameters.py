@@ -62,7 +62,7 @@ def consistent(model: Model, values: np.ndarray, root: np.ndarray) -> np.ndarray
     """
     robot = model.robot
     before = replace(given_estimate(robot), model=model, values=np.array(values))
-    metric = Metric(_FIRM * root, model.names, 0, "the last iteration")
+    metric = Metric(_FIRM * root, model.names, rows=0, source="the last iteration")
     found = project(before, Prior(robot), metric, Within("full"))
     effects = found.values[model.base.rank :]
     return np.concatenate([found.robot.theta, effects])

@@ -19,7 +19,7 @@ PIECES = 20
 """Consecutive pieces of the data, between which estimates scatter."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class PosedRegression:
     """The regression that a model and data pose.
 
@@ -53,7 +53,15 @@ def pose(model: Model, dataset: Dataset) -> PosedRegression:
     first = solve_factors(model, factors)
     compressed = compress(pieces, 1.0 / first.torque_std)
     compressed = replace(compressed, X=compressed.X[:, kept])
-    return PosedRegression(model, relaxed.basis, values, factors, first, kept, compressed)
+    return PosedRegression(
+        model=model,
+        basis=relaxed.basis,
+        values=values,
+        factors=factors,
+        first=first,
+        kept=kept,
+        compressed=compressed,
+    )
 
 
 def pieces_of(model: Model, dataset: Dataset, values: np.ndarray | None) -> list[TriangularFactors]:

@@ -1,15 +1,86 @@
-"""Instruments from repetition: the other periods of the same excitation."""
+"""Instruments from the measurement itself: its other periods, or filtered far more strongly.
+
+In: recordings. Out: the same recordings with other positions, once and for all estimates.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from dynident.errors import FitError
-from dynident.fitting.instrumental.source import FixedInstruments, Guess, InstrumentSource, prepared
+from dynident.fitting.instrumental.source import Guess, InstrumentSource, prepared
 from dynident.model import Model
-from dynident.recording import SIGNALS, Dataset, Recording, periods, require_repetition
+from dynident.recording import SIGNALS, Dataset, Recording, lowpass, periods, require_repetition
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FixedInstruments:
+    """Instruments that do not depend on the estimate; see `InstrumentSource`."""
+
+    measured: Dataset
+    instruments: Dataset
+    notes: tuple[str, ...]
+    noise_share: float
+    iterates: bool = False
+
+    def at(self, values: np.ndarray) -> Dataset:
+        """Return the instruments."""
+        return self.instruments
+
+    def verdict(self) -> str:
+        """Return nothing: there is no loop to doubt."""
+        return ""
+
+
+@dataclass(frozen=True)
+class Filtered:
+    """The measured positions through a low-pass far below the filter of the regressor.
+
+    What noise lies below the cut-off is common to both sides and still biases the estimate; what
+    lies above no longer does. For recordings that neither repeat nor tell their controller.
+
+    Attributes
+    ----------
+    cutoff_hz : of a zero-phase Butterworth filter of order 4.
+    """
+
+    cutoff_hz: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.cutoff_hz) and self.cutoff_hz > 0):
+            raise FitError(f"cutoff_hz = {self.cutoff_hz!r}", "instruments", "choose it above 0")
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        return f"measurements below {self.cutoff_hz:g} Hz"
+
+    def prepare(self, model: Model, dataset: Dataset, guess: Guess) -> InstrumentSource:
+        """Return the recordings and their instruments.
+
+        Raises
+        ------
+        RecordingError
+            If the cut-off does not suit a recording.
+        """
+        measured = prepared(dataset)
+        smooth = [
+            r.replace(q=lowpass(r.q, r.rate_hz, self.cutoff_hz, where=r.where), v=None, a=None)
+            for r in measured.recordings
+        ]
+        notes = (
+            f"Instruments: the measured positions below {self.cutoff_hz:g} Hz. Noise below that is "
+            "common to both sides and still biases the estimate.",
+        )
+        return FixedInstruments(
+            measured=measured,
+            instruments=replace(measured, recordings=tuple(smooth)),
+            notes=notes,
+            noise_share=1.0,
+        )
 
 
 @dataclass(frozen=True)
@@ -45,7 +116,9 @@ class SwappedPeriods:
         measured = replace(dataset, recordings=tuple(one for one, _ in pairs))
         instruments = replace(dataset, recordings=tuple(other for _, other in pairs))
         share = float(np.mean([1.0 + 1.0 / (_count(one) - 1) for one in told]))
-        return FixedInstruments(measured, instruments, notes, share)
+        return FixedInstruments(
+            measured=measured, instruments=instruments, notes=notes, noise_share=share
+        )
 
 
 def _count(recording: Recording) -> int:

@@ -17,10 +17,10 @@ from dynident.errors import FitError
 from dynident.fitting import load_estimate, rows
 from dynident.fitting.noisy_inputs import encoder_noise, input_noise
 from dynident.fitting.noisy_inputs.compressed import compress
-from dynident.fitting.noisy_inputs.named import NAMES
 from dynident.fitting.noisy_inputs.posed import pieces_of
 from dynident.moments import TriangularFactors, factorise
-from dynident.regression.joint_factors import BayesianFactorRegression
+from dynident.regression.bayesian_factors import BayesianFactorRegression
+from dynident.regression.names import REGRESSIONS
 from synthetic import arm, synthetic, true_values
 
 STD = 2e-4
@@ -47,7 +47,7 @@ def noisy(seed: int = 3, position_std: float = STD) -> di.Dataset:
     return di.Dataset((one,), ROUGH, KNOWN)
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name != "corrected"])
+@pytest.mark.parametrize("name", [name for name in REGRESSIONS if name != "corrected"])
 def test_every_regression_finds_the_truth_where_there_is_no_input_noise(name: str) -> None:
     found = di.fit(model(), noisy(3, 0.0), di.Regression(name))
     size = np.abs(truth()).max()

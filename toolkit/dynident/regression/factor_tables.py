@@ -1,17 +1,48 @@
-"""A factor regression in words and tables: what was found, and what it is worth."""
+"""A factor regression in words and tables: what was found, and what it is worth.
+
+In: a fitted regression, known by its attributes alone. Out: its tables.
+"""
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
-from dynident.regression.corrected import LEAST_SHARE
-from dynident.regression.joint_factors import LEAST_RELIABILITY, JointFactorRegression
+from dynident.regression.corrected import LEAST_SHARE, CorrectedLeastSquares
+from dynident.regression.factor_analysis import LEAST_RELIABILITY
+from dynident.robot import BaseParameters
 from dynident.tables import Table, number
 
 _AGREES = 3.0  # standard deviations of corrected least squares
 
 
-def summary(regression: JointFactorRegression) -> tuple[Table, ...]:
+class FittedFactors(Protocol):
+    """What the tables show of a fitted regression; see `JointFactorRegression`."""
+
+    words: str
+    coef_noisy_: np.ndarray
+    coef_true_: np.ndarray
+    sigma_true_: np.ndarray
+    reliability_: np.ndarray
+    known_: np.ndarray
+    constant_: np.ndarray
+    pruned_: np.ndarray
+    basis_: BaseParameters | None
+    corrected_: CorrectedLeastSquares | None
+    bounds_: np.ndarray
+    n_iter_: int
+    ending_: str
+    converged_: bool
+    left_: float
+    drift_: float
+
+    def input_names(self) -> list[str]:
+        """Return the names of the inputs."""
+        ...
+
+
+def factor_tables(regression: FittedFactors) -> tuple[Table, ...]:
     """Return a fitted regression as a table of its inputs, with its caveats."""
     names, corrected = regression.input_names(), regression.corrected_
     relevance = getattr(regression, "relevance_", None)
@@ -36,13 +67,13 @@ def summary(regression: JointFactorRegression) -> tuple[Table, ...]:
     return (Table(title, (*columns, ""), tuple(rows), _notes(regression)),)
 
 
-def _word(regression: JointFactorRegression, m: int) -> str:
+def _word(regression: FittedFactors, m: int) -> str:
     if regression.constant_[m]:
         return "constant"
     return "pruned" if regression.pruned_[m] else ""
 
 
-def _notes(regression: JointFactorRegression) -> tuple[str, ...]:
+def _notes(regression: FittedFactors) -> tuple[str, ...]:
     names, corrected = regression.input_names(), regression.corrected_
     notes = [
         _ended(regression),
@@ -75,11 +106,11 @@ def _notes(regression: JointFactorRegression) -> tuple[str, ...]:
         )
     if regression.basis_ is not None and regression.basis_.dependent:
         lost = ", ".join(regression.basis_.names[i] for i in regression.basis_.dependent)
-        notes.append(f"Not told on their own, being combinations of other inputs: {lost}.")
+        notes.append(f"Not identified on their own, being combinations of other inputs: {lost}.")
     return tuple(notes)
 
 
-def _ended(regression: JointFactorRegression) -> str:
+def _ended(regression: FittedFactors) -> str:
     bounds = regression.bounds_
     rounds = f"{regression.n_iter_} rounds, bound {bounds[-1]:.9g} nats"
     if regression.converged_:
@@ -96,7 +127,7 @@ def _ended(regression: JointFactorRegression) -> str:
     return f"Not converged: {rounds}{last}. Raise max_iter."
 
 
-def _beside(regression: JointFactorRegression) -> str:
+def _beside(regression: FittedFactors) -> str:
     """What corrected least squares says of b_true."""
     corrected = regression.corrected_
     assert corrected is not None
