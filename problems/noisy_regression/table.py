@@ -29,8 +29,8 @@ from sklearn.preprocessing import StandardScaler
 
 from dynident.regression.bayesian_factors import BayesianFactorRegression
 from dynident.regression.joint_factors import JointFactorRegression
-from dynident.regression.stepwise import StepwiseRegression
 from dynident.regression.ordinary import TruncatedLeastSquares
+from dynident.regression.stepwise import StepwiseRegression
 from dynident.tables import Table, print_tables
 from dynident.threads import single_threaded
 

@@ -10,6 +10,7 @@ import pytest
 from tests.synthetic import arm
 
 from dynident.closed_loop import Controller, ControllerFile
+from dynident.closed_loop.controllers import LAWS
 from dynident.closed_loop.plant.drive import Drive, ReferenceSamples
 from dynident.errors import SimulationError, StudyError
 from dynident.robot import Robot
@@ -190,3 +191,56 @@ def test_table_of_a_file() -> None:
         short.controller(robot, "study.toml: controller")
     with pytest.raises(StudyError, match="needs kd"):
         ControllerFile(kind="pd", rate_hz=200.0, kp=1.0).controller(robot, "here")
+
+
+# --- what every kind keeps to: a new one is an entry of LAWS and nothing here ---------------------
+
+every_kind = pytest.mark.parametrize("kind", LAWS)
+
+
+def of_kind(kind: str, **settings: Any) -> Controller:
+    gains: dict[str, Any] = {name: (4.0, 9.0) for name in LAWS[kind].gains}
+    return Controller(kind=kind, rate_hz=RATE, **gains, **settings)
+
+
+def commands(controller: Controller, *measured: np.ndarray) -> np.ndarray:
+    """The last command at some positions, under a reference that stands still."""
+    drive = Drive(controller, constant(len(measured), Q_REF, 0.0), [arm()])
+    return np.array([drive.command(k, q) for k, q in enumerate(measured)])[-1]
+
+
+@every_kind
+def test_every_kind_pulls_towards_its_reference_and_damps(kind: str) -> None:
+    off = np.array([0.01, -0.02])
+    still = commands(of_kind(kind), Q_REF, Q_REF)
+    behind = commands(of_kind(kind), Q_REF - off, Q_REF - off)
+    moving = commands(of_kind(kind), Q_REF - off, Q_REF)
+    assert off @ (behind - still) > 0.0 and off @ (moving - still) < 0.0
+
+
+@every_kind
+def test_every_kind_keeps_its_limit(kind: str) -> None:
+    far = Q_REF - np.array([50.0, -50.0])
+    limit = (0.5, 0.25)
+    held = commands(of_kind(kind, limit=limit), far, far)
+    free = commands(of_kind(kind), far, far)
+    np.testing.assert_allclose(held, np.clip(free, np.negative(limit), limit))
+    assert np.any(np.abs(free) > limit)
+
+
+@every_kind
+def test_every_kind_is_read_from_a_file_and_asks_for_its_gains(kind: str) -> None:
+    gains: dict[str, Any] = {name: [4.0, 9.0] for name in LAWS[kind].gains}
+    table = ControllerFile(kind=kind, rate_hz=RATE, **gains)
+    assert table.controller(arm(), "here") == of_kind(kind)
+    for name in LAWS[kind].gains:
+        with pytest.raises(SimulationError, match=f"needs {name}|give one gain per joint"):
+            replace(of_kind(kind), **{name: ()})
+    assert len(LAWS[kind].powers) == len(LAWS[kind].gains)
+    assert np.shape(of_kind(kind).feedback().position) == (2,)
+
+
+@every_kind
+def test_a_loop_without_a_rate_cannot_be_simulated(kind: str) -> None:
+    with pytest.raises(SimulationError, match="rate is not stated"):
+        replace(of_kind(kind), rate_hz=None).simulated_rate()
