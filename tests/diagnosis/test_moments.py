@@ -15,7 +15,7 @@ def repeated(signal: np.ndarray, replicates: int, std: float, rng) -> np.ndarray
     return signal + std * rng.normal(size=(replicates, *signal.shape))
 
 
-@pytest.mark.parametrize("versions", [2, 3, 5])
+@pytest.mark.parametrize("replicates", [2, 3, 5])
 def test_signal_moments_are_free_of_noise_in_the_mean(replicates: int) -> None:
     signal = RNG.normal(size=(60, 3))
     edges = np.array([0, 20, 60])
@@ -87,7 +87,7 @@ def test_dependent_columns_get_the_smallest_answer_and_no_explosion() -> None:
     assert np.allclose(solution.values @ [1.0, 2.0], 5.0)
 
 
-@pytest.mark.parametrize("versions", [2, 3])
+@pytest.mark.parametrize("replicates", [2, 3])
 def test_differences_have_the_variance_of_the_noise(replicates: int) -> None:
     residual = repeated(np.sin(np.arange(4000.0)), replicates, 0.3, RNG)
     assert np.mean(differences(residual, "repeated") ** 2) == pytest.approx(0.09, rel=0.08)

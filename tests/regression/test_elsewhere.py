@@ -7,6 +7,7 @@ from functools import reduce
 from operator import add
 from typing import Any
 
+import cloudpickle
 import numpy as np
 from joblib import Parallel, delayed
 
@@ -15,7 +16,8 @@ import dynident as di
 
 def test_the_package_goes_by_its_name() -> None:
     """As a notebook's functions do, which are sent with all that they refer to."""
-    assert pickle.loads(pickle.dumps(di)) is di
+    sent = cloudpickle.dumps(lambda: di)
+    assert pickle.loads(sent)() is di
 
 
 def test_statistics_of_other_processes_add_up() -> None:
