@@ -1,98 +1,54 @@
-"""The floors of the house: a room imports only from rooms above it."""
+"""The floors of the house: a room imports only from rooms below it, and nothing goes in circles."""
 
 from __future__ import annotations
 
-import ast
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).parents[1] / "toolkit" / "dynident"
-FLOORS = [
-    ("errors",),
-    ("files", "tables"),
-    ("settings", "places", "threads"),
-    ("inertia", "moments"),
-    ("recording",),
-    ("robot",),
-    ("effects",),
-    ("model",),
-    ("constraints",),
-    ("nlp", "regression"),
-    ("closed_loop",),
-    ("fitting",),
-    ("consistency", "validation"),
-    ("evidence",),
-    ("diagnosis",),
-    ("study",),
-    ("refitting",),
-    ("reporting",),
-    ("cli",),
-]
+from known_violations import excused
+from package_map import FLOORS, Module, circles, imports, modules, room_of
+
 HEIGHT = {room: height for height, rooms in enumerate(FLOORS) for room in rooms}
 PLOTTING = {"matplotlib", "plotly"}
 
-
-def room_of(path: Path) -> str:
-    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
-
-
-def sources() -> list[Path]:
-    return [p for p in sorted(PACKAGE.rglob("*.py")) if p != PACKAGE / "__init__.py"]
+each_module = pytest.mark.parametrize(
+    "module", [m for m in modules().values() if m.room], ids=lambda m: m.name
+)
 
 
-def imported(path: Path) -> list[tuple[str, bool]]:
-    """Modules imported by a file, and whether at run time when the file is first imported."""
-    tree = ast.parse(path.read_text())
-    typing_only = {
-        id(inner)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
-        for inner in ast.walk(node)
+@each_module
+def test_imports_go_down_the_floors_only(module: Module) -> None:
+    assert module.room in HEIGHT, f"room '{module.room}' is on no floor"
+    for name in imports()[module.name]:
+        other = room_of(name)
+        allowed = other == module.room or (other and HEIGHT[other] < HEIGHT[module.room])
+        assert allowed, f"{module.room} imports {name}, which is above it"
+
+
+def test_no_imports_go_in_circles() -> None:
+    """Those inside functions and for type checkers count: what is shared has a place of its own."""
+    found = {" ".join(name.removeprefix("dynident.") for name in c) for c in circles(imports())}
+    assert found == excused("circles")
+
+
+def test_nothing_imports_the_facade_that_it_stands_behind() -> None:
+    """Else whatever the facade imports could lead back, and the order of imports would matter."""
+    found = {
+        f"{name} {other}".replace("dynident.", "")
+        for name, others in imports().items()
+        for other in others
+        if name.startswith(f"{other}.") and modules()[other].is_facade
+        if not name.endswith(".__main__")
     }
-    top = {id(node) for node in tree.body}
-    found = []
-    for node in ast.walk(tree):
-        if id(node) in typing_only:
-            continue
-        if isinstance(node, ast.Import):
-            found += [(alias.name, id(node) in top) for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}: relative import"
-            found.append((str(node.module), id(node) in top))
-            if node.module == "dynident":
-                found += [(f"dynident.{a.name}", id(node) in top) for a in node.names]
-    return found
+    assert found == excused("own facade")
 
 
-@pytest.mark.parametrize("path", sources(), ids=lambda p: str(p.relative_to(PACKAGE)))
-def test_imports_go_down_the_floors_only(path: Path) -> None:
-    here = room_of(path)
-    assert here in HEIGHT, f"room '{here}' is on no floor"
-    for name, _ in imported(path):
-        parts = name.split(".")
-        if parts[0] != "dynident" or len(parts) == 1:
-            continue
-        other = parts[1]
-        allowed = other == here or HEIGHT[other] < HEIGHT[here]
-        assert allowed, f"{here} imports {other}, which is above it"
-
-
-@pytest.mark.parametrize("path", sources(), ids=lambda p: str(p.relative_to(PACKAGE)))
-def test_only_the_report_imports_plotting_libraries(path: Path) -> None:
-    names = {name.split(".")[0] for name, _ in imported(path)}
-    assert room_of(path) == "reporting" or not names & PLOTTING
-
-
-def test_every_file_has_a_docstring_and_most_are_short() -> None:
-    lengths = {}
-    for path in sources():
-        text = path.read_text()
-        assert ast.get_docstring(ast.parse(text)), f"{path} has no docstring"
-        lengths[path] = text.count("\n")
-    assert sum(n >= 300 for n in lengths.values()) <= 0.1 * len(lengths), lengths
+@each_module
+def test_only_the_report_imports_plotting_libraries(module: Module) -> None:
+    libraries = {name.split(".")[0] for name in module.names}
+    assert module.room == "reporting" or not libraries & PLOTTING
 
 
 def test_importing_the_package_loads_nothing_heavy() -> None:
