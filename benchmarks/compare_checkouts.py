@@ -147,7 +147,7 @@ def differences(
         both_nan = math.isnan(one) and math.isnan(other)
         if not both_nan and not math.isclose(one, other, rel_tol=tolerance, abs_tol=1e-14):
             yield f"{where}: {one!r} and {other!r}", False
-    elif one != other:
+    elif one != other or isinstance(one, bool) is not isinstance(other, bool):
         sentence = isinstance(one, str) and isinstance(other, str) and " " in one
         yield f"{where}: {str(one)[:300]!r} and {str(other)[:300]!r}", sentence
 

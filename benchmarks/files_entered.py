@@ -11,6 +11,7 @@ output is the command's own.
 
 from __future__ import annotations
 
+import inspect
 import sys
 from collections import Counter
 from collections.abc import Callable
@@ -54,12 +55,14 @@ def entered(work: Callable[[], Any], package: Path) -> list[Path]:
         work()
     finally:
         sys.setprofile(None)
-    named = {Path(code.co_filename) for code in called if _has_a_name(code.co_name)}
+    named = {Path(code.co_filename) for code in called if _is_named_function(code)}
     return sorted(path.relative_to(package) for path in named if path.is_relative_to(package))
 
 
-def _has_a_name(name: str) -> bool:
-    return not name.startswith(("<", "__"))
+def _is_named_function(code: CodeType) -> bool:
+    """Tell functions with a name from modules and the bodies of classes, which run on import."""
+    is_function = bool(code.co_flags & inspect.CO_OPTIMIZED)
+    return is_function and not code.co_name.startswith(("<", "__"))
 
 
 if __name__ == "__main__":
