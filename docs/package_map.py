@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -70,15 +70,15 @@ def room_of(name: str) -> str:
 
 @cache
 def modules() -> Mapping[str, Module]:
-    """Return every module by its name; a lazy facade is its stub, which says what it imports."""
+    """Return every module by its name; the stub of a lazy facade adds what it imports."""
     found: dict[str, Module] = {}
     for path in sorted(PACKAGE.rglob("*.py*")):
         if path.suffix in (".py", ".pyi"):
             name = _name(path)
             tree = ast.parse(path.read_text())
             names = frozenset(_imported(tree, name))
-            before = found[name].names if name in found else frozenset()
-            found[name] = Module(name, path, tree, names | before)
+            same = found.get(name, Module(name, path, tree, frozenset()))
+            found[name] = replace(same, names=same.names | names)
     return found
 
 
