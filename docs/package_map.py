@@ -19,6 +19,7 @@ FLOORS = (
     ("errors",),
     ("files", "tables"),
     ("settings", "places", "threads"),
+    ("criteria",),
     ("inertia", "moments"),
     ("recording",),
     ("robot",),

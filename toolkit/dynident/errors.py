@@ -53,6 +53,10 @@ class StudyError(DynidentError):
     """A study or experiment file is unusable."""
 
 
+class CriteriaError(DynidentError):
+    """A criterion of the diagnosis is unknown, of the wrong kind or out of its range."""
+
+
 class FitError(DynidentError):
     """An estimate cannot be computed from this data."""
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dynident.closed_loop import Controller
+from dynident.criteria import Criteria
 from dynident.diagnosis.assembly import Found, Search, told
 from dynident.diagnosis.nuisances.contacts import Contacts
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
@@ -44,6 +45,7 @@ def diagnose(
     *,
     controller: Controller | None = None,
     most: int | None = None,
+    criteria: Criteria | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Diagnosis:
     """Find where a model fails and which physical effects it lacks.
@@ -57,6 +59,7 @@ def diagnose(
     controller : of the closed loop behind the recordings; where nothing repeats, the simulated
         loop gives the instruments.
     most : effects that are added at most; see `MOST_EFFECTS`.
+    criteria : the numbers that decide the answer; None for the defaults.
     tell : told what is being done, for a progress display.
 
     Raises
@@ -64,14 +67,17 @@ def diagnose(
     RecordingError
         If a recording is too short, or does not repeat with its period.
     """
+    criteria = Criteria() if criteria is None else criteria
     given = model.model if isinstance(model, Estimate) else model
     most = max(MOST_EFFECTS, 2 * given.robot.n) if most is None else most
     train, *others = numbered(train, *([] if test is None else [test]))
     test = others[0] if others else None
     progress("reading the motion")
     loop = motion_of_loop(given, train, controller, progress)
-    evidence = Evidence(given, loop.runs or gather(train))
-    held = Evidence(given, gather(test)) if test is not None and len(test) else None
+    evidence = Evidence(given, loop.runs or gather(train), criteria)
+    held = None
+    if test is not None and len(test):
+        held = Evidence(given, gather(test), criteria)
     progress("evaluating every effect")
     everything = [v for effect in candidates(given) for v in effect.variants(given.robot)]
     evidence.prepare([*given.effects, *everything])

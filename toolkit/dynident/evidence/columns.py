@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from dynident.criteria import Criteria
 from dynident.effects import Block, Effect, JointEffect
 from dynident.evidence.runs import Run, Signals
 from dynident.fitting.sampling import Sampled
@@ -31,6 +32,7 @@ class Evidence:
 
     model: Model
     runs: tuple[Run, ...]
+    criteria: Criteria = field(default_factory=Criteria)
     _rigid: list[Signals] = field(default_factory=list)
     _known: dict[Effect, list[Signals]] = field(default_factory=dict)
     _now: Hashable = None
@@ -50,7 +52,7 @@ class Evidence:
             for run in self.runs
         )
         if self._simulation is None:
-            self._simulation = Evidence(self.model, runs)
+            self._simulation = Evidence(self.model, runs, self.criteria)
         self._simulation.runs = runs  # who carries the payload may have been found out
         return self._simulation
 

@@ -131,7 +131,7 @@ def _worst_recording(evidence: Evidence, fitted: EvidenceFit) -> tuple[Evidence,
         )
         for run, e in zip(evidence.runs, left, strict=True)
     ]
-    alone = Evidence(evidence.model, (evidence.runs[int(np.argmax(sizes))],))
+    alone = Evidence(evidence.model, (evidence.runs[int(np.argmax(sizes))],), evidence.criteria)
     alone.prepare(fitted.model.effects)
     return alone, fit_evidence(alone, fitted.model, fitted)
 

@@ -1,0 +1,224 @@
+"""Criteria of the search for missing effects: what is tried, what passes, how shapes are found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dynident.criteria.criterion import TWO_LINK_CASES, CriteriaGroup, criterion
+
+
+@dataclass(frozen=True, kw_only=True)
+class SearchCriteria(CriteriaGroup):
+    """How much is searched, which of several effects is named, and which is dropped again."""
+
+    most_effects: int = criterion(8, "effects", "effects that are added at most", least=0)
+    most_effects_per_joint: int = criterion(
+        2, "effects", "the same for each joint, where that is more", least=0
+    )
+    contenders: int = criterion(
+        6, "effects", "effects that are refined and cross-validated in each round", least=1
+    )
+    hopeless: float = criterion(
+        0.2,
+        "1",
+        "corrected p value above which no better shape makes an effect significant",
+        over=0,
+        most=1,
+    )
+    below_noise: float = criterion(
+        0.15,
+        "1",
+        "systematic residual over noise below which filtered dynamic regressors are not evaluated",
+    )
+    payload_recordings: int = criterion(
+        6, "recordings", "recordings up to which every choice of payload carriers is tried", least=1
+    )
+    another_model: float = criterion(
+        0.1,
+        "1",
+        "fall of the relative torque error after which candidates are evaluated anew",
+        least=0,
+        most=1,
+    )
+    alike: float = criterion(
+        0.015,
+        "1",
+        "relative difference of what two effects explain, up to which they are indistinguishable",
+        TWO_LINK_CASES,
+        least=0,
+        most=1,
+    )
+    set_level: float = criterion(
+        0.05,
+        "1",
+        "chance that the best effect is not in the model confidence set",
+        "literature: Hansen, Lunde and Nason, The model confidence set, Econometrica 79 (2011); "
+        "the conventional level",
+        over=0,
+        most=1,
+    )
+    set_draws: int = criterion(1000, "draws", "bootstrap draws behind that set", least=100)
+    set_block: int = criterion(
+        2,
+        "blocks",
+        "consecutive blocks of time that are drawn together, as they share motion",
+        least=1,
+    )
+    simpler_share: float = criterion(
+        0.75,
+        "1",
+        "share of the best effect's drop that a simpler effect must reach, to be named first",
+        least=0,
+        most=1,
+    )
+    rival_share: float = criterion(
+        0.85,
+        "1",
+        "share of the best effect's drop from which a rival is fitted to compare, if not linear",
+        least=0,
+        most=1,
+    )
+    least_kept: float = criterion(
+        0.1,
+        "1",
+        "share of what a filtered dynamic regressor promises that the joint fit must keep",
+        least=0,
+        most=1,
+    )
+    least_fall: float = criterion(
+        0.015,
+        "1",
+        "share of a joint's squared noise that an added effect must take off the test residual",
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class GateCriteria(CriteriaGroup):
+    """What an effect must show to be significant and relevant."""
+
+    level: float = criterion(
+        0.01,
+        "1",
+        "level of the test, corrected for the number of effects and shapes tried (Bonferroni)",
+        TWO_LINK_CASES + "; alone it is not enough: 23 of 30 healthy cases pass it",
+        over=0,
+        most=1,
+    )
+    first_share: float = criterion(
+        0.006,
+        "1",
+        "least share of the squared residual that the first effect must explain",
+        TWO_LINK_CASES,
+        least=0,
+        most=1,
+    )
+    later_share: float = criterion(
+        0.02,
+        "1",
+        "least share of the squared residual that later effects must explain",
+        TWO_LINK_CASES,
+        least=0,
+        most=1,
+    )
+    standard_errors: float = criterion(
+        1.5, "1", "held-out gain over its standard error, from which it counts", TWO_LINK_CASES
+    )
+    blocks_gaining: float = criterion(
+        0.65,
+        "1",
+        "share of blocks in which the held-out residual must fall, where the gain is less certain",
+        TWO_LINK_CASES,
+        least=0,
+        most=1,
+    )
+    not_identifiable: float = criterion(
+        2e-3,
+        "1",
+        "share of an effect's columns (in norm) left beside the model, below which it is not "
+        "identifiable",
+        TWO_LINK_CASES,
+        over=0,
+        most=1,
+    )
+    unseen: float = criterion(
+        1e-3,
+        "1",
+        "part of the noise below which a column is not seen at any possible value",
+        over=0,
+    )
+    beyond_bounds: float = criterion(
+        3.0, "1", "standard deviations by which one of several values may leave its bounds"
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShapeCriteria(CriteriaGroup):
+    """How the shape parameters and linearisation points of effects are found."""
+
+    linearisations: int = criterion(
+        3, "1", "times that columns are taken at the values just found", least=1
+    )
+    converged: float = criterion(
+        0.02, "1", "relative change of values at which linearisations have converged", over=0
+    )
+    least_explained: float = criterion(
+        0.5,
+        "1",
+        "share of its drop that an effect must keep at a new linearisation point",
+        least=0,
+        most=1,
+    )
+    values_tried: int = criterion(
+        10, "1", "values tried of a column that is taken at a value", least=2
+    )
+    value_range: float = criterion(
+        0.5, "1", "range of the logarithm of such a value, to each side", over=0
+    )
+    precision: float = criterion(
+        1e-3, "1", "precision of the logarithm of a shape parameter without derivatives", over=0
+    )
+    evaluations: int = criterion(
+        25, "1", "evaluations of a shape search with derivatives, at most", least=1
+    )
+    furthest: float = criterion(
+        1.7, "1", "factor by which such a search changes a shape, at most", over=1
+    )
+    gradient_precision: float = criterion(
+        1e-4, "1", "relative precision of the logarithms of its shapes", over=0
+    )
+    gradient_fall: float = criterion(
+        1e-6, "1", "relative fall of the residual at which it ends", over=0
+    )
+    refits: int = criterion(
+        12, "rounds", "refits of shapes whose columns depend on the bodies, at most", least=1
+    )
+    gained: float = criterion(
+        0.02, "1", "share of the systematic square that another refit must take away", least=0
+    )
+    negligible: float = criterion(
+        0.005, "1", "share of the squared noise that no refit is worth", least=0
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class GlobalSearchCriteria(CriteriaGroup):
+    """The search through all shapes, where the grid has left a residual unexplained."""
+
+    least: float = criterion(
+        0.1,
+        "1",
+        "share of the systematic square that the best of all shapes must explain, to be refined",
+        least=0,
+        most=1,
+    )
+    enough: float = criterion(
+        0.9, "1", "share of it that ends the search: the gradient does the rest", least=0, most=1
+    )
+    population: int = criterion(12, "shapes", "shapes of a generation, per unknown", least=2)
+    generations: int = criterion(25, "generations", "generations at most", least=1)
+    finalists: int = criterion(
+        24, "shapes", "shapes about which the other recordings are asked", least=1
+    )
+    patience: int = criterion(
+        6, "generations", "generations after which a search that explains nothing ends", least=1
+    )
