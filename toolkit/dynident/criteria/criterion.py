@@ -42,7 +42,7 @@ class Description:
         if isinstance(default, tuple):
             if not isinstance(value, tuple) or len(value) < 2:
                 return "needs a list of at least two numbers"
-            each = [replace(self, default=default[0]).objection(x) for x in value]
+            each = [replace(self, default=0.0).objection(x) for x in value]
             if any(each):
                 return next(filter(None, each))
             return "" if list(value) == sorted(set(value)) else "its numbers must ascend"
