@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from dynident.criteria import DEFAULTS
 from dynident.diagnosis.search.confidence_set import confidence_set
 
 BLOCKS = 20
@@ -17,17 +18,19 @@ def losses(excess: tuple[float, ...], seed: int) -> np.ndarray:
 
 
 def test_what_is_clearly_worse_is_dropped_and_equals_stay_together() -> None:
-    kept = [confidence_set(losses((0.0, 0.0, 40.0), seed)) for seed in range(20)]
+    kept = [confidence_set(losses((0.0, 0.0, 40.0), seed), DEFAULTS.search) for seed in range(20)]
     assert not any(2 in one for one in kept)
     assert np.mean([one == (0, 1) for one in kept]) >= 0.8
 
 
 def test_the_best_is_kept_at_the_level_asked_for() -> None:
-    kept = [0 in confidence_set(losses((0.0, 2.0, 4.0), seed)) for seed in range(40)]
+    kept = [
+        0 in confidence_set(losses((0.0, 2.0, 4.0), seed), DEFAULTS.search) for seed in range(40)
+    ]
     assert np.mean(kept) >= 0.9
 
 
 def test_one_model_or_identical_ones_are_all_kept() -> None:
     one = losses((0.0,), 0)
-    assert confidence_set(one) == (0,)
-    assert confidence_set(np.hstack([one, one])) == (0, 1)
+    assert confidence_set(one, DEFAULTS.search) == (0,)
+    assert confidence_set(np.hstack([one, one]), DEFAULTS.search) == (0, 1)

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from dynident.criteria import DEFAULTS
 from dynident.diagnosis.nuisances.changes import Repeated, changes_of, scanned
 from dynident.diagnosis.nuisances.pulse_search import (
-    LEVEL,
-    WIDTHS,
     DisturbancePulse,
     pulses_in,
     without,
@@ -70,12 +69,12 @@ def test_one_burst_is_found_where_it_is_and_nowhere_else(kind: str, seed: int) -
     time = 50.0 + STEP * INSTANTS * 2 + 1.7
     # Slow noise of the same size hides more.
     height = 9.0 if kind == "coloured" else 5.0
-    (pulse,) = pulses_in(pushed(data(seed, kind), 3, 2, time, 0.2, height))
+    (pulse,) = pulses_in(pushed(data(seed, kind), 3, 2, time, 0.2, height), DEFAULTS)
     assert (pulse.run, pulse.number, pulse.repetition, pulse.joint) == (1, 2, 2, "elbow")
     assert pulse.time == pytest.approx(time, abs=0.2)
     assert 0.1 < pulse.width < 0.4
     assert pulse.amplitude == pytest.approx(height, rel=0.5)
-    assert pulse.p_value < LEVEL
+    assert pulse.p_value < DEFAULTS.contacts.level
 
 
 @pytest.mark.parametrize("p", [0, 1])
@@ -86,7 +85,7 @@ def test_of_two_repetitions_it_is_the_one_with_the_larger_residual(p: int, heigh
         replace(s, residual=noise(np.random.default_rng(k), "", s.speed))
         for k, s in enumerate(data(5, repetitions=2))
     ]
-    (pulse,) = pulses_in(pushed(below_noise, 0, p, time, 0.15, height))
+    (pulse,) = pulses_in(pushed(below_noise, 0, p, time, 0.15, height), DEFAULTS)
     assert (pulse.repetition, pulse.joint) == (p, "shoulder")
     assert pulse.time == pytest.approx(time, abs=0.1)
     assert np.sign(pulse.amplitude) == np.sign(height)
@@ -94,14 +93,14 @@ def test_of_two_repetitions_it_is_the_one_with_the_larger_residual(p: int, heigh
 
 def test_bursts_come_in_the_order_of_their_significance() -> None:
     series = pushed(data(1), 0, 1, STEP * INSTANTS + 2.0, 0.2, 6.0)
-    found = pulses_in(pushed(series, 3, 0, 53.0, 0.2, -12.0))
+    found = pulses_in(pushed(series, 3, 0, 53.0, 0.2, -12.0), DEFAULTS)
     assert [(b.run, b.joint) for b in found] == [(1, "elbow"), (0, "shoulder")]
     assert found[0].p_value <= found[1].p_value
 
 
 @pytest.mark.parametrize("kind", ["", "coloured", "slow", "coloured slow", "heavy"])
 def test_noise_is_no_contact(kind: str) -> None:
-    assert [seed for seed in range(6) if pulses_in(data(100 + seed, kind))] == []
+    assert [seed for seed in range(6) if pulses_in(data(100 + seed, kind), DEFAULTS)] == []
 
 
 def test_friction_that_falls_is_no_contact() -> None:
@@ -109,14 +108,14 @@ def test_friction_that_falls_is_no_contact() -> None:
         replace(s, residual=s.residual + 8.0 * np.exp(-s.t / 10.0) * np.sign(s.speed))
         for s in data(7)
     ]
-    assert pulses_in(warming) == ()
+    assert pulses_in(warming, DEFAULTS) == ()
 
 
 def test_the_scan_is_the_fit_at_every_row() -> None:
     series = [s for s in data(2, "coloured slow") if s.joint == "elbow"]
-    prepared = changes_of(series, [np.zeros(INSTANTS, dtype=bool)] * len(series))[0]
+    prepared = changes_of(series, [np.zeros(INSTANTS, dtype=bool)] * len(series), DEFAULTS)[0]
     rows = np.arange(100.0, 600.0)
-    for width in (WIDTHS[0] / STEP, WIDTHS[4] / STEP):
+    for width in (0.025 / STEP, 0.32 / STEP):
         exact = prepared.match(prepared.change, rows, width)[0]
         np.testing.assert_allclose(scanned(prepared, width)[100:600], exact, atol=0.01)
 
@@ -127,8 +126,8 @@ def test_instants_of_a_bump_are_left_out_of_all_repetitions() -> None:
     replicate: Any = SimpleNamespace(t=t, recording=recording)
     run = Run("repeated", (replicate,), np.arange(1000).reshape(4, 250), np.array([0, 125, 250]))
     pulse = DisturbancePulse(0, 1, 2, "elbow", 100.0 + 11.0, 0.1, 5.0, 1e-9)
-    short = without(run, [pulse])
-    assert without(run, []) is run
+    short = without(run, [pulse], DEFAULTS.contacts)
+    assert without(run, [], DEFAULTS.contacts) is run
     # One second into the period, less and plus four widths.
     gone = set(range(250)) - set(short.index[0])
     assert min(gone) == pytest.approx(30, abs=1) and max(gone) == pytest.approx(70, abs=1)

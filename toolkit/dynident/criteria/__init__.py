@@ -26,7 +26,7 @@ A study changes criteria by tables that are named as the groups are::
     level = 0.005
 """
 
-from dynident.criteria.criteria import Criteria
+from dynident.criteria.criteria import DEFAULTS, Criteria
 from dynident.criteria.criterion import ChangedCriterion
 from dynident.criteria.evidence_criteria import FitCriteria, MapCriteria, NoiseCriteria
 from dynident.criteria.judgement_criteria import (
@@ -44,6 +44,7 @@ from dynident.criteria.search_criteria import (
 )
 
 __all__ = [
+    "DEFAULTS",
     "AdviceCriteria",
     "ChangedCriterion",
     "ContactCriteria",

@@ -26,7 +26,7 @@ from dynident.settings import nearest
 from dynident.tables import Table
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Criteria:
     """The numbers that decide what a diagnosis says; see `dynident.criteria`.
 
@@ -92,6 +92,10 @@ class Criteria:
                 raise CriteriaError(f"{group}.{error.what}", remedy=error.remedy) from None
         return cls(**groups)
 
+    def __repr__(self) -> str:
+        """What differs from the defaults only: the rest is long."""
+        return f"Criteria({', '.join(str(one) for one in self.changed)})"
+
     @property
     def changed(self) -> tuple[ChangedCriterion, ...]:
         """What differs from the defaults."""
@@ -114,3 +118,7 @@ class Criteria:
                 )
         columns = ("criterion", "value", "unit", "what it is", "source")
         return Table("Criteria of the diagnosis", columns, tuple(rows))
+
+
+DEFAULTS = Criteria()
+"""Every criterion as it is where nobody says otherwise."""

@@ -53,6 +53,9 @@ class ContactCriteria(CriteriaGroup):
         "widths on either side beyond which a pulse is nothing, and which are left out",
         over=0,
     )
+    peak_reach: float = criterion(
+        3.0, "1", "widths about the peak that say nothing of the usual size of the noise", over=0
+    )
     left_out: float = criterion(
         0.25,
         "1",

@@ -90,7 +90,7 @@ def told(search: Search, train: Dataset, test: Dataset | None, held: Evidence | 
         # With its dry friction blunted where that was called for later.
         stages.append(fitted)
     judged = [
-        with_noise_of(on_recordings(held, s), on_recordings(evidence, s))
+        with_noise_of(on_recordings(held, s), on_recordings(evidence, s), evidence.criteria.noise)
         if held
         else on_blocks(evidence, s)
         for s in stages
@@ -113,7 +113,7 @@ def told(search: Search, train: Dataset, test: Dataset | None, held: Evidence | 
     first_error = contacts[0].test_error_before if contacts else before.error
     steps = (*contacts, *_advised(steps, Adviser.of(evidence, stages[-1])))
     source = noise_source(evidence, held)
-    verdict = verdict_of(before, after, steps, rounds[-1])
+    verdict = verdict_of(before, after, steps, rounds[-1], evidence.criteria.verdict)
     pushed = contact_candidates(given, evidence, search.disturbances)
     return Diagnosis(
         verdict,
@@ -125,11 +125,11 @@ def told(search: Search, train: Dataset, test: Dataset | None, held: Evidence | 
         _candidates(rounds[-1], after.error, stages[-1]),
         _estimate(evidence, start, train),
         _estimate(evidence, stages[-1], train),
-        residual_maps(given, before, after),
+        residual_maps(given, before, after, evidence.criteria.maps),
         _traces(given, before, after),
         (
             *notes_on(evidence, held, stages[-1], source),
-            *rounding_notes(after, given.robot.names),
+            *rounding_notes(after, given.robot.names, evidence.criteria.verdict),
             *search.notes,
         ),
         sources_of(test) if test is not None else (),

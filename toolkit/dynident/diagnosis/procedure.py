@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dynident.closed_loop import Controller
-from dynident.criteria import Criteria
+from dynident.criteria import DEFAULTS, Criteria
 from dynident.diagnosis.assembly import Found, Search, told
 from dynident.diagnosis.nuisances.contacts import Contacts
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
@@ -20,7 +20,6 @@ from dynident.diagnosis.search.pruning import without_superfluous
 from dynident.diagnosis.search.ranking import Ranking, candidates, rank
 from dynident.diagnosis.search.selection import alternatives_only, breaks_its_promise, choose
 from dynident.diagnosis.search.shaped_fit import refitted, shaped
-from dynident.diagnosis.verdict import RESOLUTION
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import on_recordings
@@ -31,11 +30,6 @@ from dynident.model import Model
 from dynident.recording import Dataset, numbered
 from dynident.threads import single_threaded
 
-MOST_EFFECTS = 8
-"""Effects that are added at most; two for each joint where there are more joints."""
-
-_ANOTHER = 0.1  # of the torque that must be explained for a model to be another one
-
 
 @single_threaded
 def diagnose(
@@ -45,7 +39,7 @@ def diagnose(
     *,
     controller: Controller | None = None,
     most: int | None = None,
-    criteria: Criteria | None = None,
+    criteria: Criteria = DEFAULTS,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Diagnosis:
     """Find where a model fails and which physical effects it lacks.
@@ -58,8 +52,8 @@ def diagnose(
     test : recordings to judge by; without any, blocks of the training recordings are held out.
     controller : of the closed loop behind the recordings; where nothing repeats, the simulated
         loop gives the instruments.
-    most : effects that are added at most; see `MOST_EFFECTS`.
-    criteria : the numbers that decide the answer; None for the defaults.
+    most : effects that are added at most; None for `SearchCriteria.most_effects`.
+    criteria : the numbers that decide the answer, see `dynident.criteria`.
     tell : told what is being done, for a progress display.
 
     Raises
@@ -67,17 +61,18 @@ def diagnose(
     RecordingError
         If a recording is too short, or does not repeat with its period.
     """
-    criteria = Criteria() if criteria is None else criteria
     given = model.model if isinstance(model, Estimate) else model
-    most = max(MOST_EFFECTS, 2 * given.robot.n) if most is None else most
+    if most is None:
+        per_joint = criteria.search.most_effects_per_joint * given.robot.n
+        most = max(criteria.search.most_effects, per_joint)
     train, *others = numbered(train, *([] if test is None else [test]))
     test = others[0] if others else None
     progress("reading the motion")
-    loop = motion_of_loop(given, train, controller, progress)
-    evidence = Evidence(given, loop.runs or gather(train), criteria)
+    loop = motion_of_loop(given, train, controller, progress, criteria)
+    evidence = Evidence(given, loop.runs or gather(train, criteria.noise), criteria)
     held = None
     if test is not None and len(test):
-        held = Evidence(given, gather(test), criteria)
+        held = Evidence(given, gather(test, criteria.noise), criteria)
     progress("evaluating every effect")
     everything = [v for effect in candidates(given) for v in effect.variants(given.robot)]
     evidence.prepare([*given.effects, *everything])
@@ -181,11 +176,11 @@ class _Growth:
 def _has_changed(evidence: Evidence, start: EvidenceFit, fitted: EvidenceFit) -> bool:
     """Whether effects have changed the predicted torque enough to look at candidates again."""
     before, now = (on_recordings(evidence, one) for one in (start, fitted))
-    return now.error < before.error - _ANOTHER
+    return now.error < before.error - evidence.criteria.search.another_model
 
 
 def _resolved(evidence: Evidence, fitted: EvidenceFit, train: Dataset) -> bool:
     """Whether what is left is what the processing cannot resolve, or what encoders' steps leave."""
     judged = on_recordings(evidence, fitted)
-    small = np.all(judged.residual_rms <= RESOLUTION * judged.torque_rms)
+    small = np.all(judged.residual_rms <= evidence.criteria.verdict.resolution * judged.torque_rms)
     return bool(small) or nothing_but_rounding(judged, fitted, train)

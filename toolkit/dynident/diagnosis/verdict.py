@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from dynident.criteria import VerdictCriteria
 from dynident.diagnosis.nuisances.friction_width import friction_width_notes
 from dynident.diagnosis.result import Verdict
 from dynident.diagnosis.search.ranking import Ranking
@@ -12,41 +13,33 @@ from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut
 from dynident.recording.dataset import NoiseSource
 
-WITHIN_NOISE = 0.3
-"""Systematic residual over noise that must be surpassed, with 99 % confidence, before anything is
-said to be missing."""
 
-RESOLUTION = 1e-4
-"""Share of a joint's torque below which a residual is that of differentiation and filters."""
-
-MOST_EXPLAINED = 0.8
-"""Share of the systematic square that the effects added must take away for the residual to count
-as explained although a part smaller than the noise is left of it."""
-
-
-def verdict_of(before: HeldOut, after: HeldOut, steps, last: Ranking) -> Verdict:
+def verdict_of(
+    before: HeldOut, after: HeldOut, steps, last: Ranking, criteria: VerdictCriteria
+) -> Verdict:
     """Return the verdict on a search, from held-out data before and after and its last ranking."""
     if after.least_ratio is None or after.ratio is None or before.ratio is None:
         if last.material:
             return "unexplained"
         return "explained" if steps else "nothing_missing"
-    if within_noise(after):
+    if within_noise(after, criteria):
         return "explained" if steps else "nothing_missing"
     explained = 1.0 - float(np.sum(after.ratio**2) / np.sum(before.ratio**2))
-    if steps and explained >= MOST_EXPLAINED and float(after.ratio.max()) <= 1.0:
+    much = explained >= criteria.most_explained
+    if steps and much and float(after.ratio.max()) <= criteria.most_left:
         return "explained"
     return "unexplained"
 
 
-def within_noise(judged: HeldOut) -> bool:
+def within_noise(judged: HeldOut, criteria: VerdictCriteria) -> bool:
     """Whether nothing remains at any joint but noise, and what nothing can resolve."""
     assert judged.least_ratio is not None and judged.noise_std is not None
     power = (judged.least_ratio * judged.noise_std) ** 2
     if judged.rounding is not None:
         power = power - judged.rounding
     systematic = np.sqrt(np.clip(power, 0.0, None))
-    matters = systematic > RESOLUTION * judged.torque_rms
-    return not np.any(matters & (systematic > WITHIN_NOISE * judged.noise_std))
+    matters = systematic > criteria.resolution * judged.torque_rms
+    return not np.any(matters & (systematic > criteria.within_noise * judged.noise_std))
 
 
 def noise_source(evidence: Evidence, held: Evidence | None) -> NoiseSource:

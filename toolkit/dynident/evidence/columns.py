@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from dynident.criteria import Criteria
+from dynident.criteria import DEFAULTS, Criteria
 from dynident.effects import Block, Effect, JointEffect
 from dynident.evidence.runs import Run, Signals
 from dynident.fitting.sampling import Sampled
@@ -32,7 +32,7 @@ class Evidence:
 
     model: Model
     runs: tuple[Run, ...]
-    criteria: Criteria = field(default_factory=Criteria)
+    criteria: Criteria = DEFAULTS
     _rigid: list[Signals] = field(default_factory=list)
     _known: dict[Effect, list[Signals]] = field(default_factory=dict)
     _now: Hashable = None

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from dynident.closed_loop import Controller
+from dynident.criteria import DEFAULTS, Criteria
 from dynident.errors import FitError
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
@@ -34,12 +35,14 @@ class Comparison:
     results : what each misses.
     loops : each in the closed loop of the recordings, see `dynident.validate`; None where the
         controller or the reference is not known.
+    criteria : by which noise was measured, and maps are read.
     """
 
     names: tuple[str, ...]
     models: tuple[Model, ...]
     results: tuple[HeldOut, ...]
     loops: tuple[Loop, ...] = ()
+    criteria: Criteria = DEFAULTS
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON of `compare --json`."""
@@ -101,7 +104,7 @@ class Comparison:
                 notes=(*notes, *loops.notes),
             )
             loops = None
-        seen = residual_maps(self.models[-1], last, last)
+        seen = residual_maps(self.models[-1], last, last, self.criteria.maps)
         where = tuple((m.joint, m.against, m.sentence) for m in seen if m.sentence)
         first = (errors, loops) if loops else (errors,)
         if not where:
@@ -119,6 +122,7 @@ def compare(
     estimates: Estimate | Mapping[str, Estimate],
     dataset: Dataset,
     controller: Controller | None = None,
+    criteria: Criteria = DEFAULTS,
 ) -> Comparison:
     """Compare estimates with measurements that they were not fitted to.
 
@@ -128,6 +132,7 @@ def compare(
     dataset : recordings, with their filter and, where nothing repeats, their noise.
     controller : of the loop in which they were made: each estimate is simulated in it, too, where
         recordings have their reference.
+    criteria : of the noise, of loops and of what residual maps show.
 
     Raises
     ------
@@ -138,10 +143,10 @@ def compare(
     if not named or not dataset.recordings:
         what = "no estimate" if not named else "no recording to compare with"
         raise FitError(what, remedy='mark some recordings use = "test"')
-    runs = gather(dataset)
+    runs = gather(dataset, criteria.noise)
     results = []
     for estimate in named.values():
-        evidence = Evidence(estimate.model, runs)
+        evidence = Evidence(estimate.model, runs, criteria)
         evidence.prepare(estimate.model.effects)
         results.append(on_recordings(evidence, estimate))
     return Comparison(
@@ -149,6 +154,7 @@ def compare(
         tuple(e.model for e in named.values()),
         tuple(results),
         tuple(loop_of(Judged.of(e), dataset, controller) for e in named.values()),
+        criteria,
     )
 
 
@@ -158,6 +164,7 @@ def compare_models(
     train: Dataset,
     test: Dataset,
     controller: Controller | None = None,
+    criteria: Criteria = DEFAULTS,
 ) -> Comparison:
     """Fit models as the diagnosis does, and compare them on data that they have not seen.
 
@@ -169,22 +176,23 @@ def compare_models(
         are held out.
     controller : as in `compare`; the loops are those of the test recordings, or of the training
         recordings where there are none.
+    criteria : of the noise, the fit, of loops and of what residual maps show.
     """
-    runs = gather(train)
-    held = gather(test) if len(test) else None
+    runs = gather(train, criteria.noise)
+    held = gather(test, criteria.noise) if len(test) else None
     results, compared, loops = [], [], []
     for model in models.values():
         if shaped_effects(model):
             model = refine_shapes(model, train).model
-        evidence = Evidence(model, runs)
+        evidence = Evidence(model, runs, criteria)
         evidence.prepare(model.effects)
         fitted = fit_evidence(evidence, model)
         if held is None:
             results.append(on_blocks(evidence, fitted))
         else:
-            judge = Evidence(model, held)
+            judge = Evidence(model, held, criteria)
             judge.prepare(model.effects)
             results.append(on_recordings(judge, fitted))
         compared.append(model)
         loops.append(loop_of(Judged(model, fitted.values), test if held else train, controller))
-    return Comparison(tuple(models), tuple(compared), tuple(results), tuple(loops))
+    return Comparison(tuple(models), tuple(compared), tuple(results), tuple(loops), criteria)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dynident.criteria import Criteria
 from dynident.evidence.columns import Evidence, joints_of
 from dynident.evidence.noise_model import (
     NoiseModel,
@@ -25,10 +26,6 @@ from dynident.moments.replicated import (
     time_varying_moments,
 )
 
-_ROUNDS = 3  # fit, measure the noise, fit again: the noise model settles at once
-_PRESENT_ROUNDS = 30  # at most, until columns that depend on the model's values settle as well
-_PRESENT_TOLERANCE = 1e-4
-
 
 @dataclass(frozen=True)
 class EvidenceFit:
@@ -36,6 +33,7 @@ class EvidenceFit:
 
     Attributes
     ----------
+    criteria : by which it was fitted.
     model : with its effects and their shapes.
     values : (p,) in the order of `model.names`.
     covariance : (p, p).
@@ -50,6 +48,7 @@ class EvidenceFit:
     variances : (n,) of the noise; of the torque, where the noise is unknown or zero.
     """
 
+    criteria: Criteria
     model: Model
     values: np.ndarray
     covariance: np.ndarray
@@ -90,7 +89,7 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
     FitError
         If the columns are not finite.
     """
-    n = model.robot.n
+    n, criteria = model.robot.n, evidence.criteria.fit
     at = _held(model, _beginning(model, near))
     torque_std = [
         float(
@@ -103,7 +102,7 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
     noise = tuple(flat_noise(std or 1.0) for std in torque_std) if near is None else near.noise
     known = any(run.kind != "single" for run in evidence.runs)
     columns, values, fixed_point = [], at, FixedPoint()
-    for round in range(_PRESENT_ROUNDS if model.needs_values else _ROUNDS):
+    for round in range(criteria.value_rounds if model.needs_values else criteria.noise_rounds):
         if not columns or model.needs_values:
             model = model.at(at)
             columns = [
@@ -116,9 +115,8 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
             values = _waiting(model, at, values)
         noise = tuple(_Left.of(evidence, columns, values, j).noise for j in range(n))
         change = float(np.linalg.norm(_held(model, values) - at))
-        if round >= _ROUNDS - (near is not None) and change <= _PRESENT_TOLERANCE * np.linalg.norm(
-            values
-        ):
+        small = change <= criteria.value_tolerance * np.linalg.norm(values)
+        if round >= criteria.noise_rounds - (near is not None) and small:
             break
         at = _held(model, fixed_point.following(model, at, values))
     white = _whiten(evidence, columns, noise, values)
@@ -131,6 +129,7 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
     )
     left = [_Left.of(evidence, columns, values, j) for j in range(n)]
     return EvidenceFit(
+        evidence.criteria,
         model.at(_held(model, values)),
         values,
         solution.covariance,
@@ -278,6 +277,7 @@ class _Left:
     systematic : mean square of what the versions of a run have in common, for each.
     """
 
+    criteria: Criteria
     stretches: list[np.ndarray]
     speeds: list[np.ndarray]
     plain: list[np.ndarray]
@@ -286,7 +286,7 @@ class _Left:
     @classmethod
     def of(cls, evidence: Evidence, columns, values: np.ndarray, joint: int) -> _Left:
         combination = np.append(-values, 1.0)
-        left = cls([], [], [], [])
+        left = cls(evidence.criteria, [], [], [], [])
         for run, joints in zip(evidence.runs, columns, strict=True):
             residual = run.fold([c @ combination for c in joints[joint]])
             if run.kind == "single":
@@ -316,5 +316,5 @@ class _Left:
         """The noise; the residual itself, where nothing tells them from each other."""
         root = float(np.sqrt(self.square))
         if self.stretches:
-            return measure_noise(self.stretches, self.speeds, root)
+            return measure_noise(self.stretches, self.speeds, self.criteria.noise, root)
         return flat_noise(root or 1.0)

@@ -7,14 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
+from dynident.criteria import NoiseCriteria
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, model_columns
 from dynident.evidence.noise_model import differences, inflation, systematic_square
 from dynident.fitting.estimate import Estimate
 from dynident.moments.replicated import Kind, solve
-
-_QUANTILE = float(stats.norm.ppf(0.99))
-_LARGEST = float(stats.chi2.ppf(0.99, 1))  # of a square over its mean, in the worst of cases
 
 
 @dataclass(frozen=True)
@@ -44,8 +42,8 @@ class HeldOut:
     runs : with predictions.
     noise_std : (n,) N m or N; None where the noise is unknown.
     ratio : (n,) systematic residual over noise (root mean squares); None likewise.
-    least_ratio : (n,) what that ratio is at least, with 99 % confidence, the uncertainty of the
-        parameters accounted for; None likewise.
+    least_ratio : (n,) what that ratio is at least, with the confidence of the criteria, the
+        uncertainty of the parameters accounted for; None likewise.
     inflation : (n,) variance of a mean of consecutive noise over that of white noise.
     rounding : (n,) mean square of the residual that encoders' steps leave; None where that was not
         looked at.
@@ -138,7 +136,7 @@ def on_blocks(evidence: Evidence, fitted: EvidenceFit) -> HeldOut:
     return _judged(evidence, tuple(runs), folded, doubt)
 
 
-def with_noise_of(judged: HeldOut, noise: HeldOut) -> HeldOut:
+def with_noise_of(judged: HeldOut, noise: HeldOut, criteria: NoiseCriteria) -> HeldOut:
     """Judge recordings that do not tell their own noise by the noise measured on others.
 
     What exceeds that noise is systematic. The mean square of noise alone varies by 2 s^4 over the
@@ -151,8 +149,9 @@ def with_noise_of(judged: HeldOut, noise: HeldOut) -> HeldOut:
     rows = sum(len(run.t) for run in judged.runs)
     excess = judged.residual_rms**2 - power
     error = power * np.sqrt(2.0 * noise.inflation / rows)
+    quantile = float(stats.norm.ppf(criteria.confidence))
     ratio, least = (
-        np.sqrt(np.clip(x, 0.0, None) / safe) for x in (excess, excess - _QUANTILE * error)
+        np.sqrt(np.clip(x, 0.0, None) / safe) for x in (excess, excess - quantile * error)
     )
     return replace(
         judged,
@@ -169,7 +168,7 @@ def _doubt(columns: np.ndarray, fitted: EvidenceFit | Estimate) -> float:
     return float(np.mean(np.sum((used @ fitted.covariance) * used, axis=1)))
 
 
-def _variance(residual: np.ndarray, kind: Kind) -> float:
+def _variance(residual: np.ndarray, kind: Kind, criteria: NoiseCriteria) -> float:
     """Variance of `systematic_square` (P, S), by the noise alone: what is missing is no chance.
 
     With noise of variance s^2, which may change in time, and what the versions have in common
@@ -185,7 +184,8 @@ def _variance(residual: np.ndarray, kind: Kind) -> float:
     mixed = max(float(np.mean(common**2 * local)) - fourth / count, 0.0)
     per_instant = 2.0 * fourth / max(count * (count - 1), 1) + 4.0 * mixed / count
     rows = list(noise)
-    return per_instant * max(inflation(rows), inflation(rows, power=2)) / residual.shape[1]
+    grown = max(inflation(rows, criteria), inflation(rows, criteria, power=2))
+    return per_instant * grown / residual.shape[1]
 
 
 def _judged(
@@ -202,7 +202,7 @@ def _judged(
     doubt : mean square of the prediction's error that the parameters' covariance stands for, of
         each run, (n,).
     """
-    n = runs[0].measured.shape[1]
+    n, criteria = runs[0].measured.shape[1], evidence.criteria.noise
     pairs: list[tuple[Kind, np.ndarray]] = [
         (run.kind, e) for run, e in zip(evidence.runs, folded, strict=True) if run.kind != "single"
     ]
@@ -213,11 +213,15 @@ def _judged(
     sizes = np.array([e.shape[1] for _, e in pairs])
     squares = [[systematic_square(e[..., j], kind) for j in range(n)] for kind, e in pairs]
     excess = np.average(squares, axis=0, weights=sizes)
-    spread = np.array([[_variance(e[..., j], kind) for j in range(n)] for kind, e in pairs])
+    spread = np.array(
+        [[_variance(e[..., j], kind, criteria) for j in range(n)] for kind, e in pairs]
+    )
     error = np.sqrt((sizes**2 @ spread) / sizes.sum() ** 2)
-    doubtful = _LARGEST * np.average(doubt, axis=0, weights=[e.shape[1] for e in folded])
-    least = excess - _QUANTILE * error - doubtful
+    # Of a square over its mean, in the worst of cases.
+    largest = float(stats.chi2.ppf(criteria.confidence, 1))
+    doubtful = largest * np.average(doubt, axis=0, weights=[e.shape[1] for e in folded])
+    least = excess - float(stats.norm.ppf(criteria.confidence)) * error - doubtful
     safe = np.where(power > 0, power, 1.0)
     ratio, at_least = (np.sqrt(np.clip(x, 0.0, None) / safe) for x in (excess, least))
-    grown = np.array([inflation([row for d in ds for row in d]) for ds in noise])
+    grown = np.array([inflation([row for d in ds for row in d], criteria) for ds in noise])
     return HeldOut(runs, np.sqrt(power), ratio, at_least, grown)

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy import stats
 
+from dynident.criteria import DEFAULTS, MapCriteria
 from dynident.evidence.held_out import HeldOut
 from dynident.model import Model
 from dynident.robot import Robot
 
-BINS = 24
-HARMONICS = np.arange(1, 61)
-"""Cycles per revolution (or per 2 pi metres) at which the residual is looked at."""
-
-_LEVEL = 1e-3  # of the tests behind a sentence
-_SHARE = 0.5  # of a map's variance that a shape must explain to be named
+Space = Literal["linear", "root"]
+"""In what classes of a quantity are of equal width."""
 
 
 @dataclass(frozen=True)
@@ -97,19 +95,26 @@ _SHAPES: dict[str, tuple[_Shape, ...]] = {
 }
 
 
-def residual_maps(model: Model, before: HeldOut, after: HeldOut) -> tuple[ResidualMap, ...]:
+def residual_maps(
+    model: Model, before: HeldOut, after: HeldOut, criteria: MapCriteria = DEFAULTS.maps
+) -> tuple[ResidualMap, ...]:
     """Residual maps of every joint on held-out data.
 
     Parameters
     ----------
     model : as given: what its effects can fit is cleared away before a shape is named.
     before, after : of the model as given and of the final one, on the same recordings.
+    criteria : when a map shows something.
     """
     joints = range(model.robot.n)
-    return tuple(one for joint in joints for one in _of_joint(model, joint, before, after))
+    return tuple(
+        one for joint in joints for one in _of_joint(model, joint, before, after, criteria)
+    )
 
 
-def _of_joint(model: Model, j: int, before: HeldOut, after: HeldOut) -> Iterator[ResidualMap]:
+def _of_joint(
+    model: Model, j: int, before: HeldOut, after: HeldOut, criteria: MapCriteria
+) -> Iterator[ResidualMap]:
     robot = model.robot
     fitted = {e.name for e in model.effects if e.joint == robot.names[j]}
     old = np.concatenate([run.residual[:, j] for run in before.runs])
@@ -125,13 +130,14 @@ def _of_joint(model: Model, j: int, before: HeldOut, after: HeldOut) -> Iterator
     }
     for against, (unit, parts) in quantities.items():
         x = np.concatenate(parts)
-        at, means, count = _binned(x, np.column_stack([old, new]), fine=against == "velocity")
+        space: Space = "root" if against == "velocity" else "linear"
+        at, means, count = _binned(x, np.column_stack([old, new]), space, criteria)
         if len(at) < 4:
             continue
         spread = np.sqrt(before.inflation[j] / count)
-        band = np.full(len(at), np.nan) if noise is None else 2.0 * noise * spread
+        band = np.full(len(at), np.nan) if noise is None else criteria.band * noise * spread
         sigma = (noise if noise is not None else float(np.std(old))) * spread
-        sentence = _sentence(against, at, means[:, 0], sigma, fitted)
+        sentence = _sentence(against, at, (means[:, 0], sigma), fitted, criteria)
         yield ResidualMap(
             robot.names[j],
             robot.torque_units[j],
@@ -143,44 +149,50 @@ def _of_joint(model: Model, j: int, before: HeldOut, after: HeldOut) -> Iterator
             band,
             sentence,
         )
-    yield _spectrum(robot, j, before, old, new, noise)
+    yield _spectrum(robot, j, before, (old, new), noise, criteria)
 
 
 def _binned(
-    x: np.ndarray, y: np.ndarray, *, fine: bool
+    x: np.ndarray, y: np.ndarray, space: Space, criteria: MapCriteria
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Centres, means and counts in bins that hold at least ten samples.
+    """Centres, means and counts in bins that hold enough samples.
 
-    Of equal width; or, if `fine`, of equal width in the root of abs(x), finer towards zero, where
+    Of equal width in x; or, with `space` "root", in the root of abs(x): finer towards zero, where
     friction does what tells one kind from another.
     """
-    low, high = np.quantile(x, [0.002, 0.998])
+    low, high = np.quantile(x, [criteria.left_out, 1.0 - criteria.left_out])
     if not high > low:
         return np.zeros(0), np.zeros((0, y.shape[1])), np.zeros(0)
-    if fine:
+    bins = criteria.bins
+    if space == "root":
         start, stop = np.sign(low) * np.sqrt(abs(low)), np.sign(high) * np.sqrt(abs(high))
-        roots = np.linspace(start, stop, BINS + 1)
+        roots = np.linspace(start, stop, bins + 1)
         edges = np.sign(roots) * roots**2
     else:
-        edges = np.linspace(low, high, BINS + 1)
-    bins = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, BINS - 1)
-    counts = np.bincount(bins, minlength=BINS)
-    kept = counts >= 10
+        edges = np.linspace(low, high, bins + 1)
+    inside = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, bins - 1)
+    counts = np.bincount(inside, minlength=bins)
+    kept = counts >= criteria.samples_per_bin
     safe = np.maximum(counts, 1)
-    at = np.bincount(bins, weights=x, minlength=BINS) / safe
-    means = np.column_stack([np.bincount(bins, weights=c, minlength=BINS) / safe for c in y.T])
+    at = np.bincount(inside, weights=x, minlength=bins) / safe
+    means = np.column_stack([np.bincount(inside, weights=c, minlength=bins) / safe for c in y.T])
     return at[kept], means[kept], counts[kept]
 
 
 def _sentence(
-    against: str, at: np.ndarray, mean: np.ndarray, sigma: np.ndarray, fitted: set[str]
+    against: str,
+    at: np.ndarray,
+    seen_with_sigma: tuple[np.ndarray, np.ndarray],
+    fitted: set[str],
+    criteria: MapCriteria,
 ) -> str:
     """The shape that a map shows, if it shows one beyond the noise."""
+    mean, sigma = seen_with_sigma
     if not np.all(sigma > 0):
         return ""
     weight = 1.0 / sigma
     power = float(np.sum((mean * weight) ** 2))
-    if stats.chi2.sf(power, len(at)) > _LEVEL:
+    if stats.chi2.sf(power, len(at)) > criteria.level:
         return ""
     scale = float(np.abs(at).max()) or 1.0
     shapes = _SHAPES[against]
@@ -197,7 +209,7 @@ def _sentence(
         explained = float(column @ seen) ** 2 / (norm * power) if norm > 0 else 0.0
         if explained > share:
             best, share = shape.words, explained
-    return f"{best} ({100 * share:.0f} % of what is seen here)" if share >= _SHARE else ""
+    return f"{best} ({100 * share:.0f} % of what is seen here)" if share >= criteria.share else ""
 
 
 def _clearing(columns: np.ndarray) -> np.ndarray:
@@ -207,29 +219,40 @@ def _clearing(columns: np.ndarray) -> np.ndarray:
 
 
 def _spectrum(
-    robot: Robot, j: int, before: HeldOut, old: np.ndarray, new: np.ndarray, noise: float | None
+    robot: Robot,
+    j: int,
+    before: HeldOut,
+    residuals: tuple[np.ndarray, np.ndarray],
+    noise: float | None,
+    criteria: MapCriteria,
 ) -> ResidualMap:
+    """Amplitudes of the residuals before and after, (T,) each, by cycles per revolution."""
+    harmonics = np.arange(1, criteria.harmonics + 1)
     q = np.concatenate([run.q[:, j] for run in before.runs])
-    waves = np.exp(-1j * np.outer(HARMONICS, q))
-    amplitudes = [2.0 * np.abs(waves @ (e - e.mean())) / len(q) for e in (old, new)]
-    size = len(HARMONICS)
+    waves = np.exp(-1j * np.outer(harmonics, q))
+    amplitudes = [2.0 * np.abs(waves @ (e - e.mean())) / len(q) for e in residuals]
+    size = len(harmonics)
     level = np.full(size, np.nan)
     sentence = ""
     if noise is not None:
         # Each amplitude is Rayleigh: one in a thousand of all lines exceeds this by chance.
-        level[:] = noise * np.sqrt(4.0 * np.log(size / _LEVEL) * before.inflation[j] / len(q))
+        level[:] = noise * np.sqrt(
+            4.0 * np.log(size / criteria.level) * before.inflation[j] / len(q)
+        )
         peak = int(np.argmax(amplitudes[0]))
         others = np.delete(amplitudes[0], [i for i in (peak - 1, peak, peak + 1) if 0 <= i < size])
-        stands_out = amplitudes[0][peak] > max(level[peak], 3.0 * float(np.median(others)))
-        if stands_out and HARMONICS[peak] > 2:
-            sentence = f"a line at {HARMONICS[peak]} cycles per revolution: ripple"
+        stands_out = amplitudes[0][peak] > max(
+            level[peak], criteria.line * float(np.median(others))
+        )
+        if stands_out and harmonics[peak] >= criteria.slowest_ripple:
+            sentence = f"a line at {harmonics[peak]} cycles per revolution: ripple"
     unit = "cycles per revolution" if robot.kinds[j] == "revolute" else "cycles per 2 pi m"
     return ResidualMap(
         robot.names[j],
         robot.torque_units[j],
         "cycles per revolution",
         unit,
-        HARMONICS.astype(float),
+        harmonics.astype(float),
         amplitudes[0],
         amplitudes[1],
         level,

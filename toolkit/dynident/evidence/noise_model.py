@@ -11,14 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_toeplitz
 
+from dynident.criteria import NoiseCriteria
 from dynident.moments.replicated import Kind
-
-ORDER = 8
-"""Order of the autoregression that describes the colour of the noise."""
-
-_BINS = 10
-_RIDGE = 1e-3  # share of white noise assumed, so that a band without power is not blown up
-_SCALE_LIMITS = (0.3, 4.0)  # of the local standard deviation over the overall one
 
 
 def differences(residual: np.ndarray, kind: Kind) -> np.ndarray:
@@ -59,7 +53,7 @@ class NoiseModel:
     std : N m or N, over all speeds.
     speeds : (B,) rad/s or m/s, absolute, at which `scales` are given.
     scales : (B,) local standard deviation over `std`.
-    colour : (ORDER + 1,) whitening filter, for noise divided by its local standard deviation.
+    colour : (order + 1,) whitening filter, for noise divided by its local standard deviation.
     """
 
     std: float
@@ -73,7 +67,7 @@ class NoiseModel:
         Parameters
         ----------
         signals : (T, k)
-            In the order of time; the first `ORDER` rows come out unreliable.
+            In the order of time; the first rows, as many as the order, come out unreliable.
         speed : (T,)
             Velocity of the joint, rad/s or m/s.
         """
@@ -92,7 +86,10 @@ def flat_noise(std: float) -> NoiseModel:
 
 
 def measure_noise(
-    noise: list[np.ndarray], speed: list[np.ndarray], misfit: float = 0.0
+    noise: list[np.ndarray],
+    speed: list[np.ndarray],
+    criteria: NoiseCriteria,
+    misfit: float = 0.0,
 ) -> NoiseModel:
     """Describe the noise of one joint.
 
@@ -104,6 +101,8 @@ def measure_noise(
     ----------
     noise, speed : lists of (T,)
         Stretches of noise in the order of time, and the joint's velocity in them.
+    criteria : NoiseCriteria
+        Order, classes of speed, limits.
     misfit : N m or N
         Root mean square of the systematic residual.
     """
@@ -111,37 +110,42 @@ def measure_noise(
     std = float(np.sqrt(np.mean(everything**2)))
     if not std > 0:
         return flat_noise(misfit or 1.0)
-    edges = np.quantile(speeds, np.linspace(0.0, 1.0, _BINS + 1))
-    bins = np.clip(np.searchsorted(edges, speeds, side="right") - 1, 0, _BINS - 1)
+    count = criteria.speed_bins
+    edges = np.quantile(speeds, np.linspace(0.0, 1.0, count + 1))
+    bins = np.clip(np.searchsorted(edges, speeds, side="right") - 1, 0, count - 1)
     centres, scales = [], []
-    for b in range(_BINS):
+    for b in range(count):
         inside = bins == b
-        if inside.sum() >= 30:
+        if inside.sum() >= criteria.samples_per_bin:
             centres.append(speeds[inside].mean())
             scales.append(np.sqrt(np.mean(everything[inside] ** 2)) / std)
     if not centres:
         centres, scales = [0.0], [1.0]
     more = (misfit / std) ** 2
-    at, limited = np.array(centres), np.sqrt(np.clip(scales, *_SCALE_LIMITS) ** 2 + more)
+    at = np.array(centres)
+    within = np.clip(scales, criteria.least_scale, criteria.largest_scale)
+    limited = np.sqrt(within**2 + more)
     scaled = [
         stretch / (np.interp(np.abs(v), at, limited) * std)
         for stretch, v in zip(noise, speed, strict=True)
     ]
-    return NoiseModel(std, at, limited, _whitening_filter(scaled, more / (1.0 + more)))
+    return NoiseModel(std, at, limited, _whitening_filter(scaled, more / (1.0 + more), criteria))
 
 
-def _whitening_filter(stretches: list[np.ndarray], white: float) -> np.ndarray:
+def _whitening_filter(
+    stretches: list[np.ndarray], white: float, criteria: NoiseCriteria
+) -> np.ndarray:
     """Yule-Walker autoregression over several stretches, scaled to innovations of variance one.
 
     `white` is the share of the variance that is added as white noise.
     """
     longest = max(len(stretch) for stretch in stretches)
-    order = min(ORDER, max(longest // 20, 0))
+    order = min(criteria.order, max(longest // 20, 0))
     total = sum(len(stretch) for stretch in stretches)
     correlation = np.array(
         [sum(float(x[: len(x) - k] @ x[k:]) for x in stretches) / total for k in range(order + 1)]
     )
-    correlation[0] = correlation[0] * (1.0 + _RIDGE) + white
+    correlation[0] = correlation[0] * (1.0 + criteria.white_share) + white
     if order == 0:
         return np.array([1.0]) / np.sqrt(correlation[0])
     coefficients = solve_toeplitz(correlation[:-1], correlation[1:])
@@ -149,7 +153,7 @@ def _whitening_filter(stretches: list[np.ndarray], white: float) -> np.ndarray:
     return np.concatenate([[1.0], -coefficients]) / np.sqrt(max(innovation, 1e-12))
 
 
-def inflation(noise: list[np.ndarray], power: int = 1) -> float:
+def inflation(noise: list[np.ndarray], criteria: NoiseCriteria, power: int = 1) -> float:
     """Variance of a mean of consecutive noise over that of independent noise, at least one.
 
     With `power` 2, of a mean of products of two such noises.
@@ -157,6 +161,6 @@ def inflation(noise: list[np.ndarray], power: int = 1) -> float:
     total = sum(float(x @ x) for x in noise)
     if not total > 0:
         return 1.0
-    lags = range(1, 11)
+    lags = range(1, criteria.lags + 1)
     correlations = [sum(float(x[:-k] @ x[k:]) for x in noise if len(x) > k) / total for k in lags]
     return max(1.0, 1.0 + 2.0 * sum(c**power for c in correlations))

@@ -13,7 +13,8 @@ from typing import Literal
 
 import numpy as np
 
-from dynident.evidence.noise_model import ORDER, NoiseModel
+from dynident.criteria import DEFAULTS, NoiseCriteria
+from dynident.evidence.noise_model import NoiseModel
 from dynident.fitting.sampling import Sampled, flagged, sample
 from dynident.moments.replicated import Kind, Moments, moments
 from dynident.recording import (
@@ -25,14 +26,6 @@ from dynident.recording import (
     require_torque,
     uniform,
 )
-
-COPIES = 4
-"""Noisy copies of each recording where the noise is stated and nothing repeats."""
-
-_COPIES_BESIDE = 2  # of them, beside a simulated motion
-
-BLOCKS = 20
-"""Blocks of time for cross-validation, over all recordings, at least three in each."""
 
 Signals = list[np.ndarray]
 """One array per version of a recording, (T, J, k): rows, joints of the effect, columns."""
@@ -116,14 +109,21 @@ class Run:
         return moments(left, right, self.edges, "single" if plain else self.kind)
 
 
-def gather(dataset: Dataset, seed: int = 0, *, simulated: Dataset | None = None) -> tuple[Run, ...]:
+def gather(
+    dataset: Dataset,
+    criteria: NoiseCriteria = DEFAULTS.noise,
+    *,
+    simulated: Dataset | None = None,
+    seed: int = 0,
+) -> tuple[Run, ...]:
     """Arrange the recordings of a dataset in versions; see the module.
 
     Parameters
     ----------
     dataset : the recordings.
-    seed : of the noise on the copies.
+    criteria : copies, and blocks of time.
     simulated : the motion of each recording, simulated, on the same time stamps.
+    seed : of the noise on the copies.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def gather(dataset: Dataset, seed: int = 0, *, simulated: Dataset | None = None)
         torque at all.
     """
     require_torque(dataset.recordings)
-    per_run = max(3, -(-BLOCKS // len(dataset.recordings)))
+    per_run = max(criteria.blocks_per_recording, -(-criteria.blocks // len(dataset.recordings)))
     runs = []
     streams = np.random.default_rng(seed).spawn(len(dataset.recordings))
     repeats = any(r.period for r in dataset.recordings)
@@ -140,17 +140,17 @@ def gather(dataset: Dataset, seed: int = 0, *, simulated: Dataset | None = None)
         # Noise on top would hide the signs of a jittered clock: straighten it before.
         recording = uniform(recording)
         first = sample(recording, dataset.filter)
-        usable = np.arange(ORDER, len(first.t))
+        usable = np.arange(criteria.order, len(first.t))
         if recording.period:
             where = recording.where
             found = periods(len(usable), first.rate_hz, recording.period, where)
-            require_repetition(first.q[ORDER:], found, where)
-            index = ORDER + found.index
+            require_repetition(first.q[criteria.order :], found, where)
+            index = criteria.order + found.index
             kind: Kind = "repeated"
             replicates: tuple[Sampled, ...] = (first,)
         elif dataset.noise and not repeats:
             # Where columns come from elsewhere, the copies tell the size of the noise only.
-            count = COPIES if simulated is None else _COPIES_BESIDE
+            count = criteria.copies if simulated is None else criteria.copies_beside_simulation
             copies = (noisy(recording, dataset.noise, stream) for _ in range(count))
             replicates = (first, *(sample(copy, dataset.filter) for copy in copies))
             index, kind = np.tile(usable, (len(replicates), 1)), "noise_augmented"

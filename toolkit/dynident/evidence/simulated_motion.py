@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dynident.closed_loop import Controller
+from dynident.criteria import DEFAULTS, Criteria
 from dynident.effects import Effect
 from dynident.errors import DynidentError
 from dynident.evidence.columns import Evidence
@@ -24,8 +25,6 @@ from dynident.fitting.instrumental import IV, SimulatedLoop
 from dynident.fitting.instrumental.source import Guess
 from dynident.model import Model
 from dynident.recording import Dataset
-
-_ROUNDS, _TOLERANCE = 6, 0.03  # of the first fit: instruments need not be those of the best fit
 
 
 @dataclass(eq=False)
@@ -94,6 +93,7 @@ def motion_of_loop(
     dataset: Dataset,
     controller: Controller | None,
     progress: Callable[[str], None] = lambda _: None,
+    criteria: Criteria = DEFAULTS,
 ) -> SimulatedMotion:
     """Simulate a model, fitted with the simulation's instruments, in its recorded loop.
 
@@ -102,7 +102,8 @@ def motion_of_loop(
     model : as given.
     dataset : recordings to fit.
     controller : of their loop; None where it is not known.
-    tell : told what is being done, for a progress display.
+    progress : is called with what is being done, for a display.
+    criteria : rounds and tolerance of the fit, copies and blocks of the recordings.
 
     Returns
     -------
@@ -115,13 +116,18 @@ def motion_of_loop(
         note = "The loop is not simulated for instruments: not every recording has q_ref."
         return SimulatedMotion(notes=(note,))
 
-    def told(what: str, done: float, total: float) -> None:
+    def report(what: str, done: float, total: float) -> None:
         progress(f"{what}, {100 * done / total:.0f} %" if total else what)
 
-    method = IV(SimulatedLoop(controller), rounds=_ROUNDS, tolerance=_TOLERANCE, progress=told)
+    method = IV(
+        SimulatedLoop(controller),
+        rounds=criteria.fit.instrument_rounds,
+        tolerance=criteria.fit.instrument_tolerance,
+        progress=report,
+    )
     try:
         found = method.iterated(model, dataset)
-        runs = gather(found.source.measured, simulated=found.instruments)
+        runs = gather(found.source.measured, criteria.noise, simulated=found.instruments)
     except DynidentError as error:
         return SimulatedMotion(notes=(f"The loop cannot be simulated for instruments: {error}",))
     notes = found.source.notes

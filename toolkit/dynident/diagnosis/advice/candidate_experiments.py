@@ -8,16 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from dynident.closed_loop.trajectories import UNLIMITED, Fourier
+from dynident.criteria import DEFAULTS, Criteria
 from dynident.effects import Block, Effect
 from dynident.evidence.columns import Evidence
 from dynident.model import Model
 
 _EVERY = 5  # samples: rows that are compared
-_SESSION = 600.0  # s, the shortest session that is advised
-SLOW = {"revolute": 0.1, "prismatic": 0.01}
-"""Speed, rad/s or m/s, below which a motion is called slow."""
-SHARE = 0.8
-"""Share of a joint's limits that is advised."""
 _WIDE, _FAST, _UNHURRIED = (10.0, 5), (4.0, 8), (20.0, 5)  # period in s, harmonics
 _SAMPLES = 1000
 _DEPENDENT = 1e-7  # of the largest singular value of scaled columns
@@ -40,11 +36,6 @@ class Recorded:
     acceleration: np.ndarray
     torque: np.ndarray
     span: float
-
-    @property
-    def longer(self) -> float:
-        """Length of a session that would show what this one does not, s."""
-        return max(_SESSION, 3.0 * self.span)
 
     @classmethod
     def of(cls, evidence: Evidence) -> Recorded:
@@ -108,12 +99,14 @@ class CandidateExperiments:
     values : (p,) its parameters.
     recorded : what has been recorded.
     excluded : labels of effects of the model whose columns do not count as the model's.
+    criteria : what is advised.
     """
 
     model: Model
     values: np.ndarray
     recorded: Recorded
     excluded: tuple[str, ...] = ()
+    criteria: Criteria = DEFAULTS
     _blocks: dict[Motion, Block] = field(default_factory=dict)
     _blocks_ready: dict[Hashable, Block] = field(default_factory=dict)
     _columns: dict[Motion, np.ndarray] = field(default_factory=dict)
@@ -183,20 +176,33 @@ class CandidateExperiments:
         """Columns of an effect in an experiment, (rows, k)."""
         return np.concatenate([self._of_effect(effect, motion) for motion in trial.motions])
 
+    @property
+    def longer(self) -> float:
+        """Length of a session that would show what the recorded one does not, s."""
+        criteria = self.criteria.advice
+        return max(criteria.session, criteria.longer * self.recorded.span)
+
+    def slow(self, joint: int) -> float:
+        """Speed below which a joint moves slowly, rad/s or m/s."""
+        prismatic = self.model.robot.kinds[joint] == "prismatic"
+        criteria = self.criteria.advice
+        return criteria.slow_prismatic if prismatic else criteria.slow_revolute
+
     def pace(self, joint: int) -> float:
         """Speed, rad/s or m/s, that is advised as the highest of a joint."""
         limit = self.model.robot.joints[joint].velocity
         if np.isfinite(limit):
-            return SHARE * float(limit)
+            return self.criteria.advice.limits_share * float(limit)
         usual = UNLIMITED[self.model.robot.kinds[joint]][1]
-        return max(usual, 1.5 * float(self.recorded.speed[joint]))
+        return max(usual, self.criteria.advice.faster * float(self.recorded.speed[joint]))
 
     def reach(self, joint: int) -> tuple[float, float]:
         """Positions, rad or m, between which a joint is advised to move."""
         one = self.model.robot.joints[joint]
         if np.isfinite(one.lower) and np.isfinite(one.upper):
             middle, half = (one.lower + one.upper) / 2, (one.upper - one.lower) / 2
-            return float(middle - SHARE * half), float(middle + SHARE * half)
+            half = self.criteria.advice.limits_share * half
+            return float(middle - half), float(middle + half)
         usual = UNLIMITED[self.model.robot.kinds[joint]][0]
         lower, upper = float(self.recorded.lower[joint]), float(self.recorded.upper[joint])
         return (
@@ -238,14 +244,14 @@ class CandidateExperiments:
                 (period, harmonics), seed = _FAST, 2
             if name == "slow":
                 (period, harmonics), seed = _UNHURRIED, 3
-                speed = [min(v, SLOW[kind]) for v, kind in zip(speed, robot.kinds, strict=True)]
+                speed = [min(v, self.slow(j)) for j, v in enumerate(speed)]
             path = Fourier.random(robot, period, seed, harmonics, speed=speed)
             if joint is not None:
                 moves = np.array([one == joint for one in robot.names])[:, None]
                 path = replace(path, sine=path.sine * moves, cosine=path.cosine * moves)
             t = np.arange(_SAMPLES) * (period / _SAMPLES)
             q, v, a = path.at(t)
-            late = self.recorded.longer * float(name == "late")
+            late = self.longer * float(name == "late")
             loaded = name == "loaded"
             self._blocks[motion] = self.model.block(t + late, q, v, a, carries_payload=loaded)
         return self._blocks[motion]

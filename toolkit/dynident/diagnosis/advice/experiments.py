@@ -8,23 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynident.diagnosis.advice.candidate_experiments import (
-    SLOW,
     CandidateExperiment,
     CandidateExperiments,
     Recorded,
 )
-from dynident.diagnosis.search.scoring import NOT_IDENTIFIABLE
 from dynident.effects import Effect
 from dynident.errors import DynidentError
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.model import Model
-
-_CLEARLY = 0.05
-"""Share of an effect's torque that another must leave, for an experiment to be advised."""
-_MORE = 1.1  # times what was recorded is worth saying
-_TINY = {"revolute": "0.01 rad", "prismatic": "1 mm"}
-_NEARLY = 0.8  # of the best: a simpler experiment as good as this is advised instead
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +33,10 @@ class Adviser:
     @classmethod
     def of(cls, evidence: Evidence, fitted: EvidenceFit) -> Adviser:
         """Return the adviser for a model as it fits the recordings of the evidence."""
-        return cls(CandidateExperiments(fitted.model, fitted.values, Recorded.of(evidence)))
+        recorded = Recorded.of(evidence)
+        return cls(
+            CandidateExperiments(fitted.model, fitted.values, recorded, criteria=evidence.criteria)
+        )
 
     def revealing(self, effect: Effect) -> str:
         """Say which experiment would show an effect that the recordings do not show.
@@ -53,7 +48,8 @@ class Adviser:
             # What depends on the past is no part of a model that sees the instant only.
             return self._by_kind(effect)
         try:
-            not_identifiable = self.trials.left(effect) < NOT_IDENTIFIABLE
+            least = self.trials.criteria.gates.not_identifiable
+            not_identifiable = self.trials.left(effect) < least
         except DynidentError:
             return effect.advice
         if not not_identifiable:
@@ -105,7 +101,7 @@ class Adviser:
         values: Sequence[float],
         others: Sequence[Effect],
     ) -> _Separation | None:
-        found = []
+        found, criteria = [], self.trials.criteria.advice
         for trial in self._candidates((first, *others)):
             try:
                 pairs = [trials.difference(first, values, one, trial) for one in others]
@@ -113,10 +109,10 @@ class Adviser:
                 continue
             torque, rest = min(pairs, key=lambda pair: float(np.linalg.norm(pair[1])))
             size, left = float(np.linalg.norm(torque)), float(np.linalg.norm(rest))
-            if left > _CLEARLY * size > 0:
+            if left > criteria.clearly * size > 0:
                 found.append(_Separation(trial, left, int(np.argmax(rest)), float(rest.max())))
         most = max((one.size for one in found), default=0.0)
-        return next((one for one in found if one.size >= _NEARLY * most), None)
+        return next((one for one in found if one.size >= criteria.nearly * most), None)
 
     def _candidates(self, effects: Sequence[Effect]) -> list[CandidateExperiment]:
         """Experiments in which effects may differ, the simpler ones first."""
@@ -144,11 +140,11 @@ class Adviser:
             still = "the other joints" if k == j else names[j]
             return f"move {names[k]} with {still} still, {self._up_to(k)}"
         if trial.kind == "fast":
-            accelerate = f"beyond {1.5 * self.trials.recorded.acceleration[j]:.2g} {unit}/s^2"
+            accelerate = f"beyond {self._faster(j):.2g} {unit}/s^2"
             return f"move all joints with {names[j]} {self._up_to(j)} and accelerating {accelerate}"
         if trial.kind == "slow":
-            slow = SLOW[self.trials.model.robot.kinds[j]]
-            return f"move all joints slowly, {names[j]} below {slow:g} {unit}/s, to and fro"
+            slow = f"{self.trials.slow(j):g} {unit}/s"
+            return f"move all joints slowly, {names[j]} below {slow}, to and fro"
         if trial.kind in ("session", "payload"):
             return self._by_kind(first, trial.kind)
         return f"move all joints at once, {names[j]} {self._from_to(j)}, {self._up_to(j)}"
@@ -160,7 +156,7 @@ class Adviser:
         if kind == "payload":
             return "record the same motion with the payload and without, and say which is which"
         if kind == "session":
-            later, before = trials.recorded.longer / 60, trials.recorded.span / 60
+            later, before = trials.longer / 60, trials.recorded.span / 60
             return (
                 f"repeat one recording at the start of a session and {later:.0f} min later "
                 f"(recorded: {before:.2g} min)"
@@ -175,18 +171,17 @@ class Adviser:
             k = self._index(effect.source)
             return f"move {effect.source} with {name} still, {self._up_to(k)}"
         if kind == "slow":
-            slow = SLOW[trials.model.robot.kinds[j]]
-            return f"sweep {name} slowly, below {slow:g} {unit}/s, {self._from_to(j)} and back"
+            slow = f"{trials.slow(j):g} {unit}/s"
+            return f"sweep {name} slowly, below {slow}, {self._from_to(j)} and back"
         if kind == "reversals":
             return f"let {name} change direction many times, {self._up_to(j)}"
         if kind == "tiny reversals":
-            return f"move {name} to and fro by less than {_TINY[trials.model.robot.kinds[j]]}"
+            return f"move {name} to and fro by less than {self._tiny(j)}"
         if kind == "position range":
             return f"move {name} slowly {self._from_to(j)}, the other joints in several poses"
         if kind == "acceleration":
-            beyond = 1.5 * recorded.acceleration[j]
             return (
-                f"accelerate {name} beyond {beyond:.2g} {unit}/s^2 (recorded: up to "
+                f"accelerate {name} beyond {self._faster(j):.2g} {unit}/s^2 (recorded: up to "
                 f"{recorded.acceleration[j]:.2g}), the other joints moving too"
             )
         if kind == "load":
@@ -209,19 +204,29 @@ class Adviser:
             j = int(np.argmax(gains))
             return f"move all joints slowly through many poses, {robot.names[j]} {self._from_to(j)}"
         if kind == "acceleration":
-            most = 1.5 * recorded.acceleration
             each = ", ".join(
-                f"{name} {a:.2g} {self._unit(j)}/s^2"
-                for j, (name, a) in enumerate(zip(robot.names, most, strict=True))
+                f"{name} {self._faster(j):.2g} {self._unit(j)}/s^2"
+                for j, name in enumerate(robot.names)
             )
             return f"move all joints faster, accelerating beyond: {each}"
         return effect.advice
+
+    def _faster(self, j: int) -> float:
+        """An acceleration above the recorded one, rad/s^2 or m/s^2."""
+        return self.trials.criteria.advice.faster * float(self.trials.recorded.acceleration[j])
+
+    def _tiny(self, j: int) -> str:
+        """A motion to and fro that is tiny, with its unit."""
+        criteria = self.trials.criteria.advice
+        if self.trials.model.robot.kinds[j] == "prismatic":
+            return f"{1000 * criteria.tiny_prismatic:g} mm"
+        return f"{criteria.tiny_revolute:g} rad"
 
     def _up_to(self, j: int) -> str:
         """A speed above the recorded one where the joint can go faster."""
         pace, before = self.trials.pace(j), float(self.trials.recorded.speed[j])
         unit = self._unit(j)
-        if pace > _MORE * before:
+        if pace > self.trials.criteria.advice.more * before:
             return f"at speeds up to {pace:.2g} {unit}/s (recorded: up to {before:.2g})"
         return f"at speeds from very slow up to {before:.2g} {unit}/s"
 
@@ -229,7 +234,7 @@ class Adviser:
         recorded, unit = self.trials.recorded, self._unit(j)
         low, high = self.trials.reach(j)
         before = recorded.upper[j] - recorded.lower[j]
-        if high - low > _MORE * before:
+        if high - low > self.trials.criteria.advice.more * before:
             was = f"{recorded.lower[j]:.2g} to {recorded.upper[j]:.2g}"
             return f"from {low:.2g} to {high:.2g} {unit} (recorded: {was})"
         return f"from {recorded.lower[j]:.2g} to {recorded.upper[j]:.2g} {unit}"

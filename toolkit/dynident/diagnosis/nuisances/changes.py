@@ -11,17 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import lfilter, oaconvolve
+from scipy.stats import t as student
 
+from dynident.criteria import ContactCriteria, Criteria
 from dynident.effects import FRICTION_WIDTH
-from dynident.evidence.noise_model import ORDER, measure_noise
+from dynident.evidence.noise_model import measure_noise
 
-REACH = 4.0
-"""Widths on either side beyond which a bump is nothing."""
-
-_QUANTILES = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0)  # of speeds: noise is worst at rest
-_FEWEST = 40  # samples that show a scale
-_WHITE = 0.3  # of the noise's size, white: where filters leave nothing, nothing is to be found
-_CLIP = 3.0  # standard deviations beyond which a sample tells nothing of the noise
+QUARTER = 0.6745
+"""Median of the absolute value of a standard normal variable."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +55,9 @@ class Changes:
     of : the series.
     change : (P S,) what each repetition does not share with the others.
     still : (P S,) one over the noise's local standard deviation.
-    colour : (ORDER + 1,) whitening filter.
+    colour : (order + 1,) whitening filter.
     kept : (S,) instants to which the slow changes were fitted.
+    reach : widths on either side beyond which a pulse is nothing.
     """
 
     of: Repeated
@@ -67,6 +65,7 @@ class Changes:
     still: np.ndarray
     colour: np.ndarray
     kept: np.ndarray
+    reach: float
 
     def certainty(self, row: float, width: float) -> float:
         """Share of a bump's z value that is left for two doubts.
@@ -104,8 +103,8 @@ class Changes:
         (2, M) z value under Gaussian noise, and amplitude.
         """
         length = len(signal)
-        half = int(np.ceil(REACH * width))
-        around = np.round(rows).astype(int)[:, None] + np.arange(-half, half + 1 + ORDER)
+        half = int(np.ceil(self.reach * width))
+        around = np.round(rows).astype(int)[:, None] + np.arange(-half, half + len(self.colour))
         inside = (around >= 0) & (around < length)
         at = np.clip(around, 0, length - 1)
         pulse = np.exp(-(((around - rows[:, None]) / width) ** 2) / 2) * inside
@@ -118,7 +117,7 @@ class Changes:
 
 def scanned(one: Changes, width: float) -> np.ndarray:
     """The z value of `Changes.match` at every row, (P S,), by convolutions."""
-    half = int(np.ceil(REACH * width))
+    half = int(np.ceil(one.reach * width))
     pulse = np.exp(-((np.arange(-half, half + 1) / width) ** 2) / 2)
     white = np.asarray(lfilter(one.colour, [1.0], one.change * one.still))
     back = np.asarray(lfilter(one.colour, [1.0], white[::-1]))[::-1] * one.still
@@ -140,39 +139,42 @@ def _convolved(signal: np.ndarray, pulse: np.ndarray) -> np.ndarray:
     return oaconvolve(signal, pulse)[half : half + len(signal)]
 
 
-def changes_of(series: Sequence[Repeated], left_out: Sequence[np.ndarray]) -> list[Changes]:
+def changes_of(
+    series: Sequence[Repeated], left_out: Sequence[np.ndarray], criteria: Criteria
+) -> list[Changes]:
     """Differences of all series of one joint, with the noise that they have in common.
 
     `left_out` are the instants (S,) of each series that are no witnesses of the noise.
     """
+    own_criteria, order = criteria.contacts, criteria.noise.order
     kept = [~np.tile(out, len(s.t)) for s, out in zip(series, left_out, strict=True)]
-    changes = [_changes(s, ~out) for s, out in zip(series, left_out, strict=True)]
+    changes = [_changes(s, ~out, own_criteria) for s, out in zip(series, left_out, strict=True)]
     still = [np.ones(len(change)) for change in changes]
     # Noise follows the speed itself, or, once filtered, the least speed near by.
     for measure in (np.abs, _slowness):
         speeds = [measure(one.speed).ravel() for one in series]
         sizes = [np.abs(c * i) for c, i in zip(changes, still, strict=True)]
         # All rows: those left out may be the only ones that turn round, say.
-        at, scales = _scales(np.concatenate(sizes), np.concatenate(speeds))
+        at, scales = _scales(np.concatenate(sizes), np.concatenate(speeds), own_criteria)
         still = [i / np.interp(s, at, scales) for i, s in zip(still, speeds, strict=True)]
     stretches = []
     for change, own, keep in zip(changes, still, kept, strict=True):
-        clipped = np.clip(change * own, -_CLIP, _CLIP)
+        clipped = np.clip(change * own, -own_criteria.clip, own_criteria.clip)
         borders = np.flatnonzero(np.diff(keep)) + 1
         parts = zip(np.split(clipped, borders), np.split(keep, borders), strict=True)
-        stretches += [part for part, inside in parts if inside[0] and len(part) > 2 * ORDER]
+        stretches += [part for part, inside in parts if inside[0] and len(part) > 2 * order]
     # The scale is in `still` already: of this model only the colour is used.
     size = float(np.sqrt(np.mean(np.concatenate(stretches) ** 2)))
     no_speed = [np.zeros(len(part)) for part in stretches]
-    noise = measure_noise(stretches, no_speed, _WHITE * size)
+    noise = measure_noise(stretches, no_speed, criteria.noise, own_criteria.white_share * size)
     colour = noise.colour / (noise.std * noise.scales[0])
     return [
-        Changes(one, change, own, colour, ~out)
+        Changes(one, change, own, colour, ~out, own_criteria.reach)
         for one, change, own, out in zip(series, changes, still, left_out, strict=True)
     ]
 
 
-def _changes(one: Repeated, kept: np.ndarray) -> np.ndarray:
+def _changes(one: Repeated, kept: np.ndarray, criteria: ContactCriteria) -> np.ndarray:
     """What each repetition does not share with the others' mean, (P S,).
 
     Less a level and friction of its own, fitted to the instants `kept` (S,) so that bursts have
@@ -191,8 +193,8 @@ def _changes(one: Repeated, kept: np.ndarray) -> np.ndarray:
             usual = 1.4826 * float(np.median(np.abs(rest[kept])))
             size = np.abs(rest) / max(usual, 1e-300)
             # Huber's weights find the bulk; Tukey's then forget what is far from it.
-            huber = np.minimum(1.0, 1.345 / np.maximum(size, 1e-9))
-            tukey = np.maximum(1.0 - (size / 4.685) ** 2, 0.0) ** 2
+            huber = np.minimum(1.0, criteria.huber / np.maximum(size, 1e-9))
+            tukey = np.maximum(1.0 - (size / criteria.tukey) ** 2, 0.0) ** 2
             weight = kept * (huber if step < 4 else tukey)
         change[:] = rest
     return found.ravel()
@@ -211,16 +213,18 @@ def _slowness(speed: np.ndarray) -> np.ndarray:
     return np.where(turns, 0.0, np.abs(near).min(axis=0))
 
 
-def _scales(sizes: np.ndarray, slowness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _scales(
+    sizes: np.ndarray, slowness: np.ndarray, criteria: ContactCriteria
+) -> tuple[np.ndarray, np.ndarray]:
     """Speeds and the noise's standard deviation there, from the 90 % quantile of its size."""
     order = np.argsort(slowness, kind="stable")
-    edges = np.unique((np.array(_QUANTILES) * len(order)).astype(int))
+    edges = np.unique((np.array(criteria.speed_quantiles) * len(order)).astype(int))
     # Turning points are a kind of their own, be they many or few.
     turning = int(np.sum(slowness == 0.0))
     edges = np.unique([0, turning, *edges[edges > turning], len(order)])
     at, scales, start = [], [], 0
     for stop in edges[1:]:
-        if stop - start < _FEWEST and stop < len(order):
+        if stop - start < criteria.samples_per_scale and stop < len(order):
             continue
         rows = order[start:stop]
         at.append(float(slowness[rows].mean()))
@@ -228,3 +232,29 @@ def _scales(sizes: np.ndarray, slowness: np.ndarray) -> tuple[np.ndarray, np.nda
         start = stop
     least = 1e-3 * max(max(scales), 1e-300)
     return np.array(at), np.maximum(scales, least)
+
+
+# --- tails ---------------------------------------------------------------------------------------
+
+
+def degrees_of_freedom(z: np.ndarray, criteria: ContactCriteria) -> float:
+    """Degrees of freedom of Student's distribution with tails like these, at their heaviest."""
+    middle = max(float(np.median(z)), 1e-300)
+    degrees, tails = np.array(criteria.degrees), criteria.tails
+    quarter = student.ppf(0.75, degrees)
+    return min(
+        float(np.interp(-value / middle, -student.ppf(0.5 + q / 2, degrees) / quarter, degrees))
+        for q, value in zip(tails, np.quantile(z, tails), strict=True)
+        if (1 - q) * len(z) >= criteria.least_in_tail or q == tails[0]
+    )
+
+
+def chance_of(z: float, degrees: float, width: float) -> float:
+    """Probability of a value as large as z at one place.
+
+    A bump of many rows is a mean of so many samples, whose excess kurtosis falls with their number;
+    half of them count, because noise comes in flocks.
+    """
+    more = max(degrees - 4.0, 0.5) * max(1.0, width / 2)
+    wide = max(degrees, 4.0 + more) if width > 2 else degrees
+    return 2 * float(student.sf(z * student.ppf(0.75, wide) / QUARTER, wide))

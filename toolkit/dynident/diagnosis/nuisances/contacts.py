@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from dynident.criteria import ContactCriteria
 from dynident.diagnosis.nuisances.pulse_search import DisturbancePulse, find_contacts, without
 from dynident.diagnosis.result import Candidate, Step
-from dynident.diagnosis.verdict import RESOLUTION
 from dynident.effects import Effect, catalogue
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
@@ -87,7 +87,10 @@ class Contacts:
         again_held = ()
         if self.held is not None and self.pulses_held:
             again_held = find_contacts(self.held, fitted)
-        pulses, pulses_held = _common(again, self.pulses), _common(again_held, self.pulses_held)
+        pulses, pulses_held = (
+            _common(new, old, self.evidence.criteria.contacts.same_place)
+            for new, old in ((again, self.pulses), (again_held, self.pulses_held))
+        )
         self._leave(pulses, pulses_held)
         return replace(self, pulses=pulses, pulses_held=pulses_held)
 
@@ -112,19 +115,23 @@ class Contacts:
     def _leave(
         self, pulses: Sequence[DisturbancePulse], pulses_held: Sequence[DisturbancePulse]
     ) -> None:
-        self.evidence.runs = _masked(self.evidence.runs, self.whole, pulses)
+        criteria = self.evidence.criteria.contacts
+        self.evidence.runs = _masked(self.evidence.runs, self.whole, pulses, criteria)
         if self.held is not None:
-            self.held.runs = _masked(self.held.runs, self.whole_held, pulses_held)
+            self.held.runs = _masked(self.held.runs, self.whole_held, pulses_held, criteria)
 
 
 def _masked(
-    runs: tuple[Run, ...], whole: tuple[Run, ...], pulses: Sequence[DisturbancePulse]
+    runs: tuple[Run, ...],
+    whole: tuple[Run, ...],
+    pulses: Sequence[DisturbancePulse],
+    criteria: ContactCriteria,
 ) -> tuple[Run, ...]:
     """Runs as they are now, with these bumps and no others left out."""
     found = []
     for r, (run, original) in enumerate(zip(runs, whole, strict=True)):
         again = replace(run, index=original.index, edges=original.edges, left_out=None)
-        found.append(without(again, [pulse for pulse in pulses if pulse.run == r]))
+        found.append(without(again, [pulse for pulse in pulses if pulse.run == r], criteria))
     return tuple(found)
 
 
@@ -136,12 +143,12 @@ def _resolved(
         return ()
     judged = on_recordings(evidence, fitted)
     names = fitted.model.robot.names
-    matters = judged.residual_rms > RESOLUTION * judged.torque_rms
+    matters = judged.residual_rms > evidence.criteria.verdict.resolution * judged.torque_rms
     return tuple(pulse for pulse in pulses if matters[names.index(pulse.joint)])
 
 
 def _common(
-    pulses: Sequence[DisturbancePulse], others: Sequence[DisturbancePulse]
+    pulses: Sequence[DisturbancePulse], others: Sequence[DisturbancePulse], reach: float
 ) -> tuple[DisturbancePulse, ...]:
     """Bumps that are among others too, at about the same time."""
     return tuple(
@@ -149,7 +156,7 @@ def _common(
         for one in pulses
         if any(
             (one.run, one.joint, one.repetition) == (two.run, two.joint, two.repetition)
-            and abs(one.time - two.time) <= 2.0 * (one.width + two.width)
+            and abs(one.time - two.time) <= reach * (one.width + two.width)
             for two in others
         )
     )

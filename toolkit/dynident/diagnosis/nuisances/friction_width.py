@@ -17,7 +17,6 @@ from dynident.effects import Block, JointEffect, Parameter, ShapeParameter
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 
-_LEAST_SHARE = 0.05  # of a joint's dry friction, to be told
 _BLUNTER = (
     "blunter",
     "Noise that the drive feeds into the joint does that, or a friction_width that is not the "
@@ -71,7 +70,7 @@ def friction_width_notes(fitted: EvidenceFit) -> tuple[str, ...]:
             unit = model.robot.units[model.robot.names.index(str(effect.joint))]
             share = fitted.values[model.slices[effect.label]][0]
             whole = fitted.values[model.slices[f"coulomb_friction@{effect.joint}"]][0]
-            if share < _LEAST_SHARE * whole:
+            if share < fitted.criteria.nuisances.friction_width_share * whole:
                 continue  # what was added since has taken its place
             part = f"{100 * share / whole:.0f} % of it" if 0 < share < whole else "it"
             how, why = _BLUNTER if effect.shape[0] > 1 else _SHARPER

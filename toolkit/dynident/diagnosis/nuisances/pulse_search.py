@@ -14,26 +14,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.optimize import minimize
 
-from dynident.diagnosis.nuisances.changes import REACH, Changes, Repeated, changes_of, scanned
-from dynident.diagnosis.nuisances.tails import QUARTER, chance_of, degrees_of_freedom
+from dynident.criteria import ContactCriteria, Criteria
+from dynident.diagnosis.nuisances.changes import (
+    QUARTER,
+    Changes,
+    Repeated,
+    chance_of,
+    changes_of,
+    degrees_of_freedom,
+    scanned,
+)
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, residuals
 from dynident.evidence.runs import Run
-
-LEVEL = 1e-6
-"""p value below which a bump is a contact.
-
-The noise is measured without the place that stands out most: p values of healthy data come out too
-small, up to a hundred times. Those of pushes that matter are smaller by many powers of ten.
-"""
-WIDTHS = tuple(float(w) for w in np.geomspace(0.025, 0.6, 6))
-"""s, of the bumps that are searched."""
-
-_MOST = 8  # bumps in one diagnosis: beyond that it is no contact but noise of another kind
-_WORTH_A_LOOK = 2e-3  # probability at the one place that stands out most
-_SHARE = 1 / 12  # of a repetition, the widest bump: it must not be most of what is compared
-_STRIDE = 0.25  # of a width, from one position to the next
-_PEAKS = 5  # positions, with what surrounds them, that are no witnesses of the noise
 
 
 @dataclass(frozen=True)
@@ -49,7 +42,7 @@ class DisturbancePulse:
     time : s, in the session.
     width : s.
     amplitude : N m or N.
-    p_value : that noise alone shows its like anywhere in the data, see `LEVEL`.
+    p_value : that noise alone shows its like anywhere in the data, see `ContactCriteria`.
     """
 
     run: int
@@ -90,37 +83,38 @@ def find_contacts(evidence: Evidence, fitted: EvidenceFit) -> tuple[DisturbanceP
                     first.v[:, j][run.index],
                 )
             )
-    return pulses_in(found)
+    return pulses_in(found, evidence.criteria)
 
 
-def pulses_in(data: Sequence[Repeated]) -> tuple[DisturbancePulse, ...]:
+def pulses_in(data: Sequence[Repeated], criteria: Criteria) -> tuple[DisturbancePulse, ...]:
     """Find bumps in residuals of any joints and recordings; the most significant first."""
     left, found = list(data), []
-    while len(found) < _MOST:
-        best = _best(left)
-        if best is None or best.p_value >= LEVEL:
+    while len(found) < criteria.contacts.most:
+        best = _best(left, criteria)
+        if best is None or best.p_value >= criteria.contacts.level:
             break
         found.append(best)
         left = [_cleared(one, best) for one in left]
     return tuple(sorted(found, key=lambda pulse: pulse.p_value))
 
 
-def without(run: Run, pulses: Sequence[DisturbancePulse]) -> Run:
+def without(run: Run, pulses: Sequence[DisturbancePulse], criteria: ContactCriteria) -> Run:
     """Return a run without the instants of bumps, in all repetitions.
 
-    That is four widths on either side, or a quarter of the repetition where that is less.
+    That is some widths on either side, or a share of the repetition where that is less.
 
     Parameters
     ----------
     run : Run
     bumps : of this run; others must not be among them.
+    criteria : how much is left out.
     """
     if not pulses:
         return run
     t = run.replicates[0].t[run.index] + run.recording.start
     kept = np.ones(t.shape[1], dtype=bool)
     for pulse in pulses:
-        reach = min(REACH * pulse.width, float(t[0, -1] - t[0, 0]) / 4)
+        reach = min(criteria.reach * pulse.width, criteria.left_out * float(t[0, -1] - t[0, 0]))
         kept &= ~np.any(np.abs(t - pulse.time) < reach, axis=0)
     before = np.concatenate([[0], np.cumsum(kept)])
     left_out = ~run.kept
@@ -133,27 +127,29 @@ def without(run: Run, pulses: Sequence[DisturbancePulse]) -> Run:
 # --- one search ---------------------------------------------------------------------------------
 
 
-def _best(data: Sequence[Repeated]) -> DisturbancePulse | None:
+def _best(data: Sequence[Repeated], criteria: Criteria) -> DisturbancePulse | None:
     """The most significant bump, whether it is or not."""
     by_joint = {one.joint: [s for s in data if s.joint == one.joint] for one in data}
     found, positions = [], 0
     for series in by_joint.values():
-        places = _places(changes_of(series, [np.zeros(s.t.shape[1], dtype=bool) for s in series]))
+        nothing = [np.zeros(s.t.shape[1], dtype=bool) for s in series]
+        places = _places(changes_of(series, nothing, criteria), criteria.contacts)
         if not places:
             continue
         peak = min(places)
         positions += sum(place.tried for place in places)
         # A burst hides behind itself at first: in the slow changes and in the noise's scale.
-        if peak.chance > _WORTH_A_LOOK:
+        if peak.chance > criteria.contacts.worth_a_look:
             found.append(peak)
             continue
         # Once more, by noise measured without what stands out most.
-        places = _places(changes_of(series, [_about(peak, k, s) for k, s in enumerate(series)]))
+        about = [_about(peak, k, s, criteria.contacts) for k, s in enumerate(series)]
+        places = _places(changes_of(series, about, criteria), criteria.contacts)
         found += places
     if not found:
         return None
     best = min(found)
-    return _refined(best, min(1.0, best.chance * positions))
+    return _refined(best, min(1.0, best.chance * positions), criteria.contacts)
 
 
 @dataclass(frozen=True, order=True)
@@ -177,15 +173,20 @@ class _PulsePlace:
     of: Changes = field(compare=False)
 
 
-def _places(prepared: Sequence[Changes]) -> list[_PulsePlace]:
+def _widths(criteria: ContactCriteria) -> list[float]:
+    """Widths of the pulses that are sought, s."""
+    return np.geomspace(criteria.narrowest, criteria.widest, criteria.widths).tolist()
+
+
+def _places(prepared: Sequence[Changes], criteria: ContactCriteria) -> list[_PulsePlace]:
     """The best place of each width, for the series of one joint."""
     found, degrees = [], 0.0
-    for width in WIDTHS:
-        tried = _tried(prepared, width)
+    for width in _widths(criteria):
+        tried = _tried(prepared, width, criteria)
         if tried is None:
             continue
         # Single samples, of which there are most, show how heavy the tails are.
-        degrees = degrees or degrees_of_freedom(tried.z[tried.witnesses(width)])
+        degrees = degrees or degrees_of_freedom(tried.z[tried.witnesses(width, criteria)], criteria)
         best = int(np.argmax(tried.z))
         k = int(tried.series[best])
         rows = width / prepared[k].of.step
@@ -196,11 +197,11 @@ def _places(prepared: Sequence[Changes]) -> list[_PulsePlace]:
     return found
 
 
-def _about(peak: _PulsePlace, k: int, one: Repeated) -> np.ndarray:
+def _about(peak: _PulsePlace, k: int, one: Repeated, criteria: ContactCriteria) -> np.ndarray:
     """Instants (S,) of a series about a peak, in whichever repetition it is."""
     instants = one.t.shape[1]
     away = np.abs(np.arange(instants) - peak.row % instants)
-    return (k == peak.series) & (away < min(3 * peak.width, instants / 8))
+    return (k == peak.series) & (away < min(criteria.peak_reach * peak.width, instants / 8))
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,12 +221,12 @@ class _Tried:
     rows: np.ndarray
     instants: np.ndarray
 
-    def witnesses(self, width: float) -> np.ndarray:
+    def witnesses(self, width: float, criteria: ContactCriteria) -> np.ndarray:
         """Which places tell the noise: not those about the peaks, in any repetition of these."""
         kept = np.ones(len(self.z), dtype=bool)
-        for _ in range(_PEAKS):
+        for _ in range(criteria.peaks):
             peak = np.argmax(np.where(kept, self.z, -1.0))
-            near = np.abs(self.instants - self.instants[peak]) < REACH * width
+            near = np.abs(self.instants - self.instants[peak]) < criteria.reach * width
             fewer = kept & ~(near & (self.series == self.series[peak]))
             if fewer.sum() < len(kept) / 2:
                 break
@@ -233,34 +234,35 @@ class _Tried:
         return kept
 
 
-def _tried(prepared: Sequence[Changes], width: float) -> _Tried | None:
+def _tried(prepared: Sequence[Changes], width: float, criteria: ContactCriteria) -> _Tried | None:
     """Try bumps of a width (s) everywhere; None where it is too wide for every series."""
     parts = []
     for k, one in enumerate(prepared):
         repetitions, instants = one.of.residual.shape
         rows_wide = width / one.of.step
-        if rows_wide > _SHARE * instants:
+        if rows_wide > criteria.widest_share * instants:
             continue
-        rows = np.arange(0, repetitions * instants, max(1, int(_STRIDE * rows_wide)))
+        rows = np.arange(0, repetitions * instants, max(1, int(criteria.stride * rows_wide)))
         z = np.abs(scanned(one, rows_wide)[rows])
         # Where a whole repetition is unlike the others, no place in it stands out.
-        of = rows // instants
-        usual = [_usual(z[of == p], rows[of == p], rows_wide) for p in range(repetitions)]
+        of, reach = rows // instants, criteria.peak_reach
+        usual = [_usual(z[of == p], rows[of == p], reach * rows_wide) for p in range(repetitions)]
         z = z / np.maximum(usual, 1.0)[of]
         parts.append((z, np.full(len(rows), k), rows, rows % instants * one.of.step))
     return _Tried(*(np.concatenate(part) for part in zip(*parts, strict=True))) if parts else None
 
 
-def _usual(z: np.ndarray, rows: np.ndarray, width: float) -> float:
+def _usual(z: np.ndarray, rows: np.ndarray, reach: float) -> float:
     """Standard deviation of z values (M,) as their median says it, but for those at the largest."""
-    away = np.abs(rows - rows[np.argmax(z)]) > 3 * width
+    away = np.abs(rows - rows[np.argmax(z)]) > reach
     return float(np.median(z[away] if away.any() else z)) / QUARTER
 
 
-def _refined(place: _PulsePlace, p_value: float) -> DisturbancePulse:
+def _refined(place: _PulsePlace, p_value: float, criteria: ContactCriteria) -> DisturbancePulse:
     """The bump with its best time and width, in the repetition where it is."""
     one, row, width = place.of, place.row, place.width
-    least, most = WIDTHS[0] / one.of.step, _SHARE * one.of.residual.shape[1]
+    least = criteria.narrowest / one.of.step
+    most = criteria.widest_share * one.of.residual.shape[1]
 
     def misfit(x: np.ndarray) -> float:
         wide = width * np.exp(np.clip(x[1], -0.7, 0.7))

@@ -10,7 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from dynident.diagnosis.verdict import WITHIN_NOISE, within_noise
+from dynident.criteria import VerdictCriteria
+from dynident.diagnosis.verdict import within_noise
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, model_columns
 from dynident.evidence.held_out import HeldOut
@@ -18,13 +19,12 @@ from dynident.evidence.runs import gather
 from dynident.fitting.sampling import sample
 from dynident.recording import Dataset, Recording, resolution, uniform
 
-_RECORDINGS = 2  # of each dataset, that are looked at
-_DRAWS = 2
+_DRAWS = 2  # whose product has no noise in the mean
 
 
 def with_rounding(judged: HeldOut, fitted: EvidenceFit, dataset: Dataset) -> HeldOut:
     """Return a judgement that knows what the encoders' steps do, where anything is left at all."""
-    if judged.least_ratio is None or within_noise(judged):
+    if judged.least_ratio is None or within_noise(judged, fitted.criteria.verdict):
         return judged
     return replace(judged, rounding=rounding_power(fitted, dataset))
 
@@ -32,7 +32,7 @@ def with_rounding(judged: HeldOut, fitted: EvidenceFit, dataset: Dataset) -> Hel
 def nothing_but_rounding(judged: HeldOut, fitted: EvidenceFit, dataset: Dataset) -> bool:
     """Whether a residual beyond the noise is no more than encoders' steps leave."""
     rounded = with_rounding(judged, fitted, dataset)
-    return rounded.rounding is not None and within_noise(rounded)
+    return rounded.rounding is not None and within_noise(rounded, fitted.criteria.verdict)
 
 
 def rounding_power(fitted: EvidenceFit, dataset: Dataset) -> np.ndarray:
@@ -48,7 +48,7 @@ def rounding_power(fitted: EvidenceFit, dataset: Dataset) -> np.ndarray:
     """
     n = fitted.model.robot.n
     found = []
-    for recording in dataset.recordings[:_RECORDINGS]:
+    for recording in dataset.recordings[: fitted.criteria.nuisances.rounding_recordings]:
         steps = resolution(recording.q)
         if not steps.any():
             found.append(np.zeros(n))
@@ -84,7 +84,8 @@ def _predicted(
     fitted: EvidenceFit, dataset: Dataset, recordings: list[Recording]
 ) -> list[np.ndarray]:
     """Torque that the model predicts along each recording, (T, n)."""
-    evidence = Evidence(fitted.model, gather(Dataset(tuple(recordings), dataset.filter)))
+    runs = gather(Dataset(tuple(recordings), dataset.filter), fitted.criteria.noise)
+    evidence = Evidence(fitted.model, runs, fitted.criteria)
     evidence.prepare(fitted.model.effects)
     joints = range(fitted.model.robot.n)
     each = []
@@ -94,7 +95,9 @@ def _predicted(
     return each
 
 
-def rounding_notes(judged: HeldOut, names: tuple[str, ...]) -> tuple[str, ...]:
+def rounding_notes(
+    judged: HeldOut, names: tuple[str, ...], criteria: VerdictCriteria
+) -> tuple[str, ...]:
     """Say where the steps of an encoder leave a part of the residual, in plain words."""
     if judged.rounding is None or judged.noise_std is None:
         return ()
@@ -103,5 +106,5 @@ def rounding_notes(judged: HeldOut, names: tuple[str, ...]) -> tuple[str, ...]:
         f"The steps of the encoder at {name} leave a residual of {part:.2g} times the noise, the "
         "same in every repetition: what is smaller than that cannot be told from them."
         for name, part in zip(names, share, strict=True)
-        if part > WITHIN_NOISE
+        if part > criteria.within_noise
     )

@@ -23,12 +23,6 @@ from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.runs import Signals
 from dynident.model import Model
 
-_SECANTS = 3  # times that columns are taken at the values just found
-_SETTLED = 0.02  # relative change of values at which secants count as settled
-_VALUES_TRIED = 10  # of a column that is taken at a value
-_VALUE_RANGE = 0.5  # of the logarithm of that value, to each side
-_PRECISION = 1e-3  # of the logarithm of a shape parameter
-
 
 @dataclass(frozen=True)
 class Beside:
@@ -86,17 +80,18 @@ def _at_its_values(
     evidence: Evidence, fitted: EvidenceFit, one: Score, columns_of: Columns | None
 ) -> Score:
     """Take secants through the values found, until they settle."""
-    for _ in range(_SECANTS):
+    criteria = fitted.criteria.shapes
+    for _ in range(criteria.linearisations):
         if not one.values or not np.any(one.values):
             return one
         effect = one.effect.at(_within_bounds(one, fitted))
         old = one.effect.point or (0.0,) * len(effect.point)
         change = np.linalg.norm(np.subtract(effect.point, old))
-        if change <= _SETTLED * np.linalg.norm(effect.point):
+        if change <= criteria.converged * np.linalg.norm(effect.point):
             break
         better = score_at(evidence, fitted, effect, one, grid_of(effect, fitted), columns_of)
         evidence.forget(effect)
-        if not better.drop > 0.5 * one.drop:
+        if not better.drop > criteria.least_explained * one.drop:
             break  # the secant has left the range in which the law is what it is
         one = better
     return one
@@ -116,13 +111,14 @@ def _at_best_value(
         effect = one.effect.at([float(np.exp(logarithm))])
         found = score_at(evidence, fitted, effect, one, grid_of(effect, fitted), columns_of)
         evidence.forget(effect)
-        if found.drop_at_point > best.drop_at_point and not impossible(found, fitted.model):
+        if found.drop_at_point > best.drop_at_point and not impossible(found, fitted):
             best = found
         return -found.drop_at_point
 
     (start,) = np.log(one.effect.point)
-    span = (start - _VALUE_RANGE, start + _VALUE_RANGE)
-    minimize_scalar(loss, bounds=span, method="bounded", options={"maxiter": _VALUES_TRIED})
+    criteria = fitted.criteria.shapes
+    span = (start - criteria.value_range, start + criteria.value_range)
+    minimize_scalar(loss, bounds=span, method="bounded", options={"maxiter": criteria.values_tried})
     return best
 
 
@@ -146,14 +142,14 @@ def _by_trial(
     def loss(shape: np.ndarray) -> float:
         return -at(shape).drop
 
-    return at(_minimum(loss, shapes, one.effect.shape))
+    return at(_minimum(loss, shapes, one.effect.shape, fitted.criteria.shapes.precision))
 
 
-def _minimum(loss: Callable[[np.ndarray], float], shapes, start) -> np.ndarray:
+def _minimum(loss: Callable[[np.ndarray], float], shapes, start, precision: float) -> np.ndarray:
     if len(shapes) == 1:
         low, high = _neighbours(shapes[0], start[0])
         span = (float(np.log(low)), float(np.log(high)))
-        return np.atleast_1d(np.asarray(fminbound(loss, *span, xtol=2 * _PRECISION)))
+        return np.atleast_1d(np.asarray(fminbound(loss, *span, xtol=2 * precision)))
     bounds = [(np.log(s.lower), np.log(s.upper)) for s in shapes]
     return minimize(loss, np.log(start), bounds=bounds, method="Nelder-Mead").x
 

@@ -9,22 +9,19 @@ from __future__ import annotations
 
 import numpy as np
 
-LEVEL = 0.05
-"""Chance that the best model is not in the set."""
+from dynident.criteria import SearchCriteria
 
-_DRAWS = 1000  # of the bootstrap
-_BLOCK = 2  # consecutive blocks of time that are drawn together: neighbours share their motion
 _SEED = 20_110
 
 
-def confidence_set(losses: np.ndarray, level: float = LEVEL) -> tuple[int, ...]:
+def confidence_set(losses: np.ndarray, criteria: SearchCriteria) -> tuple[int, ...]:
     """Return the columns that may be the best.
 
     Parameters
     ----------
     losses : (B, k)
         Held-out loss of each model in each block of time.
-    level : chance that the best one is left out.
+    criteria : chance that the best one is left out, and the bootstrap.
 
     Returns
     -------
@@ -38,6 +35,13 @@ def confidence_set(losses: np.ndarray, level: float = LEVEL) -> tuple[int, ...]:
     varied = losses - losses.mean(axis=1, keepdims=True)
     if not np.any(varied):
         return tuple(range(losses.shape[1]))
-    found = MCS(losses, size=level, reps=_DRAWS, block_size=_BLOCK, method="max", seed=_SEED)
+    found = MCS(
+        losses,
+        size=criteria.set_level,
+        reps=criteria.set_draws,
+        block_size=criteria.set_block,
+        method="max",
+        seed=_SEED,
+    )
     found.compute()
     return tuple(sorted(int(str(i)) for i in found.included))

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.optimize import OptimizeResult, differential_evolution
 
-from dynident.diagnosis.search.ranking import ALIKE, Ranking, candidates, joints_below_noise, judged
+from dynident.diagnosis.search.ranking import Ranking, candidates, joints_below_noise, judged
 from dynident.diagnosis.search.scoring import Score, candidate_moments, impossible, score
 from dynident.diagnosis.verdict import within_noise
 from dynident.effects import Effect
@@ -24,13 +24,6 @@ from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, residuals
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.noise_model import systematic_square
 from dynident.model import Model
-
-_LEAST = 0.1  # of the systematic square that the best of all shapes must explain, to be refined
-_ENOUGH = 0.9  # of it that ends the search: the gradient does the rest
-_POPULATION = 12  # shapes of a generation, per unknown
-_GENERATIONS = 25
-_FINALISTS = 24
-_PATIENCE = 6  # generations after which a search that explains nothing is given up
 
 
 @dataclass(frozen=True)
@@ -61,7 +54,9 @@ def global_search(
     -------
     That of the two of whose residual it explains the larger share; None for none, or no need.
     """
-    if not last.fitted.noise_known or within_noise(on_recordings(evidence, last.fitted)):
+    if not last.fitted.noise_known or within_noise(
+        on_recordings(evidence, last.fitted), evidence.criteria.verdict
+    ):
         return None
     sought = _sought(evidence, start.fitted.model, last.fitted)
     if not sought:
@@ -85,7 +80,13 @@ def global_search(
     one, base = max(found, key=lambda pair: pair[0].fall / pair[1].fitted.error_signal)
     tests = base.ranking.tests + sum(search.tried for search in searches)
     best, refusal = judged(evidence, base.fitted, one, tests)
-    return None if refusal else RankedModel(base.fitted, _headed(base.ranking, best, tests))
+    return (
+        None
+        if refusal
+        else RankedModel(
+            base.fitted, _headed(base.ranking, best, tests, evidence.criteria.search.alike)
+        )
+    )
 
 
 def _sought(evidence: Evidence, model: Model, last: EvidenceFit) -> list[Effect]:
@@ -103,17 +104,17 @@ def _final(evidence: Evidence, fitted: EvidenceFit, searches: list[_GlobalSearch
         for search in searches
         if search.finalists
         for score in _scores(evidence, fitted, search.finalists)
-        if not impossible(score, fitted.model)
-        and score.drop_at_point > _LEAST * fitted.error_signal
+        if not impossible(score, fitted)
+        and score.drop_at_point > evidence.criteria.global_search.least * fitted.error_signal
     ]
     return max(scores, key=lambda one: one.fall, default=None)
 
 
-def _headed(ranking: Ranking, best: Score, tests: int) -> Ranking:
+def _headed(ranking: Ranking, best: Score, tests: int, alike: float) -> Ranking:
     """A ranking with another effect at its head."""
     waits = f"asked again beside {best.effect.label}"
     others = [
-        (one, why or ("" if abs(one.drop - best.drop) <= ALIKE * best.drop else waits))
+        (one, why or ("" if abs(one.drop - best.drop) <= alike * best.drop else waits))
         for one, why in zip(ranking.scores, ranking.refusals, strict=True)
         if one.effect.label != best.effect.label
     ]
@@ -150,12 +151,12 @@ class _GlobalSearch:
     @classmethod
     def run(cls, evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> _GlobalSearch:
         """Search through all shapes, until enough is explained or no more is to be hoped for."""
-        search = cls(evidence, fitted, effect)
+        search, criteria = cls(evidence, fitted, effect), evidence.criteria.global_search
         differential_evolution(
             search.loss,
             np.log(effect.sought_in(fitted.model.robot)),
-            popsize=_POPULATION,
-            maxiter=_GENERATIONS,
+            popsize=criteria.population,
+            maxiter=criteria.generations,
             init="sobol",
             rng=0,
             polish=False,
@@ -181,17 +182,19 @@ class _GlobalSearch:
         tried = [self.effect.shaped(*x[:shapes]).at(x[shapes:]) for x in np.exp(logs.T)]
         scores = _scores(self.evidence, self.fitted, tried)
         self.tried += len(tried)
-        possible = [one for one in scores if not impossible(one, self.fitted.model)]
-        self.best = sorted([*self.best, *possible], key=lambda s: -s.fall)[:_FINALISTS]
+        possible = [one for one in scores if not impossible(one, self.fitted)]
+        best = sorted([*self.best, *possible], key=lambda s: -s.fall)
+        self.best = best[: self.evidence.criteria.global_search.finalists]
         # How wrong a wrong one is does not matter, and may be beyond all numbers.
         worst = -self.fitted.error_signal
         return np.array([-max(one.fall, worst) for one in scores])
 
     def ends(self, intermediate_result: OptimizeResult) -> bool:
         """Whether enough is explained, or nothing after so long."""
+        criteria = self.evidence.criteria.global_search
         self.generations += 1
-        hopeless = self.generations >= _PATIENCE and self.explained < _LEAST
-        return hopeless or self.explained > _ENOUGH
+        hopeless = self.generations >= criteria.patience and self.explained < criteria.least
+        return hopeless or self.explained > criteria.enough
 
 
 def _scores(evidence: Evidence, fitted: EvidenceFit, tried: list[Effect]) -> list[Score]:

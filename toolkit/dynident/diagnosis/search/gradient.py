@@ -16,10 +16,6 @@ from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.moments.replicated import Moments
 
-_EVALUATIONS = 25  # at most
-_FURTHEST = 1.7  # factor by which a shape is changed, at most
-_PRECISION = 1e-4  # relative, of the logarithms of the shapes
-_LEAST_FALL = 1e-6  # relative, of what is left: a dull metric hides what matters in a sharp one
 _ROUNDING = 1e-12  # of the largest curvature, to which others are rounding errors
 
 
@@ -96,21 +92,23 @@ def by_gradient(
             Moments(with_self.signal[:, plain, plain], with_self.total[:, plain, plain]),
             grid=grid,
         )
-        if found.drop_at_point > best.drop_at_point and not impossible(found, fitted.model):
+        if found.drop_at_point > best.drop_at_point and not impossible(found, fitted):
             best = found
         return _Trial.of(fitted, found, with_model.sums()[0], with_self.sums()[0])
 
     # Not further than to the next shapes of the grid: beyond, other peaks lead astray.
-    start = np.array([*effect.shape, *effect.point])
-    low, high = np.log(np.clip(np.outer((1.0 / _FURTHEST, _FURTHEST), start), *limits))
+    start, criteria = np.array([*effect.shape, *effect.point]), fitted.criteria.shapes
+    reach = (1.0 / criteria.furthest, criteria.furthest)
+    low, high = np.log(np.clip(np.outer(reach, start), *limits))
     least_squares(
         lambda x: at(tuple(x)).residual,
         np.log(start),
         lambda x: at(tuple(x)).jacobian,  # type: ignore[arg-type]
         bounds=(low - 1e-9, high + 1e-9),
-        max_nfev=_EVALUATIONS,
-        xtol=_PRECISION,
-        ftol=_LEAST_FALL,
+        max_nfev=criteria.evaluations,
+        xtol=criteria.gradient_precision,
+        # A flat metric hides what matters in a sharp one.
+        ftol=criteria.gradient_fall,
     )
     return best
 

@@ -14,8 +14,6 @@ from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import on_recordings
 
-_LEAST_FALL = 0.015  # of a joint's squared noise that an effect must take off the held-out residual
-
 
 @dataclass(frozen=True)
 class Kept:
@@ -62,7 +60,7 @@ def _helps(held: Evidence | None, without: EvidenceFit, fitted: EvidenceFit) -> 
         assert before.noise_std is not None and before.ratio is not None
         scale = before.noise_std
         falls.append((before.ratio * before.noise_std) ** 2 - (after.ratio * after.noise_std) ** 2)
-    return any(bool(np.any(fall > _LEAST_FALL * scale**2)) for fall in falls)
+    return any(bool(np.any(fall > held.criteria.search.least_fall * scale**2)) for fall in falls)
 
 
 def _belongs(effect: Effect, found: list[Found]) -> bool:

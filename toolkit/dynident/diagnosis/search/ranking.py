@@ -8,6 +8,7 @@ from itertools import product
 
 import numpy as np
 
+from dynident.criteria import SearchCriteria
 from dynident.diagnosis.search.candidate_shapes import refined
 from dynident.diagnosis.search.confidence_set import confidence_set
 from dynident.diagnosis.search.scoring import (
@@ -26,22 +27,7 @@ from dynident.evidence.runs import Run
 from dynident.model import Model
 from dynident.moments.replicated import Kind
 
-CONTENDERS = 6
-"""Effects that are refined and cross-validated in each round."""
-
-LEVEL = 0.01
-"""Level of the test, corrected for the number of effects and shapes tried (Bonferroni)."""
-
-LEAST_SHARE = (0.006, 0.02)
-"""Least share of the squared residual that the first effect, and later ones, must explain."""
-
-_CONFIDENT = 1.5  # standard errors of the held-out gain
-_MOST_BLOCKS = 0.65  # share of blocks in which the held-out residual must fall otherwise
-_HOPELESS = 0.2  # corrected p value above which no better shape makes an effect significant
 _NOISY = "plain least squares takes it for the noise in accelerations: record a repeated motion"
-_QUIET = 0.15  # systematic residual over noise below which driven responses are not evaluated
-ALIKE = 0.015  # two drops within this share of the larger are alike
-_MOST_CARRIERS = 6  # recordings up to which every choice of payload carriers is tried
 
 
 @dataclass(frozen=True)
@@ -95,12 +81,12 @@ def rank(
     added : number of effects added so far; later ones must explain more.
     tell : told what is being done, for a progress display.
     only : candidates, where not the whole catalogue is meant.
-    least : share of the squared residual that they must explain; None for `LEAST_SHARE`.
+    least : share of the squared residual that they must explain; None for that of the criteria.
     """
-    model, best, tests = fitted.model, [], 0
+    criteria, best, tests = evidence.criteria, [], 0
     below_noise = joints_below_noise(evidence, fitted)
     noisy = all(run.kind == "single" and run.columns_from == "recording" for run in evidence.runs)
-    for effect in only or candidates(model):
+    for effect in only or candidates(fitted.model):
         driven = {"body", "whole"} <= effect.needs
         if driven and (noisy or effect.joint in below_noise):
             best.append(Score(effect, None, not_identifiable=False))
@@ -110,18 +96,19 @@ def rank(
         tests += len(tried)
         best.append(max(tried, key=lambda s: s.penalised))
     best.sort(key=lambda s: -s.penalised)
-    for i in range(len(only) or min(CONTENDERS, len(best))):
+    for i in range(len(only) or min(criteria.search.contenders, len(best))):
         if best[i].not_identifiable:
             break
-        if best[i].p_value * tests > _HOPELESS or best[i].penalised == -np.inf:
+        if best[i].p_value * tests > criteria.search.hopeless or best[i].penalised == -np.inf:
             continue
         progress(f"{best[i].effect.label}, cross-validated")
         best[i] = _confirm(evidence, fitted, best[i])
     best.sort(key=lambda s: -s.penalised)
-    least = LEAST_SHARE[min(added, 1)] if least is None else least
+    if least is None:
+        least = criteria.gates.later_share if added else criteria.gates.first_share
     scores = tuple(best)
     refusals = tuple(
-        _unseen(s, noisy) or _refusal(s, evidence, model, tests, least) for s in scores
+        _unseen(s, noisy) or _refusal(s, evidence, fitted, tests, least) for s in scores
     )
     return Ranking(scores, tests, refusals)
 
@@ -144,12 +131,14 @@ def joints_below_noise(evidence: Evidence, fitted: EvidenceFit) -> frozenset[str
         systematic = np.mean([systematic_square(e[..., j], kind) for kind, e in judged])
         each = [differences(e[..., j], kind).ravel() for kind, e in judged]
         noise = np.mean(np.concatenate(each) ** 2)
-        if systematic < _QUIET**2 * noise:
+        if systematic < evidence.criteria.search.below_noise**2 * noise:
             found.append(name)
     return frozenset(found)
 
 
-def indistinguishable(ranking: Ranking, winner: Score) -> tuple[Effect, ...]:
+def indistinguishable(
+    ranking: Ranking, winner: Score, criteria: SearchCriteria
+) -> tuple[Effect, ...]:
     """Effects that the data cannot tell from the winner.
 
     Those of the model confidence set of all material effects, and those that explain the same. An
@@ -168,20 +157,23 @@ def indistinguishable(ranking: Ranking, winner: Score) -> tuple[Effect, ...]:
     if not rivals:
         return ()
     losses = np.column_stack([one.losses for one in (winner, *rivals) if one.losses is not None])
-    kept = confidence_set(losses)
+    kept = confidence_set(losses, criteria)
     return tuple(
         other.effect
         for k, other in enumerate(rivals, 1)
-        if k in kept or abs(winner.drop - other.drop) <= ALIKE * winner.drop
+        if k in kept or abs(winner.drop - other.drop) <= criteria.alike * winner.drop
     )
 
 
-def payload_choices(runs: tuple[Run, ...]) -> list[tuple[bool, ...]]:
-    """Which runs may carry the payload: as the study says, or every choice where it is silent."""
+def payload_choices(runs: tuple[Run, ...], most: int) -> list[tuple[bool, ...]]:
+    """Which runs may carry the payload: as the study says, or every choice where it is silent.
+
+    Of more than `most` runs only those choices in which one carries it, or all but one.
+    """
     stated = [run.recording.payload for run in runs]
     if any(flag is not None for flag in stated):
         return [tuple(bool(flag) for flag in stated)]
-    if len(runs) > _MOST_CARRIERS:
+    if len(runs) > most:
         singles = np.eye(len(runs), dtype=bool)
         return [tuple(bool(c) for c in row) for row in (*singles, *~singles)]
     every = product((False, True), repeat=len(runs))
@@ -190,13 +182,13 @@ def payload_choices(runs: tuple[Run, ...]) -> list[tuple[bool, ...]]:
 
 def _score_variants(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> Iterator[Score]:
     if "payload" in effect.needs:
-        choices = payload_choices(evidence.runs)
+        choices = payload_choices(evidence.runs, evidence.criteria.search.payload_recordings)
         (whole,) = candidate_moments(evidence, fitted, [effect])
         for choice in choices:
             parts = (moments_with_payload(part, evidence, choice) for part in whole)
             one = score(fitted, effect, *parts, grid=len(choices), payload_recordings=choice)
             # A load has mass: of two complementary choices only one can be meant.
-            yield _possible(one, fitted.model)
+            yield _possible(one, fitted)
         return
     seen = _seen(fitted, effect)
     shapes = [variant.suited(seen) for variant in effect.variants(fitted.model.robot)]
@@ -205,12 +197,12 @@ def _score_variants(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> 
         shapes = list(dict.fromkeys([*shapes, effect]))
     found = candidate_moments(evidence, fitted, shapes, evidence.screening)
     for shaped, parts in zip(shapes, found, strict=True):
-        yield _possible(score(fitted, shaped, *parts, grid=len(shapes)), fitted.model)
+        yield _possible(score(fitted, shaped, *parts, grid=len(shapes)), fitted)
 
 
-def _possible(one: Score, model: Model) -> Score:
+def _possible(one: Score, fitted: EvidenceFit) -> Score:
     """Return a score that counts for nothing where its values are impossible."""
-    return replace(one, penalised=-np.inf) if impossible(one, model) else one
+    return replace(one, penalised=-np.inf) if impossible(one, fitted) else one
 
 
 def _seen(fitted: EvidenceFit, effect: Effect) -> Block:
@@ -223,7 +215,7 @@ def _seen(fitted: EvidenceFit, effect: Effect) -> Block:
 def judged(evidence: Evidence, fitted: EvidenceFit, one: Score, tests: int) -> tuple[Score, str]:
     """Return a score refined and cross-validated, and why it is not material; empty if it is."""
     one = _confirm(evidence, fitted, one)
-    return one, _refusal(one, evidence, fitted.model, tests, LEAST_SHARE[0])
+    return one, _refusal(one, evidence, fitted, tests, evidence.criteria.gates.first_share)
 
 
 def _confirm(evidence: Evidence, fitted: EvidenceFit, one: Score) -> Score:
@@ -239,15 +231,16 @@ def _confirm(evidence: Evidence, fitted: EvidenceFit, one: Score) -> Score:
     return replace(one, penalised=relaxed, losses=with_effect, gains=without - with_effect)
 
 
-def _refusal(one: Score, evidence: Evidence, model: Model, tests: int, least: float) -> str:
-    """Why an effect is not material; empty where it is."""
+def _refusal(one: Score, evidence: Evidence, fitted: EvidenceFit, tests: int, least: float) -> str:
+    """Why an effect is not significant or not relevant; empty where it is both."""
+    gates = evidence.criteria.gates
     if one.not_identifiable:
         return one.effect.advice
-    if beyond := impossible(one, model):
+    if beyond := impossible(one, fitted):
         return beyond
     if one.rank == 0:
         return "its columns are noise in this data"
-    if min(1.0, one.p_value * tests) >= LEVEL:
+    if min(1.0, one.p_value * tests) >= gates.level:
         return "not significant"
     if not one.penalised > 0:
         return "explains less than its parameters cost"
@@ -259,8 +252,8 @@ def _refusal(one: Score, evidence: Evidence, model: Model, tests: int, least: fl
     if one.gains is None:
         return "other effects explain more"
     spread = one.gains.std(ddof=1) * np.sqrt(len(one.gains))
-    confident = one.gains.sum() > _CONFIDENT * spread
-    if not (one.gains.sum() > 0 and (confident or np.mean(one.gains > 0) >= _MOST_BLOCKS)):
+    confident = one.gains.sum() > gates.standard_errors * spread
+    if not (one.gains.sum() > 0 and (confident or np.mean(one.gains > 0) >= gates.blocks_gaining)):
         return "does not help on held-out blocks"
     return ""
 

@@ -15,12 +15,6 @@ from dynident.evidence.runs import Signals
 from dynident.model import Model
 from dynident.moments.replicated import Moments, TimeVarying, solve, time_varying_moments
 
-NOT_IDENTIFIABLE = 2e-3
-"""Share of an effect's columns (in norm) left beside the model, below which it is absorbed."""
-
-_UNSEEN = 1e-3
-"""Part of the noise below which a column is not seen."""
-
 Columns = Callable[[Effect, int, Model, np.ndarray], Signals]
 """Columns of an effect in a run, for a model and its values, as `Evidence.of`."""
 
@@ -190,7 +184,7 @@ def score(
     keep = size > 1e-9 * size[-1]
     white = directions[:, keep] / np.sqrt(size[keep]) / scale[:, None]
     left, turn = np.linalg.eigh(white.T @ left_signal @ white)
-    visible = left > NOT_IDENTIFIABLE**2
+    visible = left > fitted.criteria.gates.not_identifiable**2
     if not np.any(visible):
         return Score(effect, payload_recordings, not_identifiable=True)
     directions = white @ turn[:, visible]
@@ -232,10 +226,10 @@ def _seen(effect: Effect, fitted: EvidenceFit, scale: np.ndarray) -> np.ndarray:
     """Which columns, of these norms, could be told from rounding errors at any possible value."""
     bounds = [(p.lower, p.upper) for p in effect.parameters(fitted.model.robot)]
     reach = np.array([max(abs(low), abs(high)) for low, high in bounds])
-    return scale > _UNSEEN * np.sqrt(fitted.rows) / reach
+    return scale > fitted.criteria.gates.unseen * np.sqrt(fitted.rows) / reach
 
 
-def impossible(one: Score, model: Model) -> str:
+def impossible(one: Score, fitted: EvidenceFit) -> str:
     """What is physically impossible in a score's values; empty where nothing is.
 
     Of several values some may leave their bounds by their uncertainty. A single one that is out of
@@ -243,9 +237,10 @@ def impossible(one: Score, model: Model) -> str:
     """
     if one.not_identifiable:
         return ""
-    parameters = one.effect.parameters(model.robot)
+    parameters = one.effect.parameters(fitted.model.robot)
+    deviations = fitted.criteria.gates.beyond_bounds if len(one.values) > 1 else 0.0
     for parameter, value, sigma in zip(parameters, one.values, one.sigma, strict=False):
-        slack = 3.0 * sigma if len(one.values) > 1 else 0.0
+        slack = deviations * sigma
         if value < parameter.lower - slack or value > parameter.upper + slack:
             return f"would need {parameter.name} = {value:.3g} {parameter.unit}"
     return ""

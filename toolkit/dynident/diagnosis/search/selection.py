@@ -5,20 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 from dynident.diagnosis.assembly import Found
-from dynident.diagnosis.search.ranking import ALIKE, Ranking, indistinguishable
+from dynident.diagnosis.search.ranking import Ranking, indistinguishable
 from dynident.diagnosis.search.scoring import Score
 from dynident.effects import Effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 
-_FIRST_SHARE = 0.75  # of the largest drop that a simpler effect must reach, to be named first
-_NEARLY = 0.85  # of the largest drop, from which a rival that is not linear is fitted to compare
-_LEAST_KEPT = 0.1  # of the drop that an effect promises, that is left when all is fitted with it
-
 
 def choose(evidence: Evidence, fitted: EvidenceFit, ranking: Ranking) -> Found | None:
     """The best material effect; or the simpler one in it, where that does most of the work."""
-    material = ranking.material
+    material, criteria = ranking.material, evidence.criteria.search
     if not material:
         return None
     best = material[0]
@@ -27,14 +23,17 @@ def choose(evidence: Evidence, fitted: EvidenceFit, ranking: Ranking) -> Found |
         for s in material
         if s.effect.name in best.effect.stands_in_for
         and s.effect.joint == best.effect.joint
-        and s.drop >= _FIRST_SHARE * best.drop
+        and s.drop >= criteria.simpler_share * best.drop
     ]
     if simpler:
         # The column that they share is the same whoever it belongs to: both are named.
         return Found(simpler[0], ranking.corrected(simpler[0]), (best.effect,))
-    alike = {*indistinguishable(ranking, best), *_alike_once_fitted(evidence, fitted, ranking)}
+    alike = {
+        *indistinguishable(ranking, best, criteria),
+        *_alike_once_fitted(evidence, fitted, ranking),
+    }
     among = [s for s in material if s is best or s.effect in alike]
-    as_good = [s for s in among if s.drop >= _FIRST_SHARE * best.drop]
+    as_good = [s for s in among if s.drop >= criteria.simpler_share * best.drop]
     chosen = min(as_good, key=_size)  # the first of the simplest: they stand in order
     others = tuple(s.effect for s in among if s is not chosen)
     return Found(chosen, ranking.corrected(chosen), others)
@@ -47,6 +46,7 @@ def _alike_once_fitted(
 
     Before, columns that are not linear in their values are those of a first guess.
     """
+    criteria = evidence.criteria.search
     best, *others = ranking.material
     rivals = [
         s
@@ -54,7 +54,7 @@ def _alike_once_fitted(
         if s.effect.secant
         and "whole" not in s.effect.needs
         and s.losses is not None
-        and s.drop >= _NEARLY * best.drop
+        and s.drop >= criteria.rival_share * best.drop
     ]
     if not (best.effect.secant and "whole" not in best.effect.needs and rivals):
         return ()
@@ -64,7 +64,7 @@ def _alike_once_fitted(
         return fitted.misfit(fitted) - wider.misfit(fitted)
 
     most = explained(best.effect)
-    return tuple(s.effect for s in rivals if explained(s.effect) >= (1.0 - ALIKE) * most)
+    return tuple(s.effect for s in rivals if explained(s.effect) >= (1.0 - criteria.alike) * most)
 
 
 def breaks_its_promise(fitted: EvidenceFit, wider: EvidenceFit, one: Score) -> bool:
@@ -76,7 +76,7 @@ def breaks_its_promise(fitted: EvidenceFit, wider: EvidenceFit, one: Score) -> b
         return False
     promised = min(one.drop / fitted.error_signal, 1.0) if fitted.error_signal > 0 else 1.0
     before, after = fitted.misfit(fitted), wider.misfit(fitted)
-    return before - after < _LEAST_KEPT * promised * before
+    return before - after < fitted.criteria.search.least_kept * promised * before
 
 
 def _size(one: Score) -> int:

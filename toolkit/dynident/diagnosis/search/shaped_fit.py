@@ -7,10 +7,6 @@ from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.model import Model
 
-_REFITS = 12  # of shapes whose columns depend on the bodies
-_GAINED = 0.02  # share of the systematic square that another refit must take away
-_NEGLIGIBLE = 0.005  # of the square of the noise, that no refit is worth
-
 
 def shaped(evidence: Evidence, model: Model) -> EvidenceFit:
     """Fit a model as it was given, each shape parameter sought on its grid."""
@@ -29,10 +25,11 @@ def refitted(evidence: Evidence, model: Model, near: EvidenceFit | None = None) 
     Responses that depend on the bodies are refined again with the bodies that come out, which were
     others while the effect was missing, until nothing is gained.
     """
+    criteria = evidence.criteria.shapes
     fitted = fit_evidence(evidence, model, near)
     with_shapes = [e.label for e in model.effects if e.shape_parameters(model.robot)]
     driven = [e.label for e in model.effects if {"body", "whole"} <= e.needs]
-    for again in range(_REFITS if driven else 1):
+    for again in range(criteria.refits if driven else 1):
         labels = with_shapes if again == 0 and len(with_shapes) > 1 else driven
         before = fitted
         for label in labels:
@@ -43,6 +40,6 @@ def refitted(evidence: Evidence, model: Model, near: EvidenceFit | None = None) 
             if trial.misfit(fitted) < fitted.misfit(fitted):
                 fitted = trial
         had, has = before.misfit(before), fitted.misfit(before)
-        if had - has < _GAINED * had + _NEGLIGIBLE * before.noise_known:
+        if had - has < criteria.gained * had + criteria.negligible * before.noise_known:
             break
     return fitted
