@@ -13,6 +13,8 @@ from pathlib import Path
 from package_map import FLOORS, PACKAGE, first_line, modules, reduced, room_imports
 
 PAGE = Path(__file__).resolve().parent / "architecture.md"
+NOT_DRAWN = {"errors", "files", "tables", "settings", "places", "threads"}
+"""Files of the ground floor, which serve every room."""
 
 
 def main() -> None:
@@ -24,8 +26,9 @@ def page(text: str) -> str:
     """Return the page with its made parts as the source has them now."""
     for name, make in PARTS.items():
         begin, end = f"<!-- {name} -->\n", "<!-- end -->"
-        pattern = re.compile(f"(?<={re.escape(begin)}).*?(?={re.escape(end)})", re.DOTALL)
-        text, count = pattern.subn(lambda _, make=make: make(), text)
+        pattern = re.compile(f"{re.escape(begin)}.*?{re.escape(end)}", re.DOTALL)
+        made = begin + make() + end
+        text, count = pattern.subn(lambda _, made=made: made, text)
         if count != 1:
             raise ValueError(f"{PAGE.name} needs one '{begin.strip()}' with its '{end}'")
     return text
@@ -36,14 +39,15 @@ def picture() -> str:
 
     An arrow that a longer way replaces is left out.
     """
+    drawn = [room for room in _from_the_top() if room not in NOT_DRAWN]
+    arrows = reduced({room: room_imports()[room] & set(drawn) for room in drawn})
     lines = ["```mermaid", "flowchart TD"]
-    for room in _from_the_top():
+    for room in drawn:
         count = sum(module.room == room for module in modules().values())
-        size = f"<br/><small>{count} files</small>" if count > 1 else ""
+        size = f"<br/><small>{count} files</small>" if count > 1 else ".py"
         lines.append(f'    {room}["{room}{size}"]')
-    arrows = reduced(room_imports())
-    for room in _from_the_top():
-        lines += [f"    {room} --> {other}" for other in sorted(arrows[room], key=_floor)]
+    for room in drawn:
+        lines += [f"    {room} --> {other}" for other in sorted(arrows[room], key=drawn.index)]
     return "\n".join([*lines, "```", ""])
 
 
@@ -60,7 +64,9 @@ def rooms() -> str:
             folder = module.path.parent if module.is_facade else module.path
             where = folder.relative_to(PACKAGE).as_posix() + ("/" if module.is_facade else "")
             indent = "&emsp;" * (name.count(".") - 1)
-            lines.append(f"| {indent}[`{where}`](../toolkit/dynident/{where}) | {_said(name)} |")
+            lines.append(
+                f"| {indent}[`{where}`](../toolkit/dynident/{where}) | {first_line(module.tree)} |"
+            )
     return "\n".join([*lines, ""])
 
 
@@ -69,15 +75,6 @@ PARTS: Mapping[str, Callable[[], str]] = {"picture": picture, "rooms": rooms}
 
 def _from_the_top() -> list[str]:
     return [room for floor in reversed(FLOORS) for room in floor]
-
-
-def _floor(room: str) -> int:
-    return -next(height for height, floor in enumerate(FLOORS) if room in floor)
-
-
-def _said(name: str) -> str:
-    """Return the first line of a docstring; a lazy facade's stands in its module, not its stub."""
-    return first_line(modules()[name].tree)
 
 
 if __name__ == "__main__":
