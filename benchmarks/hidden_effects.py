@@ -166,7 +166,6 @@ def _scaled(case: Case, robot: Robot, known: list[TrueEffect], hidden: TrueEffec
     model = Model(robot, tuple(one.effect for one in known))
     for _ in range(3):
         evidence = Evidence(model, gather(Dataset(_recordings(case, robot, [*known, hidden], 2))))
-        evidence.prepare(model.effects)
         judged = on_recordings(evidence, fit_evidence(evidence, model))
         assert judged.ratio is not None
         ratio = float(judged.ratio.max())

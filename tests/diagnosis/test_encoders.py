@@ -37,7 +37,6 @@ def recordings(model: Model, step: float, torque_std: float, count: int) -> tupl
 def test_rounding_power_is_what_rounding_leaves(model: Model) -> None:
     runs = Dataset(recordings(model, STEP, 1e-3, 3))
     evidence = Evidence(model, gather(runs))
-    evidence.prepare(model.effects)
     fitted = fit_evidence(evidence, model)
     judged = on_recordings(evidence, fitted)
     assert judged.ratio is not None and judged.noise_std is not None
@@ -50,7 +49,6 @@ def test_rounding_power_is_what_rounding_leaves(model: Model) -> None:
 def test_there_is_none_without_steps(model: Model) -> None:
     runs = Dataset(recordings(model, 0.0, 1e-3, 1))
     evidence = Evidence(model, gather(runs))
-    evidence.prepare(model.effects)
     np.testing.assert_array_equal(rounding_power(fit_evidence(evidence, model), runs), np.zeros(2))
 
 

@@ -17,7 +17,6 @@ def test_columns_linear_in_the_torque_may_be_made_of_filtered_torque() -> None:
     truth = true_values(model, Fv__shoulder=1.2, Fc__elbow=0.6, **{"payload.mass": 0.4})
     run = synthetic(model, truth, 0, rate_hz=250.0, payload=True)
     evidence = Evidence(model, gather(Dataset((run,))))
-    evidence.prepare(model.effects)
     linear = [e for e in catalogue().values() if e.linear_in_torque]
     assert linear
     for kind in linear:

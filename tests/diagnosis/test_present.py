@@ -24,7 +24,6 @@ def test_load_and_elasticity_settle_together_from_a_robot_without_bodies() -> No
     evidence = Evidence(
         study.model, gather(replace(study.train, recordings=study.train.recordings[:2]))
     )
-    evidence.prepare(study.model.effects)
     alone = [fit_evidence(evidence, study.model + one) for one in (load, bends)]
     both = fit_evidence(evidence, study.model + load + bends)
     mu, c = both.values[-2:]

@@ -29,10 +29,8 @@ def evidence_of(seeds: range, drag: float, offset: float) -> Evidence:
         synthetic(full, truth, seed, rate_hz=250.0, position_std=2e-5, torque_std=0.3)
         for seed in seeds
     )
-    evidence = Evidence(PLAIN, gather(Dataset(made)))
-    every = [v for e in candidates(PLAIN) for v in e.variants(PLAIN.robot)]
-    evidence.prepare([*PLAIN.effects, *every])
-    return evidence
+    every = tuple(v for e in candidates(PLAIN) for v in e.variants(PLAIN.robot))
+    return Evidence(PLAIN, gather(Dataset(made)), every)
 
 
 def added(evidence: Evidence, *labels: str) -> tuple[EvidenceFit, list[Found]]:

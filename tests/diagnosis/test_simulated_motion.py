@@ -78,7 +78,6 @@ def test_a_healthy_robot_is_accused_by_least_squares_and_not_by_simulated_instru
 def test_moved_torque_makes_plain_regression_instrumental(healthy: Dataset) -> None:
     loop = motion_of_loop(model(), healthy, CONTROLLER)
     evidence = Evidence(model(), loop.runs)
-    evidence.prepare(evidence.model.effects)
     fitted = fit_evidence(evidence, evidence.model)
     # V' (y - W x), both whitened as the fit has it, over the norms of what is multiplied.
     V, e = [], []

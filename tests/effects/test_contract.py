@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dynident.closed_loop import Mechanism, TrueEffect
-from dynident.effects import Block, Effect, catalogue, effects_of
+from dynident.effects import Block, Effect, Needs, catalogue, effects_of
 from dynident.effects.effect import force_unit, motion_unit
 from dynident.errors import EffectError
 from dynident.model import Model
@@ -63,7 +63,7 @@ def motion(seed: int, *, whole: bool = False) -> tuple[np.ndarray, ...]:
 
 def block_of(effect: Effect | type[Effect], seed: int, *, carries_payload: bool = True) -> Block:
     """Samples with everything that some effect needs of them."""
-    t, q, v, a = motion(seed, whole="whole" in effect.needs)
+    t, q, v, a = motion(seed, whole=Needs.RECORDING in effect.needs)
     return Block(
         t,
         q,
@@ -120,7 +120,7 @@ def test_every_effect_can_be_seen_somewhere(kind: type[Effect]) -> None:
 
 @EVERY
 def test_columns_of_one_sample_are_those_of_many(effect: Effect) -> None:
-    if "whole" in effect.needs:  # its columns depend on what went before
+    if effect.needs_recording:  # its columns depend on what went before
         return
     block = warm(block_of(effect, 1))
     one = replace(block, **{name: getattr(block, name)[7:8] for name in ARRAYS})
@@ -170,9 +170,9 @@ def test_columns_are_the_torque_that_the_simulator_needs(effect: Effect, seed: i
 
 
 @EVERY
-def test_secants_tend_to_the_derivative(effect: Effect) -> None:
+def test_chords_tend_to_the_derivative(effect: Effect) -> None:
     values = random_values(effect, 6)
-    if not effect.secant:
+    if not effect.nonlinear:
         assert effect.at(values.tolist()) is effect
         return
     if effect.simulated_transmission(tuple(values), ROBOT):  # it has no derivative at zero
@@ -181,11 +181,11 @@ def test_secants_tend_to_the_derivative(effect: Effect) -> None:
     derivative = effect.columns(block)
     limit = np.abs(derivative).max()
     # At its ends, what a recording does not hold is made up.
-    inner = slice(2, -2) if "whole" in effect.needs else slice(None)
+    inner = slice(2, -2) if effect.needs_recording else slice(None)
     for size in (0.0, 1e-9, 1e-5, 1e-4):
-        secant = effect.at((size * values).tolist()).columns(block)
+        chord = effect.at((size * values).tolist()).columns(block)
         room = (1e-9 + 1e3 * size) * limit
-        np.testing.assert_allclose(secant[inner], derivative[inner], atol=room)
+        np.testing.assert_allclose(chord[inner], derivative[inner], atol=room)
 
 
 @EVERY
@@ -212,7 +212,7 @@ def test_sensitivities_are_the_derivatives_of_the_columns(effect: Effect) -> Non
 @EVERY
 def test_payload_acts_only_where_it_is_on_board(effect: Effect) -> None:
     without = effect.columns(block_of(effect, 4, carries_payload=False))
-    if "payload" in effect.needs:
+    if effect.is_payload:
         assert not np.any(without)
         t, q, v, a = motion(4)
         truth = TrueEffect(effect, tuple(random_values(effect, 4)))
@@ -326,9 +326,33 @@ def test_what_a_class_says_of_itself(kind: type[Effect]) -> None:
     for other in (*kind.confounded_with, *kind.contains):
         assert other in known, f"{other} is not (yet) in the catalogue"
         assert other != kind.name
-    assert kind.needs <= {"rigid", "torque", "body", "whole", "payload"}
-    assert "torque" in kind.needs or not kind.linear_in_torque
+    assert isinstance(kind.needs, Needs)
+    assert Needs.TORQUE in kind.needs or not kind.linear_in_torque
     assert list(kind.candidates(ROBOT)), "it can be nowhere"
+
+
+@EVERY
+def test_a_block_carries_no_more_than_the_effect_needs(effect: Effect) -> None:
+    """What an effect does not say that it needs may be missing, and changes nothing."""
+    block = warm(block_of(effect, 9))
+    carried = {"rigid": Needs.REGRESSOR, "torque": Needs.TORQUE, "body": Needs.BODIES}
+    spared = {name: None for name, need in carried.items() if need not in effect.needs}
+    np.testing.assert_array_equal(effect.columns(replace(block, **spared)), effect.columns(block))
+
+
+@EVERY
+def test_traits_agree_with_the_needs(effect: Effect) -> None:
+    model = Model(ROBOT, (effect,))
+    assert model.needs_values == (effect.depends_on_fit or effect.nonlinear)
+    assert effect.is_instantaneous == (
+        not effect.needs & (Needs.TORQUE | Needs.BODIES | Needs.RECORDING)
+    )
+    assert effect.is_dynamic_response == (Needs.BODIES | Needs.RECORDING in effect.needs)
+    assert effect.acting_columns(block_of(effect, 0)).shape[1] == len(effect.acting_at(ROBOT))
+    if effect.linear_in_torque:
+        block = block_of(effect, 10)
+        twice = replace(block, torque=2.0 * np.asarray(block.torque))
+        np.testing.assert_array_equal(effect.columns(twice), 2.0 * effect.columns(block))
 
 
 @EACH

@@ -60,7 +60,7 @@ def test_known_values_are_found_again(label: str, values: tuple[float, ...], tmp
     again = load_estimate(found.save(tmp_path / "estimate.json"))
     assert again.model.effects == found.model.effects
     effect = again.model.effects[-1]
-    assert effect.point == (tuple(found.effect_values(label)) if effect.secant else ())
+    assert effect.point == (tuple(found.effect_values(label)) if effect.nonlinear else ())
 
 
 def test_a_delay_between_samples_is_found_to_the_accuracy_of_a_spline() -> None:

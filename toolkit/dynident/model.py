@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from dynident.effects import FRICTION_WIDTH, Block, Effect, effects_of
+from dynident.effects import FRICTION_WIDTH, Block, Effect, Needs, effects_of
 from dynident.errors import EffectError
 from dynident.robot import BaseParameters, Robot, nearest_parameters, structural_base
 
@@ -72,9 +72,12 @@ class Model:
         return made
 
     def at(self, values: np.ndarray) -> Model:
-        """Return the model with the columns of its secant effects taken at other values, (p,)."""
-        secants = (e.at(_plain(values[self.slices[e.label]])) for e in self.effects if e.secant)
-        moved = tuple(one for one in secants)
+        """Return the model linearised at other values, (p,), where it is not linear in them."""
+        moved = tuple(
+            effect.at(_plain(values[self.slices[effect.label]]))
+            for effect in self.effects
+            if effect.nonlinear
+        )
         return self.with_shapes(moved) if moved else self
 
     # --- parameters ----------------------------------------------------------------------------
@@ -118,7 +121,7 @@ class Model:
     @cached_property
     def needs_values(self) -> bool:
         """Whether some columns depend on the parameters: they are taken at values, and again."""
-        return any(e.secant or e.needs & {"torque", "body"} for e in self.effects)
+        return any(e.nonlinear or e.depends_on_fit for e in self.effects)
 
     # --- torque --------------------------------------------------------------------------------
 
@@ -179,22 +182,18 @@ class Model:
         full = np.zeros((len(block.t), self.robot.n, self.size))
         rigid = len(self.base.independent)
         full[:, :, :rigid] = np.take(block.rigid, self.base.independent, axis=2)
-        known = known or {}
-        waiting = []
-        for effect in self.effects:
-            if effect.label in known:
-                full[:, :, self.slices[effect.label]] = known[effect.label]
-            elif "torque" in effect.needs:
-                waiting.append(effect)
-            else:
-                own = effect.columns(self.ready(effect, block, values))
-                full[:, :, self.slices[effect.label]] = own
-        if waiting and values is not None:
-            loaded = replace(block, torque=full @ self._without_loads(values))
-            for effect in waiting:
-                own = effect.columns(self.ready(effect, loaded, values))
-                full[:, :, self.slices[effect.label]] = own
-        return full
+
+        def torque(found: Mapping[str, np.ndarray]) -> np.ndarray:
+            # With the regressor at hand, a product is quicker than recursive inverse dynamics.
+            assert values is not None
+            return self._filled(full, found) @ self._without_loads(values)
+
+        given = known or {}
+        wanted = [e for e in self.effects if not (e.needs_torque and values is None)]
+        found = self._in_order(
+            [e for e in wanted if e.label not in given], block, values, given, torque
+        )
+        return self._filled(full, found)
 
     def whole_columns(
         self, block: Block, values: np.ndarray | None = None
@@ -211,17 +210,34 @@ class Model:
         -------
         label -> (T, n, k)
         """
-        known: dict[str, np.ndarray] = {}
-        whole = [e for e in self.effects if "whole" in e.needs]
-        for effect in whole:
-            if "torque" not in effect.needs:
-                known[effect.label] = effect.columns(self.ready(effect, block, values))
-        loads = [e for e in whole if "torque" in e.needs]
-        if loads:
-            loaded = replace(block, torque=self.torque_without_loads(block, values, known))
-            for effect in loads:
-                known[effect.label] = effect.columns(self.ready(effect, loaded, values))
-        return known
+        whole = [effect for effect in self.effects if effect.needs_recording]
+        return self._in_order(
+            whole, block, values, {}, lambda found: self.torque_without_loads(block, values, found)
+        )
+
+    def _in_order(
+        self,
+        effects: Sequence[Effect],
+        block: Block,
+        values: np.ndarray | None,
+        known: Mapping[str, np.ndarray],
+        torque: Callable[[Mapping[str, np.ndarray]], np.ndarray],
+    ) -> dict[str, np.ndarray]:
+        """Columns by label: of the effects that make the torque, then of those that depend on it.
+
+        `torque` predicts it from the columns of the former, as soon as one of the latter asks.
+        """
+        found = dict(known)
+        for effect in sorted(effects, key=lambda one: one.needs_torque):
+            if effect.needs_torque and block.torque is None:
+                block = replace(block, torque=torque(found))
+            found[effect.label] = effect.columns(self.ready(effect, block, values))
+        return found
+
+    def _filled(self, full: np.ndarray, found: Mapping[str, np.ndarray]) -> np.ndarray:
+        for label, own in found.items():
+            full[:, :, self.slices[label]] = own
+        return full
 
     def torque(self, block: Block, values: np.ndarray) -> np.ndarray:
         """Predicted torque, (T, n) in N m or N."""
@@ -262,7 +278,7 @@ class Model:
         bodies = self._bodies(values, carries_payload=carries)
         torque = bodies.inverse_dynamics(block.q, block.v, block.a)
         for effect in self.effects:
-            if effect.needs & {"torque", "payload"}:
+            if effect.needs_torque or effect.is_payload:
                 continue
             own = (known or {}).get(effect.label)
             if own is None:
@@ -273,23 +289,37 @@ class Model:
     # --- the robot that the parameters describe -------------------------------------------------
 
     def ready(self, effect: Effect, block: Block, values: np.ndarray | None) -> Block:
-        """Return a block with what an effect needs of the present model, but for its torque.
+        """Return a block with all that an effect needs of the model: bodies, regressor, torque.
+
+        What the block has already stays as it is.
 
         Parameters
         ----------
         effect : of this model, or a candidate for it.
         block : of any length.
-        values : (p,); None for the robot as described.
+        values : (p,); None for the robot as described, and no torque.
+
+        Returns
+        -------
+        A block that effects of the same `shares_block` can use as well.
         """
-        if "body" in effect.needs and block.body is None:
+        if effect.needs_bodies and block.body is None:
             values = self.given_values() if values is None else values
             carries = block.carries_payload
             body = self.current_robot(values, effect, carries_payload=carries)
             empty = self.current_robot(values, effect) if carries else body
             block = replace(block, body=body, empty=empty, rotor=self.rotor(values))
-        if "rigid" in effect.needs and block.rigid is None:
+        if effect.needs_regressor and block.rigid is None:
             block = replace(block, rigid=self.robot.regressor(block.q, block.v, block.a))
+        if effect.needs_torque and block.torque is None:
+            block = replace(block, torque=self.torque_without_loads(block, values))
         return block
+
+    def shares_block(self, effect: Effect) -> Hashable:
+        """Return what effects have in common that can use one and the same `ready` block."""
+        # What comes before an effect of the model is another robot than what a candidate sees.
+        before = effect.label if effect.needs_bodies and effect in self else ""
+        return effect.needs & Needs.OF_MODEL, before
 
     def current_robot(
         self, values: np.ndarray, before: Effect | None = None, *, carries_payload: bool = False
@@ -309,7 +339,7 @@ class Model:
         for effect in self.effects:
             if before is not None and effect.label == before.label:
                 break
-            if "body" in effect.needs:
+            if effect.needs_bodies:
                 robot = effect.simulated_robot(_plain(values[self.slices[effect.label]]), robot)
         return robot
 
@@ -332,7 +362,7 @@ class Model:
                 nearest_parameters(self.base, self.robot.theta, np.asarray(base))
             )
             for effect in self.effects:
-                if "payload" in effect.needs and carries_payload:
+                if effect.is_payload and carries_payload:
                     robot = effect.simulated_robot(_plain(values[self.slices[effect.label]]), robot)
             self._made[key] = robot
         return self._made[key]
@@ -345,12 +375,12 @@ class Model:
         """Values with those of effects that depend on the predicted torque at zero."""
         without = np.array(values)
         for effect in self.effects:
-            if "torque" in effect.needs:
+            if effect.needs_torque:
                 without[self.slices[effect.label]] = 0.0
         return without
 
-    def points(self) -> np.ndarray:
-        """Values at which the columns of secant effects are taken, all others zero, (p,)."""
+    def linearisation_point(self) -> np.ndarray:
+        """Values at which columns that are not linear in them are taken, all others zero, (p,)."""
         values = np.zeros(self.size)
         for effect in self.effects:
             if effect.point:

@@ -88,7 +88,7 @@ def add(study: Path, effect: str) -> Answer:
     fresh = tuple(one for one in effects if one not in loaded.model)
     if not fresh:
         raise StudyError(f"has {effect} already", str(study), "nothing was changed")
-    if any("payload" in one.needs for one in fresh):
+    if any(one.is_payload for one in fresh):
         recordings = (loaded.train + loaded.test).recordings
         if not any(r.payload for r in recordings):
             remedy = "set payload = true in the [[recordings]] that carry it"

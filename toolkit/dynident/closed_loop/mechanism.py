@@ -77,7 +77,7 @@ class Mechanism:
             effect = one.effect.on(robot)
             if effect.label in (other.effect.label for other in acting):
                 raise EffectError("is there twice", effect.label, "name it once")
-            if "payload" in effect.needs and not carries_payload:
+            if effect.is_payload and not carries_payload:
                 continue
             values = ordered(effect, robot, one.values)
             acting.append(TrueEffect(effect, values, one.hidden))
@@ -128,7 +128,7 @@ class Mechanism:
         robot = robot.with_theta(theta)
         acting = []
         for effect in model.effects:
-            if "payload" in effect.needs and not carries_payload:
+            if effect.is_payload and not carries_payload:
                 continue
             own = tuple(float(x) for x in values[model.slices[effect.label]])
             acting.append(TrueEffect(effect, own))

@@ -15,11 +15,12 @@ from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.nuisances.quantisation import nothing_but_rounding
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.global_search import RankedModel, global_search
-from dynident.diagnosis.search.payload_recordings import carry, decide_payload
+from dynident.diagnosis.search.payload_recordings import with_payload, with_payload_decided
 from dynident.diagnosis.search.pruning import without_superfluous
 from dynident.diagnosis.search.ranking import Ranking, candidates, rank
 from dynident.diagnosis.search.selection import alternatives_only, breaks_its_promise, choose
 from dynident.diagnosis.search.shaped_fit import refitted, shaped
+from dynident.effects import Effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import on_recordings
@@ -69,42 +70,55 @@ def diagnose(
     test = others[0] if others else None
     progress("reading the motion")
     loop = motion_of_loop(given, train, controller, progress, criteria)
-    evidence = Evidence(given, loop.runs or gather(train, criteria.noise), criteria)
+    runs = loop.runs or gather(train, criteria.noise)
+    evidence = Evidence(given, runs, criteria, _candidates(given))
     held = None
     if test is not None and len(test):
         held = Evidence(given, gather(test, criteria.noise), criteria)
     progress("evaluating every effect")
-    everything = [v for effect in candidates(given) for v in effect.variants(given.robot)]
-    evidence.prepare([*given.effects, *everything])
     start = with_friction_width(evidence, shaped(evidence, given))
     progress("looking for contacts")
-    if held is not None:
-        held.prepare(start.model.effects)
-    contacts = Contacts.leave_out(evidence, held, start)
+    contacts = Contacts.find(evidence, held, start)
+    evidence, held = contacts.left_out(evidence), contacts.left_out_of_test(held)
     if contacts.pulses:
         start = with_friction_width(evidence, shaped(evidence, given))
-    grown = _Growth(evidence, loop, train, start, most, progress).run()
-    fitted, found, rounds = grown.fitted, grown.found, grown.rounds
+    grown = _Growth(train, start, most, progress).run(evidence, loop)
+    evidence, fitted, found, rounds = grown.evidence, grown.fitted, grown.found, grown.rounds
     if held is not None:
-        decide_payload(held, fitted)
+        held = with_payload_decided(held, fitted)
     kept = without_superfluous(evidence, held, fitted, found, progress)
     if len(kept.found) < len(found):
         rounds.append(rank(evidence, kept.final, len(kept.found), progress))
-    sure = contacts.confirmed(kept.final)
+    sure = contacts.confirmed(evidence, held, kept.final)
+    evidence, held = sure.left_out(evidence), sure.left_out_of_test(held)
     if sure.pulses != contacts.pulses:
         start = fit_evidence(evidence, start.model, start)
         kept = replace(kept, final=fit_evidence(evidence, kept.final.model, kept.final))
-    disturbances = sure.told(start)
+    disturbances = sure.disturbances(evidence, held, start)
+    notes = grown.loop.notes
     search = Search(
-        evidence, start, kept.final, tuple(kept.found), tuple(rounds), disturbances, loop.notes
+        evidence, start, kept.final, tuple(kept.found), tuple(rounds), disturbances, notes
     )
     return told(search, train, test, held)
 
 
+def _candidates(given: Model) -> tuple[Effect, ...]:
+    """Every variant of every effect that is asked about in each round."""
+    return tuple(v for effect in candidates(given) for v in effect.variants(given.robot))
+
+
 @dataclass(frozen=True)
 class _Grown:
-    """A model with the effects that were added, and the ranking of each round."""
+    """A model with the effects that were added, and the ranking of each round.
 
+    Attributes
+    ----------
+    evidence : with the payload where it was found to be, and the latest simulated motion.
+    loop : behind that motion.
+    """
+
+    evidence: Evidence
+    loop: SimulatedMotion
     fitted: EvidenceFit
     found: list[Found]
     rounds: list[Ranking]
@@ -116,47 +130,40 @@ class _Grown:
 
 @dataclass(frozen=True)
 class _Growth:
-    """What the addition of effects works on; see `diagnose`."""
+    """The addition of effects; see `diagnose`."""
 
-    evidence: Evidence
-    loop: SimulatedMotion
     train: Dataset
     start: EvidenceFit
     most: int
     progress: Callable[[str], None]
 
-    def run(self) -> _Grown:
-        """Grow a model from the first one, and again if a second look finds what was missed."""
-        before = self.evidence.runs
-        nothing = _Grown(self.start, [], [rank(self.evidence, self.start, 0, self.progress)])
+    def run(self, evidence: Evidence, loop: SimulatedMotion) -> _Grown:
+        """Grow a model from the first one, and again if a global search finds what was missed."""
+        first = rank(evidence, self.start, 0, self.progress)
+        nothing = _Grown(evidence, loop, self.start, [], [first])
         grown = self.grown(nothing)
-        if not self.most or self.loop.runs:
+        if not self.most or loop.runs:
             return grown  # simulated motions are renewed as the model grows: there is no way back
-        again = global_search(self.evidence, nothing.asked, grown.asked, self.progress)
+        again = global_search(grown.evidence, nothing.asked, grown.asked, self.progress)
         if again is None:
             return grown
-        runs = self.evidence.runs
         base = grown
         if again.fitted is not grown.fitted:
-            # Who carries a payload, and what was kept for a first look, belong to the other branch.
-            base, self.evidence.runs = nothing, before
-            self.evidence.renew_screening()
+            # What was kept of a first look belongs to the other branch.
+            base = replace(nothing, evidence=evidence.looked_at_anew())
         other = self.grown(replace(base, rounds=[*base.rounds[:-1], again.ranking]))
-        if other.fitted.misfit(self.start) < grown.fitted.misfit(self.start):
-            return other
-        self.evidence.runs = runs
-        return grown
+        return other if other.fitted.misfit(self.start) < grown.fitted.misfit(self.start) else grown
 
     def grown(self, one: _Grown) -> _Grown:
         """Add the best effect and ask again, until nothing is material any more."""
-        evidence, fitted = self.evidence, one.fitted
+        evidence, loop, fitted = one.evidence, one.loop, one.fitted
         found, rounds = list(one.found), list(one.rounds)
         while len(found) < self.most and not _resolved(evidence, fitted, self.train):
             chosen = choose(evidence, fitted, rounds[-1])
             if chosen is None:
                 break
             self.progress(f"adding {chosen.score.effect.label}")
-            carry(evidence, chosen.score)
+            evidence = with_payload(evidence, chosen.score)
             wider = with_friction_width(
                 evidence, refitted(evidence, fitted.model + chosen.score.effect, fitted)
             )
@@ -165,12 +172,14 @@ class _Growth:
             found.append(chosen)
             fitted = wider
             if _has_changed(evidence, self.start, fitted):
-                evidence.renew_screening()
-            if self.loop.renew(evidence, fitted):
+                evidence = evidence.looked_at_anew()
+            loop, moved = loop.renewed(evidence, fitted)
+            if moved is not evidence:
+                evidence = moved
                 fitted = with_friction_width(evidence, refitted(evidence, fitted.model, fitted))
             rounds.append(rank(evidence, fitted, len(found), self.progress))
             found[-1] = alternatives_only(chosen, rounds[-1])
-        return _Grown(fitted, found, rounds)
+        return _Grown(evidence, loop, fitted, found, rounds)
 
 
 def _has_changed(evidence: Evidence, start: EvidenceFit, fitted: EvidenceFit) -> bool:

@@ -72,7 +72,7 @@ def notes_on(evidence, held, fitted: EvidenceFit, source: NoiseSource) -> tuple[
             f"squares, whose columns carry noise{floor}. Small effects may be false; record a "
             "repeated motion."
         )
-    if any("payload" in effect.needs for effect in fitted.model.effects):
+    if any(effect.is_payload for effect in fitted.model.effects):
         payload_recordings = [r.recording.name for r in evidence.runs if r.recording.payload]
         payload_recordings += [
             r.recording.name for r in (held.runs if held else ()) if r.recording.payload

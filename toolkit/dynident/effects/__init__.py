@@ -10,6 +10,7 @@ from dynident.effects.effect import Effect, JointEffect
 from dynident.effects.parameter import Parameter, ShapeParameter
 from dynident.effects.registry import catalogue, effects_of
 from dynident.effects.terms import Term
+from dynident.effects.traits import Needs
 from dynident.effects.transmission import Transmission
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "Block",
     "Effect",
     "JointEffect",
+    "Needs",
     "Parameter",
     "ShapeParameter",
     "Term",

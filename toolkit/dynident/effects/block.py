@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dynident.errors import EffectError
-
-if TYPE_CHECKING:
-    from dynident.robot import Robot
-    from dynident.robot.dynamics import TorqueDerivatives
+from dynident.robot import Robot
+from dynident.robot.dynamics import TorqueDerivatives
 
 FRICTION_WIDTH = 0.01
 """Speed (rad/s, or m/s for a prismatic joint) over which dry friction changes its sign.

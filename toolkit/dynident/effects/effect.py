@@ -7,7 +7,7 @@ are linear in its parameters once its shape parameters are fixed, so that
 
 One class in one file holds everything that the rest of the package needs to know of an effect:
 columns, parameters, units, bounds, how it is simulated, what it is confounded with, and which
-experiment shows it.
+experiment shows it. The questions about its columns are in `traits`, its simulation in `simulated`.
 """
 
 from __future__ import annotations
@@ -16,20 +16,17 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
 from dynident.effects.block import Block
 from dynident.effects.parameter import Parameter, ShapeParameter
+from dynident.effects.simulated import SimulatedEffect
 from dynident.effects.terms import Term
-from dynident.effects.transmission import Transmission
+from dynident.effects.traits import EffectTraits
 from dynident.errors import EffectError
-
-if TYPE_CHECKING:
-    from typing import Self
-
-    from dynident.robot import Robot
+from dynident.robot import Robot
 
 Motion = Literal[
     "speed",
@@ -50,7 +47,7 @@ session; its source moving alone; recordings with and without the payload; a rep
 
 
 @dataclass(frozen=True)
-class Effect(ABC):
+class Effect(EffectTraits, SimulatedEffect, ABC):
     """A physical effect at a joint (`joint`), between two (`source`), or of the whole robot.
 
     Attributes
@@ -58,8 +55,9 @@ class Effect(ABC):
     joint : the joint whose torque changes (first); None for an effect of the whole robot.
     source : the other joint of a coupling.
     shape : values of `shape_parameters`, in their order.
-    point : values of `parameters` at which columns are taken that are not linear in them: secants
-        through this point, so that there they are exact; empty for derivatives at zero.
+    point : linearisation point, values of `parameters` at which columns are taken that are not
+        linear in them: chords through it, so that there they are exact; empty for derivatives at
+        zero.
     """
 
     joint: str | None = None
@@ -84,20 +82,8 @@ class Effect(ABC):
     stands_in_for: ClassVar[tuple[str, ...]] = ()
     """Simpler effects whose columns it has, or may seem to have: they are named first where they do
     most of the work."""
-    needs: ClassVar[frozenset[str]] = frozenset()
-    """What `Block` must carry: "rigid", "torque", "body"; "whole" where it must be the whole
-    recording at its full rate; "payload" where runs with and without differ."""
-    linear_in_torque: ClassVar[bool] = False
-    """Whether its columns are linear in the predicted torque and depend on nothing else: then it
-    does not matter whether they are filtered or made of filtered torque, which is quicker."""
-    secant: ClassVar[bool] = False
-    """Whether its torque is not linear in its parameters, so that columns are taken at `point`."""
-    time_varying: ClassVar[bool] = False
-    """Whether its columns depend on the time in the session: they do not repeat with the motion."""
     found_by: ClassVar[Literal["residual", "repetition"]] = "residual"
     """Where it shows: in what repetitions have in common, or in what differs between them."""
-    memory: ClassVar[int] = 0
-    """Number of internal states that a simulation of it keeps."""
 
     # --- what it is ---------------------------------------------------------------------------
 
@@ -184,7 +170,7 @@ class Effect(ABC):
 
     def at(self, values: Sequence[float]) -> Self:
         """Return the effect with its columns taken at other values; itself where it is linear."""
-        return replace(self, point=tuple(float(x) for x in values)) if self.secant else self
+        return replace(self, point=tuple(float(x) for x in values)) if self.nonlinear else self
 
     @property
     def label(self) -> str:
@@ -211,6 +197,14 @@ class Effect(ABC):
     @abstractmethod
     def columns(self, block: Block) -> np.ndarray:
         """Torque per unit of each linear parameter, (T, n, k) in N m or N."""
+
+    def acting_at(self, robot: Robot) -> tuple[int, ...]:
+        """Columns of the joints whose torque it changes."""
+        return tuple(range(robot.n))
+
+    def acting_columns(self, block: Block) -> np.ndarray:
+        """Columns at the joints whose torque it changes, (T, J, k); see `acting_at`."""
+        return self.columns(block)
 
     def family(self, variants: Sequence[Any], blocks: Sequence[Block]) -> list[list[np.ndarray]]:
         """Columns of `variants`, this effect with several shapes, in each of several blocks.
@@ -243,47 +237,6 @@ class Effect(ABC):
         """
         return None
 
-    # --- how it is simulated: the ways in which an effect can act on a plant -------------------
-
-    def simulated_force(self, values: Sequence[float], block: Block) -> np.ndarray:
-        """Torque that it takes from the drives, (T, n), from t, q and v alone."""
-        return self.columns(block) @ np.asarray(values, dtype=float)
-
-    def simulated_terms(self, values: Sequence[float], robot: Robot) -> tuple[Term, ...] | None:
-        """The same force as terms that a simulator evaluates natively; None if it has others.
-
-        Such a force is evaluated in Python, which takes longer. Empty where there is no force.
-        """
-        return None
-
-    def simulated_inertia(self, values: Sequence[float], robot: Robot) -> np.ndarray:
-        """Addition to the joint-space inertia matrix, (n, n)."""
-        return np.zeros((robot.n, robot.n))
-
-    def simulated_robot(self, values: Sequence[float], robot: Robot) -> Robot:
-        """The robot with the effect on board, where the effect is a change of its bodies."""
-        return robot
-
-    def simulated_gain(self, values: Sequence[float], robot: Robot) -> np.ndarray:
-        """Recorded torque per torque that acts, (n,)."""
-        return np.ones(robot.n)
-
-    def simulated_rate(self, values: Sequence[float], block: Block) -> np.ndarray:
-        """Rate of its internal states, (T, memory) per s, from t, q, v and `block.memory`."""
-        return np.zeros((len(block.t), self.memory))
-
-    def simulated_transmission(self, values: Sequence[float], robot: Robot) -> Transmission | None:
-        """What it puts between a motor and its link; None for nothing."""
-        return None
-
-    def simulated_loss(self, values: Sequence[float], robot: Robot) -> np.ndarray:
-        """Dry friction per transmitted torque, (n,): torque needed + loss abs(torque) sign(v)."""
-        return np.zeros(robot.n)
-
-    def simulated_delay(self, values: Sequence[float], robot: Robot) -> np.ndarray:
-        """Time by which the recorded torque is late, (n,) s: it is that which acted then."""
-        return np.zeros(robot.n)
-
 
 class Forceless(Effect):
     """An effect that is simulated by a change of the plant, not by a force on it."""
@@ -301,6 +254,12 @@ class JointEffect(Effect):
     @abstractmethod
     def at_joint(self, block: Block) -> np.ndarray:
         """Columns at `joint`, (T, k)."""
+
+    def acting_at(self, robot: Robot) -> tuple[int, ...]:
+        return (robot.names.index(str(self.joint)),)
+
+    def acting_columns(self, block: Block) -> np.ndarray:
+        return self.at_joint(block)[:, None, :]
 
     def columns(self, block: Block) -> np.ndarray:
         here = self.at_joint(block)

@@ -1,18 +1,19 @@
-"""Training data in the form in which the diagnosis looks at it.
+"""Recordings as the diagnosis sees them: columns of the model and of every candidate.
 
-Columns of the model and of every candidate, low-passed and decimated like the torque, for every
-version of every run.
+Low-passed and decimated like the torque, for every replicate of every run.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from dynident.criteria import DEFAULTS, Criteria
-from dynident.effects import Block, Effect, JointEffect
+from dynident.effects import Block, Effect
+from dynident.evidence.column_cache import ColumnCache, FirstLook, Kept
 from dynident.evidence.runs import Run, Signals
 from dynident.fitting.sampling import Sampled
 from dynident.model import Model
@@ -23,157 +24,106 @@ _TOGETHER = 500_000
 """Samples, over all shapes, up to which responses in several recordings are evaluated at once."""
 
 
-@dataclass
+@dataclass(frozen=True, eq=False)
 class Evidence:
-    """Columns of the rigid body and of effects for every run, computed once.
+    """Recordings, and the columns that a model and its candidates have along them.
 
-    Payload columns are kept as if every recording carried it; `of` applies who does.
+    Payload columns are those of a recording that carries it; who does is for others to apply.
+
+    Attributes
+    ----------
+    model : whose base parameters are fitted; its effects are kept.
+    runs : the recordings in their replicates.
+    criteria : thresholds of whoever judges it.
+    candidates : further effects whose columns are kept. Those that follow from a sample alone are
+        evaluated with the model's in one pass through a motion. Of all other effects, which are
+        tried once, only those of the model that asks are kept.
+    cache : of columns, shared with the evidence that this one was made of.
+    look : the current first look, see `first_look`.
     """
 
     model: Model
     runs: tuple[Run, ...]
     criteria: Criteria = DEFAULTS
-    _rigid: list[Signals] = field(default_factory=list)
-    _known: dict[Effect, list[Signals]] = field(default_factory=dict)
-    _now: Hashable = None
-    _present: dict[Hashable, Signals] = field(default_factory=dict)
-    _blocks: dict[Hashable, Block] = field(default_factory=dict)
-    _screened: dict[Hashable, Signals] = field(default_factory=dict)
-    _full: dict[Hashable, np.ndarray] = field(default_factory=dict)
-    _simulation: Evidence | None = None
+    candidates: tuple[Effect, ...] = ()
+    cache: ColumnCache = field(default_factory=ColumnCache, repr=False)
+    look: FirstLook = field(default_factory=FirstLook, repr=False)
 
-    @property
-    def simulation(self) -> Evidence | None:
-        """Evidence of the simulated motion alone, which is all that candidates need of it."""
-        if any(run.columns_from == "recording" for run in self.runs):
-            return None
-        runs = tuple(
-            replace(run, replicates=run.replicates[-1:], columns_from="recording")
-            for run in self.runs
-        )
-        if self._simulation is None:
-            self._simulation = Evidence(self.model, runs, self.criteria)
-        self._simulation.runs = runs  # who carries the payload may have been found out
-        return self._simulation
+    def with_runs(self, runs: tuple[Run, ...]) -> Evidence:
+        """Return the evidence of other runs: what is known of their motions is still known."""
+        return replace(self, runs=runs)
 
-    def prepare(self, effects: Iterable[Effect]) -> None:
-        """Compute the rigid body's columns and those of many effects in one pass.
+    def looked_at_anew(self) -> Evidence:
+        """Return the evidence without a first look: the model has become another one."""
+        return replace(self, look=FirstLook())
 
-        Effects that depend on the present model, or need the whole recording, are left for `of`.
-        """
-        if self.simulation is not None:
-            effects = list(effects)
-            self.simulation.prepare([e for e in effects if e not in self.model])
-            effects = [e for e in effects if e in self.model]
-        later = {"torque", "body", "whole"}
-        wanted = [e for e in effects if e not in self._known and not e.needs & later]
-        base = self.model.base.independent
-        self._rigid = []
-        for effect in wanted:
-            self._known[effect] = []
-        for run in self.runs:
-            rigid: Signals = []
-            found: dict[Effect, Signals] = {effect: [] for effect in wanted}
-            for replicate in run.replicates:
-
-                def evaluate(block: Block) -> list[np.ndarray]:
-                    assert block.rigid is not None
-                    loaded = replace(block, carries_payload=True)
-                    return [block.rigid[:, :, base], *(acting(e, loaded) for e in wanted)]
-
-                first, *others = replicate.decimate(self.model, evaluate)
-                rigid.append(first)
-                for effect, columns in zip(wanted, others, strict=True):
-                    found[effect].append(columns)
-            self._rigid.append(rigid)
-            for effect in wanted:
-                self._known[effect].append(found[effect])
-
-    def forget(self, effect: Effect) -> None:
-        """Drop the columns of an effect, tried once and not needed again."""
-        self._known.pop(effect, None)
-        for run in range(len(self.runs)):
-            self._present.pop((effect, run), None)
-        if self._simulation is not None:
-            self._simulation.forget(effect)
-
-    def renew(self, runs: tuple[Run, ...]) -> None:
-        """Take runs whose last versions, the simulated motions, are new."""
-        wanted = list(self._simulation._known) if self._simulation else []
-        self.runs, self._simulation, self._now = runs, None, None
-        self._full.clear()
-        self.renew_screening()
-        fresh = self.simulation
-        assert fresh is not None
-        fresh.prepare(dict.fromkeys([*wanted, *self._known]))
-        for r in range(len(runs)):
-            self._rigid[r][-1] = fresh.rigid(r)[0]
-            for effect, columns in self._known.items():
-                columns[r][-1] = fresh.of(effect, r, self.model, None)[0]
+    # --- columns --------------------------------------------------------------------------------
 
     def rigid(self, run: int) -> Signals:
-        """Columns of the base parameters, (T, n, b) for each version."""
-        return self._rigid[run]
+        """Columns of the base parameters, (T, n, b) for each replicate."""
+        return [self._rigid(sampled) for sampled in self.runs[run].replicates]
 
     def of(self, effect: Effect, run: int, model: Model, values: np.ndarray | None) -> Signals:
-        """Columns of an effect at the joints where it acts, (T, J, k) for each version.
+        """Columns of an effect at the joints where it acts in one run.
 
-        `model` and its parameters are those whose torque and bodies some columns depend on. Of a
-        candidate for it along simulated motion, the columns of that motion only.
+        Parameters
+        ----------
+        effect : of the model, or a candidate for it.
+        run : which one.
+        model, values : (p,) whose torque and bodies some columns depend on; None for zeros.
+
+        Returns
+        -------
+        (T, J, k) for each replicate. Of a candidate where the columns are taken along a simulated
+        motion: of that motion only.
         """
-        if self.simulation is not None and effect not in model:
-            return self.simulation.of(effect, run, model, values)
-        if effect.linear_in_torque:
-            rows = zip(self.runs[run].replicates, self._filtered(run, model, values), strict=True)
-            return [acting(effect, replace(self._rows(v), torque=torque)) for v, torque in rows]
-        if effect.needs & {"torque", "body"}:
-            return self._of_present(effect, run, model, values)
-        if effect not in self._known:
-            self._known[effect] = [
-                [self._plain(effect, v) for v in r.replicates] for r in self.runs
-            ]
-        return self._known[effect][run]
+        values = np.zeros(model.size) if values is None else values
+        return [self._of(effect, one, model, values) for one in self._along(effect, run, model)]
 
-    def screening(self, effect: Effect, run: int, model: Model, values: np.ndarray) -> Signals:
-        """As `of`, but as the first model of this diagnosis had them; for a first look only.
+    def columns(
+        self, variants: Sequence[Effect], model: Model, values: np.ndarray
+    ) -> list[list[Signals]]:
+        """Columns of one effect with several shapes: for each run those of each variant, as `of`.
+
+        Parameters
+        ----------
+        variants : one effect at one place, with any number of shapes.
+        model, values : as for `of`.
+        """
+        runs = range(len(self.runs))
+        first = variants[0]
+        if len(variants) > 1 and first.is_dynamic_response and first not in model:
+            found = self._together(variants, model, values)
+            return [[found[variant, run] for variant in variants] for run in runs]
+        return [[self.of(variant, run, model, values) for variant in variants] for run in runs]
+
+    def first_look(
+        self, variants: Sequence[Effect], model: Model, values: np.ndarray
+    ) -> list[list[Signals]]:
+        """As `columns`, but as the model had them that asked first; for a first look only.
 
         Columns that depend on the predicted torque or on the bodies cost an inverse dynamics of
         the whole recording, and change little as effects are added.
         """
-        if effect.linear_in_torque or not effect.needs & {"torque", "body"}:
-            return self.of(effect, run, model, values)
-        if (effect, run) not in self._screened:
-            self._screened[effect, run] = self.of(effect, run, model, values)
-        return self._screened[effect, run]
+        if variants[0].linear_in_torque or not variants[0].depends_on_fit:
+            return self.columns(variants, model, values)
+        seen, latest = self.cache.seen_in(self.look), self._at(model, values)
+        runs = range(len(self.runs))
 
-    def together(self, variants: Sequence[Effect], model: Model, values: np.ndarray) -> None:
-        """Evaluate the response of one effect with several shapes at once, for `of` to find."""
-        first = variants[0]
-        if len(variants) < 2 or first in model or not {"body", "whole"} <= first.needs:
-            return
-        if self.simulation is not None:
-            self.simulation.together(variants, model, values)
-            return
-        self._look_at(model, values)
-        known = {*self._present, *self._screened}
-        every = range(len(self.runs))
-        new = [v for v in dict.fromkeys(variants) if any((v, r) not in known for r in every)]
-        places = [(r, i) for r, run in enumerate(self.runs) for i in range(len(run.replicates))]
-        samples = max(replicate.motion.samples for run in self.runs for replicate in run.replicates)
-        step = max(1, _TOGETHER // (samples * max(len(new), 1)))
-        found: dict[Hashable, Signals] = {(v, r): [] for v in new for r in every}
-        for start in range(0, len(places) if new else 0, step):
-            some = places[start : start + step]
-            blocks = [self._block(first, *place, model, values) for place in some]
-            for (r, i), each in zip(some, first.family(new, blocks), strict=True):
-                replicate = self.runs[r].replicates[i]
-                for variant, columns in zip(new, each, strict=True):
-                    found[variant, r].append(replicate.filtered(columns))
-        self._present.update(found)
+        def key(variant: Effect, run: int) -> Hashable:
+            return variant, tuple(one.motion for one in self._along(variant, run, model))
 
-    def renew_screening(self) -> None:
-        """Let `screening` evaluate everything anew: the model has become another one."""
-        self._screened.clear()
+        new = [v for v in dict.fromkeys(variants) if any(key(v, r) not in seen for r in runs)]
+        if new and len(variants) > 1 and new[0].is_dynamic_response:
+            found = self._together(new, model, values)
+        else:
+            found = {(v, r): self.of(v, r, model, values) for v in new for r in runs}
+        for (variant, run), signals in found.items():
+            seen.setdefault(key(variant, run), signals)
+            # To be looked at closely next, with the same model.
+            for one, columns in zip(self._along(variant, run, model), signals, strict=True):
+                latest[variant, _recorded(one)] = columns
+        return [[seen[key(variant, run)] for variant in variants] for run in runs]
 
     def time_factor(self, effect: Effect, run: int) -> np.ndarray:
         """The factor of an effect's columns that depends on the time, folded, (P, S)."""
@@ -185,123 +135,176 @@ class Evidence:
             block = replace(block, temperature=np.stack(at, axis=1))
         return effect.time_factor(block)[self.runs[run].index]
 
-    def _plain(self, effect: Effect, replicate: Sampled) -> np.ndarray:
-        if "whole" in effect.needs:
-            block = replace(replicate.block(self.model, rigid=False), carries_payload=True)
-            return replicate.filtered(acting(effect, self.model.ready(effect, block, None)))
-        return replicate.decimate(
-            self.model,
-            lambda block: [acting(effect, replace(block, carries_payload=True))],
-            rigid="rigid" in effect.needs,
-        )[0]
+    # --- of one replicate, by all that they depend on -------------------------------------------
 
-    def _of_present(
-        self, effect: Effect, run: int, model: Model, values: np.ndarray | None
-    ) -> Signals:
-        """Columns that depend on the present model; kept until another is the present one."""
-        values = np.zeros(model.size) if values is None else values
-        self._look_at(model, values)
-        if (effect, run) not in self._present:
-            count = len(self.runs[run].replicates)
-            blocks = [self._block(effect, run, i, model, values) for i in range(count)]
-            self._present[effect, run] = [
-                replicate.filtered(acting(effect, block))
-                for replicate, block in zip(self.runs[run].replicates, blocks, strict=True)
-            ]
-        return self._present[effect, run]
+    def _of(self, effect: Effect, sampled: Sampled, model: Model, values: np.ndarray) -> np.ndarray:
+        if not effect.depends_on_fit:
+            return self._plain(effect, sampled, model)
+        kept, key = self._at(model, values), (effect, _recorded(sampled))
+        if key in kept:
+            return kept[key]
+        if effect.linear_in_torque:
+            torque = self._filtered_torque(sampled, model, values)
+            return effect.acting_columns(replace(self._rows(sampled), torque=torque))
+        found = sampled.filtered(effect.acting_columns(self._block(effect, sampled, model, values)))
+        if effect in model.effects:
+            kept[key] = found
+        return found
 
-    def _look_at(self, model: Model, values: np.ndarray) -> None:
-        """Forget what depends on another present model."""
-        carries = tuple(bool(one.recording.payload) for one in self.runs)
-        now = (model.effects, values.tobytes(), carries)
-        if now != self._now:
-            self._now = now
-            self._present.clear()
-            self._blocks.clear()
-
-    def _block(
-        self, effect: Effect, run: int, replicate: int, model: Model, values: np.ndarray
-    ) -> Block:
-        """A whole version with what an effect needs of the present model; shared by many."""
-        sampled = self.runs[run].replicates[replicate]
-        # What comes before an effect of the model is another robot than what a candidate sees.
-        label = effect.label if "body" in effect.needs and effect in model else ""
-        key = (run, replicate, effect.needs & {"body", "rigid", "torque"}, label)
-        if key in self._blocks:
-            return self._blocks[key]
-        # One motion for all effects: what a robot does along it is then evaluated once.
-        motion = self._blocks.get(("motion", run, replicate))
-        motion = sampled.block(model, rigid=False) if motion is None else motion
-        block = model.ready(effect, motion, values)
-        if "torque" in effect.needs:
-            block = replace(
-                block, torque=self._torque(effect, run, replicate, block, model, values)
+    def _plain(self, effect: Effect, sampled: Sampled, model: Model) -> np.ndarray:
+        """Columns that follow from the motion alone."""
+        known, key = self.cache.along(sampled.motion), (self._robot, effect)
+        if key in known:
+            return known[key]
+        if effect in self._evaluated_at_once(sampled):
+            self._pass_through(sampled)
+            return known[key]
+        if effect.is_instantaneous:
+            (found,) = sampled.decimate(
+                self.model,
+                lambda block: [effect.acting_columns(replace(block, carries_payload=True))],
+                rigid=effect.needs_regressor,
             )
+        else:
+            block = replace(sampled.block(self.model, rigid=False), carries_payload=True)
+            found = sampled.filtered(effect.acting_columns(self.model.ready(effect, block, None)))
+        if effect in self._kept or effect in model.effects:
+            known[key] = found
+        return found
+
+    def _rigid(self, sampled: Sampled) -> np.ndarray:
+        known = self.cache.along(sampled.motion)
+        if self._robot not in known:
+            self._pass_through(sampled)
+        return known[self._robot]
+
+    def _evaluated_at_once(self, sampled: Sampled) -> list[Effect]:
+        """Effects that need nothing but samples, as far as they are asked for along a motion."""
+        every = [effect for effect in self._kept if effect.is_instantaneous]
+        if self._from_simulation and all(r.replicates[-1] is not sampled for r in self.runs):
+            return [effect for effect in every if effect in self.model]
+        return every
+
+    def _pass_through(self, sampled: Sampled) -> None:
+        """Evaluate the rigid body and many effects in one pass."""
+        known, base = self.cache.along(sampled.motion), self.model.base.independent
+        every = self._evaluated_at_once(sampled)
+        wanted = [effect for effect in every if (self._robot, effect) not in known]
+
+        def evaluate(block: Block) -> list[np.ndarray]:
+            assert block.rigid is not None
+            loaded = replace(block, carries_payload=True)
+            return [block.rigid[:, :, base], *(effect.acting_columns(loaded) for effect in wanted)]
+
+        known[self._robot], *others = sampled.decimate(self.model, evaluate)
+        known.update(zip([(self._robot, effect) for effect in wanted], others, strict=True))
+
+    def _together(
+        self, variants: Sequence[Effect], model: Model, values: np.ndarray
+    ) -> dict[tuple[Effect, int], Signals]:
+        """Responses of one effect with several shapes, walked through time at once."""
+        first, new = variants[0], list(dict.fromkeys(variants))
+        places = [
+            (run, one) for run in range(len(self.runs)) for one in self._along(first, run, model)
+        ]
+        samples = max(one.motion.samples for _, one in places)
+        step = max(1, _TOGETHER // (samples * len(new)))
+        found: dict[tuple[Effect, int], Signals] = {
+            (v, run): [] for v in new for run in range(len(self.runs))
+        }
+        for start in range(0, len(places), step):
+            some = places[start : start + step]
+            blocks = [self._block(first, one, model, values) for _, one in some]
+            for (run, one), each in zip(some, first.family(new, blocks), strict=True):
+                for variant, columns in zip(new, each, strict=True):
+                    found[variant, run].append(one.filtered(columns))
+        return found
+
+    # --- what they are made of ------------------------------------------------------------------
+
+    @cached_property
+    def _robot(self) -> Hashable:
+        """What columns depend on that follow from the motion alone."""
+        return self.model.robot, self.model.friction_width
+
+    @cached_property
+    def _kept(self) -> dict[Effect, None]:
+        return dict.fromkeys((*self.model.effects, *self.candidates))
+
+    @cached_property
+    def _from_simulation(self) -> bool:
+        return all(run.columns_from == "simulation" for run in self.runs)
+
+    def _along(self, effect: Effect, run: int, model: Model) -> tuple[Sampled, ...]:
+        """Replicates along which an effect's columns are taken."""
+        every = self.runs[run].replicates
+        # Of a simulated motion, candidates need no more than that one.
+        return every[-1:] if self._from_simulation and effect not in model else every
+
+    def _at(self, model: Model, values: np.ndarray) -> Kept:
+        """What is kept of a linearisation."""
+        return self.cache.at((self._robot, model.effects, values.tobytes()))
+
+    def _block(self, effect: Effect, sampled: Sampled, model: Model, values: np.ndarray) -> Block:
+        """A whole replicate with what an effect needs of the model; shared by many."""
+        kept, recorded = self._at(model, values), _recorded(sampled)
+        key = (model.shares_block(effect), recorded)
+        if key in kept:
+            return kept[key]
+        # One motion for all effects: what a robot does along it is then evaluated once.
+        whole = kept.get(recorded)
+        whole = sampled.block(model, rigid=False) if whole is None else whole
+        block = whole
+        if effect in model and effect.needs_torque:
+            block = replace(block, torque=self._own_torque(sampled, block, model, values))
+        block = model.ready(effect, block, values)
         if sampled.motion.samples <= _SHARED:
-            self._blocks[key] = block
-            self._blocks["motion", run, replicate] = motion
+            kept[key], kept[recorded] = block, whole
         return block
 
-    def _torque(
-        self,
-        effect: Effect,
-        run: int,
-        replicate: int,
-        block: Block,
-        model: Model,
-        values: np.ndarray,
+    def _own_torque(
+        self, sampled: Sampled, block: Block, model: Model, values: np.ndarray
     ) -> np.ndarray:
-        """Predicted torque at the full rate, (T, n), but for effects that depend on it.
+        """Torque at the full rate without what depends on it, for a model that has such an effect.
 
-        A fit whose own columns depend on it asks again and again: then the rigid body's columns are
-        kept, of which the torque is a product.
+        Its fit asks again and again: the rigid body's columns are kept, of which the torque is a
+        product, unless effects change the bodies or a recording is long.
         """
-        changes_bodies = any("body" in e.needs for e in model.effects)
-        if effect not in model or changes_bodies or len(block.t) > _SHARED:
+        if any(one.needs_bodies for one in model.effects) or len(block.t) > _SHARED:
             return model.torque_without_loads(block, values)
         base, tip = list(model.base.independent), 10 * (model.robot.tip % model.robot.n)
-        if (run, replicate) not in self._full:
+        known, key = self.cache.along(sampled.motion), (self._robot, "full rate")
+        if key not in known:
             whole = model.robot.regressor(block.q, block.v, block.a)
-            self._full[run, replicate] = whole[:, :, [*base, *range(tip, tip + 10)]]
-        rigid = self._full[run, replicate]
+            known[key] = whole[:, :, [*base, *range(tip, tip + 10)]]
+        rigid = known[key]
         torque = rigid[:, :, : len(base)] @ values[: len(base)]
         for one in model.effects:
             own = values[model.slices[one.label]]
-            if "payload" in one.needs:
+            if one.is_payload:
                 torque = torque + rigid[:, :, len(base) :] @ own * float(block.carries_payload)
-            elif "torque" not in one.needs:
+            elif not one.needs_torque:
                 torque = torque + one.columns(block) @ own
         return torque
 
-    def _rows(self, replicate: Sampled) -> Block:
-        return self.model.block(replicate.t, replicate.q, replicate.v, replicate.a, rigid=False)
-
-    def _filtered(self, run: int, model: Model, values: np.ndarray | None) -> list[np.ndarray]:
+    def _filtered_torque(self, sampled: Sampled, model: Model, values: np.ndarray) -> np.ndarray:
         """Decimated rows of the torque that the model predicts, but for effects that scale it."""
-        values = np.zeros(model.size) if values is None else values
-        base = len(model.base.independent)
-        found = [rigid @ values[:base] for rigid in self.rigid(run)]
-        for effect in model.effects:
-            if "torque" in effect.needs:
-                continue
-            if "payload" in effect.needs and not self.runs[run].recording.payload:
-                continue
-            joints = list(joints_of(effect, model))
-            own = values[model.slices[effect.label]]
-            for torque, columns in zip(found, self.of(effect, run, model, values), strict=True):
-                torque[:, joints] += columns @ own
-        return found
+        kept, key = self._at(model, values), ("torque", _recorded(sampled))
+        if key not in kept:
+            torque = self._rigid(sampled) @ values[: len(self.model.base.independent)]
+            for effect in model.effects:
+                if effect.needs_torque or (effect.is_payload and not sampled.recording.payload):
+                    continue
+                columns = self._of(effect, sampled, model, values)
+                own = values[model.slices[effect.label]]
+                torque[:, list(effect.acting_at(model.robot))] += columns @ own
+            kept[key] = torque
+        return kept[key]
+
+    def _rows(self, sampled: Sampled) -> Block:
+        return self.model.block(sampled.t, sampled.q, sampled.v, sampled.a, rigid=False)
 
 
-def joints_of(effect: Effect, model: Model) -> tuple[int, ...]:
-    """Joints whose torque an effect changes."""
-    if isinstance(effect, JointEffect):
-        return (model.robot.names.index(str(effect.joint)),)
-    return tuple(range(model.robot.n))
-
-
-def acting(effect: Effect, block: Block) -> np.ndarray:
-    """Columns of an effect at the joints where it acts, (T, J, k)."""
-    if isinstance(effect, JointEffect):
-        return effect.at_joint(block)[:, None, :]
-    return effect.columns(block)
+def _recorded(sampled: Sampled) -> Hashable:
+    """A motion, and whether the payload was on board."""
+    return sampled.motion, bool(sampled.recording.payload)

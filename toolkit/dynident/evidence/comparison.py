@@ -147,7 +147,6 @@ def compare(
     results = []
     for estimate in named.values():
         evidence = Evidence(estimate.model, runs, criteria)
-        evidence.prepare(estimate.model.effects)
         results.append(on_recordings(evidence, estimate))
     return Comparison(
         tuple(named),
@@ -185,13 +184,11 @@ def compare_models(
         if shaped_effects(model):
             model = refine_shapes(model, train).model
         evidence = Evidence(model, runs, criteria)
-        evidence.prepare(model.effects)
         fitted = fit_evidence(evidence, model)
         if held is None:
             results.append(on_blocks(evidence, fitted))
         else:
             judge = Evidence(model, held, criteria)
-            judge.prepare(model.effects)
             results.append(on_recordings(judge, fitted))
         compared.append(model)
         loops.append(loop_of(Judged(model, fitted.values), test if held else train, controller))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynident.criteria import Criteria
-from dynident.evidence.columns import Evidence, joints_of
+from dynident.evidence.columns import Evidence
 from dynident.evidence.noise_model import (
     NoiseModel,
     differences,
@@ -148,10 +148,13 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
 def _beginning(model: Model, near: EvidenceFit | None) -> np.ndarray:
     """Values at which columns that depend on them are taken first, (p,)."""
     if near is None:
-        return model.points()
+        return model.linearisation_point()
     known = dict(zip(near.model.names, near.values, strict=True))
     return np.array(
-        [known.get(name, x) for name, x in zip(model.names, model.points(), strict=True)]
+        [
+            known.get(name, x)
+            for name, x in zip(model.names, model.linearisation_point(), strict=True)
+        ]
     )
 
 
@@ -162,7 +165,7 @@ def _held(model: Model, values: np.ndarray) -> np.ndarray:
     """
     held = np.array(values)
     for effect in model.effects:
-        if effect.point and {"body", "whole"} <= effect.needs:
+        if effect.point and effect.is_dynamic_response:
             held[model.slices[effect.label]] = effect.point
     return held
 
@@ -171,7 +174,7 @@ def _waiting(model: Model, at: np.ndarray, found: np.ndarray) -> np.ndarray:
     """Values found, but those of effects that depend on the present model as they were."""
     values = np.array(found)
     for effect in model.effects:
-        if effect.needs & {"torque", "body"}:
+        if effect.depends_on_fit:
             values[model.slices[effect.label]] = at[model.slices[effect.label]]
     return values
 
@@ -183,12 +186,12 @@ def model_columns(
     recording = evidence.runs[run].recording
     parts = [[rigid[:, joint] for rigid in evidence.rigid(run)]]
     for effect in model.effects:
-        columns, joints = evidence.of(effect, run, model, values), joints_of(effect, model)
+        columns, joints = evidence.of(effect, run, model, values), effect.acting_at(model.robot)
         if joint in joints:
             at = [c[:, joints.index(joint)] for c in columns]
         else:
             at = [np.zeros_like(c[:, 0]) for c in columns]
-        if "payload" in effect.needs:
+        if effect.is_payload:
             at = [c * float(bool(recording.payload)) for c in at]
         parts.append(at)
     torque = [replicate.tau[:, [joint]] for replicate in evidence.runs[run].replicates]

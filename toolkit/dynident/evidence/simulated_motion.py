@@ -27,7 +27,7 @@ from dynident.model import Model
 from dynident.recording import Dataset
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class SimulatedMotion:
     """The recordings' references in the simulated loop of the present model.
 
@@ -47,17 +47,19 @@ class SimulatedMotion:
     measured: Dataset | None = None
     left_out: tuple[Effect, ...] = ()
 
-    def renew(self, evidence: Evidence, fitted: EvidenceFit) -> bool:
-        """Simulate another model and give its motion to the evidence.
+    def renewed(self, evidence: Evidence, fitted: EvidenceFit) -> tuple[SimulatedMotion, Evidence]:
+        """Simulate another model: what is known of its motion, and the evidence with it.
 
-        What cannot be simulated is left out, with a note; where nothing can, the motion stays.
+        What cannot be simulated is left out, with a note; where nothing can, the motion stays, and
+        the evidence is the very same.
 
-        Returns
-        -------
-        Whether the evidence has new motions.
+        Parameters
+        ----------
+        evidence : with the motions of an earlier model.
+        fitted : the model to be simulated.
         """
         if self.controller is None or self.measured is None:
-            return False
+            return self, evidence
         model, values = fitted.model, fitted.values
         payload_recordings = [run.recording.payload for run in evidence.runs]
         recordings = (
@@ -65,7 +67,7 @@ class SimulatedMotion:
             for one, carries in zip(self.measured.recordings, payload_recordings, strict=True)
         )
         measured = replace(self.measured, recordings=tuple(recordings))
-        problem = ""
+        problem, note = "", ()
         for effects in _ever_fewer(model.effects, self.left_out):
             part, own = _without(model, values, effects)
             try:
@@ -76,16 +78,11 @@ class SimulatedMotion:
                 continue
             if effects and effects != self.left_out:
                 names = ", ".join(effect.title for effect in effects)
-                self._note(f"Instruments: simulated without {names} ({problem}).")
-            self.left_out = effects
-            self.runs = runs
-            evidence.renew(runs)
-            return True
-        self._note(f"Instruments: the motion of an earlier model, as {problem}.")
-        return False
-
-    def _note(self, note: str) -> None:
-        self.notes = (*self.notes, note)
+                note = (f"Instruments: simulated without {names} ({problem}).",)
+            renewed = replace(self, runs=runs, left_out=effects, notes=(*self.notes, *note))
+            return renewed, evidence.with_runs(runs).looked_at_anew()
+        note = (f"Instruments: the motion of an earlier model, as {problem}.",)
+        return replace(self, notes=(*self.notes, *note)), evidence
 
 
 def motion_of_loop(

@@ -100,7 +100,7 @@ class Sampled:
         self, model: Model, values: np.ndarray | None = None
     ) -> dict[str, np.ndarray]:
         """Columns at the full rate of the effects that need the whole recording, by label."""
-        if not any("whole" in effect.needs for effect in model.effects):
+        if not any(effect.needs_recording for effect in model.effects):
             return {}
         return model.whole_columns(self.block(model, rigid=False), values)
 

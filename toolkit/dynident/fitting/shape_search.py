@@ -7,7 +7,7 @@ effects with a shape are evaluated again, and what the rest can explain of them 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -25,7 +25,6 @@ from dynident.recording import Dataset
 _SCREEN_MOST = 400  # combinations of all effects' variants that are screened at most
 _PRECISION = 1e-4  # of the logarithm of a shape parameter
 _PASSES = 5  # of shapes and values in turn, where columns depend on the values
-_LATER = {"torque", "body", "whole"}  # what is not at hand in a block of samples
 
 Signals = list[np.ndarray]
 """Decimated rows of each recording, (T, n, k)."""
@@ -54,7 +53,7 @@ def refine_shapes(model: Model, dataset: Dataset) -> Shaped:
     samples = [sample(recording, dataset.filter) for recording in dataset.recordings]
     if not model.needs_values:
         return _ShapeSearch(model, samples, None).run(screen=True)
-    shaped = _ShapeSearch(model, samples, _without_secants(model, dataset)).run(screen=True)
+    shaped = _ShapeSearch(model, samples, _without_nonlinear(model, dataset)).run(screen=True)
     for _ in range(_PASSES):
         before = shaped.model
         relaxed = LeastSquares().fit(before, dataset)
@@ -64,13 +63,13 @@ def refine_shapes(model: Model, dataset: Dataset) -> Shaped:
     return shaped
 
 
-def _without_secants(model: Model, dataset: Dataset) -> np.ndarray:
+def _without_nonlinear(model: Model, dataset: Dataset) -> np.ndarray:
     """Values fitted without the shaped effects whose variants take their columns elsewhere."""
     rest = model
     for effect in shaped_effects(model):
-        rest = rest - effect if effect.secant else rest
+        rest = rest - effect if effect.nonlinear else rest
     found = LeastSquares().fit(rest, dataset).values
-    values = model.points()
+    values = model.linearisation_point()
     values[: model.base.rank] = found[: model.base.rank]
     for effect in rest.effects:
         values[model.slices[effect.label]] = found[rest.slices[effect.label]]
@@ -193,12 +192,9 @@ class _ShapeSearch:
         """Whole blocks with what the shaped effects need of the present model, by label."""
         model, found = self._model, {}
         for effect in self._shaped:
-            if effect.needs & _LATER:
-                block = model.ready(effect, sampled.block(model, rigid=False), self._values)
-                if "torque" in effect.needs:
-                    torque = model.torque_without_loads(block, self._values)
-                    block = replace(block, torque=torque)
-                found[effect.label] = block
+            if not effect.is_instantaneous:
+                whole = sampled.block(model, rigid=False)
+                found[effect.label] = model.ready(effect, whole, self._values)
         return found
 
     def _differentiable(self, effects: tuple[Effect, ...]) -> bool:
@@ -217,7 +213,7 @@ class _ShapeSearch:
             if effect.label in blocks:
                 found.append(sampled.filtered(evaluate(blocks[effect.label])))
                 continue
-            rigid = "rigid" in effect.needs
+            rigid = effect.needs_regressor
             found += sampled.decimate(self._model, lambda b: [evaluate(b)], rigid=rigid)
         return found
 

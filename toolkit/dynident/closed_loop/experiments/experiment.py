@@ -130,7 +130,7 @@ class Experiment:
     @property
     def tells_payload(self) -> bool:
         """Whether the recordings say which of them carry the payload."""
-        return any("payload" in one.effect.needs for one in self.known_effects)
+        return any(one.effect.is_payload for one in self.known_effects)
 
     def rollouts(self, progress: Progress | None = None) -> tuple[Rollout, ...]:
         """Simulate the runs: true motions, measured positions, commands without noise.

@@ -219,17 +219,10 @@ class CandidateExperiments:
         return self._effects[effect, motion]
 
     def _ready(self, effect: Effect, motion: Motion) -> Block:
-        """A motion with what an effect needs of the present model; shared by many."""
-        needs = effect.needs & {"body", "rigid", "torque"}
-        # What comes before an effect of the model is another robot than what a candidate sees.
-        label = effect.label if "body" in needs and effect in self.model else ""
-        key = (motion, needs, label)
+        """A motion with what an effect needs of the model; shared by many."""
+        key = (motion, self.model.shares_block(effect))
         if key not in self._blocks_ready:
-            block = self.model.ready(effect, self._block(motion), self.values)
-            if "torque" in needs:
-                torque = self.model.torque_without_loads(block, self.values)
-                block = replace(block, torque=torque)
-            self._blocks_ready[key] = block
+            self._blocks_ready[key] = self.model.ready(effect, self._block(motion), self.values)
         return self._blocks_ready[key]
 
     # --- motions -------------------------------------------------------------------------------

@@ -44,7 +44,7 @@ class Adviser:
         One sentence without a full stop. Where the effect's torque is a part of the model's at
         every motion, it says that no experiment does.
         """
-        if effect.shown_by == "repetition" or "whole" in effect.needs:
+        if effect.shown_by == "repetition" or effect.needs_recording:
             # What depends on the past is no part of a model that sees the instant only.
             return self._by_kind(effect)
         try:

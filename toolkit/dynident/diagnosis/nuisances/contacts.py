@@ -44,81 +44,92 @@ class Contacts:
 
     Attributes
     ----------
-    evidence, held : training and test recordings; `held` is None where there are none.
-    whole, whole_held : their runs with nothing left out.
-    bumps, bumps_held : what was found in them.
+    whole, whole_held : training and test runs with nothing left out.
+    pulses, pulses_held : what was found in them.
     """
 
-    evidence: Evidence
-    held: Evidence | None
     whole: tuple[Run, ...]
     whole_held: tuple[Run, ...]
     pulses: tuple[DisturbancePulse, ...]
     pulses_held: tuple[DisturbancePulse, ...]
 
     @classmethod
-    def leave_out(cls, evidence: Evidence, held: Evidence | None, fitted: EvidenceFit) -> Contacts:
-        """Find contacts in the recordings and leave their instants out of both.
+    def find(cls, evidence: Evidence, held: Evidence | None, fitted: EvidenceFit) -> Contacts:
+        """Find contacts in the recordings.
 
         Parameters
         ----------
-        evidence, held : their runs are replaced.
-        present : the model as it fits the training recordings.
+        evidence, held : training and test recordings, nothing left out; `held` is None where there
+            are none.
+        fitted : the model as it fits the training recordings.
         """
-        whole, whole_held = evidence.runs, held.runs if held is not None else ()
         pulses = _resolved(evidence, fitted, find_contacts(evidence, fitted))
-        pulses_held = (
-            _resolved(held, fitted, find_contacts(held, fitted)) if held is not None else ()
-        )
-        found = cls(evidence, held, whole, whole_held, pulses, pulses_held)
-        found._leave(pulses, pulses_held)
-        return found
+        if held is None:
+            return cls(evidence.runs, (), pulses, ())
+        pulses_held = _resolved(held, fitted, find_contacts(held, fitted))
+        return cls(evidence.runs, held.runs, pulses, pulses_held)
 
-    def confirmed(self, fitted: EvidenceFit) -> Contacts:
-        """Keep the contacts that a better model still shows, and leave only these out.
+    def left_out(self, evidence: Evidence) -> Evidence:
+        """Return the training evidence without the instants of contacts."""
+        return _without(evidence, self.whole, self.pulses)
+
+    def left_out_of_test(self, held: Evidence | None) -> Evidence | None:
+        """Return the test evidence without the instants of contacts."""
+        return None if held is None else _without(held, self.whole_held, self.pulses_held)
+
+    def confirmed(self, evidence: Evidence, held: Evidence | None, fitted: EvidenceFit) -> Contacts:
+        """Return only the contacts that a better model still shows.
 
         What a poor model lacks is not quite the same in every repetition, as motions are not, and
         may look like a contact.
+
+        Parameters
+        ----------
+        evidence, held : training and test recordings; what is left out of them does not matter.
+        fitted : the better model.
         """
-        if not (self.pulses or self.pulses_held):
-            return self
-        self._leave((), ())
-        again = find_contacts(self.evidence, fitted) if self.pulses else ()
-        again_held = ()
-        if self.held is not None and self.pulses_held:
-            again_held = find_contacts(self.held, fitted)
-        pulses, pulses_held = (
-            _common(new, old, self.evidence.criteria.contacts.same_place)
-            for new, old in ((again, self.pulses), (again_held, self.pulses_held))
-        )
-        self._leave(pulses, pulses_held)
+        criteria, pulses, pulses_held = evidence.criteria.contacts, (), ()
+        if self.pulses:
+            again = find_contacts(_without(evidence, self.whole, ()), fitted)
+            pulses = _common(again, self.pulses, criteria.same_place)
+        if held is not None and self.pulses_held:
+            again = find_contacts(_without(held, self.whole_held, ()), fitted)
+            pulses_held = _common(again, self.pulses_held, criteria.same_place)
         return replace(self, pulses=pulses, pulses_held=pulses_held)
 
-    def told(self, fitted: EvidenceFit) -> tuple[Disturbance, ...]:
-        """One disturbance a joint, the clearest, with the error before and after it is left out."""
-        judged = self.held or self.evidence
+    def disturbances(
+        self, evidence: Evidence, held: Evidence | None, fitted: EvidenceFit
+    ) -> tuple[Disturbance, ...]:
+        """One disturbance a joint, the clearest, with the error before and after it is left out.
+
+        Parameters
+        ----------
+        evidence, held : training and test recordings; errors are those of the latter, where there
+            are any.
+        fitted : the model that is judged.
+        """
         clearest: dict[str, DisturbancePulse] = {}
         for pulse in sorted((*self.pulses, *self.pulses_held), key=lambda one: one.p_value):
             clearest.setdefault(pulse.joint, pulse)
         if not clearest:
             return ()
-        self._leave((), ())
-        before = on_recordings(judged, fitted).error
-        self._leave(self.pulses, self.pulses_held)
-        after = on_recordings(judged, fitted).error
-        told = []
+        judged, whole, pulses = evidence, self.whole, self.pulses
+        if held is not None:
+            judged, whole, pulses = held, self.whole_held, self.pulses_held
+        before = on_recordings(_without(judged, whole, ()), fitted).error
+        after = on_recordings(_without(judged, whole, pulses), fitted).error
+        found = []
         for pulse in clearest.values():
-            told.append(Disturbance(pulse, before, after))
+            found.append(Disturbance(pulse, before, after))
             before = after
-        return tuple(told)
+        return tuple(found)
 
-    def _leave(
-        self, pulses: Sequence[DisturbancePulse], pulses_held: Sequence[DisturbancePulse]
-    ) -> None:
-        criteria = self.evidence.criteria.contacts
-        self.evidence.runs = _masked(self.evidence.runs, self.whole, pulses, criteria)
-        if self.held is not None:
-            self.held.runs = _masked(self.held.runs, self.whole_held, pulses_held, criteria)
+
+def _without(
+    evidence: Evidence, whole: tuple[Run, ...], pulses: Sequence[DisturbancePulse]
+) -> Evidence:
+    """Evidence with the instants of these pulses, and of no others, left out."""
+    return evidence.with_runs(_masked(evidence.runs, whole, pulses, evidence.criteria.contacts))
 
 
 def _masked(

@@ -86,7 +86,6 @@ def _predicted(
     """Torque that the model predicts along each recording, (T, n)."""
     runs = gather(Dataset(tuple(recordings), dataset.filter), fitted.criteria.noise)
     evidence = Evidence(fitted.model, runs, fitted.criteria)
-    evidence.prepare(fitted.model.effects)
     joints = range(fitted.model.robot.n)
     each = []
     for r in range(len(recordings)):

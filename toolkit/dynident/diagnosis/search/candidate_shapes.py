@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,9 +35,11 @@ class Beside:
     evidence: Evidence
     whole: EvidenceFit
 
-    def columns(self, effect: Effect, run: int, model: Model, values: np.ndarray) -> Signals:
-        """As `Evidence.of`."""
-        return self.evidence.of(effect, run, self.whole.model, self.whole.values)
+    def columns(
+        self, variants: Sequence[Effect], model: Model, values: np.ndarray
+    ) -> list[list[Signals]]:
+        """As `Evidence.columns`."""
+        return self.evidence.columns(variants, self.whole.model, self.whole.values)
 
 
 def score_at(
@@ -64,7 +66,7 @@ def refined(
     if not one.drop > 0:
         return one
     if not one.effect.shape_parameters(fitted.model.robot):
-        return _at_its_values(evidence, fitted, one, columns_of) if one.effect.secant else one
+        return _at_its_values(evidence, fitted, one, columns_of) if one.effect.nonlinear else one
     has_slopes = type(one.effect).sensitivities is not Effect.sensitivities
     search = by_gradient if has_slopes else _by_trial
     if one.effect.point:
@@ -90,7 +92,6 @@ def _at_its_values(
         if change <= criteria.converged * np.linalg.norm(effect.point):
             break
         better = score_at(evidence, fitted, effect, one, grid_of(effect, fitted), columns_of)
-        evidence.forget(effect)
         if not better.drop > criteria.least_explained * one.drop:
             break  # the secant has left the range in which the law is what it is
         one = better
@@ -110,7 +111,6 @@ def _at_best_value(
         nonlocal best
         effect = one.effect.at([float(np.exp(logarithm))])
         found = score_at(evidence, fitted, effect, one, grid_of(effect, fitted), columns_of)
-        evidence.forget(effect)
         if found.drop_at_point > best.drop_at_point and not impossible(found, fitted):
             best = found
         return -found.drop_at_point
@@ -136,7 +136,6 @@ def _by_trial(
     def at(shape: np.ndarray) -> Score:
         effect = one.effect.shaped(*np.exp(np.atleast_1d(shape)))
         result = score_at(evidence, fitted, effect, one, grid, columns_of)
-        evidence.forget(effect)
         return result
 
     def loss(shape: np.ndarray) -> float:

@@ -132,8 +132,7 @@ def _worst_recording(evidence: Evidence, fitted: EvidenceFit) -> tuple[Evidence,
         )
         for run, e in zip(evidence.runs, left, strict=True)
     ]
-    alone = Evidence(evidence.model, (evidence.runs[int(np.argmax(sizes))],), evidence.criteria)
-    alone.prepare(fitted.model.effects)
+    alone = evidence.with_runs((evidence.runs[int(np.argmax(sizes))],))
     return alone, fit_evidence(alone, fitted.model, fitted)
 
 
@@ -199,8 +198,6 @@ class _GlobalSearch:
 
 def _scores(evidence: Evidence, fitted: EvidenceFit, tried: list[Effect]) -> list[Score]:
     parts = candidate_moments(evidence, fitted, tried)
-    for one in tried:
-        evidence.forget(one)
     return [
         score(fitted, one, *part, grid=len(tried)) for one, part in zip(tried, parts, strict=True)
     ]

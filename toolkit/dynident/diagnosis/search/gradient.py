@@ -11,7 +11,7 @@ from scipy.linalg import block_diag
 from scipy.optimize import least_squares
 
 from dynident.diagnosis.search.scoring import Columns, Score, candidate_moments, impossible, score
-from dynident.effects import Block, Effect, Parameter
+from dynident.effects import Block, Effect, Needs, Parameter
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.moments.replicated import Moments
@@ -35,7 +35,7 @@ class Tangent(Effect):
         return cls(effect.joint, effect.source, effect.shape, effect.point, effect)
 
     @property
-    def needs(self) -> frozenset[str]:  # type: ignore[override]
+    def needs(self) -> Needs:  # type: ignore[override]
         """As the effect."""
         assert self.of is not None
         return self.of.needs
@@ -83,7 +83,6 @@ def by_gradient(
         trial = effect.shaped(*x[: len(shapes)]).at(x[len(shapes) :].tolist())
         tangent = Tangent.to(trial)
         ((with_model, with_self),) = candidate_moments(evidence, fitted, [tangent], columns_of)
-        evidence.forget(tangent)
         plain = slice(0, k)
         found = score(
             fitted,

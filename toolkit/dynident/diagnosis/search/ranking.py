@@ -87,7 +87,7 @@ def rank(
     below_noise = joints_below_noise(evidence, fitted)
     noisy = all(run.kind == "single" and run.columns_from == "recording" for run in evidence.runs)
     for effect in only or candidates(fitted.model):
-        driven = {"body", "whole"} <= effect.needs
+        driven = effect.is_dynamic_response
         if driven and (noisy or effect.joint in below_noise):
             best.append(Score(effect, None, not_identifiable=False))
             continue
@@ -115,7 +115,7 @@ def rank(
 
 def _unseen(one: Score, noisy: bool) -> str:
     """Why a driven response was not evaluated; empty where it was."""
-    if one.drop != 0 or one.not_identifiable or not {"body", "whole"} <= one.effect.needs:
+    if one.drop != 0 or one.not_identifiable or not one.effect.is_dynamic_response:
         return ""
     return _NOISY if noisy else f"nothing is left to explain at {one.effect.joint}"
 
@@ -181,7 +181,7 @@ def payload_choices(runs: tuple[Run, ...], most: int) -> list[tuple[bool, ...]]:
 
 
 def _score_variants(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> Iterator[Score]:
-    if "payload" in effect.needs:
+    if effect.is_payload:
         choices = payload_choices(evidence.runs, evidence.criteria.search.payload_recordings)
         (whole,) = candidate_moments(evidence, fitted, [effect])
         for choice in choices:
@@ -195,7 +195,7 @@ def _score_variants(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> 
     if effect.point:
         # Found before, where no variant may be near enough.
         shapes = list(dict.fromkeys([*shapes, effect]))
-    found = candidate_moments(evidence, fitted, shapes, evidence.screening)
+    found = candidate_moments(evidence, fitted, shapes, evidence.first_look)
     for shaped, parts in zip(shapes, found, strict=True):
         yield _possible(score(fitted, shaped, *parts, grid=len(shapes)), fitted)
 

@@ -9,14 +9,14 @@ import numpy as np
 from scipy import stats
 
 from dynident.effects import Effect
-from dynident.evidence.columns import Evidence, joints_of
+from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, time_varying_columns, time_varying_mask
 from dynident.evidence.runs import Signals
 from dynident.model import Model
 from dynident.moments.replicated import Moments, TimeVarying, solve, time_varying_moments
 
-Columns = Callable[[Effect, int, Model, np.ndarray], Signals]
-"""Columns of an effect in a run, for a model and its values, as `Evidence.of`."""
+Columns = Callable[[Sequence[Effect], Model, np.ndarray], list[list[Signals]]]
+"""Columns of variants of an effect, for a model and its values, as `Evidence.columns`."""
 
 
 @dataclass(frozen=True)
@@ -78,22 +78,19 @@ def candidate_moments(
     Parameters
     ----------
     variants : one effect at one place, with any number of shapes.
-    columns_of : where columns come from; `Evidence.of` by default.
+    columns_of : where columns come from; `Evidence.columns` by default.
 
     Returns
     -------
     (B, p + 1, k) and (B, k, k) for each variant
     """
-    joints = joints_of(variants[0], fitted.model)
-    look = columns_of or evidence.of
+    joints = variants[0].acting_at(fitted.model.robot)
     time_varying = time_varying_mask(fitted.model)
     mixed = variants[0].time_varying or time_varying.any()
     with_model, with_self = None, None
     width = 0
-    if columns_of is None or columns_of == evidence.screening:
-        evidence.together(variants, fitted.model, fitted.values)
-    for r, run in enumerate(evidence.runs):
-        each = [look(effect, r, fitted.model, fitted.values) for effect in variants]
+    columns = (columns_of or evidence.columns)(variants, fitted.model, fitted.values)
+    for r, (run, each) in enumerate(zip(evidence.runs, columns, strict=True)):
         width = each[0][0].shape[2]
         signals = [np.concatenate(shapes, axis=2) for shapes in zip(*each, strict=True)]
         one, two = [], []

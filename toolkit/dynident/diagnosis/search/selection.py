@@ -51,12 +51,12 @@ def _alike_once_fitted(
     rivals = [
         s
         for s in others
-        if s.effect.secant
-        and "whole" not in s.effect.needs
+        if s.effect.nonlinear
+        and not s.effect.needs_recording
         and s.losses is not None
         and s.drop >= criteria.rival_share * best.drop
     ]
-    if not (best.effect.secant and "whole" not in best.effect.needs and rivals):
+    if not (best.effect.nonlinear and not best.effect.needs_recording and rivals):
         return ()
 
     def explained(effect: Effect) -> float:
@@ -72,7 +72,7 @@ def breaks_its_promise(fitted: EvidenceFit, wider: EvidenceFit, one: Score) -> b
 
     With it the bodies change, and with them the response, which may not follow.
     """
-    if not ({"body", "whole"} <= one.effect.needs and fitted.noise_known):
+    if not (one.effect.is_dynamic_response and fitted.noise_known):
         return False
     promised = min(one.drop / fitted.error_signal, 1.0) if fitted.error_signal > 0 else 1.0
     before, after = fitted.misfit(fitted), wider.misfit(fitted)

@@ -28,7 +28,7 @@ def refitted(evidence: Evidence, model: Model, near: EvidenceFit | None = None) 
     criteria = evidence.criteria.shapes
     fitted = fit_evidence(evidence, model, near)
     with_shapes = [e.label for e in model.effects if e.shape_parameters(model.robot)]
-    driven = [e.label for e in model.effects if {"body", "whole"} <= e.needs]
+    driven = [e.label for e in model.effects if e.is_dynamic_response]
     for again in range(criteria.refits if driven else 1):
         labels = with_shapes if again == 0 and len(with_shapes) > 1 else driven
         before = fitted

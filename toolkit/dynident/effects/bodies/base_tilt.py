@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dynident.effects.effect import Block, Forceless, Parameter
+from dynident.effects.traits import Needs
 
 _NEXT_TO_NOTHING = 1e-4  # rad: below it the series of the sinc is exact to rounding
 
@@ -31,8 +32,8 @@ class BaseTilt(Forceless):
         "move slowly through poses of all joints, the first one turned as far as it goes (an axis "
         "about which turning the base does not change the load on the joints stays untold)"
     )
-    needs = frozenset({"body"})
-    secant = True
+    needs = Needs.BODIES
+    nonlinear = True
 
     def parameters(self, robot):
         return (Parameter("rx", "rad", -1.0, 1.0), Parameter("ry", "rad", -1.0, 1.0))

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dynident.effects.effect import Block, Forceless, Parameter, motion_unit
+from dynident.effects.traits import Needs
 
 _NEXT_TO_NOTHING = 1e-5
 """Offset in rad or m below which a difference has fewer digits than the derivative in the middle
@@ -27,8 +28,8 @@ class JointZero(Forceless):
         "joint that carries the rest of the robot nothing but gravity shows it; at the last joint "
         "of an arm it cannot be told from the last link's centre of mass)"
     )
-    needs = frozenset({"body"})
-    secant = True
+    needs = Needs.BODIES
+    nonlinear = True
 
     def parameters(self, robot):
         unit = motion_unit(robot, self.joint)

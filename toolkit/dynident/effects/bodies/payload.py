@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.effects.effect import Block, Forceless, Parameter
+from dynident.effects.traits import Needs
 from dynident.errors import EffectError
 from dynident.inertia import PARAMETERS, UNITS
 
@@ -26,7 +27,7 @@ class Payload(Forceless):
     confounded_with = ("drive_gain",)
     shown_by = "payload"
     experiment = "repeat one recording with the payload and one without"
-    needs = frozenset({"rigid", "payload"})
+    needs = Needs.REGRESSOR | Needs.PAYLOAD
 
     def parameters(self, robot):
         # A load has mass, and diagonal second moments are sums of m x^2: none is negative.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.effects.effect import Block, Forceless, JointEffect, Parameter
+from dynident.effects.traits import Needs
 from dynident.errors import EffectError
 
 
@@ -21,7 +22,7 @@ class DriveGain(Forceless, JointEffect):
     confounded_with = ("payload", "rotor_inertia")
     shown_by = "load"
     experiment = "move {joint} through loads that the other joints feel too, or weigh a known mass"
-    needs = frozenset({"torque"})
+    needs = Needs.TORQUE
     linear_in_torque = True
 
     def parameters(self, robot):

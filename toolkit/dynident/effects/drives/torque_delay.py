@@ -6,6 +6,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from dynident.effects.effect import Block, Forceless, Parameter
+from dynident.effects.traits import Needs
 from dynident.errors import EffectError
 
 _NEXT_TO_NOTHING = 1e-7
@@ -29,8 +30,8 @@ class TorqueDelay(Forceless):
     confounded_with = ("joint_elasticity", "rotor_inertia", "viscous_friction")
     shown_by = "acceleration"
     experiment = "move fast, so that the torque changes much within the delay"
-    needs = frozenset({"torque", "whole"})
-    secant = True
+    needs = Needs.TORQUE | Needs.RECORDING
+    nonlinear = True
 
     @property
     def advice(self) -> str:

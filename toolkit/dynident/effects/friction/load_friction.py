@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.effects.effect import Block, Forceless, JointEffect, Parameter
+from dynident.effects.traits import Needs
 from dynident.errors import EffectError
 
 
@@ -21,7 +22,7 @@ class LoadFriction(Forceless, JointEffect):
     confounded_with = ("coulomb_friction", "drive_gain")
     shown_by = "load"
     experiment = "move {joint} slowly in both directions under several loads, both signs of them"
-    needs = frozenset({"torque"})
+    needs = Needs.TORQUE
 
     def parameters(self, robot):
         # From 1 on the gear would block itself.

@@ -12,6 +12,7 @@ from dynident.effects.effect import (
     force_unit,
     motion_unit,
 )
+from dynident.effects.traits import Needs
 from dynident.effects.transmissions.bands import solve_band
 
 
@@ -29,7 +30,7 @@ class Presliding(JointEffect):
     confounded_with = ("coulomb_friction", "stribeck_friction", "backlash")
     shown_by = "tiny reversals"
     experiment = "move {joint} to and fro by less than 0.01 rad (or 1 mm)"
-    needs = frozenset({"whole"})
+    needs = Needs.RECORDING
     memory = 1
 
     def parameters(self, robot):

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import weakref
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dynident.effects.block import Block
 from dynident.errors import EffectError
-
-if TYPE_CHECKING:
-    from dynident.robot import Robot
+from dynident.robot import Robot
 
 _POSES = 64
 _RATE = 200.0

@@ -34,7 +34,7 @@ class Backlash(FlexibleJoint):
     confounded_with = ("joint_elasticity", "presliding", "coulomb_friction")
     shown_by = "load"
     experiment = "move {joint} so that its load changes sign slowly, many times"
-    secant = True
+    nonlinear = True
 
     def parameters(self, robot):
         return (Parameter("gap", motion_unit(robot, self.joint), 0.0),)

@@ -7,6 +7,7 @@ from abc import abstractmethod
 import numpy as np
 
 from dynident.effects.effect import Block, Forceless, ShapeParameter
+from dynident.effects.traits import Needs
 from dynident.effects.transmission import Transmission
 from dynident.effects.transmissions.along import mean_inertia, share_of_rotor
 from dynident.effects.transmissions.driven import (
@@ -33,7 +34,7 @@ class FlexibleJoint(Forceless):
     feel the link's acceleration. See `dynident.effects.transmissions.driven`.
     """
 
-    needs = frozenset({"body", "whole"})
+    needs = Needs.BODIES | Needs.RECORDING
 
     @property
     def gap(self) -> float:

@@ -156,7 +156,7 @@ def _effects(
     """Torque of the effects alone, (T, n)."""
     total = np.zeros(q.shape)
     for effect in model.effects:
-        if effect.needs & {"torque", "whole"}:
+        if effect.needs_torque or effect.needs_recording:
             continue
         moved = model.ready(effect, replace(block, q=q, v=v, a=a, rigid=None), values)
         total += effect.columns(moved) @ values[model.slices[effect.label]]

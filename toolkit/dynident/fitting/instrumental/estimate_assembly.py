@@ -151,7 +151,7 @@ def _sure(bias: ExpectedBias) -> np.ndarray:
 def _is_dry(model: Model, label: str) -> bool:
     """Whether an effect's columns depend on the width of the friction law."""
     effect = next(e for e in model.effects if e.label == label)
-    if "whole" in effect.needs:
+    if effect.needs_recording:
         return False
     n = model.robot.n
     speed = np.full((1, n), model.friction_width)

@@ -38,7 +38,7 @@ class InertiaMatrices:
         whole = {
             e.label: np.zeros((count, n, len(e.parameters(model.robot))))
             for e in model.effects
-            if "whole" in e.needs
+            if e.needs_recording
         }
         rest = model.columns(model.block(t, poses, still, still), known=whole)
         self._columns = np.empty((count, n, n, model.size))

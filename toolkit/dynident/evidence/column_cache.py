@@ -1,0 +1,47 @@
+"""Columns that were evaluated, by all that they depend on: nothing is ever invalidated.
+
+Three kinds of columns are kept, each as long as something can ask for it again. Those that follow
+from the motion alone live as long as the motion. Those that depend on the fit belong to a
+linearisation, the model and the values at which they were taken; the latest one is kept, and with
+another one goes all that belongs to an older. Those of a first look live as long as that look.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from typing import Any
+from weakref import WeakKeyDictionary
+
+from dynident.recording import Motion
+
+
+class FirstLook:
+    """A first look at candidates, by its identity; see `Evidence.first_look`."""
+
+
+Kept = dict[Hashable, Any]
+"""Columns, or what columns are made of, by what they depend on besides their scope."""
+
+
+class ColumnCache:
+    """What was evaluated of a robot along motions; shared by all evidence of one model."""
+
+    def __init__(self) -> None:
+        self._of_motions: WeakKeyDictionary[Motion, Kept] = WeakKeyDictionary()
+        self._of_looks: WeakKeyDictionary[FirstLook, Kept] = WeakKeyDictionary()
+        self._linearisation: Hashable = None
+        self._linearised: Kept = {}
+
+    def along(self, motion: Motion) -> Kept:
+        """Return what follows from a motion alone."""
+        return self._of_motions.setdefault(motion, {})
+
+    def at(self, linearisation: Hashable) -> Kept:
+        """Return what depends on a linearisation; what belongs to an older one is gone."""
+        if linearisation != self._linearisation:
+            self._linearisation, self._linearised = linearisation, {}
+        return self._linearised
+
+    def seen_in(self, look: FirstLook) -> Kept:
+        """Return what a first look has evaluated."""
+        return self._of_looks.setdefault(look, {})
