@@ -30,7 +30,7 @@ def evidence_of(seeds: range, drag: float, offset: float) -> Evidence:
         for seed in seeds
     )
     every = tuple(v for e in candidates(PLAIN) for v in e.variants(PLAIN.robot))
-    return Evidence(PLAIN, gather(Dataset(made)), every)
+    return Evidence(PLAIN, gather(Dataset(made)), candidates=every)
 
 
 def added(evidence: Evidence, *labels: str) -> tuple[EvidenceFit, list[Found]]:
