@@ -120,15 +120,15 @@ def one_body(phi, within: Within, rows: np.ndarray | None = None, length: float 
     rows = distance_rows(reference) if rows is None else rows
     free = np.full(10, np.inf)
     space = ParameterSpace(
-        tuple(f"{name}.body" for name in PARAMETERS),
-        UNITS,
-        ("body",),
-        reference[None],
-        -free,
-        free,
-        np.eye(10),
-        phi,
-        body_scale(reference),
+        names=tuple(f"{name}.body" for name in PARAMETERS),
+        units=UNITS,
+        bodies=("body",),
+        references=reference[None],
+        lower=-free,
+        upper=free,
+        combination=np.eye(10),
+        given=phi,
+        scale=body_scale(reference),
     )
     return Problem(space, rows, rows @ phi, within)
 

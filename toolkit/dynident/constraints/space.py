@@ -16,12 +16,12 @@ from dynident.robot import Link, Robot
 _FALLBACK_LENGTH = 0.1  # m, where a robot gives no length at all
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ParameterSpace:
     """Standard parameters: ten of each link, in its own frame, then those of the effects.
 
     Links about which the description says nothing are left out, unless they are all that a joint
-    moves. Where fixed joints join several links, data tell their sum only.
+    moves. Where fixed joints join several links, data determine only their sum.
 
     Attributes
     ----------
@@ -61,16 +61,18 @@ class ParameterSpace:
         combination[rigid:, inertial:] = np.eye(len(effects))
         references = reference_bodies(robot, chosen)
         none = np.full(inertial, np.inf)
+        names = (f"{p}.{link.name}" for link in chosen for p in PARAMETERS)
+        scales = (body_scale(body) for body in references)
         return ParameterSpace(
-            (*(f"{p}.{link.name}" for link in chosen for p in PARAMETERS), *model.names[rigid:]),
-            (*UNITS * len(chosen), *model.units[rigid:]),
-            tuple(link.name for link in chosen),
-            references,
-            np.concatenate([-none, [p.lower for p in effects]]),
-            np.concatenate([none, [p.upper for p in effects]]),
-            combination,
-            np.concatenate([*(link.phi for link in chosen), np.zeros(len(effects))]),
-            np.concatenate([*(body_scale(body) for body in references), np.ones(len(effects))]),
+            names=(*names, *model.names[rigid:]),
+            units=(*UNITS * len(chosen), *model.units[rigid:]),
+            bodies=tuple(link.name for link in chosen),
+            references=references,
+            lower=np.concatenate([-none, [p.lower for p in effects]]),
+            upper=np.concatenate([none, [p.upper for p in effects]]),
+            combination=combination,
+            given=np.concatenate([*(link.phi for link in chosen), np.zeros(len(effects))]),
+            scale=np.concatenate([*scales, np.ones(len(effects))]),
         )
 
     @property

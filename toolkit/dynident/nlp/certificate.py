@@ -17,7 +17,7 @@ OPTIMAL = 1e-4
 """Relative gap below which an answer is called the optimum."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Certificate:
     """What is proved about an answer.
 
@@ -125,7 +125,17 @@ def certify(
     bound: Bound | None,
     starts: tuple[float, ...] = (),
 ) -> Certificate:
-    """State what is proved about an answer x (s,)."""
+    """State what is proved about an answer.
+
+    Parameters
+    ----------
+    problem : that was to be solved.
+    x : (s,) the answer, in SI units of the standard parameters.
+    status : the solver's.
+    program : how it was found, in words.
+    bound : that multipliers prove; None where there are none.
+    starts : objective reached from each start that was tried.
+    """
     objective = problem.objective(x)
     # An objective of zero needs no bound to be the smallest: zero up to rounding of its terms, and
     # up to what a step of twice the inset costs.
@@ -136,22 +146,21 @@ def certify(
         bound = Bound(0.0, float("nan"), float("nan"))  # a sum of squares is not negative
     value = bound.value if bound else float("nan")
     excess = objective - value
-    gap = excess / max(abs(value), least)
     within = problem.within
     inside = f", each link {within.inset:.0e} of its size inside" if within.inset else ""
     return Certificate(
-        within.notion + (inside if within.consistency != "none" else ""),
-        program,
-        objective,
-        value,
-        least,
-        float(gap),
-        bound.stationarity if bound else float("nan"),
-        bound.dual_feasibility if bound else float("nan"),
-        max(problem.violation(x), problem.body_violation(x)),
-        _worst(problem, x),
-        starts,
-        status,
+        notion=within.notion + (inside if within.consistency != "none" else ""),
+        program=program,
+        objective=objective,
+        bound=value,
+        nothing=least,
+        gap=float(excess / max(abs(value), least)),
+        stationarity=bound.stationarity if bound else float("nan"),
+        dual_feasibility=bound.dual_feasibility if bound else float("nan"),
+        violation=max(problem.violation(x), problem.body_violation(x)),
+        worst_margin=_worst(problem, x),
+        starts=starts,
+        status=status,
     )
 
 

@@ -41,9 +41,9 @@ class ConicSolution:
     multipliers: Multipliers | None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ConicProgram:
-    """A problem in Drake's words.
+    """A problem as Drake holds it.
 
     Attributes
     ----------
@@ -152,15 +152,15 @@ def pose_conic(problem: Problem) -> ConicProgram:
         for rows_, value in zip(problem.cone_rows, problem.cone_values(origin), strict=True)
     ]
     return ConicProgram(
-        program,
-        z,
-        origin,
-        problem,
-        bodies,
-        rows(lower, linear.lower - at, free),
-        rows(upper, -free, linear.upper - at),
-        rows(equal, linear.lower - at, linear.upper - at),
-        cones,
+        program=program,
+        z=z,
+        origin=origin,
+        problem=problem,
+        _bodies=bodies,
+        _lower=rows(lower, linear.lower - at, free),
+        _upper=rows(upper, -free, linear.upper - at),
+        _equal=rows(equal, linear.lower - at, linear.upper - at),
+        _cones=cones,
     )
 
 

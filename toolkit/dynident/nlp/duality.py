@@ -52,13 +52,19 @@ class Bound:
 
 
 def lower_bound(problem: Problem, x: np.ndarray, multipliers: Multipliers) -> Bound:
-    """Return the bound that multipliers prove, developed at a point x near the optimum.
+    """Return the bound that multipliers prove, developed at a point near the optimum.
 
     The Lagrangian is at least its value at x less what its gradient there can still bring: half
     the squared Newton decrement for the quadratic, and for the entropy (self-concordant) what
     Nesterov's bound says (Nesterov, "Lectures on convex optimization", theorem 5.1.12).
 
     The set is that of bodies at least the inset inside, as programs see it.
+
+    Parameters
+    ----------
+    problem : convex.
+    x : (s,) the point, in SI units of the standard parameters.
+    multipliers : of any origin; put into the dual cones first.
     """
     if not np.isfinite(problem.objective(x)):
         return Bound(-np.inf, np.inf, 0.0)

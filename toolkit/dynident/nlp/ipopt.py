@@ -21,7 +21,6 @@ import numpy as np
 
 from dynident.nlp.scaled import ScaledProgram
 from dynident.nlp.status import Status
-from dynident.threads import single_threaded
 
 _WORDS = {
     "Solve_Succeeded": "solved",
@@ -79,7 +78,6 @@ class Attempt:
         return not self.status.ok, not self.violation <= _NEAR, objective
 
 
-@single_threaded
 def solve_scaled(
     program: ScaledProgram, starts: Sequence[np.ndarray], tolerance: float, max_iterations: int
 ) -> tuple[Attempt, ...]:
@@ -92,18 +90,17 @@ def solve_scaled(
     tolerance : Ipopt's, on the scaled program.
     max_iterations : of each start.
     """
-    with _interruptible():
-        points = [program.at(start / program.scale) for start in starts]
-        undefined = [program.undefined(point) for point in points]
-        # All starts under one scaling, or the tolerance would mean another thing for each.
-        scales = program.scales(points[undefined.index("") if "" in undefined else 0])
-        solver = _ipopt(program, tolerance, max_iterations)
-        return tuple(
-            _nowhere(program, start, point.terms, name)
-            if name
-            else _attempt(program, solver, scales, tolerance, start)
-            for start, point, name in zip(starts, points, undefined, strict=True)
-        )
+    points = [program.at(start / program.scale) for start in starts]
+    undefined = [program.undefined(point) for point in points]
+    # All starts under one scaling, or the tolerance would mean another thing for each.
+    scales = program.scales(points[undefined.index("") if "" in undefined else 0])
+    solver = _ipopt(program, tolerance, max_iterations)
+    return tuple(
+        _nowhere(program, start, point.terms, name)
+        if name
+        else _attempt(program, solver, scales, tolerance, start)
+        for start, point, name in zip(starts, points, undefined, strict=True)
+    )
 
 
 def _nowhere(program: ScaledProgram, start: np.ndarray, terms: np.ndarray, name: str) -> Attempt:
@@ -138,7 +135,7 @@ def _attempt(
 def _run(program: ScaledProgram, solver: Any, scales: np.ndarray, start: np.ndarray) -> Attempt:
     lower, upper, size = program.row_lower, program.row_upper, scales[1:]
     began = time.perf_counter()
-    with _interruptible():
+    with interruptible():
         result = solver(
             x0=start / program.scale,
             p=scales,
@@ -225,7 +222,7 @@ def _ipopt(program: ScaledProgram, tolerance: float, max_iterations: int) -> Any
 
 
 @contextmanager
-def _interruptible() -> Iterator[None]:
+def interruptible() -> Iterator[None]:
     """Raise what Ctrl-C raises once the work has ended: CasADi ends a call, and swallows the rest.
 
     That holds for its solvers and for a plain evaluation, which then returns None.

@@ -1,4 +1,4 @@
-"""The nearest consistent body to ten given parameters: the smallest change that mends a link."""
+"""The nearest consistent body to ten given parameters: what makes a link consistent, and least."""
 
 from __future__ import annotations
 
@@ -43,15 +43,15 @@ def nearest_body(
     rows = distance_rows(reference)
     free = np.full(10, np.inf)
     space = ParameterSpace(
-        PARAMETERS,
-        UNITS,
-        ("body",),
-        reference[None],
-        -free,
-        free,
-        np.eye(10),
-        phi,
-        body_scale(reference),
+        names=PARAMETERS,
+        units=UNITS,
+        bodies=("body",),
+        references=reference[None],
+        lower=-free,
+        upper=free,
+        combination=np.eye(10),
+        given=phi,
+        scale=body_scale(reference),
     )
     problem = Problem(space, rows, rows @ phi, Within(consistency))
     if problem.feasible(phi):

@@ -194,12 +194,10 @@ def _constrained(program: Program, problem: Problem, x: Any) -> Program:
         program = program + Constraint(
             "linear constraints", value, "size", lower=lower, upper=upper
         )
-    for number, cone in enumerate(problem.cones, start=1):
-        size = float(np.max(np.abs(cone.A) * problem.space.scale))
-        vector = ca.DM(cone.A / size) @ x
+    for k, (cone, rows) in enumerate(zip(problem.cones, problem.cone_rows, strict=True), start=1):
+        vector = ca.DM(rows / space.scale) @ x
         inside = vector[0] ** 2 - ca.sumsqr(vector[1:])
-        name = f"{cone.name} ({number})"
-        program = program + Constraint(name, inside, lower=0.0)
+        program = program + Constraint(f"{cone.name} ({k})", inside, lower=0.0)
     return program
 
 
@@ -259,7 +257,7 @@ def solve_nonlinear(problem: Problem, seed: int = 0) -> NonlinearSolution:
     random = np.random.default_rng(seed)
     while len(found) < 2 + _RANDOM and not _agree(found):
         found.append(posed.program.solve([posed.start(_random_start(posed.problem, random))]))
-    # Where the solver stopped early the point may still be the best one: the certificate tells.
+    # Where the solver stopped early the point may still be the best one: so the certificate says.
     best = min(found, key=_rank)
     status = best.status.after(*(s.status for s in found if s is not best))
     return NonlinearSolution(

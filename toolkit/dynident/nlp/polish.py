@@ -110,7 +110,7 @@ def _violation(problem: Problem, x: np.ndarray) -> float:
 
 
 def _pattern(problem: Problem, x: np.ndarray, multipliers: Multipliers) -> _Pattern:
-    """Tell active constraints by their multipliers, which are then larger than what is left.
+    """Find active constraints by their multipliers, which are then larger than what is left.
 
     Multipliers are in units of the objective, what is left in units of the parameters' size.
     """

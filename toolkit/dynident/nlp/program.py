@@ -22,9 +22,10 @@ from dynident.nlp.blocks import (
     numbers_of,
     spread,
 )
-from dynident.nlp.ipopt import Attempt, solve_scaled
+from dynident.nlp.ipopt import Attempt, interruptible, solve_scaled
 from dynident.nlp.scaled import ScaledProgram
 from dynident.tables import Table, number, print_tables
+from dynident.threads import single_threaded
 
 _AT_BOUND = 1e-6  # of a variable's scale: nearer to a bound it is printed as being there
 _REMEDIES = {
@@ -205,6 +206,8 @@ class Program(_Printed):
             raise ProgramError("has no variables", self.title)
         return ScaledProgram(self.variables, self.terms, self.constraints)
 
+    @single_threaded
+    @interruptible()
     def solve(
         self,
         starts: Sequence[Mapping[str, ArrayLike]] | None = None,
