@@ -117,7 +117,7 @@ def test_many_motions_are_simulated_a_plant_at_a_time() -> None:
 def test_terms_are_the_force(name: str) -> None:
     """Native terms, of any sign, in a plant of two robots, to the last digits."""
     from dynident.closed_loop.plant.layers import Terms
-    from dynident.closed_loop.plant.point_force import Bodies
+    from dynident.closed_loop.plant.side_by_side import Bodies
 
     robot, rng = arm(), np.random.default_rng(0)
     (effect,) = effects_of(name + PLACES[catalogue()[name].place], robot)

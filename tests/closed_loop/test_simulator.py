@@ -22,7 +22,8 @@ from dynident.closed_loop import (
     TrueEffect,
     simulate,
 )
-from dynident.closed_loop.plant.point_force import Bodies, PlainForce, TracedForce, point_force
+from dynident.closed_loop.plant.point_force import PlainForce, TracedForce, point_force
+from dynident.closed_loop.plant.side_by_side import Bodies
 from dynident.effects import Effect, catalogue, effects_of
 from dynident.errors import SimulationError
 from dynident.model import Model

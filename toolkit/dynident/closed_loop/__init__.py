@@ -5,12 +5,13 @@ from dynident.closed_loop.experiments.experiment import Experiment, ExperimentRu
 from dynident.closed_loop.experiments.experiment_file import load_experiment
 from dynident.closed_loop.experiments.virtual_study import write_experiment
 from dynident.closed_loop.loop import ClosedLoop, simulate
-from dynident.closed_loop.mechanism import Mechanism, TrueEffect
+from dynident.closed_loop.mechanism import Mechanism
 from dynident.closed_loop.references import Reference, SampledReference
 from dynident.closed_loop.retrace import Retraced, retrace
 from dynident.closed_loop.rollout import Rollout, Task
 from dynident.closed_loop.sensors import Sensors
 from dynident.closed_loop.trajectories import Fourier
+from dynident.closed_loop.true_effects import TrueEffect
 
 __all__ = [
     "ClosedLoop",

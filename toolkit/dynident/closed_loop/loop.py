@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dynident.closed_loop.controllers import Controller
+from dynident.closed_loop.plant.side_by_side import structure
 from dynident.closed_loop.rollout import LEAD_IN, Rollout, Task
 from dynident.closed_loop.sensors import Sensors, rounded
 from dynident.errors import SimulationError
@@ -178,7 +179,7 @@ class ClosedLoop:
     def _plant(self, tasks: Sequence[Task]) -> Plant:
         """Return the diagram of some tasks, with their parameters."""
         # Drake is loaded when something is simulated.
-        from dynident.closed_loop.plant.diagram import Plant, structure
+        from dynident.closed_loop.plant.diagram import Plant
 
         mechanisms = [task.mechanism for task in tasks]
         key = structure(mechanisms)

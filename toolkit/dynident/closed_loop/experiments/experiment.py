@@ -11,10 +11,11 @@ import numpy as np
 
 from dynident.closed_loop.controllers import Controller
 from dynident.closed_loop.loop import SIDE_BY_SIDE, simulate
-from dynident.closed_loop.mechanism import Mechanism, TrueEffect
+from dynident.closed_loop.mechanism import Mechanism
 from dynident.closed_loop.rollout import LEAD_IN, Rollout, Task
 from dynident.closed_loop.sensors import Sensors, delayed, rounded
 from dynident.closed_loop.trajectories import Fourier
+from dynident.closed_loop.true_effects import TrueEffect
 from dynident.effects import FRICTION_WIDTH
 from dynident.effects.friction.thermal_friction import ThermalFriction
 from dynident.errors import SimulationError

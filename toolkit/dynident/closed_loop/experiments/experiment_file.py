@@ -9,10 +9,10 @@ from pydantic import Field
 
 from dynident.closed_loop.controllers import ControllerFile
 from dynident.closed_loop.experiments.experiment import Experiment, ExperimentRun
-from dynident.closed_loop.mechanism import TrueEffect
 from dynident.closed_loop.rollout import LEAD_IN
 from dynident.closed_loop.sensors import Sensors
 from dynident.closed_loop.trajectories import Fourier
+from dynident.closed_loop.true_effects import TrueEffect
 from dynident.effects import FRICTION_WIDTH
 from dynident.errors import DynidentError, StudyError
 from dynident.robot import Robot

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
@@ -10,15 +10,21 @@ from typing import Any
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
+from scipy.linalg import block_diag
 
 from dynident.closed_loop.mechanism import Mechanism, Past
 from dynident.closed_loop.plant.drake_effects import ForceSystem, InertiaSystem
-from dynident.closed_loop.plant.drivetrain import DrivetrainSystem, Gears, Layout, giving_way
+from dynident.closed_loop.plant.drivetrain import DrivetrainSystem, Gears, Layout
 from dynident.closed_loop.plant.layers import Layers, Terms, summed
-from dynident.closed_loop.plant.point_force import Bodies, point_force
+from dynident.closed_loop.plant.point_force import point_force
+from dynident.closed_loop.plant.side_by_side import (
+    Bodies,
+    giving_way,
+    is_coupled,
+    with_other_forces,
+)
 from dynident.errors import DynidentError, SimulationError
 from dynident.inertia import to_drake
-from dynident.robot import Robot
 from dynident.robot.drake import add_to_plant
 
 _FAR = 1e6
@@ -27,36 +33,6 @@ _SETTLING = 5
 """Iterations for the weight of a link to hang where its spring carries it."""
 _LOST = 0.01
 """Least eigenvalue of the inertia over that along the reference, below which it is lost."""
-
-
-def structure(mechanisms: Sequence[Mechanism]) -> Hashable:
-    """Return what two groups of mechanisms have in common where one diagram serves both."""
-    parts = []
-    for one in mechanisms:
-        terms = frozenset((term.at, term.law, term.of) for term in one.terms)
-        others = tuple((other.effect, len(other.values)) for other in one.others)
-        said = (one.friction_width, one.carries_payload, one.number) if others else ()
-        gears = tuple(gear.joint for gear in one.transmissions)
-        train = gears, bool(np.any(one.loss))
-        parts.append((_kinematics(one.robot), terms, others, said, train))
-    return tuple(parts), any(_is_coupled(one.inertia) for one in mechanisms)
-
-
-def _kinematics(robot: Robot) -> Hashable:
-    joints = tuple(
-        (joint.name, joint.kind, joint.parent, _bytes(joint.R, joint.p, joint.axis))
-        for joint in robot.joints
-    )
-    return joints, robot.bodies, _bytes(robot.gravity)
-
-
-def _bytes(*arrays: np.ndarray) -> bytes:
-    return b"".join(np.asarray(one, dtype=float).tobytes() for one in arrays)
-
-
-def _is_coupled(inertia: np.ndarray) -> bool:
-    """Whether an effect's inertia is more than the motors' own, which Drake has by itself."""
-    return bool(np.any(inertia - np.diag(np.diag(inertia))))
 
 
 @contextmanager
@@ -101,7 +77,7 @@ class Plant:
         bodies = self._bodies(mechanisms, [0.0] * len(mechanisms))
         self._compliant = giving_way(mechanisms)
         self._train: Any = None
-        seen, terms, others = state, Terms.of(bodies), _others(bodies)
+        seen, terms, others = state, Terms.of(bodies), with_other_forces(bodies)
         computed = any(one.effects for one in others.mechanisms)
         if len(self._compliant) or any(np.any(one.loss) for one in mechanisms):
             layout = Layout(self.place, self.inputs)
@@ -127,7 +103,7 @@ class Plant:
                 builder.Connect(summed(builder, outputs, size), self._train.forces)
             outputs = [self._train.applied]
         self._coupling: Any = None
-        if any(_is_coupled(one.inertia) for one in mechanisms):
+        if any(is_coupled(one.inertia) for one in mechanisms):
             self._coupling = builder.AddSystem(InertiaSystem(plant, bool(outputs)))
             builder.Connect(state, self._coupling.state)
             if self._train is None:
@@ -163,7 +139,7 @@ class Plant:
         """
         self._mechanisms = tuple(mechanisms)
         bodies = self._bodies(mechanisms, starts)
-        inertia = _diagonal_blocks([one.inertia for one in mechanisms])
+        inertia = block_diag(*(one.inertia for one in mechanisms))
         self._set_train(mechanisms, inertia)
         self._inertia, motors = inertia, np.diag(inertia)
         self.gain = np.concatenate([one.gain for one in mechanisms])
@@ -187,7 +163,7 @@ class Plant:
                 actuator.SetRotorInertia(context, value)
         self._layers.set(self.context, Terms.of(bodies))
         if self._forces is not None:
-            self._forces.force.set(_others(bodies))
+            self._forces.force.set(with_other_forces(bodies))
 
     def _set_train(self, mechanisms: Sequence[Mechanism], inertia: np.ndarray) -> None:
         """Set the drivetrain; motors before a spring are its own, not the plant's."""
@@ -291,7 +267,7 @@ class Plant:
             for mechanism in self._mechanisms
             for one in mechanism.effects
             if one in mechanism.others
-            or _is_coupled(one.effect.simulated_inertia(one.values, mechanism.robot))
+            or is_coupled(one.effect.simulated_inertia(one.values, mechanism.robot))
             or one.effect.simulated_transmission(one.values, mechanism.robot) is not None
             or np.any(one.effect.simulated_loss(one.values, mechanism.robot))
         ]
@@ -302,20 +278,6 @@ class Plant:
 
     def _bodies(self, mechanisms: Sequence[Mechanism], starts: Sequence[float]) -> Bodies:
         return Bodies(tuple(mechanisms), tuple(starts), self.place)
-
-
-def _others(bodies: Bodies) -> Bodies:
-    """Return the mechanisms with only those effects whose force is more than terms."""
-    by_id = {id(one): replace(one, effects=one.others) for one in bodies.distinct}
-    return replace(bodies, mechanisms=tuple(by_id[id(one)] for one in bodies.mechanisms))
-
-
-def _diagonal_blocks(blocks: Sequence[np.ndarray]) -> np.ndarray:
-    size, n = sum(len(block) for block in blocks), len(blocks[0])
-    full = np.zeros((size, size))
-    for k, block in enumerate(blocks):
-        full[k * n : k * n + n, k * n : k * n + n] = block
-    return full
 
 
 def _least_eigenvalues(matrices: np.ndarray) -> np.ndarray:

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from pydrake.systems.framework import LeafSystem
 
-from dynident.closed_loop.mechanism import Mechanism
 from dynident.effects import Transmission
 from dynident.errors import SimulationError
 
@@ -34,13 +33,6 @@ class Layout:
 
     place: np.ndarray
     inputs: np.ndarray
-
-
-def giving_way(mechanisms: Sequence[Mechanism]) -> np.ndarray:
-    """Return which of the N joints give way, (c,) in our order."""
-    n = mechanisms[0].robot.n
-    joints = [k * n + gear.joint for k, one in enumerate(mechanisms) for gear in one.transmissions]
-    return np.array(joints, dtype=int)
 
 
 class Gears:

@@ -17,7 +17,7 @@ import numpy as np
 from pydrake.systems.primitives import Adder, MultilayerPerceptron
 from pydrake.systems.primitives import PerceptronActivationType as Activation
 
-from dynident.closed_loop.plant.point_force import Bodies
+from dynident.closed_loop.plant.side_by_side import Bodies
 from dynident.effects import Term
 
 Unit = tuple[str, tuple[int, ...]]

@@ -10,12 +10,13 @@ values, say) are evaluated as they are.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
 
 from dynident.closed_loop.mechanism import Mechanism
+from dynident.closed_loop.plant.side_by_side import Bodies
 
 _PROBES = 64
 _AGREEMENT = 1e-9
@@ -35,33 +36,6 @@ class PointForce(Protocol):
     def rate(self, t: float, x: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Return the rate of the memory (M,), per s; the next call overwrites it."""
         ...
-
-
-@dataclass(frozen=True, eq=False)
-class Bodies:
-    """Mechanisms of n joints each, side by side in one plant.
-
-    Attributes
-    ----------
-    mechanisms : K of them.
-    starts : (K,) s, added to the time of each.
-    place : (K n,) where each joint's speed stands in the plant's velocities, and its position in
-        the plant's positions, which come first in the state.
-    """
-
-    mechanisms: tuple[Mechanism, ...]
-    starts: tuple[float, ...]
-    place: np.ndarray
-
-    @property
-    def distinct(self) -> list[Mechanism]:
-        """Each mechanism once."""
-        return list({id(one): one for one in self.mechanisms}.values())
-
-    @property
-    def memory(self) -> int:
-        """Number of internal states of all, M: one mechanism after the other."""
-        return sum(one.memory for one in self.mechanisms)
 
 
 def point_force(bodies: Bodies) -> PointForce:
