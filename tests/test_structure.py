@@ -12,6 +12,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
+from itertools import takewhile
 
 from known_violations import excused
 from package_map import Module, modules
@@ -23,6 +24,7 @@ UNDOCUMENTED_ARGUMENTS = 2
 
 PLAIN_FACTS: dict[str, str] = {
     "carries_payload": "a fact about the recording: whether the robot held its payload",
+    "hidden": "a fact about an effect of a virtual robot: whether its user is to find it",
 }
 """Boolean arguments that say how things are and choose no behaviour, with the reason."""
 
@@ -192,8 +194,9 @@ def _takes_positions(node: ast.ClassDef) -> bool:
 
 
 def _fields(node: ast.ClassDef) -> list[str]:
-    """Fields that the constructor takes."""
+    """Fields that the constructor takes by position: none after `_: KW_ONLY`."""
     found = [n for n in node.body if isinstance(n, ast.AnnAssign)]
+    found = list(takewhile(lambda n: ast.unparse(n.annotation) != "KW_ONLY", found))
     return [
         ast.unparse(n.target)
         for n in found

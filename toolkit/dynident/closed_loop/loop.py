@@ -100,6 +100,10 @@ class ClosedLoop:
         feedback_scale : (n,) factor of the feedback (all gains, not the feed-forward); 1 if None.
         progress : called now and then, see `Progress`.
 
+        Returns
+        -------
+        One `Rollout` a task, in their order.
+
         Raises
         ------
         SimulationError
@@ -204,7 +208,26 @@ def simulate(
     accuracy: float = ACCURACY,
     progress: Progress | None = None,
 ) -> tuple[Rollout, ...]:
-    """Simulate on a fresh `ClosedLoop`; for the parameters and what is raised see there."""
+    """Simulate loops that follow their references, on a fresh `ClosedLoop`.
+
+    Parameters
+    ----------
+    tasks : the motions, of robots with the same number of joints.
+    controller : of every one of them.
+    sensors : of position; ideal by default.
+    lead_in : s, simulated and thrown away.
+    accuracy : of the integrator, see `ACCURACY`.
+    progress : called now and then, see `Progress`.
+
+    Returns
+    -------
+    One `Rollout` a task, in their order.
+
+    Raises
+    ------
+    SimulationError
+        See `ClosedLoop.simulate`.
+    """
     loop = ClosedLoop(accuracy=accuracy)
     return loop.simulate(tasks, controller, sensors, lead_in=lead_in, progress=progress)
 

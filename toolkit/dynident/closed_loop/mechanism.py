@@ -30,7 +30,14 @@ class Past:
     memory: np.ndarray
 
     def of(self, rows: slice, joints: slice, memory: slice) -> Past:
-        """Return that of one mechanism among others."""
+        """Return that of one mechanism among others side by side.
+
+        Parameters
+        ----------
+        rows : samples that are kept.
+        joints : the mechanism's columns of `q` and `v`.
+        memory : its columns of `memory`.
+        """
         return Past(self.q[rows, joints], self.v[rows, joints], self.memory[rows, memory])
 
 
@@ -150,13 +157,24 @@ class Mechanism(ActingEffects):
         return self.stiff_command(t, q, v, a)
 
     def inverse_dynamics(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
-        """Return the command at time zero (T, n), for a controller whose nominal model it is."""
+        """Return the command at time zero (T, n), for a controller whose nominal model it is.
+
+        Parameters
+        ----------
+        q, v, a : (T, n) rad or m, and derivatives.
+        """
         return self.command(np.zeros(len(q)), q, v, a)
 
     def stiff_command(
         self, t: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray
     ) -> np.ndarray:
-        """Return `command` as if nothing gave way and internal states were zero; see there."""
+        """Return `command` (T, n) as if nothing gave way and internal states were zero.
+
+        Parameters
+        ----------
+        t : (T,) s, in the session.
+        q, v, a : (T, n) rad or m, and derivatives, of the motors.
+        """
         rigid = self.robot.inverse_dynamics(q, v, a)
         load = rigid + a @ self.inertia.T + self.force(t, q, v)
         return self.gain * (load + self.loss * np.abs(load) * self._sign(v))

@@ -61,6 +61,10 @@ def retrace(
     nominal : the model inside the controller; None for each mechanism's own.
     feedback_scale, progress : see `ClosedLoop.simulate`.
 
+    Returns
+    -------
+    One `Retraced` a recording, in their order.
+
     Raises
     ------
     SimulationError

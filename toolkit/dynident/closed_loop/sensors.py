@@ -57,6 +57,13 @@ def delayed(tau: np.ndarray, t: np.ndarray, delay: np.ndarray, period: float) ->
     Between samples they are interpolated: a measured torque is taken to be straight, and a held
     one is averaged over each step, which is the same. What lies outside the record is taken a
     period further inside, or from its end where it is shorter.
+
+    Parameters
+    ----------
+    tau : (T, n) N m or N.
+    t : (T,) s, ascending.
+    delay : (n,) s.
+    period : s, after which the motion repeats.
     """
     late = np.empty_like(tau)
     for joint, d in enumerate(delay):

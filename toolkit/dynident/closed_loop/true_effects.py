@@ -65,8 +65,16 @@ class TrueEffect:
         )
 
 
-def ordered(effect: Effect, robot: Robot, values) -> tuple[float, ...]:
-    """Return values, given by name or in order, in the order of an effect's parameters.
+def ordered(
+    effect: Effect, robot: Robot, values: Mapping[str, float] | Sequence[float]
+) -> tuple[float, ...]:
+    """Return values in the order of an effect's parameters.
+
+    Parameters
+    ----------
+    effect : on the robot.
+    robot : whose places decide what parameters there are.
+    values : by name (those left out are 0), or all in order.
 
     Raises
     ------
@@ -185,7 +193,13 @@ class ActingEffects:
         )
 
     def block(self, t: np.ndarray, q: np.ndarray, v: np.ndarray) -> Block:
-        """Return samples as effects see them; no force depends on the acceleration."""
+        """Return samples as effects see them; no force depends on the acceleration.
+
+        Parameters
+        ----------
+        t : (T,) s, in the session.
+        q, v : (T, n) rad or m, and per s, of the motors.
+        """
         return Block(
             t,
             q,
@@ -238,12 +252,12 @@ class ActingEffects:
     def force(
         self, t: np.ndarray, q: np.ndarray, v: np.ndarray, memory: np.ndarray | None = None
     ) -> np.ndarray:
-        """Return what effects take from the torque that acts.
+        """Return what effects take from the torque that acts, (T, n) N m or N.
 
         Parameters
         ----------
-        t : (T,) s.
-        q, v : (T, n) of the motors.
+        t : (T,) s, in the session.
+        q, v : (T, n) rad or m, and per s, of the motors.
         memory : (T, m) internal states; None for zero.
         """
         total = np.zeros(q.shape)
@@ -254,7 +268,14 @@ class ActingEffects:
     def memory_rate(
         self, t: np.ndarray, q: np.ndarray, v: np.ndarray, memory: np.ndarray
     ) -> np.ndarray:
-        """Return the rates of the internal states (T, m), per s; parameters as of `force`."""
+        """Return the rates of the internal states, (T, m) per s.
+
+        Parameters
+        ----------
+        t : (T,) s, in the session.
+        q, v : (T, n) rad or m, and per s, of the motors.
+        memory : (T, m) internal states.
+        """
         rates = [np.zeros((len(q), 0))]
         for one, block in self._blocks(t, q, v, memory):
             if one.effect.memory:

@@ -57,10 +57,21 @@ def essential_parameters(
 ) -> EssentialParameters:
     """Drop parameters, one at a time, until every relative standard deviation is below a limit.
 
+    Source: Khalil, Gautier and Lemoine, ICRA 2007.
+
     Parameters
     ----------
     model, factors : the columns, by name, and their sufficient statistics.
     largest : relative standard deviation above which a parameter is dropped.
+
+    Returns
+    -------
+    What is left, with the torque errors before and after.
+
+    Raises
+    ------
+    FitError
+        As `solve_factors`.
     """
     full = solve_factors(model, factors)
     R = factors.pooled(1.0 / full.torque_std)

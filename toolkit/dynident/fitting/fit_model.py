@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import LeastSquares
@@ -14,10 +14,28 @@ from dynident.threads import single_threaded
 
 
 class Method(Protocol):
-    """An estimator: it fits a model whose shape parameters are fixed."""
+    """An estimator: a frozen dataclass of its settings, that fits a model to recordings.
+
+    A new one is a class with these two; `fit` and the command line know no others by their kind,
+    and `tests/fitting/test_estimator_contract.py` says what each keeps to.
+
+    Attributes
+    ----------
+    name : in words, as `Estimate.method` begins.
+    """
+
+    name: ClassVar[str]
 
     def fit(self, model: Model, dataset: Dataset) -> Estimate:
-        """Fit the model to the recordings."""
+        """Fit a model whose shape parameters are fixed.
+
+        Raises
+        ------
+        FitError
+            If there is no recording, or the data cannot carry the model.
+        RecordingError
+            If a recording does not suit its filter.
+        """
         ...
 
 
@@ -32,7 +50,12 @@ def fit(model: Model, data: Dataset | Recording, method: Method | None = None) -
     ----------
     model : the robot and its effects.
     data : recordings with their filter; a single recording takes the default filter.
-    method : default: least squares, weighted per joint.
+    method : an estimator: `LeastSquares`, `Constrained`, `IV`, `Regression`, or any other class
+        with their `fit`; default: least squares, weighted per joint.
+
+    Returns
+    -------
+    The estimate, of the model with its shape parameters as refined.
 
     Raises
     ------

@@ -68,6 +68,10 @@ def read_parameters(
     model : the robot whose parameters they are, and effects whose parameters may be among them.
     order : of numbers without names, one of `ORDERS`.
 
+    Returns
+    -------
+    The description with these parameters, and the values of effects.
+
     Raises
     ------
     FileError

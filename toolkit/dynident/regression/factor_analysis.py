@@ -105,7 +105,14 @@ def start_of(
 
 
 def begun(factors: Loadings, count: int, prior: Gamma | None) -> Loadings:
-    """Return factors with the relevance and variances that follow from their weights."""
+    """Return factors with the relevance and variances that follow from their weights.
+
+    Parameters
+    ----------
+    factors : with weights and the variances of z, of the inputs and of the output.
+    count : samples.
+    prior : of the relevance; None for plain joint factor analysis, which has none.
+    """
     if prior is None:
         return factors
     rate = prior.rate + (factors.wz**2 + factors.wx**2) / 2

@@ -99,6 +99,10 @@ def analyse(
     known : (d,) bool, inputs whose noise px is what the start says.
     rounds : at most so many.
     tolerance : nats that a leap of the largest degree may still gain.
+
+    Returns
+    -------
+    The factors where the iterations ended, with the bounds on their way and how they ended.
     """
     here = Posterior(start, statistics)
     bounds, used, in_a_row, degree, quiet = [here.bound(prior)], 0, 0, _DEGREES[0], 0

@@ -186,6 +186,10 @@ class Plant:
         """Return the diagram's state where motors move so, (N,) each, and springs carry the load.
 
         Internal states of effects are zero.
+
+        Parameters
+        ----------
+        q, v, a : (N,) rad or m, and derivatives.
         """
         at, size = self._compliant, len(self.place)
         state = np.zeros(self.context.num_continuous_states())

@@ -145,7 +145,14 @@ def _rectified_weights(terms: Terms, units: Sequence[Unit]) -> Weights:
 
 
 def summed(builder: Any, outputs: Sequence[Any], size: int) -> Any:
-    """Return an output port (size,) of the sum of others; of one, itself."""
+    """Return an output port of the sum of others; of one, itself.
+
+    Parameters
+    ----------
+    builder : Drake's diagram builder.
+    outputs : ports of vectors (size,).
+    size : of each vector.
+    """
     if len(outputs) == 1:
         return outputs[0]
     adder: Any = builder.AddSystem(Adder(len(outputs), size))

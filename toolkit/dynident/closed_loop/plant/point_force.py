@@ -34,7 +34,14 @@ class PointForce(Protocol):
         ...
 
     def rate(self, t: float, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return the rate of the memory (M,), per s; the next call overwrites it."""
+        """Return the rate of the memory (M,), per s; the next call overwrites it.
+
+        Parameters
+        ----------
+        t : s.
+        x : (2 N,) state of the plant.
+        z : (M,) memory.
+        """
         ...
 
 
@@ -70,7 +77,7 @@ def _agrees(mechanism: Mechanism) -> bool:
     return bool(np.abs(found - expected).max() <= _AGREEMENT * np.abs(expected).max())
 
 
-class TracedForce:
+class TracedForce(PointForce):
     """The force as a CasADi function of t, state, starts and values."""
 
     def __init__(self, bodies: Bodies) -> None:
@@ -143,7 +150,7 @@ def _parameters(bodies: Bodies) -> list[float]:
     return [*bodies.starts, *values]
 
 
-class PlainForce:
+class PlainForce(PointForce):
     """The force as the effects themselves evaluate it."""
 
     def __init__(self, bodies: Bodies) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,26 @@ class Measurement:
 
     noise: np.ndarray
     resolution: np.ndarray
+
+    def of(self, k: int, q: np.ndarray) -> np.ndarray:
+        """Return positions q (N,) as they are measured at sample k."""
+        if self._noisy:
+            q = q + self.noise[k]
+        if self._coarse:
+            q = np.where(self.resolution == 0, q, np.rint(q / self._step) * self._step)
+        return q
+
+    @cached_property
+    def _noisy(self) -> bool:
+        return bool(np.any(self.noise))
+
+    @cached_property
+    def _coarse(self) -> bool:
+        return bool(np.any(self.resolution > 0))
+
+    @cached_property
+    def _step(self) -> np.ndarray:
+        return np.where(self.resolution == 0, 1.0, self.resolution)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -108,6 +129,10 @@ class Stepper:
         reference, drive, measurement : of these samples.
         progress : called now and then with the seconds done.
 
+        Returns
+        -------
+        The motion at the samples, and the commands that made it.
+
         Raises
         ------
         SimulationError
@@ -117,10 +142,6 @@ class Stepper:
         place, order = plant.positions, np.argsort(plant.inputs)
         effect = (1.0 / plant.gain)[order]
         total, size = measurement.noise.shape
-        resolution, noise = measurement.resolution, measurement.noise
-        coarse, fine = bool(np.any(resolution > 0)), resolution == 0
-        noisy, limited = bool(np.any(noise)), drive.limited
-        step = np.where(fine, 1.0, resolution)
         beyond = (_RUNAWAY * (1.0 + np.abs(reference.q).max() + np.abs(reference.v).max())) ** 2
 
         simulator, state, held = self._start(time[0], reference)
@@ -136,14 +157,9 @@ class Stepper:
             states[k] = x = state.CopyToVector()
             if not x.dot(x) < beyond:  # true of NaN too
                 raise self._diverged(time[k], x)
-            q = x[place]
-            if noisy:
-                q += noise[k]
-            if coarse:
-                q = np.where(fine, q, np.rint(q / step) * step)
-            measured[k] = q
+            measured[k] = q = measurement.of(k, x[place])
             commands[k] = u = drive.command(k, q)
-            if limited:
+            if drive.limited:
                 saturated[k] = drive.saturated
             if late:
                 u = commands[max(k - late, 0)]

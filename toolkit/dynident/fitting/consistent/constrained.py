@@ -11,7 +11,7 @@ from dynident.constraints import ParameterSpace, Within
 from dynident.errors import FitError
 from dynident.fitting.consistent.active import active_set
 from dynident.fitting.consistent.metric import Metric
-from dynident.fitting.consistent.posterior import believed, sized
+from dynident.fitting.consistent.posterior import prior_centre, sized
 from dynident.fitting.consistent.prior import Prior
 from dynident.fitting.consistent.programs import Solver, require_solver, solve
 from dynident.fitting.consistent.projection import project
@@ -58,7 +58,7 @@ class Constrained:
 
     @single_threaded
     def fit(self, model: Model, dataset: Dataset) -> Estimate:
-        """Fit a model whose shape parameters are what they are.
+        """Fit a model whose shape parameters are fixed.
 
         Raises
         ------
@@ -68,7 +68,7 @@ class Constrained:
         prior = self.prior if isinstance(self.prior, Prior) else Prior(self.prior or model.robot)
         model = prior_model(model, prior.robot)
         free = LeastSquares(self.weighting).fit(model, dataset)
-        # Columns that depend on the present model are taken where least squares settled.
+        # Columns that depend on the fit are taken where least squares converged.
         model = free.model
         factors = factorise(rows(model, dataset, free.values))
         std = free.torque_std
@@ -81,7 +81,7 @@ class Constrained:
         effects = free.values[len(model.base.independent) :]
         x_free = np.concatenate([space.given[: space.rigid], effects])
         space = sized(space, data, factors.rows, x_free)
-        centre, notes = believed(space, x_free)
+        centre, notes = prior_centre(space, x_free)
         held, held_at = prior.rows(space, centre)
         problem = Problem(
             space,
@@ -107,8 +107,8 @@ class Constrained:
             links=links,
             certificate=answer.certificate,
         )
-        told = _compared(estimate, free, factors, prior, self.within)
-        return replace(estimate, notes=(*estimate.notes, *notes, active.sentence, *told))
+        compared = _compared(estimate, free, factors, prior, self.within)
+        return replace(estimate, notes=(*estimate.notes, *notes, active.sentence, *compared))
 
 
 def _compared(

@@ -60,6 +60,10 @@ class Metric:
         noise_std : of the equations, N m or N.
         rows : number of equations.
 
+        Returns
+        -------
+        The metric whose R'R is M over the variance of the noise.
+
         Raises
         ------
         FitError
@@ -107,11 +111,18 @@ class Metric:
     @staticmethod
     @single_threaded
     def of_data(model: Model, dataset: Dataset, values: np.ndarray | None = None) -> Metric:
-        """X'X of recordings, each joint in units of its residual in least squares.
+        """Return the metric of recordings: X'X, each joint in units of its residual.
 
         Parameters
         ----------
+        model : its p parameters are those of the metric.
+        dataset : the recordings, with their filter.
         values : (p,) at which columns that depend on the predicted torque are taken.
+
+        Raises
+        ------
+        FitError
+            As `solve_factors`.
         """
         factors = factorise(rows(model, dataset, values))
         solution = solve_factors(model, factors)

@@ -22,10 +22,11 @@ def posterior(
     metric: Metric | None,
     within: Within,
 ) -> tuple[Problem, tuple[str, ...]]:
-    """Return the problem of a projection, and what has to be told about it.
+    """Return the problem of a projection, and what has to be noted about it.
 
     Parameters
     ----------
+    space : the s standard parameters.
     x_hat : (s,) what is projected.
     names : the model's parameters.
     prior, metric, within : as of `project`.
@@ -43,7 +44,7 @@ def posterior(
     mapping = mapping_of(space, metric, names)
     space = sized(space, metric.R @ mapping, metric.rows, x_hat)
     rows = metric.R @ mapping
-    centre, notes = believed(space, x_hat)
+    centre, notes = prior_centre(space, x_hat)
     held, held_at = prior.rows(space, centre)
     off = [metric.names.index(name) for name in metric.irrelevant]
     if off:
@@ -54,7 +55,19 @@ def posterior(
 
 
 def mapping_of(space: ParameterSpace, metric: Metric, names: tuple[str, ...]) -> np.ndarray:
-    """From standard parameters to those of the metric; `names` are the model's."""
+    """Return the map from standard parameters to those of the metric, (p, s).
+
+    Parameters
+    ----------
+    space : the s standard parameters.
+    metric : of the model's parameters, or of the standard ones.
+    names : the model's parameters.
+
+    Raises
+    ------
+    FitError
+        If the metric is one of other parameters.
+    """
     if metric.names == space.names:
         return np.eye(space.size)
     if metric.names == names:
@@ -67,10 +80,11 @@ def mapping_of(space: ParameterSpace, metric: Metric, names: tuple[str, ...]) ->
 
 
 def sized(space: ParameterSpace, rows: np.ndarray, count: int, x_hat: np.ndarray) -> ParameterSpace:
-    """The space with sizes of the effects' parameters: what makes a torque like the noise.
+    """Return the space with sizes of the effects' parameters: what makes a torque like the noise.
 
     Parameters
     ----------
+    space : the s standard parameters.
     rows : (r, s) of the data, in units of noise.
     count : equations behind them.
     x_hat : (s,) whose effects are taken as their size where no data show them.
@@ -84,10 +98,11 @@ def sized(space: ParameterSpace, rows: np.ndarray, count: int, x_hat: np.ndarray
     return space.sized(sizes)
 
 
-def believed(space: ParameterSpace, x_hat: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
-    """The centre of a prior (s,): the description, broken links replaced by bodies of their size.
+def prior_centre(space: ParameterSpace, x_hat: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Return the centre of a prior (s,), and what has to be noted about it.
 
-    Of the effects the description says nothing: their centre is what data say.
+    It is the description, links that no rigid body can have replaced by reference bodies of their
+    size. Of the effects the description says nothing: their centre is what data say, `x_hat` (s,).
     """
     centre = np.concatenate([space.given[: space.rigid], x_hat[space.rigid :]])
     replaced = []

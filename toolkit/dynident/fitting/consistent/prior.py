@@ -1,4 +1,4 @@
-"""What is believed about a robot before its data are seen: a description, and how much of it."""
+"""The prior of a robot: a description, and how far its parameters may be from the truth."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _THIN = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """A belief about the inertial parameters of every link.
+    """A prior of the inertial parameters of every link.
 
     The weight is that of a maximum a posteriori estimate: distances are in units of `spread`,
     data in units of their noise. A prior that is off by a tenth of its spread costs as much as
@@ -34,7 +34,7 @@ class Prior:
 
     Attributes
     ----------
-    robot : the description that is believed in.
+    robot : the description: where the prior has its centre.
     distance : "quadratic" in the pseudo-inertia of the description (`inertia.distance_rows`), or
         "entropic", the log-det divergence of pseudo-inertias, which grows without bound towards
         bodies that cannot be and therefore keeps off the boundary.

@@ -24,7 +24,7 @@ their values, from several starts, its answer compared with the conic bound."""
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class CertifiedPoint:
     """An answer x (s,) to a problem, and what is proved about it."""
 
     x: np.ndarray
@@ -43,12 +43,18 @@ def require_solver(solver: str) -> None:
         raise FitError(f"no solver '{solver}'", remedy="choose conic or nlp")
 
 
-def solve(problem: Problem, solver: Solver, stay: np.ndarray | None = None) -> Answer:
+def solve(problem: Problem, solver: Solver, stay: np.ndarray | None = None) -> CertifiedPoint:
     """Solve a problem and certify the answer.
 
     Parameters
     ----------
+    problem : what is minimised, and within which sets.
+    solver : see `Solver`.
     stay : (s,) parameters that a link keeps, to the bit, where another answer is no better.
+
+    Returns
+    -------
+    The answer, and how near to the optimum it is proved to be.
 
     Raises
     ------
@@ -63,14 +69,14 @@ def solve(problem: Problem, solver: Solver, stay: np.ndarray | None = None) -> A
     if free is not None and problem.feasible(free):
         status = Status("least squares", "solved", "no constraint is active", 0, 0.0)
         bound = unconstrained_bound(problem, free)
-        return Answer(free, certify(problem, free, status, "linear least squares", bound))
+        return CertifiedPoint(free, certify(problem, free, status, "linear least squares", bound))
     conic = solve_conic(problem)
     _require(conic.status, problem)
     assert conic.multipliers is not None
     bound = lower_bound(problem, conic.x, conic.multipliers)
     if solver == "conic":
         x = _kept(problem, problem.retracted(conic.x), stay)
-        return Answer(x, certify(problem, x, conic.status, "conic program", bound))
+        return CertifiedPoint(x, certify(problem, x, conic.status, "conic program", bound))
     from dynident.nlp.parametrised import solve_nonlinear
 
     found = solve_nonlinear(problem)
@@ -79,7 +85,7 @@ def solve(problem: Problem, solver: Solver, stay: np.ndarray | None = None) -> A
     x = _kept(problem, problem.retracted(found.x), stay)
     bound = replace(bound, stationarity=found.solution.stationarity)
     certificate = certify(problem, x, found.status, found.program, bound, found.objectives)
-    return Answer(x, certificate)
+    return CertifiedPoint(x, certificate)
 
 
 def _kept(problem: Problem, x: np.ndarray, stay: np.ndarray | None) -> np.ndarray:
@@ -102,11 +108,13 @@ def _kept(problem: Problem, x: np.ndarray, stay: np.ndarray | None) -> np.ndarra
     return x
 
 
-def trivial(problem: Problem, x: np.ndarray) -> Answer:
+def trivial(problem: Problem, x: np.ndarray) -> CertifiedPoint:
     """The answer to a projection of a point x (s,) that is within already: itself."""
     status = Status("none", "solved", "already within", 0, 0.0)
     centred = replace(problem, b=problem.A @ x, entropy=None)
-    return Answer(x, certify(centred, x, status, "none needed: it lies within already", None))
+    return CertifiedPoint(
+        x, certify(centred, x, status, "none needed: it lies within already", None)
+    )
 
 
 def _require(status: Status, problem: Problem) -> None:

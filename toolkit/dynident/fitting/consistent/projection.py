@@ -14,7 +14,13 @@ from dynident.fitting.consistent.active import active_set
 from dynident.fitting.consistent.metric import Metric
 from dynident.fitting.consistent.posterior import mapping_of, posterior
 from dynident.fitting.consistent.prior import Prior
-from dynident.fitting.consistent.programs import Answer, Solver, require_solver, solve, trivial
+from dynident.fitting.consistent.programs import (
+    CertifiedPoint,
+    Solver,
+    require_solver,
+    solve,
+    trivial,
+)
 from dynident.fitting.consistent.separable import solve_apart
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.given import given_estimate, prior_model
@@ -233,7 +239,7 @@ def _standard(before: Estimate, model: Model, space: ParameterSpace) -> np.ndarr
 
 
 def _projection(
-    answer: Answer,
+    answer: CertifiedPoint,
     before: Estimate,
     problem: Problem,
     x_hat: np.ndarray,

@@ -7,18 +7,23 @@ from itertools import zip_longest
 
 import numpy as np
 
-from dynident.fitting.consistent.programs import Answer, Solver, solve, trivial
+from dynident.fitting.consistent.programs import CertifiedPoint, Solver, solve, trivial
 from dynident.nlp import Bound, Problem, Status, certify
 
 
-def solve_apart(problem: Problem, solver: Solver, x_hat: np.ndarray) -> Answer:
+def solve_apart(problem: Problem, solver: Solver, x_hat: np.ndarray) -> CertifiedPoint:
     """Project a point x_hat (s,) under a metric of each link of its own, and certify the whole.
 
     Parameters
     ----------
     problem : with quadratic rows that hold parameters of one link each, or one of an effect; no
         constraint sets.
-    x_hat : where the rows are zero.
+    solver : see `Solver`.
+    x_hat : (s,) where the rows are zero.
+
+    Returns
+    -------
+    The answer for all links together, its bound the sum of theirs.
 
     Raises
     ------
@@ -51,7 +56,7 @@ def solve_apart(problem: Problem, solver: Solver, x_hat: np.ndarray) -> Answer:
         for row in together
     )
     starts = starts if any(one.starts for one in parts) else ()
-    return Answer(
+    return CertifiedPoint(
         x, certify(problem, x, worst.status, f"{worst.program}, link by link", bound, starts)
     )
 
@@ -75,14 +80,14 @@ def _alone(problem: Problem, k: int) -> Problem:
     return replace(problem, space=own, A=problem.A[rows, part], b=problem.b[rows])
 
 
-def _solve_one(problem: Problem, solver: Solver, x_hat: np.ndarray) -> Answer:
+def _solve_one(problem: Problem, solver: Solver, x_hat: np.ndarray) -> CertifiedPoint:
     if problem.feasible(x_hat):
         return trivial(problem, x_hat)
     edge = problem.retracted(x_hat)
     if problem.body_violation(x_hat) == 0 and problem.feasible(edge):
         # On the edge already (an inertia without mass): as far inside as rounding demands.
         status = Status("none", "solved", "on the edge already", 0, 0.0)
-        return Answer(edge, certify(problem, edge, status, "a step off the edge", None))
+        return CertifiedPoint(edge, certify(problem, edge, status, "a step off the edge", None))
     return solve(problem, solver, x_hat)
 
 

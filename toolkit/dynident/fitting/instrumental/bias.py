@@ -1,7 +1,7 @@
 """The bias that instruments leave: what encoder noise does to columns that bend within it.
 
 E[tanh(v + n)] is not tanh(v): the regressor of dry friction is wrong in the mean, not only in the
-single sample, and no instrument mends that. How much it makes is found by adding noise of the
+single sample, and no instrument removes that. How much it makes is found by adding noise of the
 measured size to the instruments' own motion, whose parameters are known, and estimating again.
 
 Sampling leaves a bias of its own: held torques and central differences do not match to the last
@@ -50,7 +50,7 @@ def expected_bias(
     simulated: np.ndarray | None = None,
     seed: int = 0,
 ) -> ExpectedBias:
-    """Estimate from the instruments' own motion under encoder noise.
+    """Estimate from the instruments' own motion under encoder noise, and average the errors.
 
     Parameters
     ----------
@@ -61,6 +61,10 @@ def expected_bias(
     position_std : (n,) encoder noise, rad or m.
     simulated : (p,) values whose simulation the instruments are; None where they are none.
     seed : of the noise.
+
+    Returns
+    -------
+    The mean error of the estimates under noise, and what sampling alone does.
     """
     kept = list(solution.basis.independent)
     truth = values if simulated is None else simulated

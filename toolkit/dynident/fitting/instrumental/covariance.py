@@ -68,7 +68,13 @@ def textbook_covariance(
 ) -> np.ndarray:
     """Return the covariance (p, p) that takes the errors of the rows as independent.
 
-    variance * (V' O^-1 W)^-1 V' O^-1 V (W' O^-1 V)^-1, the variance being that of a weighted row.
+    variance * (V' O^-1 W)^-1 V' O^-1 V (W' O^-1 V)^-1, the textbook's for independent rows.
+
+    Parameters
+    ----------
+    model : of p parameters.
+    solution : the estimate's inverse and instruments.
+    variance : of a weighted row's error.
     """
     kept = list(solution.basis.independent)
     covariance = np.zeros((model.size, model.size))
@@ -138,7 +144,7 @@ def _jacobians(
         unit = np.zeros(n)
         unit[j] = 1.0
         found.by_a[:, :, j] += _effects(model, values, block, q, v, a + unit) - here
-        # Dry friction is a step on the scale of the noise: what counts is its secant.
+        # Dry friction is a step on the scale of the noise: a secant across the noise counts.
         h = max(_STEP, float(speed_noise[j])) * unit
         rise = _effects(model, values, block, q, v + h, a)
         rise -= _effects(model, values, block, q, v - h, a)

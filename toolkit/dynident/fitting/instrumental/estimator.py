@@ -34,7 +34,7 @@ class IV:
     """Instrumental variables: x = (V' W)^-1 V' y, V from motion that has not the measured noise.
 
     With noisy positions the regressor W is noisy too, and least squares is wrong however long the
-    recording. V, the same columns along a motion without that noise, mends this. Where V comes
+    recording. V, the same columns along a motion without that noise, corrects this. Where V comes
     from the simulated loop of the last estimate, the two are iterated to a fixed point.
 
     Parameters
@@ -47,7 +47,7 @@ class IV:
     weighting : "joint" weights each joint's rows with the standard deviation of its residual.
     tolerance : the iterations stop when the norm of y - V x changes by less, relatively.
     rounds : at most so many iterations.
-    tell : of progress.
+    progress : called with what is being done, how much is done, and how much there is to do.
 
     Notes
     -----
@@ -87,7 +87,7 @@ class IV:
 
     @single_threaded
     def fit(self, model: Model, dataset: Dataset) -> Estimate:
-        """Fit a model whose shape parameters are what they are.
+        """Fit a model whose shape parameters are fixed.
 
         Raises
         ------
@@ -100,7 +100,13 @@ class IV:
         return assemble(f"{self.name}, {self.chosen.name}", iterations)
 
     def iterated(self, model: Model, dataset: Dataset) -> Iterations:
-        """Return the iterations of a fit, done; raises what `fit` raises."""
+        """Return the iterations of a fit, done.
+
+        Raises
+        ------
+        FitError, SimulationError
+            As `fit`.
+        """
         if not dataset.recordings:
             raise FitError("no recording to fit", remedy='mark some recordings use = "train"')
         first = LeastSquares(self.weighting).fit(model, dataset)
@@ -129,6 +135,12 @@ def _hopeless(source: InstrumentSource, start: np.ndarray) -> bool:
 
 def start_values(start: Start | Estimate, model: Model, least_squares: Estimate) -> np.ndarray:
     """Return the parameters (p,) at which the iterations begin.
+
+    Parameters
+    ----------
+    start : as of `IV`.
+    model : of p parameters.
+    least_squares : the estimate of least squares, for a start of that name.
 
     Raises
     ------

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dynident.errors import FitError
-from dynident.fitting.instrumental.source import Guess, InstrumentSource, prepared
+from dynident.fitting.instrumental.source import Guess, Instruments, InstrumentSource, prepared
 from dynident.model import Model
 from dynident.recording import SIGNALS, Dataset, Recording, lowpass, periods, require_repetition
 
@@ -36,11 +36,11 @@ class FixedInstruments:
 
 
 @dataclass(frozen=True)
-class Filtered:
+class Filtered(Instruments):
     """The measured positions through a low-pass far below the filter of the regressor.
 
     What noise lies below the cut-off is common to both sides and still biases the estimate; what
-    lies above no longer does. For recordings that neither repeat nor tell their controller.
+    lies above no longer does. For recordings that neither repeat nor have a known controller.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class Filtered:
 
 
 @dataclass(frozen=True)
-class SwappedPeriods:
+class SwappedPeriods(Instruments):
     """The mean of the other periods in place of each period.
 
     Noise of one period is independent of that of the others, so what was measured in these is an
@@ -104,18 +104,18 @@ class SwappedPeriods:
         FitError
             If no recording states a period.
         """
-        told = [r for r in prepared(dataset).recordings if r.period is not None]
-        if not told:
+        stated = [r for r in prepared(dataset).recordings if r.period is not None]
+        if not stated:
             remedy = "state the period of a recording, or choose other instruments"
             raise FitError("no recording repeats with a known period", "instruments", remedy)
         skipped = [r.where for r in dataset.recordings if r.period is None]
-        pairs = [_swapped(one) for one in told]
+        pairs = [_swapped(one) for one in stated]
         notes = ("Instruments: the other periods of each recording.",)
         if skipped:
             notes += (f"Without a period, and left out: {', '.join(skipped)}.",)
         measured = replace(dataset, recordings=tuple(one for one, _ in pairs))
         instruments = replace(dataset, recordings=tuple(other for _, other in pairs))
-        share = float(np.mean([1.0 + 1.0 / (_count(one) - 1) for one in told]))
+        share = float(np.mean([1.0 + 1.0 / (_count(one) - 1) for one in stated]))
         return FixedInstruments(
             measured=measured, instruments=instruments, notes=notes, noise_share=share
         )

@@ -57,10 +57,11 @@ def position_noise(source: InstrumentSource, instruments: Dataset) -> np.ndarray
 def torque_noise(
     measured: Dataset, variance: np.ndarray, expected: np.ndarray, counts: np.ndarray
 ) -> np.ndarray:
-    """White torque noise that accounts for what the encoders do not, (n,) N m or N.
+    """Return the white torque noise that accounts for what the encoders do not, (n,) N m or N.
 
     Parameters
     ----------
+    measured : the recordings, whose filters pass the noise.
     variance : (n,) of the residual of each joint's rows.
     expected : (n,) that the encoders' noise accounts for.
     counts : (n,) rows.

@@ -17,7 +17,7 @@ from dynident.errors import FitError, SimulationError
 from dynident.fitting.instrumental import standard_parameters as lift
 from dynident.fitting.instrumental.gains import InertiaMatrices, poses_of, retuned, stiffness
 from dynident.fitting.instrumental.noise_level import position_noise
-from dynident.fitting.instrumental.source import Guess, prepared
+from dynident.fitting.instrumental.source import Guess, Instruments, prepared
 from dynident.fitting.sampling import LEAST_ROWS
 from dynident.model import Model
 from dynident.recording import Dataset, Recording, within
@@ -33,7 +33,7 @@ _DOUBT = 1.1
 
 
 @dataclass(frozen=True)
-class SimulatedLoop:
+class SimulatedLoop(Instruments):
     """The robot of the last estimate in the recording's own closed loop.
 
     The simulated motion has no noise, and is as good an instrument as it is near to the true

@@ -21,18 +21,23 @@ _PERIODS = 3.0
 
 
 def silent(what: str, done: float, total: float) -> None:
-    """Tell nobody."""
+    """Show no progress.
+
+    Parameters
+    ----------
+    what, done, total : as of `ProgressCallback`.
+    """
 
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """What is believed before the first iteration.
+    """What is known before the first iteration.
 
     Attributes
     ----------
     start : (p,) where the iterations begin.
     others : (p,) values that may be nearer to the truth where the start is none, best first.
-    tell : of progress.
+    progress : see `ProgressCallback`.
     """
 
     start: np.ndarray
@@ -79,7 +84,7 @@ class InstrumentSource(Protocol):
 
 
 class Instruments(Protocol):
-    """A choice of instruments."""
+    """A choice of instruments: a frozen dataclass of its settings. A new one is such a class."""
 
     @property
     def name(self) -> str:
@@ -88,6 +93,12 @@ class Instruments(Protocol):
 
     def prepare(self, model: Model, dataset: Dataset, guess: Guess) -> InstrumentSource:
         """Return the instruments of recordings.
+
+        Parameters
+        ----------
+        model : whose columns are to be instrumented.
+        dataset : the recordings as measured, with their filter.
+        guess : where the iterations begin.
 
         Raises
         ------

@@ -39,9 +39,13 @@ def encoder_noise(
     ----------
     model : its columns.
     dataset : recordings with their stated noise.
-    values : (p,) at which columns that depend on the present model are taken.
+    values : (p,) at which columns that depend on the fit are taken.
     draws : realisations for each recording.
     seed : of the draws.
+
+    Returns
+    -------
+    The noise of the p columns, summed over all rows.
 
     Raises
     ------

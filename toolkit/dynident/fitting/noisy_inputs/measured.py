@@ -56,7 +56,13 @@ def input_noise(model: Model, dataset: Dataset, values: np.ndarray | None = None
 
     Parameters
     ----------
-    values : (p,) at which columns that depend on the present model are taken.
+    model : its columns.
+    dataset : recordings, of which some state a period.
+    values : (p,) at which columns that depend on the fit are taken.
+
+    Returns
+    -------
+    The noise of the p columns, scaled up to all rows.
 
     Raises
     ------

@@ -18,7 +18,7 @@ from dynident.recording import Dataset
 from dynident.threads import single_threaded
 
 if TYPE_CHECKING:
-    from dynident.fitting.noisy_inputs.regressors import Found
+    from dynident.fitting.noisy_inputs.regressors import RegressionResult
     from dynident.regression.statistics_regressor import StatisticsRegressor
 
 _SIGMA = (
@@ -106,7 +106,7 @@ class Regression:
         posed = pose(model, dataset)
         return fitted(regressor, posed, self._psi(posed, dataset))
 
-    def _found(self, posed: PosedRegression, dataset: Dataset) -> Found:
+    def _found(self, posed: PosedRegression, dataset: Dataset) -> RegressionResult:
         from dynident.fitting.noisy_inputs.regressors import found_by, found_by_validation, named
 
         regressor = named(self.estimator)

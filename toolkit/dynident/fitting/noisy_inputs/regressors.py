@@ -1,7 +1,7 @@
 """The regressions at work: fitted to the compressed rows, and what an estimate takes from them.
 
 In: a regression as it was posed, an estimator or its name, and the covariance of the inputs' noise.
-Out: what the regression `Found`. Loads scikit-learn: imported when a regression is fitted.
+Out: a `RegressionResult`. It loads scikit-learn, and is imported when a regression is fitted.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _OWN: dict[str, Callable[[], StatisticsRegressor]] = {
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Found:
+class RegressionResult:
     """What a regression found of the parameters that the data identify.
 
     Attributes
@@ -94,6 +94,10 @@ def fitted(
     posed : the regression.
     psi : (r, r) covariance of the inputs' noise in a row; None where it is not known.
 
+    Returns
+    -------
+    Another estimator with its settings, fitted.
+
     Raises
     ------
     FitError
@@ -135,14 +139,19 @@ def _cluster(regressor: StatisticsRegressor, compressed: Compressed, psi: np.nda
 
 def found_by(
     regressor: StatisticsRegressor, posed: PosedRegression, psi: np.ndarray | None
-) -> Found:
-    """Fit an estimator as `fitted` does, and return what an estimate holds of it."""
+) -> RegressionResult:
+    """Fit an estimator as `fitted` does, and return what an estimate holds of it.
+
+    Parameters
+    ----------
+    regressor, posed, psi : as of `fitted`.
+    """
     regressor = fitted(regressor, posed, psi)
     words = regressor.words
     if isinstance(regressor, CorrectedLeastSquares):
         assert psi is not None
         notes = _worth(regressor, output_noise(posed.compressed, regressor.coef_, psi))
-        return Found(
+        return RegressionResult(
             values=regressor.coef_, covariance=regressor.covariance_, words=words, notes=notes
         )
     if isinstance(regressor, JointFactorRegression):
@@ -150,7 +159,7 @@ def found_by(
         if psi is not None and regressor.corrected_ is not None:
             away = true - regressor.corrected_.coef_
             covariance = regressor.corrected_.covariance_ + np.outer(away, away)
-        return Found(
+        return RegressionResult(
             values=true,
             covariance=covariance,
             words=words,
@@ -158,7 +167,7 @@ def found_by(
             details=factor_tables(regressor),
         )
     alone = "No intervals: they would have to carry what the noise of the inputs does."
-    return Found(values=regressor.coef_, words=words, notes=(alone,))
+    return RegressionResult(values=regressor.coef_, words=words, notes=(alone,))
 
 
 def _worth(regressor: CorrectedLeastSquares, noise: OutputNoise) -> tuple[str, ...]:
@@ -185,7 +194,7 @@ def _worth(regressor: CorrectedLeastSquares, noise: OutputNoise) -> tuple[str, .
     return tuple(notes)
 
 
-def found_by_validation(name: str, posed: PosedRegression) -> Found:
+def found_by_validation(name: str, posed: PosedRegression) -> RegressionResult:
     """Fit one of scikit-learn's regressions, its penalty chosen between pieces of the data."""
     compressed = posed.compressed
     scale = np.sqrt(np.mean(compressed.X**2, axis=0))
@@ -195,7 +204,9 @@ def found_by_validation(name: str, posed: PosedRegression) -> Found:
         f"{name}, {chosen.choice}, chosen between {_FOLDS} consecutive pieces of "
         "the data. No intervals: they would have to carry the bias of the penalty."
     )
-    return Found(values=chosen.coefficients / scale, words=f"{name} regression", notes=(note,))
+    return RegressionResult(
+        values=chosen.coefficients / scale, words=f"{name} regression", notes=(note,)
+    )
 
 
 @dataclass(frozen=True, eq=False)
