@@ -7,7 +7,8 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from dynident.diagnosis.result import Candidate, Diagnosis, JointResult, Step, TestError, Trace
+from dynident.diagnosis.details import Candidate, JointResult, Step, TestError, Trace
+from dynident.diagnosis.result import Diagnosis
 from dynident.effects import Effect, catalogue
 from dynident.evidence.maps import ResidualMap
 from dynident.fitting.estimate import DataSource, Estimate
@@ -149,62 +150,109 @@ def diagnosis(
     total = np.sqrt(samples * len(RECORDINGS))
     results = tuple(
         JointResult(
-            name,
-            "N m",
-            norm(left, j) / norm(measured, j),
-            norm(left_after, j) / norm(measured, j),
-            norm(measured, j) / total,
-            NOISE if noise else None,
-            float(np.sqrt(max((norm(left, j) / total / NOISE) ** 2 - 1, 0))) if noise else None,
-            0.11 if noise else None,
+            name=name,
+            torque_unit="N m",
+            error_before=norm(left, j) / norm(measured, j),
+            error_after=norm(left_after, j) / norm(measured, j),
+            torque_rms=norm(measured, j) / total,
+            noise_rms=NOISE if noise else None,
+            ratio_before=float(np.sqrt(max((norm(left, j) / total / NOISE) ** 2 - 1, 0)))
+            if noise
+            else None,
+            ratio_after=0.11 if noise else None,
         )
         for j, name in enumerate(joints)
     )
     floor = NOISE * total * np.sqrt(robot.n) / norm(measured) if noise else None
-    error = TestError(norm(left) / norm(measured), norm(left_after) / norm(measured), floor)
+    error = TestError(
+        before=norm(left) / norm(measured),
+        after=norm(left_after) / norm(measured),
+        noise_floor=floor,
+    )
     rival = effect("asymmetric_friction", last)
     step = Step(
-        stribeck,
-        tuple(new.effect_values(stribeck.label)) if steps else (),
-        error.before,
-        error.after,
-        (rival,),
-        3e-41,
+        effect=stribeck,
+        values=tuple(new.effect_values(stribeck.label)) if steps else (),
+        test_error_before=error.before,
+        test_error_after=error.after,
+        indistinguishable=(rival,),
+        p_value=3e-41,
     )
     gain = error.before - error.after
     weak = "its gain does not hold on the held-out blocks"
     candidates = (
-        Candidate(stribeck, "material" if steps else "not_material", 3e-41, gain, (1.1,)),
-        Candidate(rival, "material" if steps else "not_material", 8e-39, 0.97 * gain),
-        Candidate(effect("quadratic_drag", last), "not_material", 0.004, 0.2 * gain, (0.02,), weak),
-        Candidate(effect("torque_offset", joints[0]), "not_material", 0.6, 0.0002, (0.01,), weak),
-        Candidate(effect("joint_spring", last), "not_material", 1.0, -0.0004, (0.1, 0.0), weak),
         Candidate(
-            effect("rotor_inertia", joints[0]),
-            "absorbed",
-            None,
-            0.0,
-            (),
-            f"Izz of the first link takes its place; lock {joints[0]}'s gravity load to see it.",
+            effect=stribeck,
+            status="material" if steps else "not_material",
+            p_value=3e-41,
+            test_gain=gain,
+            values=(1.1,),
+        ),
+        Candidate(
+            effect=rival,
+            status="material" if steps else "not_material",
+            p_value=8e-39,
+            test_gain=0.97 * gain,
+        ),
+        Candidate(
+            effect=effect("quadratic_drag", last),
+            status="not_material",
+            p_value=0.004,
+            test_gain=0.2 * gain,
+            values=(0.02,),
+            remark=weak,
+        ),
+        Candidate(
+            effect=effect("torque_offset", joints[0]),
+            status="not_material",
+            p_value=0.6,
+            test_gain=0.0002,
+            values=(0.01,),
+            remark=weak,
+        ),
+        Candidate(
+            effect=effect("joint_spring", last),
+            status="not_material",
+            p_value=1.0,
+            test_gain=-0.0004,
+            values=(0.1, 0.0),
+            remark=weak,
+        ),
+        Candidate(
+            effect=effect("rotor_inertia", joints[0]),
+            status="absorbed",
+            p_value=None,
+            test_gain=0.0,
+            values=(),
+            remark="Izz of the first link takes its place; "
+            f"lock {joints[0]}'s gravity load to see it.",
         ),
     )
     return Diagnosis(
-        "explained" if steps else "nothing_missing",
-        "replicates" if noise else "unknown",
-        results,
-        error,
-        (step,) if steps else (),
-        candidates,
-        tuple(replace(c, status="not_material", test_gain=0.0) for c in candidates[2:5]),
-        old,
-        new,
-        residual_maps(robot, measured, before, after, moves[1:], known=noise),
-        tuple(
-            Trace(run, name, "N m", move[0], m[:, j], p[:, j], n[:, j])
+        verdict="explained" if steps else "nothing_missing",
+        noise_source="replicates" if noise else "unknown",
+        joints=results,
+        test_error=error,
+        steps=(step,) if steps else (),
+        candidates=candidates,
+        remaining=tuple(replace(c, status="not_material", test_gain=0.0) for c in candidates[2:5]),
+        before=old,
+        after=new,
+        maps=residual_maps(robot, measured, before, after, moves[1:], known=noise),
+        traces=tuple(
+            Trace(
+                recording=run,
+                joint=name,
+                torque_unit="N m",
+                t=move[0],
+                measured=m[:, j],
+                before=p[:, j],
+                after=n[:, j],
+            )
             for run, move, m, p, n in zip(
                 RECORDINGS, moves[1:], measured, before, after, strict=True
             )
             for j, name in enumerate(joints)
         ),
-        ("One recording warmed up for two minutes only.",),
+        notes=("One recording warmed up for two minutes only.",),
     )

@@ -10,7 +10,8 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from dynident.diagnosis.result import Candidate, Diagnosis, Step
+from dynident.diagnosis.details import Candidate, Step
+from dynident.diagnosis.result import Diagnosis
 from dynident.errors import DynidentError
 from dynident.reporting import report
 from dynident.reporting.html import page
@@ -198,7 +199,10 @@ def test_every_kind_of_diagnosis(joints, steps, noise):
 
 def test_absorbed_without_a_remark_names_its_experiment(found):
     hidden = effect("rotor_inertia", "shoulder")
-    only = replace(found, candidates=(Candidate(hidden, "absorbed", None, 0.0),))
+    only = replace(
+        found,
+        candidates=(Candidate(effect=hidden, status="absorbed", p_value=None, test_gain=0.0),),
+    )
     assert hidden.advice in Elements(page(only)).text
 
 
@@ -207,7 +211,14 @@ def test_several_steps_and_effects_of_the_whole_robot(found):
     count = len(whole.parameters(found.after.model.robot))
     steps = (
         *found.steps,
-        Step(whole, (0.5,) * count, 0.0095, 0.0094, (), 1e-5),
+        Step(
+            effect=whole,
+            values=(0.5,) * count,
+            test_error_before=0.0095,
+            test_error_after=0.0094,
+            indistinguishable=(),
+            p_value=1e-5,
+        ),
     )
     text = Elements(page(replace(found, steps=steps))).text
     assert "payload" in text and "with 2 effects added" in text

@@ -7,7 +7,7 @@ import pytest
 from IPython.core.formatters import PNGFormatter
 from matplotlib.figure import Figure
 
-from dynident.diagnosis.result import Step
+from dynident.diagnosis.details import Step
 from dynident.errors import DynidentError
 from dynident.reporting.content import bars, seen, thinned
 from dynident.reporting.pictures import diagnosis_pictures as pictures
@@ -30,7 +30,14 @@ def unknown():
 
 
 def test_the_waterfall_goes_from_the_given_error_to_the_final_one(found):
-    second = Step(effect("torque_offset", "elbow"), (0.1,), 0.0095, 0.009, (), 1e-4)
+    second = Step(
+        effect=effect("torque_offset", "elbow"),
+        values=(0.1,),
+        test_error_before=0.0095,
+        test_error_after=0.009,
+        indistinguishable=(),
+        p_value=1e-4,
+    )
     error = replace(found.test_error, after=0.009)
     more = replace(found, steps=(*found.steps, second), test_error=error)
     rows = bars(more)

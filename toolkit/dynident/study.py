@@ -18,6 +18,7 @@ from pydantic_core import PydanticCustomError
 
 from dynident import files
 from dynident.closed_loop import Controller, ControllerFile
+from dynident.criteria import DEFAULTS, Criteria
 from dynident.effects import FRICTION_WIDTH, Effect, effects_of
 from dynident.errors import DynidentError, RobotError, StudyError
 from dynident.model import Model
@@ -79,6 +80,7 @@ class _StudyFile(SettingsTable):
     noise: _NoiseEntry | None = None
     controller: ControllerFile | None = None
     columns: dict[str, str | _ColumnEntry] = Field(default_factory=dict)
+    criteria: dict[str, Any] = Field(default_factory=dict)
 
     @field_validator("columns", mode="before")
     @classmethod
@@ -103,6 +105,8 @@ class Study:
     train, test : recordings to fit and recordings to judge by; `test` is empty where the study
         names none, and the diagnosis then holds out blocks of time.
     controller : of the closed loop, where the study states one.
+    criteria : the numbers that decide a diagnosis, with those that the study wants otherwise: a
+        table for each group, as `[criteria.gates] level = 0.005`; see `dynident.criteria`.
     """
 
     path: Path
@@ -110,6 +114,7 @@ class Study:
     train: Dataset
     test: Dataset
     controller: Controller | None = None
+    criteria: Criteria = DEFAULTS
 
     @property
     def robot(self) -> Robot:
@@ -140,6 +145,8 @@ def load(path: str | Path) -> Study:
     recordings = _recordings(said, path, robot)
     with _in(path, "filter"):
         settings = Filter(**said.filter.model_dump()) if said.filter else None
+    with _in(path, "criteria"):
+        criteria = Criteria.with_values(said.criteria)
     noise = None
     if said.noise:
         noise = Noise(
@@ -160,7 +167,7 @@ def load(path: str | Path) -> Study:
     controller = None
     if said.controller:
         controller = said.controller.controller(robot, f"{path}: controller")
-    return Study(path, model, sets["train"], sets["test"], controller)
+    return Study(path, model, sets["train"], sets["test"], controller, criteria)
 
 
 def add_effects(path: str | Path, effects: tuple[Effect, ...]) -> None:

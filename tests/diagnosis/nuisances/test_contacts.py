@@ -125,7 +125,16 @@ def test_instants_of_a_bump_are_left_out_of_all_repetitions() -> None:
     recording: Any = SimpleNamespace(start=100.0)
     replicate: Any = SimpleNamespace(t=t, recording=recording)
     run = Run("repeated", (replicate,), np.arange(1000).reshape(4, 250), np.array([0, 125, 250]))
-    pulse = DisturbancePulse(0, 1, 2, "elbow", 100.0 + 11.0, 0.1, 5.0, 1e-9)
+    pulse = DisturbancePulse(
+        run=0,
+        number=1,
+        repetition=2,
+        joint="elbow",
+        time=100.0 + 11.0,
+        width=0.1,
+        amplitude=5.0,
+        p_value=1e-9,
+    )
     short = without(run, [pulse], DEFAULTS.contacts)
     assert without(run, [], DEFAULTS.contacts) is run
     # One second into the period, less and plus four widths.

@@ -3,7 +3,8 @@
 In: a model (or an estimate) and recordings. Out: a `Diagnosis`.
 """
 
+from dynident.diagnosis.details import Candidate, JointResult, Step
 from dynident.diagnosis.procedure import diagnose
-from dynident.diagnosis.result import Candidate, Diagnosis, JointResult, Step
+from dynident.diagnosis.result import Diagnosis
 
 __all__ = ["Candidate", "Diagnosis", "JointResult", "Step", "diagnose"]

@@ -7,17 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dynident.diagnosis.advice.experiments import Adviser
+from dynident.diagnosis.details import Candidate, JointResult, Status, Step, TestError, Trace
 from dynident.diagnosis.nuisances.contacts import Disturbance, contact_candidates
 from dynident.diagnosis.nuisances.quantisation import rounding_notes, with_rounding
-from dynident.diagnosis.result import (
-    Candidate,
-    Diagnosis,
-    JointResult,
-    Status,
-    Step,
-    TestError,
-    Trace,
-)
+from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.search.scoring import Score
 from dynident.diagnosis.verdict import noise_source, notes_on, verdict_of
@@ -100,12 +93,12 @@ def told(search: Search, train: Dataset, test: Dataset | None, held: Evidence | 
     after = with_rounding(judged[-1], stages[-1], rounded) if found else before
     steps = tuple(
         Step(
-            by_label[one.score.effect.label],
-            tuple(stage.values[stage.model.slices[one.score.effect.label]]),
-            old.error,
-            new.error,
-            one.indistinguishable,
-            one.p_value,
+            effect=by_label[one.score.effect.label],
+            values=tuple(stage.values[stage.model.slices[one.score.effect.label]]),
+            test_error_before=old.error,
+            test_error_after=new.error,
+            indistinguishable=one.indistinguishable,
+            p_value=one.p_value,
         )
         for one, stage, old, new in zip(found, stages[1:], judged[:-1], judged[1:], strict=True)
     )
@@ -115,24 +108,26 @@ def told(search: Search, train: Dataset, test: Dataset | None, held: Evidence | 
     source = noise_source(evidence, held)
     verdict = verdict_of(before, after, steps, rounds[-1], evidence.criteria.verdict)
     pushed = contact_candidates(given, evidence, search.disturbances)
+    first = _merged(_candidates(rounds[0], before.error, start), pushed)
     return Diagnosis(
-        verdict,
-        source,
-        _joint_results(given, before, after),
-        TestError(first_error, after.error, after.floor),
-        steps,
-        _revealed(_merged(_candidates(rounds[0], before.error, start), pushed), evidence, start),
-        _candidates(rounds[-1], after.error, stages[-1]),
-        _estimate(evidence, start, train),
-        _estimate(evidence, stages[-1], train),
-        residual_maps(given, before, after, evidence.criteria.maps),
-        _traces(given, before, after),
-        (
+        verdict=verdict,
+        noise_source=source,
+        joints=_joint_results(given, before, after),
+        test_error=TestError(before=first_error, after=after.error, noise_floor=after.floor),
+        steps=steps,
+        candidates=_revealed(first, evidence, start),
+        remaining=_candidates(rounds[-1], after.error, stages[-1]),
+        before=_estimate(evidence, start, train),
+        after=_estimate(evidence, stages[-1], train),
+        maps=residual_maps(given, before, after, evidence.criteria.maps),
+        traces=_traces(given, before, after),
+        notes=(
             *notes_on(evidence, held, stages[-1], source),
             *rounding_notes(after, given.robot.names, evidence.criteria.verdict),
             *search.notes,
         ),
-        sources_of(test) if test is not None else (),
+        test_sources=sources_of(test) if test is not None else (),
+        criteria=evidence.criteria,
     )
 
 
@@ -171,14 +166,14 @@ def _joint_results(given: Model, before: HeldOut, after: HeldOut) -> tuple[Joint
 
     return tuple(
         JointResult(
-            name,
-            unit,
-            float(before.joint_errors[j]),
-            float(after.joint_errors[j]),
-            float(before.torque_rms[j]),
-            at(after.noise_std, j),
-            at(before.ratio, j),
-            at(after.ratio, j),
+            name=name,
+            torque_unit=unit,
+            error_before=float(before.joint_errors[j]),
+            error_after=float(after.joint_errors[j]),
+            torque_rms=float(before.torque_rms[j]),
+            noise_rms=at(after.noise_std, j),
+            ratio_before=at(before.ratio, j),
+            ratio_after=at(after.ratio, j),
         )
         for j, (name, unit) in enumerate(
             zip(given.robot.names, given.robot.torque_units, strict=True)
@@ -198,12 +193,12 @@ def _candidates(ranking: Ranking, error: float, fitted: EvidenceFit) -> tuple[Ca
         share = min(max(float(gain) / total, -1.0), 1.0) if np.isfinite(gain) else 0.0
         found.append(
             Candidate(
-                score.effect,
-                status,
-                None if score.not_identifiable else ranking.corrected(score),
-                error * (1.0 - float(np.sqrt(1.0 - share))),
-                score.values,
-                refusal,
+                effect=score.effect,
+                status=status,
+                p_value=None if score.not_identifiable else ranking.corrected(score),
+                test_gain=error * (1.0 - float(np.sqrt(1.0 - share))),
+                values=score.values,
+                remark=refusal,
             )
         )
     return tuple(found)
@@ -247,13 +242,13 @@ def _traces(given: Model, before: HeldOut, after: HeldOut) -> tuple[Trace, ...]:
     robot = given.robot
     return tuple(
         Trace(
-            old.name,
-            name,
-            unit,
-            old.t,
-            old.measured[:, j],
-            old.predicted[:, j],
-            new.predicted[:, j],
+            recording=old.name,
+            joint=name,
+            torque_unit=unit,
+            t=old.t,
+            measured=old.measured[:, j],
+            before=old.predicted[:, j],
+            after=new.predicted[:, j],
         )
         for old, new in zip(before.runs, after.runs, strict=True)
         for j, (name, unit) in enumerate(zip(robot.names, robot.torque_units, strict=True))

@@ -5,17 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import numpy as np
-
+from dynident.criteria import DEFAULTS, Criteria
+from dynident.diagnosis.details import Candidate, JointResult, Step, TestError, Trace, place
 from dynident.diagnosis.track_record import TrackRecord, track_record
-from dynident.effects import Effect
 from dynident.evidence.maps import ResidualMap
 from dynident.fitting.estimate import DataSource, Estimate
 from dynident.recording.dataset import NoiseSource
 from dynident.tables import Table, finite, number, percent, print_tables
 
 Verdict = Literal["nothing_missing", "explained", "unexplained"]
-Status = Literal["material", "not_material", "absorbed"]
 
 _VERDICTS: dict[Verdict, str] = {
     "nothing_missing": "Nothing is missing: what remains is within the noise.",
@@ -25,114 +23,16 @@ _VERDICTS: dict[Verdict, str] = {
 }
 
 _VERDICTS_WITHOUT_NOISE: dict[Verdict, str] = {
-    "nothing_missing": "No effect in the catalogue is material; the noise is unknown, so whether "
-    "something else is missing cannot be said.",
-    "explained": "Added: {effects}. No further effect is material; the noise is unknown, so "
-    "whether something else is missing cannot be said.",
-    "unexplained": "Added: {effects}. More effects are material; the noise is unknown.",
+    "nothing_missing": "No effect in the catalogue is significant and relevant; the noise is "
+    "unknown, so whether something else is missing cannot be said.",
+    "explained": "Added: {effects}. No further effect is significant and relevant; the noise is "
+    "unknown, so whether something else is missing cannot be said.",
+    "unexplained": "Added: {effects}. More effects are significant and relevant; the noise is "
+    "unknown.",
 }
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """An effect that was tried on the model as it was given.
-
-    Attributes
-    ----------
-    effect : with the shape at which it does best.
-    status : "material" (it passes every gate), "not_material", or "absorbed" (this data cannot
-        show it, because the model's own parameters take its place).
-    p_value : of the hypothesis that it has no part, corrected for the number of candidates;
-        None where it is absorbed.
-    test_gain : cross-validated drop of the relative torque error if it were added.
-    values : its parameters if it were added.
-    remark : why it is not material, or the experiment that would show it.
-    """
-
-    effect: Effect
-    status: Status
-    p_value: float | None
-    test_gain: float
-    values: tuple[float, ...] = ()
-    remark: str = ""
-
-
-@dataclass(frozen=True)
-class Step:
-    """One effect added, and what the test recordings say of it.
-
-    Attributes
-    ----------
-    effect : the effect with its refined shape.
-    values : its parameters in the joint fit that follows, (k,).
-    test_error_before, test_error_after : relative torque error on the test recordings.
-    indistinguishable : effects that this data cannot tell from it.
-    p_value : as in `Candidate`.
-    advice : the experiment that would tell it from those; empty where there are none.
-    """
-
-    effect: Effect
-    values: tuple[float, ...]
-    test_error_before: float
-    test_error_after: float
-    indistinguishable: tuple[Effect, ...]
-    p_value: float
-    advice: str = ""
-
-
-@dataclass(frozen=True)
-class JointResult:
-    """Errors at one joint, on the test recordings.
-
-    Attributes
-    ----------
-    name, torque_unit : the joint, and N m or N.
-    error_before, error_after : norm of the residual over norm of the torque; NaN without torque.
-    torque_rms : N m or N.
-    noise_rms : N m or N; None where the noise is unknown.
-    ratio_before, ratio_after : systematic residual over noise (RNR); None likewise.
-    """
-
-    name: str
-    torque_unit: str
-    error_before: float
-    error_after: float
-    torque_rms: float
-    noise_rms: float | None
-    ratio_before: float | None
-    ratio_after: float | None
-
-    @property
-    def noise_share(self) -> float | None:
-        """The noise over the torque; None where either is unknown or there is no torque."""
-        if self.noise_rms is None or not self.torque_rms > 0:
-            return None
-        return self.noise_rms / self.torque_rms
-
-
-@dataclass(frozen=True)
-class TestError:
-    """Relative torque error over all joints of the test recordings."""
-
-    before: float
-    after: float
-    noise_floor: float | None
-
-
-@dataclass(frozen=True)
-class Trace:
-    """Measured and predicted torque of one joint in one test recording, (T,) each, SI units."""
-
-    recording: str
-    joint: str
-    torque_unit: str
-    t: np.ndarray
-    measured: np.ndarray
-    before: np.ndarray
-    after: np.ndarray
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Diagnosis:
     """The answer of `diagnose`.
 
@@ -148,6 +48,7 @@ class Diagnosis:
     maps, traces : for pictures.
     notes : caveats that belong to the verdict, in plain words.
     test_sources : the test recordings; empty where blocks of time were held out.
+    criteria : the numbers by which all this was decided.
     """
 
     verdict: Verdict
@@ -163,6 +64,7 @@ class Diagnosis:
     traces: tuple[Trace, ...] = ()
     notes: tuple[str, ...] = ()
     test_sources: tuple[DataSource, ...] = ()
+    criteria: Criteria = DEFAULTS
 
     @property
     def best(self) -> Step | None:
@@ -176,7 +78,7 @@ class Diagnosis:
         if self.noise_source == "unknown":
             return _VERDICTS_WITHOUT_NOISE[self.verdict].format(effects=effects)
         left = max((j.ratio_after or 0.0 for j in self.joints), default=0.0)
-        if self.verdict == "explained" and left > 0.5:
+        if self.verdict == "explained" and left > self.criteria.verdict.not_nothing:
             return (
                 f"Explained: {effects} added, and what remains is smaller than the noise "
                 f"({left:.2g} of it), though not nothing."
@@ -192,9 +94,12 @@ class Diagnosis:
 
     @property
     def track_record(self) -> TrackRecord | None:
-        """How often answers like this one were right; None where the noise was not measured."""
+        """How often answers like this one were right; None where that is not known.
+
+        It holds for noise that was measured and for the default criteria.
+        """
         floor = self.test_error.noise_floor
-        if self.noise_source != "replicates" or not floor:
+        if self.noise_source != "replicates" or not floor or self.criteria.changed:
             return None
         over = self.test_error.before / floor
         return track_record(self.verdict, named=bool(self.steps), over_floor=over)
@@ -204,11 +109,18 @@ class Diagnosis:
         """The same in plain words; empty where nothing can be said."""
         return str(self.track_record or "")
 
-    def _confidence_lines(self) -> tuple[str, ...]:
-        return (self.confidence,) if self.confidence else ()
+    @property
+    def caveats(self) -> tuple[str, ...]:
+        """How far the verdict can be trusted, in plain words: its record, criteria, notes."""
+        changed = ", ".join(str(one) for one in self.criteria.changed)
+        return (
+            *((self.confidence,) if self.confidence else ()),
+            *((f"Criteria of the study, not the defaults: {changed}.",) if changed else ()),
+            *self.notes,
+        )
 
     def _named(self, step: Step) -> str:
-        """A step with everything that the data cannot tell it from: never one alone."""
+        """A step with everything that is indistinguishable from it: never one alone."""
         added = {one.effect.label for one in self.steps}
         others = [e.title for e in step.indistinguishable if e.label not in added]
         return step.effect.title + (f" (or {' or '.join(others)})" if others else "")
@@ -250,8 +162,12 @@ class Diagnosis:
                 "after": self.test_error.after,
                 "noise_floor": self.test_error.noise_floor,
             },
-            "notes": [*self._confidence_lines(), *self.notes],
+            "notes": list(self.caveats),
+            **({"criteria": self._changed_criteria()} if self.criteria.changed else {}),
         }
+
+    def _changed_criteria(self) -> dict[str, Any]:
+        return {one.name: one.value for one in self.criteria.changed}
 
     def tables(self) -> tuple[Table | str, ...]:
         """Everything that `show` prints, in its order."""
@@ -261,8 +177,7 @@ class Diagnosis:
             self.candidate_table(),
             self.step_table(),
             self.sentence,
-            *self._confidence_lines(),
-            *self.notes,
+            *self.caveats,
         )
 
     def show(self) -> None:
@@ -300,19 +215,21 @@ class Diagnosis:
     def candidate_table(self, most: int = 10) -> Table:
         """The ranking on the model as given."""
         shown = [c for c in self.candidates if c.status != "absorbed"][:most]
-        not_identifiable = [c for c in self.candidates if c.status == "absorbed"]
         rows = tuple(
             (
                 c.effect.label,
-                c.status.replace("_", " "),
                 number(c.p_value, 2),
                 f"{round(100 * c.test_gain, 2) + 0.0:.2f}",
-                c.remark,
+                c.finding,
             )
             for c in shown
         )
-        notes = tuple(f"Absorbed: {c.effect.title}. {c.remark}" for c in not_identifiable)
-        columns = ("effect", "status", "p", "gain, points", "remark")
+        notes = tuple(
+            f"Not identifiable: {c.effect.title}. {c.remark}"
+            for c in self.candidates
+            if c.status == "absorbed"
+        )
+        columns = ("effect", "p", "gain, points", "finding")
         return Table("Candidates, tried on the model as given", columns, rows, notes)
 
     def step_table(self) -> Table:
@@ -343,8 +260,3 @@ class Diagnosis:
             "given": "as the study states it, not measured",
             "unknown": "unknown (nothing repeats and no noise is stated), so the verdict is weaker",
         }[self.noise_source]
-
-
-def place(effect: Effect) -> dict[str, str | None]:
-    """An effect as JSON names it."""
-    return {"effect": effect.name, "joint": effect.joint, "source": effect.source}

@@ -9,7 +9,8 @@ from typing import Literal
 
 import numpy as np
 
-from dynident.diagnosis.result import Candidate, Diagnosis, Step, Trace
+from dynident.diagnosis.details import Candidate, Step, Trace
+from dynident.diagnosis.result import Diagnosis
 from dynident.errors import DynidentError
 from dynident.evidence.maps import ResidualMap
 

@@ -10,7 +10,8 @@ from datetime import datetime
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
-from dynident.diagnosis.result import Candidate, Diagnosis, Step
+from dynident.diagnosis.details import Candidate, Step
+from dynident.diagnosis.result import Diagnosis
 from dynident.reporting.content import first_set
 from dynident.reporting.joint_states import states
 from dynident.tables import Table, number, percent

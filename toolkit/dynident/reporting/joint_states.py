@@ -7,7 +7,8 @@ from typing import Literal
 
 import plotly.graph_objects as go
 
-from dynident.diagnosis.result import Diagnosis, JointResult
+from dynident.diagnosis.details import JointResult
+from dynident.diagnosis.result import Diagnosis
 from dynident.reporting.content import AFTER_COLOUR, BEFORE_COLOUR, GIVEN, GREY, after_name
 from dynident.reporting.pictures.look import dressed, mark, plain
 from dynident.tables import number

@@ -5,7 +5,8 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass
 
-from dynident.diagnosis.result import Diagnosis, Step
+from dynident.diagnosis.details import Step
+from dynident.diagnosis.result import Diagnosis
 from dynident.effects import Effect
 from dynident.reporting.joint_states import states
 from dynident.tables import percent

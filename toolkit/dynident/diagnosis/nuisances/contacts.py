@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from dynident.criteria import ContactCriteria
+from dynident.diagnosis.details import Candidate, Step
 from dynident.diagnosis.nuisances.pulse_search import DisturbancePulse, find_contacts, without
-from dynident.diagnosis.result import Candidate, Step
 from dynident.effects import Effect, catalogue
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
@@ -32,9 +32,13 @@ class Disturbance:
 
     def step(self, model: Model) -> Step:
         """Return it as a step of the diagnosis."""
-        values = (self.pulse.amplitude,)
         return Step(
-            self.effect(model), values, self.error_before, self.error_after, (), self.pulse.p_value
+            effect=self.effect(model),
+            values=(self.pulse.amplitude,),
+            test_error_before=self.error_before,
+            test_error_after=self.error_after,
+            indistinguishable=(),
+            p_value=self.pulse.p_value,
         )
 
 
@@ -184,15 +188,33 @@ def contact_candidates(
         effect = effect.on(model.robot)
         one = by_joint.get(str(effect.joint))
         if one is not None:
-            gain = one.error_before - one.error_after
             candidates.append(
                 Candidate(
-                    one.effect(model), "material", one.pulse.p_value, gain, (one.pulse.amplitude,)
+                    effect=one.effect(model),
+                    status="material",
+                    p_value=one.pulse.p_value,
+                    test_gain=one.error_before - one.error_after,
+                    values=(one.pulse.amplitude,),
                 )
             )
         elif repeats:
-            remark = "no burst differs from one repetition to another"
-            candidates.append(Candidate(effect, "not_material", 1.0, 0.0, (), remark))
+            candidates.append(
+                Candidate(
+                    effect=effect,
+                    status="not_material",
+                    p_value=1.0,
+                    test_gain=0.0,
+                    remark="no burst differs from one repetition to another",
+                )
+            )
         else:
-            candidates.append(Candidate(effect, "absorbed", None, 0.0, (), effect.advice))
+            candidates.append(
+                Candidate(
+                    effect=effect,
+                    status="absorbed",
+                    p_value=None,
+                    test_gain=0.0,
+                    remark=effect.advice,
+                )
+            )
     return tuple(candidates)

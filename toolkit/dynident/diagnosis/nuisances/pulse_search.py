@@ -29,7 +29,7 @@ from dynident.evidence.evidence_fit import EvidenceFit, residuals
 from dynident.evidence.runs import Run
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class DisturbancePulse:
     """A burst in one repetition: amplitude exp(-((t - time) / width)^2 / 2).
 
@@ -283,14 +283,14 @@ def _refined(place: _PulsePlace, p_value: float, criteria: ContactCriteria) -> D
             row, amplitude = twin, -amplitude
     time = float(np.interp(row, np.arange(one.change.size), one.of.t.ravel()))
     return DisturbancePulse(
-        one.of.run,
-        one.of.number,
-        int(row // instants),
-        one.of.joint,
-        time,
-        width * one.of.step,
-        amplitude,
-        p_value,
+        run=one.of.run,
+        number=one.of.number,
+        repetition=int(row // instants),
+        joint=one.of.joint,
+        time=time,
+        width=width * one.of.step,
+        amplitude=amplitude,
+        p_value=p_value,
     )
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from dynident.diagnosis.result import Diagnosis, Trace
+from dynident.diagnosis.details import Trace
+from dynident.diagnosis.result import Diagnosis
 from dynident.evidence.maps import ResidualMap
 from dynident.reporting.content import (
     AFTER_COLOUR,

@@ -1,0 +1,126 @@
+"""What a diagnosis consists of: candidates, steps, joints, the error, torques to be drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from dynident.effects import Effect
+
+Status = Literal["material", "not_material", "absorbed"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """An effect that was tried on the model as it was given.
+
+    Attributes
+    ----------
+    effect : with the shape at which it does best.
+    status : "material" (significant and relevant: it passes every gate), "not_material", or
+        "absorbed" (not identifiable: the model's own parameters take its place in this data).
+    p_value : of the hypothesis that it has no part, corrected for the number of candidates;
+        None where it is not identifiable.
+    test_gain : cross-validated drop of the relative torque error if it were added.
+    values : its parameters if it were added.
+    remark : which gate it does not pass, or the experiment that would show it.
+    """
+
+    effect: Effect
+    status: Status
+    p_value: float | None
+    test_gain: float
+    values: tuple[float, ...] = ()
+    remark: str = ""
+
+    @property
+    def finding(self) -> str:
+        """The status in plain words: of what does not pass, the gate that it does not pass."""
+        match self.status:
+            case "material":
+                return "significant and relevant"
+            case "absorbed":
+                return "not identifiable"
+        return self.remark or "not significant"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """One effect added, and what the test recordings say of it.
+
+    Attributes
+    ----------
+    effect : the effect with its refined shape.
+    values : its parameters in the joint fit that follows, (k,).
+    test_error_before, test_error_after : relative torque error on the test recordings.
+    indistinguishable : effects that are indistinguishable from it with this data.
+    p_value : as in `Candidate`.
+    advice : the experiment that would distinguish it from those; empty where there are none.
+    """
+
+    effect: Effect
+    values: tuple[float, ...]
+    test_error_before: float
+    test_error_after: float
+    indistinguishable: tuple[Effect, ...]
+    p_value: float
+    advice: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointResult:
+    """Errors at one joint, on the test recordings.
+
+    Attributes
+    ----------
+    name, torque_unit : the joint, and N m or N.
+    error_before, error_after : norm of the residual over norm of the torque; NaN without torque.
+    torque_rms : N m or N.
+    noise_rms : N m or N; None where the noise is unknown.
+    ratio_before, ratio_after : systematic residual over noise (RNR); None likewise.
+    """
+
+    name: str
+    torque_unit: str
+    error_before: float
+    error_after: float
+    torque_rms: float
+    noise_rms: float | None
+    ratio_before: float | None
+    ratio_after: float | None
+
+    @property
+    def noise_share(self) -> float | None:
+        """The noise over the torque; None where either is unknown or there is no torque."""
+        if self.noise_rms is None or not self.torque_rms > 0:
+            return None
+        return self.noise_rms / self.torque_rms
+
+
+@dataclass(frozen=True, kw_only=True)
+class TestError:
+    """Relative torque error over all joints of the test recordings."""
+
+    before: float
+    after: float
+    noise_floor: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trace:
+    """Measured and predicted torque of one joint in one test recording, (T,) each, SI units."""
+
+    recording: str
+    joint: str
+    torque_unit: str
+    t: np.ndarray
+    measured: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+
+
+def place(effect: Effect) -> dict[str, str | None]:
+    """An effect as JSON names it."""
+    return {"effect": effect.name, "joint": effect.joint, "source": effect.source}
