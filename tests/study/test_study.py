@@ -350,3 +350,24 @@ def test_a_recording_shorter_than_its_neighbours_is_named(tmp_path):
     assert study.test.recordings[0].samples == round(5.0 * RATE_HZ)
     with pytest.raises(DynidentError, match=r"test.csv: .*no two periods of 8 s"):
         compare_models({"study": study.model}, study.train, study.test)
+
+
+def test_criteria_of_a_study_are_its_own(study) -> None:
+    assert study().criteria.changed == ()
+    (changed,) = study(STUDY + "[criteria.gates]\nlevel = 0.005\n").criteria.changed
+    assert (changed.name, changed.value) == ("gates.level", 0.005)
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ("[criteria.gates]\nlevl = 1", "unknown criterion 'gates.levl'. did you mean 'level'?"),
+        ("[criteria.gate]\nlevel = 1", "unknown group 'gate'. did you mean 'gates'?"),
+        ("[criteria.gates]\nlevel = -1", "gates.level: -1 is out of its range"),
+        ("[criteria]\ngates = 3", "gates: a table is needed here"),
+    ],
+)
+def test_criteria_that_make_no_sense_are_refused(study, table: str, message: str) -> None:
+    with pytest.raises(StudyError) as refused:
+        study(STUDY + table + "\n")
+    assert "study.toml: criteria: " in str(refused.value) and message in str(refused.value)

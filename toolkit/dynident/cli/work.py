@@ -51,9 +51,13 @@ def diagnosis_of(study: Study) -> Diagnosis:
     from dynident.diagnosis import diagnose as search
 
     with progress("diagnosing") as show_progress:
-        controller = study.controller
         return search(
-            study.model, study.train, study.test, controller=controller, progress=show_progress
+            study.model,
+            study.train,
+            study.test,
+            controller=study.controller,
+            criteria=study.criteria,
+            progress=show_progress,
         )
 
 
@@ -68,7 +72,7 @@ def comparison_of(study: Study, additions: tuple[str, ...]) -> Comparison:
             model = model + effect
         models[f"+ {label}"] = model
     with progress("comparing"):
-        return compare_models(models, study.train, study.test, study.controller)
+        return compare_models(models, study.train, study.test, study.controller, study.criteria)
 
 
 def _missing(label: str, study: Study):
@@ -86,7 +90,9 @@ def write_report(study: Study, diagnosis: Diagnosis, to: Path | None) -> None:
 
     with progress("simulating"):
         recordings = study.test if len(study.test) else study.train
-        loop = loop_of(Judged.of(diagnosis.after), recordings, study.controller)
+        loop = loop_of(
+            Judged.of(diagnosis.after), recordings, study.controller, study.criteria.loops
+        )
     write(diagnosis, to=to, loop=loop, command=command_line(), study=study.path)
     click.echo(f"report: {to}", err=True)
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from dynident.criteria.criterion import ChangedCriterion, CriteriaGroup, description
+from dynident.criteria.criterion import ChangedCriterion, CriteriaGroup, about
 from dynident.criteria.evidence_criteria import FitCriteria, MapCriteria, NoiseCriteria
 from dynident.criteria.judgement_criteria import (
     AdviceCriteria,
@@ -109,12 +109,12 @@ class Criteria:
         for group in fields(self):
             own: CriteriaGroup = getattr(self, group.name)
             for one in fields(own):
-                about, value = description(one), getattr(own, one.name)
+                known, value = about(one), getattr(own, one.name)
                 shown = ", ".join(
                     f"{x:g}" for x in (value if isinstance(value, tuple) else (value,))
                 )
                 rows.append(
-                    (f"{group.name}.{one.name}", shown, about.unit, about.what, about.source)
+                    (f"{group.name}.{one.name}", shown, known.unit, known.what, known.source)
                 )
         columns = ("criterion", "value", "unit", "what it is", "source")
         return Table("Criteria of the diagnosis", columns, tuple(rows))

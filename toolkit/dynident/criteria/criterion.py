@@ -16,7 +16,7 @@ TWO_LINK_CASES = "measured: 160 simulated two-link robots with one hidden effect
 
 
 @dataclass(frozen=True, kw_only=True)
-class Description:
+class AboutCriterion:
     """What is known of a criterion beside its value.
 
     Attributes
@@ -76,9 +76,9 @@ def criterion(
     Parameters
     ----------
     default : a number, whole or not, or ascending numbers.
-    unit, what, source, over, least, most : see `Description`.
+    unit, what, source, over, least, most : see `AboutCriterion`.
     """
-    about = Description(
+    known = AboutCriterion(
         default=default,
         what=what,
         unit=unit,
@@ -87,7 +87,7 @@ def criterion(
         least=least if over is None else -math.inf,
         most=most,
     )
-    return field(default=default, metadata={"criterion": about})  # type: ignore[return-value]
+    return field(default=default, metadata={"criterion": known})  # type: ignore[return-value]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +103,7 @@ class CriteriaGroup:
     def __post_init__(self) -> None:
         """Refuse what makes no sense."""
         for one in fields(self):
-            objection = description(one).objection(getattr(self, one.name))
+            objection = about(one).objection(getattr(self, one.name))
             if objection:
                 raise CriteriaError(f"{one.name}: {objection}", remedy=described(one))
 
@@ -115,7 +115,7 @@ class CriteriaGroup:
     def changed(self, group: str) -> Iterator[ChangedCriterion]:
         """Yield what differs from the defaults; `group` is the name of this group."""
         for one in fields(self):
-            value, usual = getattr(self, one.name), description(one).default
+            value, usual = getattr(self, one.name), about(one).default
             if value != usual:
                 yield ChangedCriterion(name=f"{group}.{one.name}", value=value, usual=usual)
 
@@ -134,18 +134,23 @@ class ChangedCriterion:
     value: Number
     usual: Number
 
+    @property
+    def cells(self) -> tuple[str, str, str]:
+        """Name, value and default, as a row of a table."""
+        return self.name, _plain(self.value), _plain(self.usual)
+
     def __str__(self) -> str:
-        return f"{self.name} = {_plain(self.value)} (default {_plain(self.usual)})"
+        return "{} = {} (default {})".format(*self.cells)
 
 
-def description(one: Field[Any]) -> Description:
+def about(one: Field[Any]) -> AboutCriterion:
     """What is known of a field of a group."""
     return one.metadata["criterion"]
 
 
 def described(one: Field[Any]) -> str:
     """Say what a field is, with its default."""
-    found = description(one)
+    found = about(one)
     unit = "" if found.unit == "1" else f" {found.unit}"
     return f"{one.name} is: {found.what} (default {_plain(found.default)}{unit})"
 

@@ -24,7 +24,7 @@ from dynident.validation.replay import Judged, loop_of
 from dynident.validation.validation_result import Loop, loop_table
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Comparison:
     """Errors of several estimates on the same recordings.
 
@@ -149,11 +149,13 @@ def compare(
         evidence = Evidence(estimate.model, runs, criteria)
         results.append(on_recordings(evidence, estimate))
     return Comparison(
-        tuple(named),
-        tuple(e.model for e in named.values()),
-        tuple(results),
-        tuple(loop_of(Judged.of(e), dataset, controller) for e in named.values()),
-        criteria,
+        names=tuple(named),
+        models=tuple(e.model for e in named.values()),
+        results=tuple(results),
+        loops=tuple(
+            loop_of(Judged.of(e), dataset, controller, criteria.loops) for e in named.values()
+        ),
+        criteria=criteria,
     )
 
 
@@ -191,5 +193,12 @@ def compare_models(
             judge = Evidence(model, held, criteria)
             results.append(on_recordings(judge, fitted))
         compared.append(model)
-        loops.append(loop_of(Judged(model, fitted.values), test if held else train, controller))
-    return Comparison(tuple(models), tuple(compared), tuple(results), tuple(loops), criteria)
+        judged, recorded = Judged(model, fitted.values), test if held else train
+        loops.append(loop_of(judged, recorded, controller, criteria.loops))
+    return Comparison(
+        names=tuple(models),
+        models=tuple(compared),
+        results=tuple(results),
+        loops=tuple(loops),
+        criteria=criteria,
+    )

@@ -90,7 +90,8 @@ def refit(
     found = project(start, prior, metric, within, solver)
     judges = study.test if len(study.test) else study.train
     three = {"as given": start, "least squares": free, "refit": found.estimate}
-    errors = TorqueErrors("test" if len(study.test) else "training", compare(three, judges))
+    compared = compare(three, judges, criteria=study.criteria)
+    errors = TorqueErrors("test" if len(study.test) else "training", compared)
     return _refit(subject, found, within, errors)
 
 

@@ -102,14 +102,13 @@ def candidate_table(diagnosis: Diagnosis, shown: tuple[Candidate, ...]) -> Table
     rows = tuple(
         (
             ("\u2503 " if c.effect.label in bracketed else "") + c.effect.title,
-            "added" if c.effect.label in added else c.status.replace("_", " "),
             number(c.p_value, 2),
             f"{round(100 * c.test_gain, 2) + 0.0:.2f}",
-            c.remark,
+            "added" if c.effect.label in added else c.finding,
         )
         for c in shown
     )
-    columns = ("effect", "status", "p", "gain, points", "remark")
+    columns = ("effect", "p", "gain, points", "finding")
     notes = ("\u2503 These cannot be told apart with this data.",) if bracketed else ()
     return Table("Candidates, tried on the model as given", columns, rows, notes)
 
@@ -120,18 +119,29 @@ def remaining_table(diagnosis: Diagnosis) -> Table:
     return replace(final, title="Candidates, tried on the final model", notes=())
 
 
-def absorbed_table(diagnosis: Diagnosis) -> Table:
+def not_identifiable_table(diagnosis: Diagnosis) -> Table:
     """Effects that this data cannot show, and what would."""
     rows = tuple(
         (c.effect.title, c.remark or c.effect.advice)
         for c in diagnosis.candidates
         if c.status == "absorbed"
     )
-    return Table("Absorbed effects", ("effect", "what would show it"), rows)
+    return Table("Effects that are not identifiable", ("effect", "what would show it"), rows)
 
 
-def provenance(diagnosis: Diagnosis, command: str, study: Path | None) -> tuple[Table, Table]:
-    """Files and versions that a diagnosis rests on."""
+def provenance(diagnosis: Diagnosis, command: str, study: Path | None) -> tuple[Table, ...]:
+    """Files, versions and changed criteria that a diagnosis rests on.
+
+    Parameters
+    ----------
+    diagnosis : the diagnosis.
+    command : the command line that led to it; may be empty.
+    study : the study file; None where there is none.
+
+    Returns
+    -------
+    A table each; that of the criteria has no rows where nothing was changed.
+    """
     description = diagnosis.after.model.robot.description
     rows = []
     if study is not None and study.is_file():
@@ -144,7 +154,13 @@ def provenance(diagnosis: Diagnosis, command: str, study: Path | None) -> tuple[
     for use, sources in used:
         rows += [(s.file, use, s.sha256, s.filter) for s in sources]
     columns = ("file", "used as", "SHA-256", "filter")
-    return Table("Files", columns, tuple(rows)), versions(command)
+    changed = tuple(one.cells for one in diagnosis.criteria.changed)
+    names = ("criterion", "value", "default")
+    return (
+        Table("Files", columns, tuple(rows)),
+        versions(command),
+        Table("Criteria that are not the defaults", names, changed),
+    )
 
 
 def versions(command: str) -> Table:

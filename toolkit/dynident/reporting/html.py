@@ -14,9 +14,9 @@ from dynident.diagnosis.result import Diagnosis
 from dynident.evidence.maps import ResidualMap
 from dynident.reporting.content import after_name, left, ranked, seen
 from dynident.reporting.diagnosis_tables import (
-    absorbed_table,
     candidate_table,
     joint_table,
+    not_identifiable_table,
     provenance,
     remaining_table,
     step_table,
@@ -160,7 +160,7 @@ def _diagnosis_page(
         candidates=candidate_table(diagnosis, ranked(diagnosis)),
         weaker=candidate_table(diagnosis, ranked(diagnosis, len(diagnosis.candidates))[10:]),
         remaining=remaining_table(diagnosis),
-        not_identifiable=absorbed_table(diagnosis),
+        not_identifiable=not_identifiable_table(diagnosis),
         parameters=parameter_table(diagnosis.after, widening_after(diagnosis), noise_known=known),
         fit_error=diagnosis.after.error_table(),
         given_parameters=given_parameters if diagnosis.steps else None,

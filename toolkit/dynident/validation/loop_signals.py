@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dynident.closed_loop import Controller
+from dynident.criteria import LoopCriteria
 from dynident.errors import RecordingError
 from dynident.fitting.instrumental.noise_level import white_variance
 from dynident.fitting.sampling import LEAST_ROWS, Sampled, sample
@@ -20,9 +21,6 @@ from dynident.validation.loop_errors import QUANTITIES, LoopRun, Signals
 if TYPE_CHECKING:
     from dynident.closed_loop.retrace import Retraced
 
-_REPEATS = 0.3
-"""Mismatch of two periods, relative to the motion, above which nothing repeats."""
-
 
 def filtered_run(
     recording: Recording,
@@ -31,6 +29,7 @@ def filtered_run(
     model: Model,
     dataset: Dataset,
     settling: float,
+    criteria: LoopCriteria,
 ) -> LoopRun:
     """Pass measurement, simulation and reference through the same filters."""
     assert recording.q_ref is not None
@@ -46,7 +45,9 @@ def filtered_run(
     law = law_torque(recording, controller, model.robot)
     reference = sample(recording.replace(q=recording.q_ref, tau=law), dataset.filter)
     kept = _inside(measured)
-    noise = _noise(recording, dataset, kept, lambda one: law_torque(one, controller, model.robot))
+    noise = _noise(
+        recording, dataset, kept, lambda one: law_torque(one, controller, model.robot), criteria
+    )
     return LoopRun(
         name=recording.name,
         t=measured.t[kept],
@@ -118,13 +119,14 @@ def _noise(
     dataset: Dataset,
     kept: np.ndarray,
     law: Callable[[Recording], np.ndarray],
+    criteria: LoopCriteria,
 ) -> np.ndarray | None:
     """Noise of the measured quantities, rms (4, n): of repeated periods, else as stated.
 
     The noise alone passes the filters, so that nothing of what they do to the motion at the ends
     of the record is taken for noise. Its mean is over the rows that repeat.
     """
-    alone = _repeated(recording) or _stated(recording, dataset.noise, law)
+    alone = _repeated(recording, criteria) or _stated(recording, dataset.noise, law)
     if alone is None:
         return None
     sampled = sample(alone, dataset.filter)
@@ -136,7 +138,7 @@ def _noise(
     return np.array([np.sqrt(np.mean(noise.of(one) ** 2, axis=0)) for one in QUANTITIES])
 
 
-def _repeated(recording: Recording) -> Recording | None:
+def _repeated(recording: Recording, criteria: LoopCriteria) -> Recording | None:
     """Return what differs from period to period within the recording's window, if it repeats."""
     if recording.period is None:
         return None
@@ -147,7 +149,7 @@ def _repeated(recording: Recording) -> Recording | None:
     except RecordingError:
         return None
     rows = inside[found.index]
-    if mismatch(recording.q[rows]) > _REPEATS:
+    if mismatch(recording.q[rows]) > criteria.repeats:
         return None
     grown = np.sqrt(found.count / (found.count - 1))
     changes = {}

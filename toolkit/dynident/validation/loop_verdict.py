@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from dynident.criteria import LoopCriteria
 from dynident.tables import percent
 from dynident.validation.loop_errors import LoopErrors
 
@@ -18,17 +19,6 @@ ORIENTATION = (
     "published with 0.014 %, 0.23 %, 8.6 % and 5.8 % of the force."
 )
 """Janot et al., instrumental variables for a SCARA robot; and the benchmark's own figures."""
-
-_SAME_AS_NOISE = 1.5
-"""A difference up to so many times the noise may be the noise."""
-_FURTHER = 1.2
-"""Distances from the measurement, noise taken out, whose ratio is below this are about equal."""
-_BEYOND_NOISE = 3.0
-_MATERIAL = 0.01
-"""Torque error over its noise, and over the torque, above which something is missing."""
-_LAW_HOLDS = 0.2
-_LAW_NOISE = 3.0
-"""Relative error, and multiple of the noise, up to which the stated control law may have run."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -56,26 +46,37 @@ class Judgement:
     lacking: np.ndarray
 
     @staticmethod
-    def of(joints: tuple[str, ...], errors: LoopErrors) -> Judgement:
-        """Return what is the matter with each joint of simulated loops."""
+    def of(joints: tuple[str, ...], errors: LoopErrors, criteria: LoopCriteria) -> Judgement:
+        """Return what is the matter with each joint of simulated loops.
+
+        Parameters
+        ----------
+        joints, errors : names, and the errors to judge.
+        criteria : what the errors mean.
+
+        Returns
+        -------
+        One truth value for each joint and complaint.
+        """
         own, reference = errors.own.joints, errors.without_model.joints
         noise = errors.noise.joints[3] if errors.noise is not None else np.zeros(len(joints))
-        unlike = reference[3] > np.maximum(_LAW_HOLDS, _LAW_NOISE * noise)
+        unlike = reference[3] > np.maximum(criteria.law_holds, criteria.law_noise * noise)
         terms = np.fmax(errors.law_terms, 1.0)
         encoder = errors.position_noise
         # Measured less simulated, and measured less reference: both hold the encoder's noise.
         far, near = (np.sqrt(np.fmax(x[0] ** 2 - encoder**2, 0.0)) for x in (own, reference))
-        beyond = own[0] > _SAME_AS_NOISE * encoder
-        lost = beyond & (far > _FURTHER * near)
+        beyond = own[0] > criteria.same_as_noise * encoder
+        lost = beyond & (far > criteria.further * near)
         excess = np.sqrt(np.fmax(own[3] ** 2 - noise**2, 0.0))
+        beyond_noise = (noise > 0) & (own[3] > criteria.beyond_noise * noise)
         return Judgement(
             joints=joints,
             errors=errors,
             unlike=unlike,
-            foreign=unlike & (reference[3] > _LAW_HOLDS * terms),
+            foreign=unlike & (reference[3] > criteria.law_holds * terms),
             lost=lost,
             undecided=~lost & ~(far < near),
-            lacking=(noise > 0) & (own[3] > _BEYOND_NOISE * noise) & (excess > _MATERIAL),
+            lacking=beyond_noise & (excess > criteria.relevant),
         )
 
     @property

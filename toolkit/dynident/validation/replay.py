@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dynident.closed_loop import Controller, Mechanism
+from dynident.criteria import DEFAULTS, LoopCriteria
 from dynident.errors import DynidentError, DynidentWarning, RecordingError, SimulationError
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import sources_of
@@ -38,6 +39,7 @@ def validate(
     dataset: Dataset,
     controller: Controller,
     *,
+    criteria: LoopCriteria = DEFAULTS.loops,
     progress: Progress | None = None,
 ) -> Validation:
     """Simulate the identified robot in the loop that was recorded, and compare the motion.
@@ -52,6 +54,7 @@ def validate(
     estimate : of the robot and its effects.
     dataset : recordings; those without a reference are left out by name.
     controller : of the loop in which they were made.
+    criteria : what the errors mean.
     progress : called now and then with the seconds simulated, and the seconds to simulate.
 
     Raises
@@ -60,7 +63,7 @@ def validate(
         If no recording has a reference, or the controller cannot be simulated or is another
         robot's. A loop that cannot be simulated is no error: see `Validation.skipped`.
     """
-    return simulate_again(Judged.of(estimate), dataset, controller, progress)
+    return simulate_again(Judged.of(estimate), dataset, controller, criteria, progress)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,9 +96,16 @@ def loop_of(
     judged: Judged,
     dataset: Dataset,
     controller: Controller | None,
-    progress: Progress | None = None,
+    criteria: LoopCriteria = DEFAULTS.loops,
 ) -> Validation | Unsimulated | None:
     """Simulate the loop where there is one to simulate, for those who do not insist.
+
+    Parameters
+    ----------
+    judged : the model with its values.
+    dataset : recordings, some with their reference.
+    controller : of their loop; None where it is not known.
+    criteria : what the errors mean.
 
     Returns
     -------
@@ -107,7 +117,7 @@ def loop_of(
         with warnings.catch_warnings():
             # What is to be said of the recordings was said when they were compared.
             warnings.simplefilter("ignore", DynidentWarning)
-            found = simulate_again(judged, dataset, controller, progress)
+            found = simulate_again(judged, dataset, controller, criteria)
     except DynidentError as error:
         return Unsimulated(str(error))
     if found.runs:
@@ -116,7 +126,11 @@ def loop_of(
 
 
 def simulate_again(
-    judged: Judged, dataset: Dataset, controller: Controller, progress: Progress | None = None
+    judged: Judged,
+    dataset: Dataset,
+    controller: Controller,
+    criteria: LoopCriteria,
+    progress: Progress | None = None,
 ) -> Validation:
     """`validate` for any model with values."""
     robot = judged.model.robot
@@ -133,6 +147,7 @@ def simulate_again(
         raise SimulationError(what, where, remedy)
     usable = [uniform(r) for r in dataset.recordings if r.q_ref is not None]
     nothing = Validation(
+        criteria=criteria,
         robot=robot.name,
         joints=robot.names,
         units=robot.units,
@@ -173,7 +188,8 @@ def simulate_again(
     for recording, one in again:
         try:
             drop = _settling(recording, slowest)
-            runs.append(filtered_run(recording, one, controller, judged.model, dataset, drop))
+            run = filtered_run(recording, one, controller, judged.model, dataset, drop, criteria)
+            runs.append(run)
         except RecordingError as error:
             skipped.append(Skipped(recording.name, "too_short", _reason(error, recording)))
     return replace(

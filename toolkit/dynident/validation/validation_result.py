@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from dynident.criteria import DEFAULTS, LoopCriteria
 from dynident.fitting.estimate import DataSource
 from dynident.recording.dataset import NoiseSource
 from dynident.tables import Table, finite, number, percent, print_tables
@@ -61,6 +62,7 @@ class Validation:
     noise_source : "replicates", "given" or "unknown".
     sources : the recordings.
     remarks : of the simulator.
+    criteria : what the errors mean.
     """
 
     robot: str
@@ -74,6 +76,7 @@ class Validation:
     noise_source: NoiseSource
     sources: tuple[DataSource, ...] = ()
     remarks: tuple[str, ...] = ()
+    criteria: LoopCriteria = DEFAULTS.loops
 
     @cached_property
     def _numbers(self) -> LoopErrors:
@@ -111,7 +114,7 @@ class Validation:
     @cached_property
     def judgement(self) -> Judgement:
         """What is the matter with each joint."""
-        return Judgement.of(self.joints, self._numbers)
+        return Judgement.of(self.joints, self._numbers, self.criteria)
 
     @property
     def verdict(self) -> Verdict:

@@ -95,8 +95,8 @@ def ranking(diagnosis: Diagnosis, most: int = 10) -> go.Figure:
     shown = ranked(diagnosis, most)
     figure = go.Figure()
     for status, name, symbol in (
-        ("material", "material", "circle"),
-        ("not_material", "not material", "circle-open"),
+        ("material", "significant and relevant", "circle"),
+        ("not_material", "not significant or not relevant", "circle-open"),
     ):
         rows = [i for i, c in enumerate(shown) if c.status == status]
         colour = AFTER_COLOUR if status == "material" else GREY
