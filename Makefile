@@ -1,10 +1,11 @@
 # make demo   environment, install, the main job on an embedded example, a report to open
 # make test   environment, install, all tests
+# make test-fast   the same less the tests that are marked slow
 PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
 
-.PHONY: install demo test lint bench clean
+.PHONY: install demo test test-fast lint bench clean
 
 install: $(STAMP)
 
@@ -19,6 +20,9 @@ demo: install
 
 test: install
 	$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal
+
+test-fast: install
+	$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal -m "not slow"
 
 lint: install
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[lint]'

@@ -38,6 +38,7 @@ def with_contact(recording: Recording, size: float) -> Recording:
 
 
 @pytest.mark.parametrize("size", [1.0, 4.0])
+@pytest.mark.slow
 def test_a_short_disturbance_that_returns_is_not_called_noise(model: Model, size: float) -> None:
     """However short: it is in every period, and no noise is."""
     runs = tuple(with_contact(one, size) for one in recordings(model))
@@ -132,6 +133,7 @@ def test_test_recordings_that_repeat_give_the_floor_that_the_others_cannot(model
     assert any("plain least squares" in note for note in found.notes)
 
 
+@pytest.mark.slow
 def test_what_differentiation_leaves_is_not_called_missing(model: Model) -> None:
     """Without any noise the floor is zero, and rounding and truncation are all that is left."""
     truth = true_values(model, **FRICTION)

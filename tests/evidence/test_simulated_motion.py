@@ -95,6 +95,7 @@ def test_moved_torque_makes_plain_regression_instrumental(healthy: Dataset) -> N
     assert np.allclose(fitted.values[-4:], truth, atol=0.12)
 
 
+@pytest.mark.slow
 def test_a_hidden_offset_is_found(healthy: Dataset) -> None:
     hidden = TrueEffect.of("torque_offset@elbow", arm(), [0.5], hidden=True)
     found = diagnose(model(), recordings(0, 2, hidden), controller=CONTROLLER)

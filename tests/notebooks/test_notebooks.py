@@ -45,6 +45,7 @@ def test_there_are_notebooks() -> None:
 
 
 @each_notebook
+@pytest.mark.slow
 def test_it_runs_from_top_to_bottom(path: Path, tmp_path: Path, fonts: Path, monkeypatch) -> None:
     from nbclient import NotebookClient
 

@@ -67,6 +67,7 @@ def test_asymmetric_friction_is_reproduced_to_a_hundredth_of_a_percent() -> None
 
 
 @needs_data
+@pytest.mark.slow
 def test_the_rigid_body_alone_leads_to_asymmetric_friction_and_no_further() -> None:
     study = load(PROBLEM / "study.toml")
     assert study.model.effects == ()
@@ -117,6 +118,7 @@ def test_the_simulated_loop_is_as_near_to_the_record_as_the_published_one() -> N
 
 
 @needs_data
+@pytest.mark.slow
 def test_a_noisier_encoder_takes_the_mass_from_least_squares_and_not_from_instruments() -> None:
     study, said = closed_loop.load(), PUBLISHED["noise"]
     true = PUBLISHED["symmetric"]["values"]["m.carriage"]

@@ -8,6 +8,7 @@ from dynident.effects import catalogue
 from hidden_effects import FOREIGN, Case, run_case
 
 
+@pytest.mark.slow
 def test_a_healthy_robot_gets_no_effect() -> None:
     outcome = run_case(Case(None, None, None, 0.0, 5003))
     assert (outcome.verdict, outcome.first) == ("nothing_missing", None)
@@ -17,11 +18,12 @@ def test_a_healthy_robot_gets_no_effect() -> None:
     ("effect", "joint", "source"),
     [
         ("stribeck_friction", "elbow", None),
-        pytest.param("payload", None, None, marks=pytest.mark.slow),
-        pytest.param("joint_coupling", "shoulder", "elbow", marks=pytest.mark.slow),
-        pytest.param("torque_ripple", "elbow", None, marks=pytest.mark.slow),
+        ("payload", None, None),
+        ("joint_coupling", "shoulder", "elbow"),
+        ("torque_ripple", "elbow", None),
     ],
 )
+@pytest.mark.slow
 def test_a_hidden_effect_is_suggested_first(effect: str, joint, source) -> None:
     outcome = run_case(Case(effect, joint, source, 3.0, 31))
     assert outcome.ratio >= 1.0
@@ -31,6 +33,7 @@ def test_a_hidden_effect_is_suggested_first(effect: str, joint, source) -> None:
     assert outcome.over_floor <= 1.15
 
 
+@pytest.mark.slow
 def test_an_effect_in_no_catalogue_is_called_unknown() -> None:
     assert FOREIGN not in catalogue()
     outcome = run_case(Case(FOREIGN, "elbow", None, 10.0, 4001))
