@@ -8,7 +8,7 @@ from tests.synthetic import arm
 
 from dynident.closed_loop import ClosedLoop, Controller, Fourier, Mechanism, Task, TrueEffect
 from dynident.closed_loop.rollout import Rollout
-from dynident.effects.transmissions.driven import mean_inertia
+from dynident.effects.transmissions.along import mean_inertia
 from dynident.errors import SimulationError
 from dynident.robot import Robot
 

@@ -1,4 +1,4 @@
-"""Driven responses and Dahl's state: what they say of a motion is what the closed loop shows."""
+"""Responses of links and Dahl's state: what they say of a motion is what the closed loop shows."""
 
 from __future__ import annotations
 

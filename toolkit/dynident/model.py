@@ -303,16 +303,30 @@ class Model:
         -------
         A block that effects of the same `shares_block` can use as well.
         """
+        block = self.with_bodies(effect, block, values)
+        if effect.needs_regressor and block.rigid is None:
+            block = replace(block, rigid=self.robot.regressor(block.q, block.v, block.a))
+        if effect.needs_torque and block.torque is None:
+            block = replace(block, torque=self.torque_without_loads(block, values))
+        return block
+
+    def with_bodies(self, effect: Effect, block: Block, values: np.ndarray | None) -> Block:
+        """Return a block with the bodies that an effect needs, and no more of what it needs.
+
+        Parameters
+        ----------
+        effect, block, values : as for `ready`.
+
+        Returns
+        -------
+        The block itself where the effect needs none, or the block has them.
+        """
         if effect.needs_bodies and block.body is None:
             values = self.given_values() if values is None else values
             carries = block.carries_payload
             body = self.current_robot(values, effect, carries_payload=carries)
             empty = self.current_robot(values, effect) if carries else body
             block = replace(block, body=body, empty=empty, rotor=self.rotor(values))
-        if effect.needs_regressor and block.rigid is None:
-            block = replace(block, rigid=self.robot.regressor(block.q, block.v, block.a))
-        if effect.needs_torque and block.torque is None:
-            block = replace(block, torque=self.torque_without_loads(block, values))
         return block
 
     def shares_block(self, effect: Effect) -> Hashable:

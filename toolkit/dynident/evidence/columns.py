@@ -89,6 +89,10 @@ class Evidence:
         ----------
         variants : one effect at one place, with any number of shapes.
         model, values : as for `of`.
+
+        Returns
+        -------
+        For each run, for each variant: (T, J, k) for each replicate.
         """
         runs = range(len(self.runs))
         first = variants[0]
@@ -104,6 +108,14 @@ class Evidence:
 
         Columns that depend on the predicted torque or on the bodies cost an inverse dynamics of
         the whole recording, and change little as effects are added.
+
+        Parameters
+        ----------
+        variants, model, values : as for `columns`.
+
+        Returns
+        -------
+        As `columns`.
         """
         if variants[0].linear_in_torque or not variants[0].depends_on_fit:
             return self.columns(variants, model, values)
@@ -127,13 +139,8 @@ class Evidence:
 
     def time_factor(self, effect: Effect, run: int) -> np.ndarray:
         """The factor of an effect's columns that depends on the time, folded, (P, S)."""
-        replicate, recording = self.runs[run].replicates[0], self.runs[run].recording
-        block = replace(self._rows(replicate), t=replicate.t + recording.start)
-        if recording.temperature is not None:
-            columns = recording.temperature.T
-            at = [np.interp(replicate.t, recording.t, column) for column in columns]
-            block = replace(block, temperature=np.stack(at, axis=1))
-        return effect.time_factor(block)[self.runs[run].index]
+        recorded = self.runs[run]
+        return effect.time_factor(recorded.rows(self.model))[recorded.index]
 
     # --- of one replicate, by all that they depend on -------------------------------------------
 

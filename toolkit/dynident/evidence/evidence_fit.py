@@ -8,13 +8,8 @@ import numpy as np
 
 from dynident.criteria import Criteria
 from dynident.evidence.columns import Evidence
-from dynident.evidence.noise_model import (
-    NoiseModel,
-    differences,
-    flat_noise,
-    measure_noise,
-    systematic_square,
-)
+from dynident.evidence.joint_residual import JointResidual
+from dynident.evidence.noise_model import NoiseModel, flat_noise
 from dynident.evidence.runs import Signals
 from dynident.fitting.fixed_point import FixedPoint
 from dynident.model import Model
@@ -78,11 +73,20 @@ class EvidenceFit:
 
 
 def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = None) -> EvidenceFit:
-    """Fit a model to the runs of the evidence.
+    """Fit a model to the runs of the evidence, and measure their noise.
+
+    The instrumental variables are the other replicates of a run, see `dynident.moments`. Where
+    columns depend on the fit, fit and columns are repeated until they agree.
 
     Parameters
     ----------
+    evidence : recordings and their columns.
+    model : with its effects and their shapes.
     near : the fit of a like model, from which columns that depend on the values start.
+
+    Returns
+    -------
+    The fit, its model linearised at the values found.
 
     Raises
     ------
@@ -112,8 +116,8 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
         values, _ = _solve(_moments(evidence, model, _whiten(evidence, columns, noise, values)))
         if round == 0 and near is None:
             # Along a robot without bodies their columns are rounding errors, and any value fits.
-            values = _waiting(model, at, values)
-        noise = tuple(_Left.of(evidence, columns, values, j).noise for j in range(n))
+            values = _keeping_dependent(model, at, values)
+        noise = tuple(JointResidual.of(evidence, columns, values, j).noise for j in range(n))
         change = float(np.linalg.norm(_held(model, values) - at))
         small = change <= criteria.value_tolerance * np.linalg.norm(values)
         if round >= criteria.noise_rounds - (near is not None) and small:
@@ -127,7 +131,7 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
         for run, joints in zip(evidence.runs, white, strict=True)
         for part in joints
     )
-    left = [_Left.of(evidence, columns, values, j) for j in range(n)]
+    left = [JointResidual.of(evidence, columns, values, j) for j in range(n)]
     return EvidenceFit(
         evidence.criteria,
         model.at(_held(model, values)),
@@ -170,8 +174,8 @@ def _held(model: Model, values: np.ndarray) -> np.ndarray:
     return held
 
 
-def _waiting(model: Model, at: np.ndarray, found: np.ndarray) -> np.ndarray:
-    """Values found, but those of effects that depend on the present model as they were."""
+def _keeping_dependent(model: Model, at: np.ndarray, found: np.ndarray) -> np.ndarray:
+    """Values found, but those of effects whose columns depend on the fit as they were."""
     values = np.array(found)
     for effect in model.effects:
         if effect.depends_on_fit:
@@ -182,7 +186,19 @@ def _waiting(model: Model, at: np.ndarray, found: np.ndarray) -> np.ndarray:
 def model_columns(
     evidence: Evidence, model: Model, run: int, joint: int, values: np.ndarray | None
 ) -> Signals:
-    """Columns of a model and the torque at one joint, (T, p + 1) for each version of a run."""
+    """Columns of a model and the torque at one joint.
+
+    Parameters
+    ----------
+    evidence, run : recordings, and which one of them.
+    model : with its effects and their shapes.
+    joint : column of the joint.
+    values : (p,) at which columns that depend on the fit are taken; None for zeros.
+
+    Returns
+    -------
+    (T, p + 1) for each replicate of the run.
+    """
     recording = evidence.runs[run].recording
     parts = [[rigid[:, joint] for rigid in evidence.rigid(run)]]
     for effect in model.effects:
@@ -199,7 +215,17 @@ def model_columns(
 
 
 def residuals(evidence: Evidence, model: Model, values: np.ndarray) -> list[np.ndarray]:
-    """Torque minus prediction of each run, folded, (P, S, n) in N m or N."""
+    """Torque minus prediction of each run, folded.
+
+    Parameters
+    ----------
+    evidence : recordings and their columns.
+    model, values : (p,) that predict.
+
+    Returns
+    -------
+    (P, S, n) in N m or N for each run.
+    """
     combination = np.append(-values, 1.0)
     found = []
     for r, run in enumerate(evidence.runs):
@@ -233,7 +259,7 @@ def _moments(evidence: Evidence, model: Model, white) -> Moments:
 
 
 def _signal(evidence: Evidence, white, values: np.ndarray) -> float:
-    """Squared whitened residual, of what the versions have in common."""
+    """Squared whitened residual, of what the replicates have in common."""
     combination = np.append(-values, 1.0)[:, None]
     return sum(
         float(run.moments(w @ combination, w @ combination).signal.sum())
@@ -245,7 +271,18 @@ def _signal(evidence: Evidence, white, values: np.ndarray) -> float:
 def time_varying_columns(
     evidence: Evidence, model: Model, run: int, white: np.ndarray
 ) -> TimeVarying:
-    """Whitened columns of a model and the torque, (P, S, p + 1), with what time does to them."""
+    """Columns of a model and the torque with the factors that the time makes of them.
+
+    Parameters
+    ----------
+    evidence, run : recordings, and which one of them.
+    model : with its effects.
+    white : (P, S, p + 1) whitened columns and torque.
+
+    Returns
+    -------
+    The columns, and their factors of the time in the session.
+    """
     time_factor = np.ones_like(white)
     for effect in model.effects:
         if effect.time_varying:
@@ -267,57 +304,3 @@ def _solve(summed: Moments) -> tuple[np.ndarray, MomentSolution]:
     signal, total = summed.sums()
     solution = solve(signal[:-1, :-1], total[:-1, :-1], signal[:-1, -1])
     return solution.values, solution
-
-
-@dataclass(frozen=True)
-class _Left:
-    """What a fit leaves at one joint.
-
-    Attributes
-    ----------
-    stretches, speeds : of noise in the order of time, and the joint's velocity in them.
-    plain : residuals of which nothing tells the noise.
-    systematic : mean square of what the versions of a run have in common, for each.
-    """
-
-    criteria: Criteria
-    stretches: list[np.ndarray]
-    speeds: list[np.ndarray]
-    plain: list[np.ndarray]
-    systematic: list[float]
-
-    @classmethod
-    def of(cls, evidence: Evidence, columns, values: np.ndarray, joint: int) -> _Left:
-        combination = np.append(-values, 1.0)
-        left = cls(evidence.criteria, [], [], [], [])
-        for run, joints in zip(evidence.runs, columns, strict=True):
-            residual = run.fold([c @ combination for c in joints[joint]])
-            if run.kind == "single":
-                left.plain.append(residual[0])
-                continue
-            left.systematic.append(systematic_square(residual, run.kind))
-            speed = run.replicates[0].v[:, joint][run.index]
-            for stretch, v in zip(differences(residual, run.kind), speed, strict=False):
-                left.stretches.append(stretch)
-                left.speeds.append(v)
-        return left
-
-    @property
-    def square(self) -> float:
-        """Mean square of what is systematic; of everything, where nothing tells it from noise."""
-        if self.systematic:
-            return max(float(np.mean(self.systematic)), 0.0)
-        return float(np.mean(np.concatenate(self.plain) ** 2))
-
-    @property
-    def variance(self) -> float:
-        """Of the noise; zero where there is none, or nothing tells it."""
-        return float(np.mean(np.concatenate(self.stretches) ** 2)) if self.stretches else 0.0
-
-    @property
-    def noise(self) -> NoiseModel:
-        """The noise; the residual itself, where nothing tells them from each other."""
-        root = float(np.sqrt(self.square))
-        if self.stretches:
-            return measure_noise(self.stretches, self.speeds, self.criteria.noise, root)
-        return flat_noise(root or 1.0)

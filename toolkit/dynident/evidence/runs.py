@@ -14,8 +14,10 @@ from typing import Literal
 import numpy as np
 
 from dynident.criteria import DEFAULTS, NoiseCriteria
+from dynident.effects import Block
 from dynident.evidence.noise_model import NoiseModel
 from dynident.fitting.sampling import Sampled, flagged, sample
+from dynident.model import Model
 from dynident.moments.replicated import Kind, Moments, moments
 from dynident.recording import (
     Dataset,
@@ -64,6 +66,20 @@ class Run:
     def recording(self) -> Recording:
         """The recording itself."""
         return self.replicates[0].recording
+
+    def rows(self, model: Model) -> Block:
+        """Return the decimated rows as effects see them, with their time in the session.
+
+        For what varies slowly: the motion and its temperatures, and no regressor.
+        """
+        first, recording = self.replicates[0], self.recording
+        temperature = None
+        if recording.temperature is not None:
+            columns = recording.temperature.T
+            at = [np.interp(first.t, recording.t, column) for column in columns]
+            temperature = np.stack(at, axis=1)
+        start, motion = recording.start, (first.q, first.v, first.a)
+        return model.block(first.t + start, *motion, rigid=False, temperature=temperature)
 
     def fold(self, signals: Sequence[np.ndarray]) -> np.ndarray:
         """Arrange measured signals, (T, ...) for each version, as (P, S, ...)."""

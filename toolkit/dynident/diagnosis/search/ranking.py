@@ -206,10 +206,10 @@ def _possible(one: Score, fitted: EvidenceFit) -> Score:
 
 
 def _seen(fitted: EvidenceFit, effect: Effect) -> Block:
-    """One sample with what an effect needs of the present model."""
+    """One sample with the bodies that an effect needs of the fitted model."""
     still = np.zeros((1, fitted.model.robot.n))
     block = fitted.model.block(np.zeros(1), still, still, still, rigid=False)
-    return fitted.model.ready(effect, block, fitted.values)
+    return fitted.model.with_bodies(effect, block, fitted.values)
 
 
 def judged(evidence: Evidence, fitted: EvidenceFit, one: Score, tests: int) -> tuple[Score, str]:

@@ -9,9 +9,10 @@ import numpy as np
 
 from dynident.effects.effect import Block, Parameter, ShapeParameter, motion_unit
 from dynident.effects.transmissions.along import mean_inertia
-from dynident.effects.transmissions.driven import DrivenLink, responses
+from dynident.effects.transmissions.dead_zone import Transmitting
+from dynident.effects.transmissions.driven_link import DrivenLink
 from dynident.effects.transmissions.flexible import DAMPING, RESONANCE, ROTOR_SHARE, FlexibleJoint
-from dynident.effects.transmissions.gaps import Transmitting
+from dynident.effects.transmissions.link_response import responses
 
 _GAPS = (0.0015, 0.004, 0.01, 0.025)
 """rad (a tenth of it in m): gaps that are screened."""
@@ -22,10 +23,10 @@ _SOUGHT_GAPS = (8e-4, 6e-2)
 
 
 class Backlash(FlexibleJoint):
-    """A gap between two compliant sides: the link is free inside.
+    """A dead zone between two compliant sides: the link is free inside.
 
-    Its torque is not linear in the gap: the column is the driven response with the gap at which it
-    is taken (`point`), per unit of it.
+    Its torque is not linear in the gap: the column is the response with the gap that is the
+    linearisation point, per unit of it.
     """
 
     name = "backlash"

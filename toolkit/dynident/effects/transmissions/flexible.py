@@ -10,13 +10,9 @@ from dynident.effects.effect import Block, Forceless, ShapeParameter
 from dynident.effects.traits import Needs
 from dynident.effects.transmission import Transmission
 from dynident.effects.transmissions.along import mean_inertia, share_of_rotor
-from dynident.effects.transmissions.driven import (
-    DrivenLink,
-    Response,
-    Transmitting,
-    responses,
-    stacked,
-)
+from dynident.effects.transmissions.dead_zone import Transmitting
+from dynident.effects.transmissions.driven_link import DrivenLink
+from dynident.effects.transmissions.link_response import Response, responses, stacked
 from dynident.robot import Robot
 
 _SCREENED = (3.0, 4.0, 5.4, 7.3, 9.8, 13.2, 18.0, 25.0, 40.0, 80.0)  # Hz: a peak is narrow
@@ -30,8 +26,9 @@ ROTOR_SHARE = ShapeParameter("rotor_share", "1", (0.3,), 0.005, 0.95)
 class FlexibleJoint(Forceless):
     """A compliant transmission between the motor and the link of a joint, perhaps with a gap.
 
-    Its column is the link's driven response behind it. The torque of every joint changes, as all
-    feel the link's acceleration. See `dynident.effects.transmissions.driven`.
+    Its column is a filtered dynamic regressor, the response of the link behind it. The torque of
+    every joint changes, as all feel the link's acceleration. See
+    `dynident.effects.transmissions.link_response`.
     """
 
     needs = Needs.BODIES | Needs.RECORDING

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynident.effects.transmissions.gaps import Driven, Transmitting, through_gaps
+from dynident.effects.transmissions.dead_zone import DeadZoneLink, Transmitting, through_dead_zones
 
 STEP, STEPS = 1e-3, 4000
 
@@ -20,9 +20,9 @@ def test_several_gaps_at_once_are_each_gap_alone() -> None:
             m = 0.07 * (1.0 + 0.2 * np.sin(t)) * rng.uniform(0.8, 1.2)
             load = np.sin(7.0 * t) + 0.1 * rng.standard_normal(len(t))
             c, g = 0.01 * np.cos(t), 0.1 * np.sin(2.0 * t)
-            links.append(Driven(m, load, c, g, gear, t[1]))
-    for link, together in zip(links, through_gaps(links), strict=True):
-        (alone,) = through_gaps([link])
+            links.append(DeadZoneLink(m, load, c, g, gear, t[1]))
+    for link, together in zip(links, through_dead_zones(links), strict=True):
+        (alone,) = through_dead_zones([link])
         np.testing.assert_allclose(together.d, alone.d, rtol=1e-6, atol=1e-9)
         np.testing.assert_array_equal(together.side[1:-1], alone.side[1:-1])
         # Inside its gap a link touches nothing, beyond it it does.
@@ -35,6 +35,7 @@ def test_a_link_that_runs_away_does_so_quietly() -> None:
     """Hanging upside down on a spring too weak to hold it, with hardly any inertia."""
     m, load, still = np.full(STEPS, 1e-6), np.ones(STEPS), np.zeros(STEPS)
     gears = [Transmitting.of(1e-6, (15.0, 0.1, 0.3), gap) for gap in (1e-3, 1e-2)]
-    for walked in through_gaps([Driven(m, load, still, still - 5.0, one, STEP) for one in gears]):
+    links = [DeadZoneLink(m, load, still, still - 5.0, one, STEP) for one in gears]
+    for walked in through_dead_zones(links):
         assert not np.isfinite(walked.d).all()
         assert np.isin(walked.side, (-1.0, 0.0, 1.0)).all()

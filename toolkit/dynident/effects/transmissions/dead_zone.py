@@ -34,7 +34,7 @@ class Transmitting:
 
 
 @dataclass(frozen=True, eq=False)
-class Driven:
+class DeadZoneLink:
     """A link behind a transmission with a gap, in steps of time.
 
     Attributes
@@ -53,7 +53,7 @@ class Driven:
 
 
 @dataclass(frozen=True, eq=False)
-class Walked:
+class DeadZoneMotion:
     """Deflection of a link in a gap (S,), not finite where it ran away, and the side it touches.
 
     The side is -1, 0 or 1.
@@ -63,13 +63,13 @@ class Walked:
     side: np.ndarray
 
 
-def through_gaps(links: Sequence[Driven]) -> list[Walked]:
+def through_dead_zones(links: Sequence[DeadZoneLink]) -> list[DeadZoneMotion]:
     """Return how links move in gaps: together, as a step costs the same for one and for dozens."""
     longest = max(len(link.m) for link in links)
     most = max(1, _TOGETHER // longest)
     if len(links) > most:
         parts = [links[k : k + most] for k in range(0, len(links), most)]
-        return [one for part in parts for one in through_gaps(part)]
+        return [one for part in parts for one in through_dead_zones(part)]
     if len(links) == 1:
         return [_walk(_Recursion.of(links[0], len(links[0].m)))]
     each = [_Recursion.of(link, longest) for link in links]
@@ -82,7 +82,7 @@ def through_gaps(links: Sequence[Driven]) -> list[Walked]:
         side[1:-1] = np.sign(beyond)
     side = np.nan_to_num(side)
     lengths = [len(link.m) for link in links]
-    return [Walked(d[:s, v], side[:s, v]) for v, s in enumerate(lengths)]
+    return [DeadZoneMotion(d[:s, v], side[:s, v]) for v, s in enumerate(lengths)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +100,7 @@ class _Recursion:
     half: np.ndarray
 
     @classmethod
-    def of(cls, link: Driven, steps: int) -> _Recursion:
+    def of(cls, link: DeadZoneLink, steps: int) -> _Recursion:
         """Return it for as many steps, the last one repeated."""
         rows = np.minimum(np.arange(steps), len(link.m) - 1)
         m, load, c, g = (x[rows] for x in (link.m, link.load, link.c, link.g))
@@ -154,7 +154,7 @@ def _walk_together(r: _Recursion) -> np.ndarray:
     return d
 
 
-def _walk(r: _Recursion) -> Walked:
+def _walk(r: _Recursion) -> DeadZoneMotion:
     """As `_walk_together`, of one link: in plain numbers, which are faster than arrays of one."""
     load, inertia = r.load.tolist(), r.inertia.tolist()
     free, free_back = r.free.tolist(), r.free_back.tolist()
@@ -174,4 +174,4 @@ def _walk(r: _Recursion) -> Walked:
             after = pushed * free[k] - free_back[k] * before
         before, now = now, after
         d[k + 1] = after
-    return Walked(np.array(d), np.array(side))
+    return DeadZoneMotion(np.array(d), np.array(side))

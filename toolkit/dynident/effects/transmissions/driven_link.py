@@ -1,0 +1,134 @@
+"""A link behind a transmission that gives way, along the motion of its motor.
+
+What the recursion in `link_response` runs through: inertia, load and their derivatives by the
+link's motion, at the samples of a recording and in steps that follow the fastest oscillation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynident.effects.block import Block
+from dynident.effects.transmissions.along import along_motion, mean_inertia
+from dynident.effects.transmissions.dead_zone import Transmitting
+from dynident.errors import EffectError
+
+_PHASE = 0.3
+"""rad that an oscillation may turn in a step: its frequency is then wrong by 0.4 %."""
+_SHORTEST = 4e-5
+"""s: the stiffest transmission on the lightest link that is possible asks for longer steps."""
+_RUNG_DOWN = np.log(100.0)
+"""Decades of a start that a run-up takes away, as a logarithm."""
+_LEAST = 0.05
+"""Of the mean inertia: no link is lighter, or unlikely estimates would ring beyond reason."""
+
+
+class DrivenLink:
+    """The link of one joint, along the motion of a recording.
+
+    Parameters
+    ----------
+    block : whole recording, with the present model's body and rotor inertias.
+    joint : column of the joint.
+
+    Attributes
+    ----------
+    inertia : kg m^2 or kg, of all that moves with the joint, in the mean over its poses.
+    a, whole, load : (T,) acceleration of the motor, and inertia and torque of all that moves.
+    step, period : s between samples; samples after which the motion repeats, 0 where it does not.
+    M, C, G : (T, n) derivatives of torques by the joint's acceleration, speed and position.
+    """
+
+    def __init__(self, block: Block, joint: int) -> None:
+        robot, along = along_motion(block)
+        rotor = 0.0 if block.rotor is None else float(block.rotor[joint])
+        self.joint, self.a = joint, block.a[:, joint]
+        self.M, self.C, self.G = (x[:, :, joint] for x in (along.by_a, along.by_v, along.by_q))
+        self.whole = along.by_a[:, joint, joint] + rotor
+        self.load = along.torque[:, joint] + rotor * self.a
+        # What is stiff stays as stiff when a payload is taken up.
+        self.inertia = max(mean_inertia(block.empty or robot, joint) + rotor, 1e-9)
+        if len(block.t) < 3:
+            raise EffectError("its response needs more than two samples")
+        self.step = float(np.mean(np.diff(block.t)))
+        self.period = 0 if block.period is None else round(block.period / self.step)
+
+    def behind(self, gear: Transmitting) -> np.ndarray:
+        """Return the inertia behind a transmission, (T,): no less than a part of the mean."""
+        return np.maximum(self.whole - gear.rotor, self.least_inertia)
+
+    @property
+    def least_inertia(self) -> float:
+        """The least inertia behind a transmission: a part of the mean, kg m^2 or kg."""
+        return _LEAST * self.inertia
+
+    def steps_per_sample(self, gear: Transmitting) -> int:
+        """Return how many steps of the recursion follow an oscillation well enough."""
+        stiffest = max(float((gear.stiffness + self.G[:, self.joint]).max()), 0.0)
+        fastest = np.sqrt(stiffest / self.behind(gear).min())
+        return max(1, int(np.ceil(fastest * self.step / _PHASE)))
+
+    def follows(self, gear: Transmitting) -> bool:
+        """Return whether steps of a sensible length follow it: not where an inertia is impossible.
+
+        A wrong estimate may leave next to no inertia at a joint, or less than none.
+        """
+        return self.step / self.steps_per_sample(gear) >= min(_SHORTEST, self.step)
+
+    def run_up(self, gear: Transmitting) -> np.ndarray:
+        """Return rows of the motion that came before the first, as it repeats itself.
+
+        As many as the ringing takes that a start at rest gives rise to; none where nothing repeats.
+        """
+        decay = gear.damping / (2.0 * (self.inertia - gear.rotor))  # per s
+        if not (self.period and decay > 0):
+            return np.zeros(0, dtype=int)
+        wanted = min(int(np.ceil(_RUNG_DOWN / (decay * self.step))), 2 * self.period)
+        return np.arange(-wanted, 0) % self.period
+
+
+@dataclass(frozen=True, eq=False)
+class Fine:
+    """A link's motion in the steps of a recursion, (S,) each, a run-up before it.
+
+    Attributes
+    ----------
+    rows, first : (R,) samples that are run through, and where those of the motion begin in them.
+    per, step : steps per sample, and their length in s.
+    whole, c, g, load, a : inertia of all that moves, damping and stiffness without a transmission,
+        torque where nothing gives way, and acceleration of the motor.
+    """
+
+    rows: np.ndarray
+    first: int
+    per: int
+    step: float
+    whole: np.ndarray
+    c: np.ndarray
+    g: np.ndarray
+    load: np.ndarray
+    a: np.ndarray
+
+    @classmethod
+    def of(cls, link: DrivenLink, per: int, before: np.ndarray) -> Fine:
+        """Return a link's motion in finer steps.
+
+        Parameters
+        ----------
+        link : along the motion of a recording.
+        per : steps per sample.
+        before : (R,) rows of the motion that are run through first.
+        """
+        rows, j = np.concatenate([before, np.arange(len(link.a))]), link.joint
+        steps = np.arange((len(rows) - 1) * per + 1) / per
+        samples = np.stack([link.C[:, j], link.G[:, j], link.load, link.a], axis=1)[rows]
+        whole = link.whole[rows]
+        if per > 1:
+            from scipy.interpolate import CubicSpline
+
+            # Without kinks, which a second derivative would show; but an inertia stays positive.
+            samples = CubicSpline(np.arange(len(rows)), samples)(steps)
+            whole = np.interp(steps, np.arange(len(rows)), whole)
+        return cls(rows, len(before), per, link.step / per, whole, *samples.T)

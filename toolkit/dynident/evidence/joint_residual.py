@@ -1,0 +1,92 @@
+"""What a fit leaves at one joint: systematic residual and noise, told apart by replicates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynident.criteria import Criteria
+from dynident.evidence.columns import Evidence
+from dynident.evidence.noise_model import (
+    NoiseModel,
+    differences,
+    flat_noise,
+    measure_noise,
+    systematic_square,
+)
+from dynident.evidence.runs import Signals
+
+
+@dataclass(frozen=True)
+class JointResidual:
+    """What a fit leaves at one joint.
+
+    Attributes
+    ----------
+    stretches, speeds : of noise in the order of time, and the joint's velocity in them.
+    plain : residuals of which nothing tells the noise.
+    systematic : mean square of what the replicates of a run have in common, for each.
+    """
+
+    criteria: Criteria
+    stretches: list[np.ndarray]
+    speeds: list[np.ndarray]
+    plain: list[np.ndarray]
+    systematic: list[float]
+
+    @classmethod
+    def of(
+        cls,
+        evidence: Evidence,
+        columns: Sequence[Sequence[Signals]],
+        values: np.ndarray,
+        joint: int,
+    ) -> JointResidual:
+        """Return what values leave of the torque at a joint.
+
+        Parameters
+        ----------
+        evidence : the recordings.
+        columns : of the model and the torque, (T, p + 1) for each run, joint and replicate.
+        values : (p,) of the fit.
+        joint : column of the joint.
+
+        Returns
+        -------
+        Residuals and noise of all runs.
+        """
+        combination = np.append(-values, 1.0)
+        left = cls(evidence.criteria, [], [], [], [])
+        for run, joints in zip(evidence.runs, columns, strict=True):
+            residual = run.fold([c @ combination for c in joints[joint]])
+            if run.kind == "single":
+                left.plain.append(residual[0])
+                continue
+            left.systematic.append(systematic_square(residual, run.kind))
+            speed = run.replicates[0].v[:, joint][run.index]
+            for stretch, v in zip(differences(residual, run.kind), speed, strict=False):
+                left.stretches.append(stretch)
+                left.speeds.append(v)
+        return left
+
+    @property
+    def square(self) -> float:
+        """Mean square of what is systematic; of everything, where nothing tells it from noise."""
+        if self.systematic:
+            return max(float(np.mean(self.systematic)), 0.0)
+        return float(np.mean(np.concatenate(self.plain) ** 2))
+
+    @property
+    def variance(self) -> float:
+        """Of the noise; zero where there is none, or nothing tells it."""
+        return float(np.mean(np.concatenate(self.stretches) ** 2)) if self.stretches else 0.0
+
+    @property
+    def noise(self) -> NoiseModel:
+        """The noise; the residual itself, where nothing tells them from each other."""
+        root = float(np.sqrt(self.square))
+        if self.stretches:
+            return measure_noise(self.stretches, self.speeds, self.criteria.noise, root)
+        return flat_noise(root or 1.0)
