@@ -1,4 +1,4 @@
-"""Links in gaps: several walked through together move as each alone."""
+"""Links in dead zones: several walked through together move as each alone."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def test_several_gaps_at_once_are_each_gap_alone() -> None:
             m = 0.07 * (1.0 + 0.2 * np.sin(t)) * rng.uniform(0.8, 1.2)
             load = np.sin(7.0 * t) + 0.1 * rng.standard_normal(len(t))
             c, g = 0.01 * np.cos(t), 0.1 * np.sin(2.0 * t)
-            links.append(DeadZoneLink(m, load, c, g, gear, t[1]))
+            links.append(DeadZoneLink(m=m, load=load, c=c, g=g, gear=gear, step=t[1]))
     for link, together in zip(links, through_dead_zones(links), strict=True):
         (alone,) = through_dead_zones([link])
         np.testing.assert_allclose(together.d, alone.d, rtol=1e-6, atol=1e-9)
@@ -35,7 +35,8 @@ def test_a_link_that_runs_away_does_so_quietly() -> None:
     """Hanging upside down on a spring too weak to hold it, with hardly any inertia."""
     m, load, still = np.full(STEPS, 1e-6), np.ones(STEPS), np.zeros(STEPS)
     gears = [Transmitting.of(1e-6, (15.0, 0.1, 0.3), gap) for gap in (1e-3, 1e-2)]
-    links = [DeadZoneLink(m, load, still, still - 5.0, one, STEP) for one in gears]
+    motion = {"m": m, "load": load, "c": still, "g": still - 5.0, "step": STEP}
+    links = [DeadZoneLink(gear=one, **motion) for one in gears]
     for walked in through_dead_zones(links):
         assert not np.isfinite(walked.d).all()
         assert np.isin(walked.side, (-1.0, 0.0, 1.0)).all()

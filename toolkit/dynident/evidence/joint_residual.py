@@ -19,7 +19,7 @@ from dynident.evidence.noise_model import (
 from dynident.evidence.runs import Signals
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class JointResidual:
     """What a fit leaves at one joint.
 
@@ -58,7 +58,7 @@ class JointResidual:
         Residuals and noise of all runs.
         """
         combination = np.append(-values, 1.0)
-        left = cls(evidence.criteria, [], [], [], [])
+        left = cls(criteria=evidence.criteria, stretches=[], speeds=[], plain=[], systematic=[])
         for run, joints in zip(evidence.runs, columns, strict=True):
             residual = run.fold([c @ combination for c in joints[joint]])
             if run.kind == "single":

@@ -27,13 +27,20 @@ class Transmitting:
 
     @classmethod
     def of(cls, inertia: float, shape: tuple[float, ...], gap: float = 0.0) -> Transmitting:
-        """Return what a resonance (Hz), a damping ratio and a share of the inertia stand for."""
+        """Return the transmission that a shape stands for.
+
+        Parameters
+        ----------
+        inertia : kg m^2 or kg, of all that moves with the joint.
+        shape : resonance (Hz), damping ratio, and the motor's share of the inertia.
+        gap : rad or m, whole width of the dead zone.
+        """
         resonance, damping, share = shape
         link, w = (1.0 - share) * inertia, 2.0 * np.pi * resonance
         return cls(link * w**2, 2.0 * damping * link * w, gap / 2.0, share * inertia)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class DeadZoneLink:
     """A link behind a transmission with a gap, in steps of time.
 

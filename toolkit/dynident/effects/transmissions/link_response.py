@@ -94,7 +94,9 @@ class Response:
     def driven(self) -> DeadZoneLink:
         """The same for the recursion in time."""
         fine = self._fine
-        return DeadZoneLink(self.m, self.load, fine.c, fine.g, self.gear, fine.step)
+        return DeadZoneLink(
+            m=self.m, load=self.load, c=fine.c, g=fine.g, gear=self.gear, step=fine.step
+        )
 
     @cached_property
     def torque(self) -> np.ndarray:
