@@ -46,9 +46,9 @@ class Laboratory(Experiment):
     says_payload: bool = False
 
     @property
-    def tells_payload(self) -> bool:
+    def states_payload(self) -> bool:
         """Whether the recordings say which of them carry the payload."""
-        return self.says_payload or super().tells_payload
+        return self.says_payload or super().states_payload
 
     def run(self, progress=None) -> tuple[Recording, ...]:
         """Simulate and record the runs."""

@@ -1,4 +1,10 @@
-"""Closed loops in Drake, and virtual experiments. Drake is loaded when something is simulated."""
+"""Closed loops in Drake, and virtual experiments. Drake is loaded when something is simulated.
+
+In: a `Mechanism` (a robot with the effects that it truly has), a `Reference` and a `Controller`.
+Out: `simulate` gives `Rollout`s; `retrace` runs measured references again; an `Experiment` records
+virtual measurements, which `write_experiment` writes with a study. A new kind of controller is an
+entry of `controllers.LAWS`.
+"""
 
 from dynident.closed_loop.controllers import Controller, ControllerFile
 from dynident.closed_loop.experiments.experiment import Experiment, ExperimentRun

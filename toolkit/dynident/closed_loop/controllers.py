@@ -67,7 +67,7 @@ class Controller:
     - "pid": u = kp e + ki (integral of e) + kd (v_ref - v)
     - "cascade": u = kv (kp e - v)
     - "computed_torque": u = M(q) (a_ref + kp e + kd (v_ref - v)) + h(q, v), with M and h of the
-      rigid body that the controller believes in (`Task.nominal`)
+      rigid body that is the controller's nominal model (`Task.nominal`)
 
     v is the backward difference of the measured position, through a first-order low-pass where
     `derivative_cutoff_hz` is given. The integral stands still while the torque is at its limit.
@@ -89,8 +89,8 @@ class Controller:
     derivative_cutoff_hz : Hz, or None for the bare difference.
     limit : (n,) N m or N, greatest magnitude of the command, or None.
     delay_s : s from a sample to when its command acts; any fraction or multiple of a sample.
-    feedforward : whether the torque of the robot that the controller believes in, along the
-        reference, is added (a computed torque has it already: there it changes nothing).
+    feedforward : whether the torque of the controller's nominal model, along the reference,
+        is added (a computed torque has it already: there it changes nothing).
     drive_gain : (n,) N m or N per unit of control signal, positive; the gains are then per unit of
         torque above, in units of that signal. None where the gains make torques.
 

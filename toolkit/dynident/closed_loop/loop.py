@@ -170,8 +170,8 @@ class ClosedLoop:
             )
         ]
         nominal = [task.nominal or task.mechanism.robot for task in tasks]
-        settled = _needed(tasks, references, time[:1]) if controller.ki else None
-        drive = Drive(controller, reference, nominal, scale, settled)
+        steady = _needed(tasks, references, time[:1]) if controller.ki else None
+        drive = Drive(controller, reference, nominal, scale, steady)
         stepper = Stepper(plant, joints, rate, controller.delay_s, self._accuracy)
         measurement = Measurement(noise, np.tile(resolution, len(tasks)))
         motion = stepper.run(time, reference, drive, measurement, advance)

@@ -1,4 +1,4 @@
-"""What a loop is told to follow: any function of time, or samples of one."""
+"""What a loop follows: any function of time, or samples of one."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from dynident.errors import SimulationError
 from dynident.robot import Robot
 
 LEAD_IN = 2.0
-"""s that a motion is simulated before it is recorded, for the loop to settle on it."""
+"""s that a motion is simulated before it is recorded, for its transient to decay."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -132,7 +132,7 @@ class ActingEffects:
     number: int = 0
 
     def numbered(self, number: int) -> Self:
-        """Return it as it is in one recording; itself where no effect tells recordings apart."""
+        """Return it as it is in one recording; itself where recordings do not differ."""
         if any(one.effect.found_by == "repetition" for one in self.effects):
             return replace(self, number=number)
         return self

@@ -109,9 +109,9 @@ class Estimate:
     def robot(self) -> Robot:
         """The robot with the identified base parameters.
 
-        What the data cannot tell (how a base parameter is shared among the links) stays as near to
-        the given description as it can, unless the fit chose it (`links`); without that the links
-        need not be physically consistent.
+        What the data do not identify (how a base parameter is shared among the links) stays as
+        near to the given description as it can, unless the fit chose it (`links`); without that
+        the links need not be physically consistent.
         """
         robot = self.model.robot
         if self.links is not None:
@@ -146,7 +146,7 @@ class Estimate:
         values[~self.identified] = np.nan
         rows = []
         for i, name in enumerate(self.names):
-            expression = heads.get(i, "not told on its own, only in combinations")
+            expression = heads.get(i, "not identified on its own, only in combinations")
             if expression == name:
                 expression = self.model.expressions[i]
             rows.append(
@@ -262,7 +262,7 @@ class Estimate:
     def write_robot(self, path: str | Path) -> Path:
         """Write the robot description with the identified inertial parameters.
 
-        A patched copy of the given description; see `robot` for what the data cannot tell.
+        A patched copy of the given description; see `robot` for what the data do not identify.
 
         Raises
         ------

@@ -30,8 +30,8 @@ _SKEW = 1e-6
 def load_estimate(path: str | Path) -> Estimate:
     """Read an estimate that `Estimate.save` wrote.
 
-    Its certificate and its iterations are not read back: a proof holds for whoever has computed
-    it.
+    Its certificate and its iterations are not read back: a proof holds where it was
+    computed.
 
     Raises
     ------

@@ -34,7 +34,7 @@ _Square = Annotated[float, Field(gt=-(LARGEST**2), lt=LARGEST**2)]
 _Number = Annotated[float, Field(gt=-LARGEST, lt=LARGEST)]
 _Size = Annotated[float, Field(ge=0.0, lt=LARGEST)]
 _Positive = Annotated[float, Field(gt=0.0, lt=LARGEST)]
-# What nobody computes with: unknown (NaN, null) where nothing was fitted.
+# What nothing is computed from: unknown (NaN, null) where nothing was fitted.
 _Reported = Annotated[float, BeforeValidator(_not_null), AfterValidator(_reported)]
 _Index = Annotated[int, Field(ge=0)]
 

@@ -1,4 +1,4 @@
-"""Parameters that somebody gives, as an estimate: a description's own, or a list of numbers."""
+"""Parameters that are given, as an estimate: a description's own, or a list of numbers."""
 
 from __future__ import annotations
 

@@ -70,8 +70,8 @@ class Convergence:
     sigma : (p,) standard deviations with the noise carried through filters and derivatives.
     textbook_sigma : (p,) those that take the rows' errors as independent.
     expected_bias : (p,) what the encoders' noise does to the estimate in the mean, since no
-        instrument mends columns that bend within the noise (dry friction); NaN where it is not
-        told from zero.
+        instrument corrects columns that bend within the noise (dry friction); NaN where it does
+        not differ from zero significantly.
     sampling_bias : (p,) what central differences and held torques do to it, without any noise; NaN
         where the instruments are not simulated.
     position_std : (n,) encoder noise behind `sigma`, rad or m.
@@ -125,7 +125,7 @@ class Convergence:
     def round_table(self) -> Table:
         """Parameters and errors, iteration by iteration."""
         count = len(self.rounds)
-        # A long history is told by its two ends.
+        # Of a long history only its two ends are shown.
         shown = list(range(count + 1)) if count <= 6 else [0, 1, 2, 3, count - 1, count]
         heads = ("start" if k == 0 else str(k) for k in shown)
         rows = [

@@ -1,4 +1,4 @@
-"""Parameters from a CSV file whose header, or whoever reads it, says in which order they stand.
+"""Parameters from a CSV file whose header, or the caller, states their order.
 
 Three layouts are read. *By name*: columns `name` and `value`, with "m.<link>", "mx.<link>", ...
 (and parameters of effects, "Fv@<joint>"). *By link*: a column `link` and one for each of the ten
@@ -43,7 +43,7 @@ _LAYOUTS = (
 
 @dataclass(frozen=True, eq=False)
 class GivenParameters:
-    """Parameters that somebody gives.
+    """Parameters that are given, not fitted.
 
     Attributes
     ----------

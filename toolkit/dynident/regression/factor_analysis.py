@@ -80,7 +80,7 @@ def start_of(
     Parameters
     ----------
     statistics : standardised: every input and the output have variance 1.
-    reliability : of the inputs, between 0 and 1; the data alone do not tell it.
+    reliability : of the inputs, between 0 and 1; the data alone do not identify it.
     prior : None for plain joint factor analysis.
     """
     d, N = statistics.inputs, statistics.count

@@ -1,4 +1,4 @@
-"""What data tell of the reliability of their inputs, and what start and prior decide instead."""
+"""What data show of the reliability of their inputs, and what start and prior decide instead."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dynident.regression.joint_factors import RELIABILITIES, JointFactorRegressi
 from dynident.regression.statistics import Statistics
 from dynident.tables import Table, number
 
-TOLD = 1.92
+DISTINCT = 1.92
 """Nats of log-likelihood between two values of one parameter that tell them apart at 95 %."""
 
 _CORRELATED = 0.2
@@ -85,7 +85,7 @@ class StartSensitivity:
         )
         words = f"Between starts b_true differs by {100 * self.spread:.2g} % of its size"
         words += "; the inputs that differ most are shown." if len(worst) else "."
-        if np.sum(self.converged) > 1 and np.ptp(self.bounds[self.converged]) > TOLD:
+        if np.sum(self.converged) > 1 and np.ptp(self.bounds[self.converged]) > DISTINCT:
             words += (
                 " Converged bounds differ by more than the data allow for: these are different "
                 "optima."
@@ -96,7 +96,7 @@ class StartSensitivity:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ReliabilityProfile:
-    """Log-likelihood along the reliability: flat where the data do not tell it.
+    """Log-likelihood along the reliability: flat where the data do not identify it.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ class ReliabilityProfile:
     @property
     def flat(self) -> bool:
         """Whether the data leave all these reliabilities open, at 95 %."""
-        return float(np.ptp(self.likelihoods)) < TOLD
+        return float(np.ptp(self.likelihoods)) < DISTINCT
 
     def to_dict(self) -> dict[str, Any]:
         """Return what JSON holds; likelihoods and bounds in nats."""
@@ -155,7 +155,7 @@ class ReliabilityProfile:
         if not self.flat and self.correlation > _CORRELATED:
             words += (
                 f" These inputs are not independent (correlations up to {self.correlation:.2g}), "
-                "and what the likelihood prefers may be what mends that: no evidence of the noise."
+                "and what the likelihood prefers may make up for that: no evidence of the noise."
             )
         if not np.all(self.converged):
             words += " Where the iterations did not converge the likelihood is a lower bound."
@@ -236,7 +236,7 @@ def reliability_profile(
         ).fit_statistics(statistics)
         bounds.append(own.bounds_[-1])
         likelihoods.append(plain.bounds_[-1])
-        converged.append(plain.converged_ or plain.left_ < TOLD / 10)
+        converged.append(plain.converged_ or plain.left_ < DISTINCT / 10)
     return ReliabilityProfile(
         reliabilities=np.array(reliabilities, dtype=float),
         likelihoods=np.array(likelihoods),

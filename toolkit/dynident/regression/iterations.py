@@ -1,12 +1,12 @@
 """Rounds of variational EM until hardly anything is left to gain, faster where they creep.
 
-Along a reliability that the data hardly tell, EM takes ten thousand rounds and more. Near where it
-goes it is a linear iteration whose errors shrink by factors between 0 and 1, and Chebyshev
+Along a reliability that the data hardly identify, EM takes ten thousand rounds and more. Near
+where it goes it is a linear iteration whose errors shrink by factors between 0 and 1, and Chebyshev
 polynomials of it gain with the square of their degree what rounds gain one by one. A leap of that
-kind is kept where the bound is higher after it; how much leaps still gain tells when to stop.
+kind is kept where the bound is higher after it; how much leaps still gain decides when to stop.
 
 Golub and Varga, "Chebyshev semi-iterative methods, successive overrelaxation iterative methods, and
-second order Richardson iterative methods", Numerische Mathematik 3 (1961). Schemes that tell their
+second order Richardson iterative methods", Numerische Mathematik 3 (1961). Schemes that take their
 steps from the last differences (SQUAREM) are no faster, and their paths are chaotic: inputs in
 another order or unit, whose rounding differs, would get another answer.
 """
@@ -21,7 +21,7 @@ import numpy as np
 from dynident.regression.factor_analysis import LEAST_VARIANCE, Gamma, Loadings, Posterior
 from dynident.regression.statistics import Statistics
 
-_QUIET = 5
+_PATIENCE = 5
 """Leaps in a row that gain next to nothing: one may just have been unlucky."""
 _NOTHING = 1e-3  # of the tolerance: a leap that gains no more is neither right nor wrong
 _DEGREES = (2, 32)  # of a leap, least and most
@@ -55,8 +55,8 @@ class Analysis:
     bounds : lower bound of the log evidence in nats, of every plain round and every leap; the last
         one is that of `factors`. In plain joint factor analysis the log-likelihood itself.
     ending : whether they ended by themselves.
-    left : nats that are seen to be left where they ended; NaN where nobody looked.
-    drift : how far a reliability would go on for them, at most; NaN where nobody looked.
+    left : nats that are seen to be left where they ended; NaN where it was not looked for.
+    drift : how far a reliability would go on for them, at most; NaN where it was not looked for.
     """
 
     factors: Loadings
@@ -84,11 +84,11 @@ def analyse(
 ) -> Analysis:
     """Iterate until hardly anything is left to gain.
 
-    What is left is told from what leaps gain, in proportion to the square of their degree up to the
-    largest, which is worth two thousand rounds of slow progress. Rounds do not tell it: where they
-    creep, the difference between two gains is rounding.
+    What is left is estimated from what leaps gain, in proportion to the square of their degree up
+    to the largest, which is worth two thousand rounds of slow progress. Rounds do not show it:
+    where they creep, the difference between two gains is rounding.
 
-    Along a reliability that the data do not tell, a hundred thousand rounds may still be left.
+    Along a reliability that the data do not identify, a hundred thousand rounds may still be left.
     Leaps much longer than is stable look how far that is, and are not taken.
 
     Parameters
@@ -105,7 +105,7 @@ def analyse(
     The factors where the iterations ended, with the bounds on their way and how they ended.
     """
     here = Posterior(start, statistics)
-    bounds, used, in_a_row, degree, quiet = [here.bound(prior)], 0, 0, _DEGREES[0], 0
+    bounds, used, in_a_row, degree, little_gained = [here.bound(prior)], 0, 0, _DEGREES[0], 0
     ending, left, drift = AnalysisEnding.ROUNDS_EXHAUSTED, np.nan, np.nan
     while used < rounds:
         here = Posterior(here.updated(prior, known), statistics)
@@ -121,7 +121,7 @@ def analyse(
         used, in_a_row = used + degree, 0
         # Gains that grow are those of a saddle that is being left.
         growing = gain - (bounds[-2] - bounds[-3]) > here.rounding
-        with np.errstate(all="ignore"):  # it may go anywhere: its bound tells
+        with np.errstate(all="ignore"):  # it may go anywhere: its bound decides
             there = _leap(here, prior, known, degree)
             won = there.bound(prior) - bounds[-1]
         nothing = max(_NOTHING * tolerance, here.rounding)
@@ -129,12 +129,12 @@ def analyse(
             degree = max(int(degree / _RETREAT), _DEGREES[0])
             continue
         little = won * (_DEGREES[1] / degree) ** 2 <= tolerance
-        quiet = quiet + 1 if little and not growing else 0
+        little_gained = little_gained + 1 if little and not growing else 0
         degree = min(int(_GROWTH * degree + 1), _DEGREES[1])
         if won > nothing:
             here = there
             bounds.append(bounds[-1] + won)
-        if quiet == _QUIET:
+        if little_gained == _PATIENCE:
             ahead = _ahead(here, prior, known)
             left, drift = ahead.bound(prior) - here.bound(prior), _drift(here, ahead)
             flat = left > _LITTLE and drift > _STILL

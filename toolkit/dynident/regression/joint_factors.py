@@ -28,8 +28,9 @@ class JointFactorRegression(StatisticsRegressor):
 
     Two sets of coefficients come out. `coef_noisy_` (b_noise) predicts the output of inputs that
     have noise, as those of the fit had. `coef_true_` (b_true) is the law behind it, for inputs
-    without noise: b_noise over the reliability of each input. **The data do not tell the
-    reliability**: where `input_noise` is not given, maximum likelihood leaves it where it started.
+    without noise: b_noise over the reliability of each input. **The data do not identify
+    the reliability**: where `input_noise` is not given, maximum likelihood leaves it where it
+    started.
 
     The model takes the inputs as independent. Where they are not, b_true is biased even with noise
     that is known; `corrected_` is not, and stands beside it.
@@ -59,7 +60,7 @@ class JointFactorRegression(StatisticsRegressor):
     ending_ : how the iterations ended, in words.
     converged_ : whether by themselves, and not on a flat ridge of the bound.
     left_, drift_ : nats of the bound that are seen to be left there, and how far a reliability
-        would go on for them; NaN where nobody looked.
+        would go on for them; NaN where it was not looked for.
     n_iter_ : rounds.
     least_squares_, sigma_noisy_ : (d,) ordinary least squares and its standard deviations, which
         are b_noise's before anything was shrunk; NaN for combinations of other inputs.

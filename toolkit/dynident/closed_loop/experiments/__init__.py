@@ -1,1 +1,5 @@
-"""Virtual measurements: experiments, their files, and the studies that they write."""
+"""Virtual experiments: a robot as it truly is, measured.
+
+In: an `Experiment`, or its file. Out: recordings, and on disk a study that does not mention what
+is hidden.
+"""

@@ -77,7 +77,7 @@ class Experiment:
     nominal : the robot that the user of the recordings is given; None for the true one.
     torque : "held_command": the command, held from its sample to the next. "measured": its mean
         over the sample before and the one after, as a sensor of limited bandwidth has it.
-    lead_in : s, simulated before each recording, for the loop to settle on its reference.
+    lead_in : s, simulated before each recording, for its transient to decay.
     """
 
     robot: Robot
@@ -125,11 +125,11 @@ class Experiment:
 
     @property
     def known_effects(self) -> tuple[TrueEffect, ...]:
-        """The effects that the user of the recordings is told of."""
+        """The effects that are in the study of the recordings."""
         return tuple(one for one in self.effects if not one.hidden)
 
     @property
-    def tells_payload(self) -> bool:
+    def states_payload(self) -> bool:
         """Whether the recordings say which of them carry the payload."""
         return any(one.effect.is_payload for one in self.known_effects)
 
@@ -214,7 +214,7 @@ class Experiment:
             period=run.trajectory.period,
             start=run.start,
             use=run.use,
-            payload=run.payload if self.tells_payload else None,
+            payload=run.payload if self.states_payload else None,
             torque=self.torque,
             name=run.file,
             number=index + 1,

@@ -82,7 +82,7 @@ def load_experiment(path: str | Path) -> Experiment:
     Raises
     ------
     StudyError
-        If a key is unknown, missing or out of range: it names the key, and the mend.
+        If a key is unknown, missing or out of range: it names the key, and the remedy.
     DynidentError
         If a robot description is unusable.
     """

@@ -95,7 +95,7 @@ def _study(experiment: Experiment, nominal: Robot, description: str) -> tomlkit.
         entry["period"] = run.trajectory.period
         if run.start:
             entry["start"] = run.start
-        if experiment.tells_payload:
+        if experiment.states_payload:
             entry["payload"] = run.payload
         entries.append(entry)
     document["recordings"] = entries

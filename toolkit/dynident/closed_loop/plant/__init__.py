@@ -1,1 +1,4 @@
-"""The simulated plant as a Drake diagram, and its stepping from sample to sample."""
+"""The plant in Drake: bodies, effects and drivetrains as one diagram, stepped sample by sample.
+
+In: mechanisms side by side, the samples of their references, and a drive. Out: a `SteppedMotion`.
+"""

@@ -50,7 +50,7 @@ class Plant:
     Attributes
     ----------
     diagram : its input is the actuation (N,) in the order of `inputs`.
-    context : the diagram's, with the present parameters.
+    context : the diagram's, with the parameters that were set last.
     place : (N,) where each joint stands in the plant's positions and velocities.
     inputs : (N,) where each joint stands in the plant's actuation.
     positions, speeds : (N,) where the motion of each joint's motor stands in the diagram's state;

@@ -39,7 +39,7 @@ class Drive:
     nominal : the model inside the controller, for each robot. Used by a computed torque and by a
         feed-forward only.
     scale : (n,) factor of the feedback; None for 1.
-    settled : (K n,) first command of a controller with an integral, which begins with what makes
+    steady : (K n,) first command of a controller with an integral, which begins with what makes
         it so: an integral that begins at zero takes long to find the weight. None for zero.
 
     Attributes
@@ -53,7 +53,7 @@ class Drive:
         reference: ReferenceSamples,
         nominal: Sequence[Robot | Mechanism],
         scale: np.ndarray | None = None,
-        settled: np.ndarray | None = None,
+        steady: np.ndarray | None = None,
     ) -> None:
         n, rate, count = controller.n, controller.simulated_rate(), len(nominal)
         feedback, factor = controller.feedback(), np.ones(n) if scale is None else scale
@@ -84,8 +84,8 @@ class Drive:
         self._blend = None if cutoff is None else -math.expm1(-2 * math.pi * cutoff / rate)
         self._q, self._v = reference.q[0] - reference.v[0] / rate, reference.v[0]
         self._integral = np.zeros(n * count)
-        if settled is not None and self._integrates:
-            self._integral = settled - (
+        if steady is not None and self._integrates:
+            self._integral = steady - (
                 self._ahead[0] - self._kp * reference.q[0] - self._kd * reference.v[0]
             )
 

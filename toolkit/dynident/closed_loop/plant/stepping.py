@@ -145,7 +145,7 @@ class Stepper:
         beyond = (_RUNAWAY * (1.0 + np.abs(reference.q).max() + np.abs(reference.v).max())) ** 2
 
         simulator, state, held = self._start(time[0], reference)
-        # The object behind the input stays; asking for it is what tells Drake that it changes.
+        # The object behind the input stays; asking for it is how Drake learns that it changes.
         data, torque = held.GetMutableData, held.GetMutableData().get_mutable_value()
         advance = simulator.AdvanceTo
         states = np.empty((total, state.size()))

@@ -18,7 +18,7 @@ from dynident.recording import Dataset
 from dynident.threads import single_threaded
 
 _NOTHING = 1e-12  # of the largest information: less is rounding
-_HELD = 1e-3  # of what all data together could tell about a parameter alone
+_HELD = 1e-3  # of what all data together know of a parameter alone
 
 
 @dataclass(frozen=True, eq=False)

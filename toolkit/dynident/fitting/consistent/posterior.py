@@ -114,4 +114,4 @@ def prior_centre(space: ParameterSpace, x_hat: np.ndarray) -> tuple[np.ndarray, 
     if not replaced:
         return centre, ()
     words = f"The prior's own links are impossible: {', '.join(replaced)}."
-    return centre, (f"{words} It believes in bodies of their size instead.",)
+    return centre, (f"{words} Its centre there is a reference body of their size.",)

@@ -249,11 +249,11 @@ def _projection(
 ) -> Projection:
     space, x = problem.space, answer.x
     moved = not np.array_equal(x, x_hat)
-    covariance, told = before.covariance, ()
+    covariance, active_notes = before.covariance, ()
     if moved and metric is not None:
         active = active_set(problem, x)
         covariance = space.combination @ active.covariance @ space.combination.T
-        told = (active.sentence,)
+        active_notes = (active.sentence,)
     links = {body: x[10 * k : 10 * k + 10] for k, body in enumerate(space.bodies)}
     estimate = replace(
         before,
@@ -261,7 +261,7 @@ def _projection(
         values=space.combination @ x if moved else before.values,
         covariance=covariance,
         method=f"{before.method}; projected" if moved else before.method,
-        notes=(*before.notes, *notes, *told) if moved else before.notes,
+        notes=(*before.notes, *notes, *active_notes) if moved else before.notes,
         links=links,
         certificate=answer.certificate,
     )
@@ -274,5 +274,5 @@ def _projection(
         certificate=answer.certificate,
         metric=metric,
         prior=prior,
-        notes=(*notes, *told),
+        notes=(*notes, *active_notes),
     )

@@ -19,10 +19,10 @@ from dynident.model import Model
 from dynident.tables import number
 
 _SURE = 10.0
-"""Standard errors from which an expected bias is told: the 99.5 % quantile of Student's t with the
-two degrees of freedom of three pairs."""
-_TOLD = 0.2
-"""Standard deviations of the estimate below which an expected bias is not worth a word."""
+"""Standard errors from which an expected bias is reported: the 99.5 % quantile of Student's t with
+the two degrees of freedom of three pairs."""
+_REPORTED = 0.2
+"""Standard deviations of the estimate below which an expected bias is not reported."""
 _WEAK = 0.02
 """Canonical correlation below which instruments and regressor hardly have to do with each other."""
 
@@ -118,15 +118,17 @@ def _notes(model: Model, solution, history: Convergence, bias: ExpectedBias) -> 
             "its standard deviation says what is left."
         )
     dry = [label for label in (e.label for e in model.effects) if _is_dry(model, label)]
-    told = np.flatnonzero(_sure(bias) & (np.abs(bias.values) > _TOLD * history.sigma))
+    reported = np.flatnonzero(_sure(bias) & (np.abs(bias.values) > _REPORTED * history.sigma))
     if dry:
         notes.append(
-            "Instruments do not mend the columns of dry friction: the mean of tanh((v + noise)/w) "
-            "is not tanh(v/w), however long the recording. See the expected bias."
+            "Instruments do not correct the columns of dry friction: the mean of "
+            "tanh((v + noise)/w) is not tanh(v/w), however long the recording. "
+            "See the expected bias."
         )
-    if told.size:
+    if reported.size:
         listed = ", ".join(
-            f"{model.names[i]} {number(float(bias.values[i]), 2)} {model.units[i]}" for i in told
+            f"{model.names[i]} {number(float(bias.values[i]), 2)} {model.units[i]}"
+            for i in reported
         )
         notes.append(
             "Expected bias, from adding encoder noise of this size to the instruments' own "

@@ -136,7 +136,7 @@ def _swapped(recording: Recording) -> tuple[Recording, Recording]:
         remedy = "record two periods or more, or choose other instruments"
         raise FitError(f"it holds no two whole periods of {recording.period:g} s", where, remedy)
     found = periods(count * whole, rate, recording.period, where)
-    # Counted from the end, where the motion is settled best.
+    # Counted from the end, where the transient has decayed furthest.
     rows = slice(recording.samples - count * whole, recording.samples)
     folded = found.fold(recording.q[rows])
     require_repetition(recording.q[rows], found, where)

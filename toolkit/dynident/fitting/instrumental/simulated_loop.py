@@ -23,11 +23,11 @@ from dynident.model import Model
 from dynident.recording import Dataset, Recording, within
 from dynident.robot import Robot
 
-_SETTLED = 5.0
+_TRANSIENT = 5.0
 """Transient in units of 1/w_n, as in the paper: of an offset at the start, (1 + 5) exp(-5) = 4 % is
 left at critical damping."""
 _MASSLESS = 0.02
-"""Share of the believed inertia below which a start is not worth a simulation."""
+"""Share of the expected inertia below which a start is not worth a simulation."""
 _DOUBT = 1.1
 """Distance of the simulated from the measured motion over that of the reference from it."""
 
@@ -45,7 +45,7 @@ class SimulatedLoop(Instruments):
     natural_frequency_hz : (n,) or one number; poles that the simulated loop keeps, with the damping
         of the stated gains: at each iteration its gains belong to the inertia of the estimate
         (equations 45 to 47). None: the gains as stated, which are the real loop's; only those of
-        the start, if its inertia is not the believed one, are in proportion.
+        the start, if its inertia is not the expected one, are in proportion.
     lift : how base parameters become bodies: "minimum_norm" (nearest to the description, possible
         or not) or "consistent" (the nearest possible robot).
     nominal : the robot inside a computed torque or a feed-forward; None: the description.
@@ -97,7 +97,7 @@ class Projected:
 
 
 class LoopSource:
-    """The closed loops of some recordings; see `Source`. One diagram serves all estimates."""
+    """The closed loops of some recordings, as an `InstrumentSource`."""
 
     iterates = True
     noise_share = 1.0
@@ -110,25 +110,25 @@ class LoopSource:
             what = f"a controller of {controller.n} joints for a robot of {n}"
             raise SimulationError(what, "controller", "give its gains for every joint")
         controller.simulated_rate()
-        self._settings, self._model, self._tell = settings, model, guess.progress
+        self._settings, self._model, self._progress = settings, model, guess.progress
         references = [_reference(one) for one in dataset.recordings]
         self._matrices = InertiaMatrices(model, poses_of(references))
         self._start = guess.start
-        self._believed = self._believed_inertias(guess)
-        self._stiffness = stiffness(controller, self._believed)
+        self._expected = self._expected_inertias(guess)
+        self._stiffness = stiffness(controller, self._expected)
         for joint, k in zip(model.robot.names, self._stiffness, strict=True):
             if not k > 0:
                 remedy = "nothing holds it at its reference: choose other instruments"
                 raise SimulationError(f"kp = 0 at joint '{joint}'", "controller", remedy)
         # Of a double integrator under this feedback (equation 44).
-        frequencies = np.sqrt(self._stiffness / self._believed)
+        frequencies = np.sqrt(self._stiffness / self._expected)
         if settings.natural_frequency_hz is not None:
             given = 2 * np.pi * np.asarray(settings.natural_frequency_hz, dtype=float)
             controller = retuned(controller, given / frequencies)
             frequencies = np.broadcast_to(given, (n,)).copy()
         self._controller = controller
         self._frequencies = frequencies
-        self.transient = float(_SETTLED / frequencies.min())
+        self.transient = float(_TRANSIENT / frequencies.min())
         cut = tuple(_without_transient(one, self.transient) for one in dataset.recordings)
         self.measured = replace(dataset, recordings=cut)
         self._loop = ClosedLoop()
@@ -158,15 +158,15 @@ class LoopSource:
         return (*found, *self._loop.notes)
 
     def next_to_massless(self, values: np.ndarray) -> bool:
-        """Whether a joint's inertia is far below what is believed of it.
+        """Whether a joint's inertia is far below what is expected of it.
 
         Noise that least squares cannot cope with makes that of it: such a robot under real
         friction takes steps of microseconds to simulate.
         """
-        return bool(np.any(self._matrices.joint_inertias(values) < _MASSLESS * self._believed))
+        return bool(np.any(self._matrices.joint_inertias(values) < _MASSLESS * self._expected))
 
     def at(self, values: np.ndarray) -> Dataset:
-        """Simulate an estimate; see `Source.at`."""
+        """Simulate an estimate; see `InstrumentSource.at`."""
         if self._settings.lift == "consistent":
             return self.projected(values).instruments
         self._matrices.require_positive(values)
@@ -195,7 +195,7 @@ class LoopSource:
     def verdict(self) -> str:
         """Return which joints are further from the measured motion than the reference is.
 
-        The encoder's noise is in both distances and is taken off; within it nothing is told.
+        The encoder's noise is in both distances and is taken off; within it no joint is reported.
         """
         names = self._model.robot.names
         simulated, reference, rows = np.zeros(len(names)), np.zeros(len(names)), 0
@@ -235,7 +235,7 @@ class LoopSource:
         total = sum(one.duration for one in recordings)
 
         def progress(done: float, whole: float) -> None:
-            self._tell("simulating", done, whole or total)
+            self._progress("simulating", done, whole or total)
 
         self._last = retrace(
             self._loop,
@@ -252,11 +252,11 @@ class LoopSource:
         """Feedback of these values, (n,) times the stated; `asked` is what they were made of."""
         started = np.array_equal(asked, self._start)
         if started or self._settings.natural_frequency_hz is not None:
-            return self._matrices.joint_inertias(values) / self._believed
-        return np.ones(len(self._believed))
+            return self._matrices.joint_inertias(values) / self._expected
+        return np.ones(len(self._expected))
 
-    def _believed_inertias(self, guess: Guess) -> np.ndarray:
-        """Joint inertias before the first iteration: the largest that is believed of each.
+    def _expected_inertias(self, guess: Guess) -> np.ndarray:
+        """Joint inertias before the first iteration: the largest expected of each.
 
         A description often lacks the motors' inertia, and least squares shrinks what it estimates
         from noisy accelerations: both err downwards.

@@ -1,6 +1,8 @@
 """Regressions with noise in the inputs as methods of `fit`, and that noise measured or carried.
 
-The estimators themselves are in `dynident.regression`; they are imported where they are used.
+In: a model, recordings, and the noise of the inputs (`input_noise` from repetitions,
+`encoder_noise` from the stated noise). Out: an estimate by any regression of
+`dynident.regression`, which is loaded when it is used.
 """
 
 from dynident.fitting.noisy_inputs.encoder_noise import encoder_noise
