@@ -23,8 +23,11 @@ FIELDS_BY_POSITION = 4
 UNDOCUMENTED_ARGUMENTS = 2
 
 PLAIN_FACTS: dict[str, str] = {
-    "carries_payload": "a fact about the recording: whether the robot held its payload",
-    "hidden": "a fact about an effect of a virtual robot: whether its user is to find it",
+    "carries_payload": "whether the robot held its payload: a fact about the instant",
+    "carries": "the same of a recording",
+    "payload": "the same of a recording, None where it is not known",
+    "named": "whether the answer adds an effect: of it the record of such answers is looked up",
+    "noise_known": "whether the noise was measured or stated",
 }
 """Boolean arguments that say how things are and choose no behaviour, with the reason."""
 

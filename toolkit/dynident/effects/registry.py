@@ -6,9 +6,9 @@ import difflib
 import importlib
 import pkgutil
 from functools import cache
+from pathlib import Path
 from types import MappingProxyType
 
-from dynident import effects
 from dynident.effects.effect import Effect
 from dynident.errors import EffectError
 
@@ -17,7 +17,7 @@ from dynident.errors import EffectError
 def catalogue() -> MappingProxyType[str, type[Effect]]:
     """Every effect by its name, in alphabetical order."""
     found: dict[str, type[Effect]] = {}
-    for module in pkgutil.walk_packages(effects.__path__, f"{effects.__name__}."):
+    for module in pkgutil.walk_packages([str(Path(__file__).parent)], f"{__package__}."):
         content = importlib.import_module(module.name)
         for value in vars(content).values():
             if isinstance(value, type) and issubclass(value, Effect) and hasattr(value, "name"):
