@@ -360,6 +360,7 @@ def test_robot(run, study, tmp_path, kind):
     refused(run, tmp_path, message, "compare", path)
 
 
+@pytest.mark.slow
 def test_a_joint_at_rest_is_named(run, study, tmp_path):
     path = study()
     (tmp_path / "train.csv").write_text(still(slice(2, 3)))

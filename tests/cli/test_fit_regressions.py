@@ -24,6 +24,7 @@ def test_a_regression_by_name(run, tmp_path, words):
     assert values["Fv@shoulder"] == pytest.approx(2.0, rel=0.1)
 
 
+@pytest.mark.slow
 def test_what_the_data_do_not_tell(run, tmp_path):
     path = write_loop_study(tmp_path, LOOP_STUDY)
     done = run("fit", path, "--method", "factors", "--identifiability")

@@ -73,6 +73,7 @@ def test_a_pipe_gets_json_alone_and_no_progress(tmp_path):
 
 
 @pytest.mark.parametrize(("flag", "reader"), [("", "head -1"), ("--json", "true")])
+@pytest.mark.slow
 def test_broken_pipe(tmp_path, flag, reader):
     path = write_study(tmp_path)
     command = f"{shlex.join(DYNIDENT)} compare {shlex.quote(str(path))} {flag} | {reader}"
@@ -102,6 +103,7 @@ def read_until(terminal: int, words: bytes, limit: float = LIMIT) -> bytes:
 
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="no pseudo-terminals here")
+@pytest.mark.slow
 def test_interrupt_during_a_diagnosis(tmp_path):
     """A terminal shows progress; Ctrl-C ends it with one line, status 130, and no files."""
     # The same recording many times: enough work to be interrupted in the middle of it.

@@ -49,6 +49,7 @@ def data(seed: int = 0, rows: int = 300) -> tuple[np.ndarray, np.ndarray]:
 
 @parametrize_with_checks(EVERY)
 @pytest.mark.filterwarnings("ignore::sklearn.exceptions.SkipTestWarning")
+@pytest.mark.slow
 def test_scikit_learns_own_checks(estimator, check) -> None:
     check(estimator)
 
@@ -254,6 +255,7 @@ def test_a_fit_that_is_refused_leaves_the_one_before(regression: StatisticsRegre
 
 
 @every
+@pytest.mark.slow
 def test_blocks_may_be_shorter_than_a_fit_needs(regression: StatisticsRegressor) -> None:
     X, y = data()
     found = regression.another()

@@ -131,6 +131,7 @@ def test_candidates_are_ranked_and_the_set_is_bracketed(found):
 
 
 @pytest.mark.parametrize("names", [("shoulder", "elbow"), ("a$b$", "<i>")])
+@pytest.mark.slow
 def test_static_pictures(names, tmp_path):
     found = diagnosis(names, samples=200)
     for one in (found, diagnosis(names, noise=False, steps=False, samples=200)):

@@ -87,6 +87,7 @@ def test_noise_that_ruins_least_squares_is_mended(model, truth, method):
     assert mended < plain / 5
 
 
+@pytest.mark.slow
 def test_noise_is_measured_and_carried_to_honest_intervals(model, truth):
     """95 % intervals of 100 noisy recordings of one motion; 8 parameters are counted together."""
     std = np.array([2e-5, 4e-5])
@@ -109,6 +110,7 @@ def test_noise_is_measured_and_carried_to_honest_intervals(model, truth):
 
 
 @pytest.mark.parametrize("position_cutoff", [None, 30.0])
+@pytest.mark.slow
 def test_intervals_hold_behind_filters_and_decimation(model, truth, position_cutoff):
     filter = Filter(position_cutoff, 15.0, 50.0)
     true = synthetic(model, truth, 3, rate_hz=200.0, duration=6.0)
