@@ -5,7 +5,7 @@ Pinocchio is given joints and inertias by us, never a file: its parsers change b
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -101,113 +101,97 @@ class Dynamics:
     """
 
     def __init__(self, joints: Sequence[Joint], gravity: Array) -> None:
-        self.model, order = _kinematics(joints, gravity)
+        self.model, self.sequence = _kinematics(joints, gravity)
         self.data = self.model.createData()
         self.n = len(joints)
-        # q_pin = q[:, order]; a permutation is applied only where the order differs.
-        self.order = None if order == list(range(self.n)) else np.array(order)
+        # q_pin = q[:, order] and q = q_pin[:, back]; slices make no copies where nothing moves.
+        ordered = self.sequence == list(range(self.n))
+        self.order: Any = slice(None) if ordered else np.array(self.sequence)
+        self.back: Any = slice(None) if ordered else np.argsort(self.sequence)
         # A simulation asks for one sample at a time, of parameters that stay the same.
         self._held: Array | None = None
-        self._judged: Array | None = None
-        self._extra: Array | None = None
+        self._keeps_digits = True
 
-    def _sorted(self, *motion: Array) -> list[Array]:
-        if self.order is None:
-            return list(motion)
-        return [np.ascontiguousarray(x[:, self.order]) for x in motion]
+    def _evaluate(
+        self, function: Callable[..., Any], motion: tuple[Array, ...], shape: tuple[int, ...]
+    ) -> Array:
+        """Return the function's values (T, *shape) at all samples, in the order of the model."""
+        q, v, a = (np.ascontiguousarray(x[:, self.order]) for x in motion)
+        out = np.empty((len(q), *shape))
+        for k in range(len(q)):
+            out[k] = function(self.model, self.data, q[k], v[k], a[k])
+        return out
 
     def regressor(self, q: Array, v: Array, a: Array) -> Array:
-        """Return Y (T, n, 10 n), rows and columns in the robot's order."""
-        q, v, a = self._sorted(q, v, a)
-        model, data, evaluate = self.model, self.data, pin.computeJointTorqueRegressor
-        out = np.empty((len(q), self.n, 10 * self.n))
-        for k in range(len(q)):
-            out[k] = evaluate(model, data, q[k], v[k], a[k])
-        if self.order is None:
-            return out
-        permuted = np.empty_like(out)
-        columns = (10 * self.order[:, None] + np.arange(10)).ravel()
-        permuted[:, self.order[:, None], columns[None, :]] = out
-        return permuted
+        """Return Y (T, n, 10 n), rows and columns in the robot's order.
+
+        Parameters
+        ----------
+        q, v, a : (T, n) ndarray
+            As in `Robot.regressor`.
+        """
+        Y = self._evaluate(pin.computeJointTorqueRegressor, (q, v, a), (self.n, 10 * self.n))
+        blocks = Y.reshape(len(Y), self.n, self.n, 10)
+        return blocks[:, self.back][:, :, self.back].reshape(Y.shape)
 
     def inverse_dynamics(self, q: Array, v: Array, a: Array, theta: Array) -> Array:
-        """Return tau (T, n) for any finite or non-finite theta (10 n,), in the robot's order."""
+        """Return tau (T, n), in the robot's order; NaN for parameters that are not finite.
+
+        Parameters
+        ----------
+        q, v, a : (T, n) ndarray
+        theta : (10 n,) ndarray
+            As in `Robot.inverse_dynamics`.
+        """
         phi = theta.reshape(self.n, 10)
         if not np.all(np.isfinite(phi)):
             return np.full(q.shape, np.nan)
-        extra = self._extra_masses(phi)
-        if extra is None:
-            return self._rnea(q, v, a, phi)
-        return self._rnea(q, v, a, phi + extra) - self._rnea(q, v, a, extra)
+        self._hold(phi)
+        function = pin.rnea
+        if not self._keeps_digits:
+            # Pinocchio holds mass, centre of mass and central inertia, which a massless body with
+            # a first moment does not have. Its regressor needs none of them.
+            ours = phi[self.sequence].ravel()
 
-    def _extra_masses(self, phi: Array) -> Array | None:
-        # Pinocchio holds mass, centre of mass and central inertia, which a massless body with a
-        # first moment does not have. The torque is linear in theta: give every body a mass
-        # large enough to represent, and take the torque of those masses off again.
-        if self._judged is None or not np.array_equal(phi, self._judged):
-            sound = [_representable(body) for body in phi]
-            self._extra = None
-            if not all(sound):
-                self._extra = np.zeros((self.n, 10))
-                self._extra[:, 0] = np.where(sound, 0.0, _mass_offset(phi))
-            self._judged = phi.copy()
-        return self._extra
+            def function(*sample: Any) -> Array:
+                return pin.computeJointTorqueRegressor(*sample) @ ours
+
+        return self._evaluate(function, (q, v, a), (self.n,))[:, self.back]
 
     def derivatives(self, q: Array, v: Array, a: Array, theta: Array) -> TorqueDerivatives:
-        """Return the derivatives of tau, in the robot's order; theta must be representable."""
-        model, data, evaluate = self.model, self.data, pin.computeRNEADerivatives
-        self._set_inertias(theta.reshape(self.n, 10))
-        q, v, a = self._sorted(q, v, a)
-        by_q, by_v, by_a = (np.empty((len(q), self.n, self.n)) for _ in range(3))
-        for k in range(len(q)):
-            by_q[k], by_v[k], by_a[k] = evaluate(model, data, q[k], v[k], a[k])
+        """Return the derivatives of tau, in the robot's order.
+
+        Parameters
+        ----------
+        q, v, a : (T, n) ndarray
+        theta : (10 n,) ndarray
+            As in `Robot.torque_derivatives`.
+        """
+        self._hold(theta.reshape(self.n, 10))
+        found = self._evaluate(pin.computeRNEADerivatives, (q, v, a), (3, self.n, self.n))
+        by_q, by_v, by_a = np.ascontiguousarray(found.swapaxes(0, 1))
         # Pinocchio fills the upper triangle of the inertia matrix only.
         by_a = np.triu(by_a) + np.triu(by_a, 1).transpose(0, 2, 1)
-        if self.order is None:
-            return TorqueDerivatives(by_q, by_v, by_a)
-        sorted_back = []
-        for x in (by_q, by_v, by_a):
-            permuted = np.empty_like(x)
-            permuted[:, self.order[:, None], self.order[None, :]] = x
-            sorted_back.append(permuted)
-        return TorqueDerivatives(*sorted_back)
+        ours = (x[:, self.back][:, :, self.back] for x in (by_q, by_v, by_a))
+        return TorqueDerivatives(*ours)
 
-    def _set_inertias(self, phi: Array) -> None:
+    def _hold(self, phi: Array) -> None:
+        """Give the model these inertias, and note whether it holds them with all their digits."""
         if self._held is not None and np.array_equal(phi, self._held):
             return
         self._held = None
-        order = range(self.n) if self.order is None else self.order
-        for pin_id, index in enumerate(order, start=1):
-            body = phi[index]
+        for pin_id, index in enumerate(self.sequence, start=1):
+            body = np.array(phi[index])
             self.model.inertias[pin_id] = (
-                pin.Inertia.FromDynamicParameters(np.array(body))
-                if np.any(body)
-                else pin.Inertia.Zero()
+                pin.Inertia.FromDynamicParameters(body) if np.any(body) else pin.Inertia.Zero()
             )
+        self._keeps_digits = all(_keeps_digits(body) for body in phi)
         self._held = phi.copy()
 
-    def _rnea(self, q: Array, v: Array, a: Array, phi: Array) -> Array:
-        model, data, evaluate = self.model, self.data, pin.rnea
-        self._set_inertias(phi)
-        q, v, a = self._sorted(q, v, a)
-        out = np.empty(q.shape)
-        for k in range(len(q)):
-            out[k] = evaluate(model, data, q[k], v[k], a[k])
-        if self.order is None:
-            return out
-        permuted = np.empty_like(out)
-        permuted[:, self.order] = out
-        return permuted
 
-
-def _representable(phi: Array) -> bool:
+def _keeps_digits(phi: Array) -> bool:
     """Whether the central inertia keeps its digits: no large part of it cancels."""
     if not np.any(phi):
         return True
     mass, moment, inertia = abs(phi[0]), np.abs(phi[1:4]).max(), np.abs(phi[4:]).max()
     return mass > 0.0 and moment**2 <= 1e2 * mass * max(inertia, 1e-6 * mass)
-
-
-def _mass_offset(phi: Array) -> Array:
-    """A mass for each body that is of the size of its own numbers."""
-    return np.abs(phi).max(axis=1) + np.abs(phi[:, 0])

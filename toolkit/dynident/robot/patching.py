@@ -50,7 +50,7 @@ def write(robot: Robot, path: str | Path) -> Path:
 
 
 def patched(robot: Robot) -> str:
-    """Return the text that `write` writes."""
+    """Return the text that `write` writes; raises as `write` does."""
     if robot.description is None:
         raise RobotError(
             "was not read from a description, so there is nothing to patch",

@@ -110,7 +110,21 @@ class Robot:
         joints: Sequence[str] | None = None,
         gravity: ArrayLike | None = None,
     ) -> Robot:
-        """Read a robot description from its text; `where` names it in messages. See `from_file`."""
+        """Read a robot description from its text.
+
+        Parameters
+        ----------
+        text : str
+        where : str
+            Names it in messages.
+        joints, gravity
+            As in `from_file`.
+
+        Raises
+        ------
+        RobotError
+            As in `from_file`.
+        """
         opened, tree = read_tree(text, where, None if joints is None else tuple(joints))
         if gravity is None:
             gravity = GRAVITY if opened.contents.gravity is None else opened.contents.gravity
@@ -335,11 +349,7 @@ class Robot:
         return self._dynamics.derivatives(*self._motion(q, v, a), own)
 
     def random_motion(self, seed: int, samples: int) -> tuple[Array, Array, Array]:
-        """Return q, v, a (samples, n), uniform within the limits, for structural questions.
-
-        Where a limit is missing (or leaves no room) q is within pi rad or 1 m, the speed within
-        3 rad/s or 1 m/s; accelerations are within 10 rad/s^2 or m/s^2.
-        """
+        """Return q, v, a (samples, n), uniform within the limits; see `tree.random_motion`."""
         return random_motion(self.joints, seed, samples)
 
     def _vector(self, theta: ArrayLike) -> Array:

@@ -19,7 +19,21 @@ _ACCELERATION = 10.0
 
 
 def frozen(values: object, shape: tuple[int, ...], what: str) -> Array:
-    """Return a read-only double array of that shape."""
+    """Return a read-only double array.
+
+    Parameters
+    ----------
+    values : array_like
+    shape : tuple of int
+        That it has to have.
+    what : str
+        For messages.
+
+    Raises
+    ------
+    RobotError
+        If it has another shape.
+    """
     array = np.array(values, dtype=float)
     if array.shape != shape:
         raise RobotError(f"has shape {array.shape} where {shape} is needed", what)
@@ -27,7 +41,7 @@ def frozen(values: object, shape: tuple[int, ...], what: str) -> Array:
     return array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Joint:
     """A moving joint.
 
@@ -82,7 +96,7 @@ class Joint:
             raise RobotError("has a placement that is not finite", where)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Link:
     """A rigid body of the description, carried by a joint.
 
@@ -138,7 +152,15 @@ class Description:
 
 
 def random_motion(joints: Sequence[Joint], seed: int, samples: int) -> tuple[Array, Array, Array]:
-    """Return q, v, a (samples, n); see `Robot.random_motion`."""
+    """Return q, v, a (samples, n), uniform within the limits.
+
+    Parameters
+    ----------
+    joints : sequence of Joint
+        Where a limit is missing (or leaves no room) q is within pi rad or 1 m, the speed within
+        3 rad/s or 1 m/s; accelerations are within 10 rad/s^2 or m/s^2.
+    seed, samples : int
+    """
     rng = np.random.default_rng(seed)
     spans = np.array([_span(joint) for joint in joints])
     speed = np.array([min(_SPEED[joint.kind], joint.velocity) for joint in joints])

@@ -29,7 +29,15 @@ def keep(element: Element, attributes: tuple[str, ...]) -> Element:
 
 
 def named(root: Element, tag: str, where: str) -> dict[str, Element]:
-    """Return the children of that tag by their names, in order.
+    """Return the children of an element by their names, in order.
+
+    Parameters
+    ----------
+    root : Element
+    tag : str
+        Of the children.
+    where : str
+        For messages.
 
     Raises
     ------
@@ -145,7 +153,21 @@ def stated(mass: float, com: Array, R: Array, inertia: Array) -> Inertial:
 
 
 def required(inertial: Element, where: str, example: str) -> tuple[Element, Element]:
-    """Return the <mass> and the <inertia> of an inertial element; see `only`."""
+    """Return the <mass> and the <inertia> of an inertial element.
+
+    Parameters
+    ----------
+    inertial : Element
+    where : str
+        The link, for messages.
+    example : str
+        How the format states a mass.
+
+    Raises
+    ------
+    RobotError
+        If one is absent, or there are two.
+    """
     mass, tensor = only(inertial, "mass", where), only(inertial, "inertia", where)
     if mass is None:
         raise RobotError("has an <inertial> without <mass>", where, f"add {example}")
@@ -222,7 +244,13 @@ class ShapeWords:
     ellipsoid: dict[str, int]
 
     def solid(self, element: Element) -> dict[str, Any]:
-        """Return kind, sizes, mesh and scale of the shape under a visual or collision element."""
+        """Return kind, sizes, mesh and scale of the shape under a visual or collision element.
+
+        Raises
+        ------
+        RobotError
+            If there is none, or it is of another kind, or broken.
+        """
         found = [kind for geometry in element.findall("geometry") for kind in geometry]
         if not found:
             raise RobotError("a shape without geometry")
@@ -249,7 +277,18 @@ def readable_shapes(
 
 
 def bounded(text: str | None, count: int, what: str) -> Array:
-    """Read finite numbers of the size of a robot; see `finite`."""
+    """Read finite numbers, none beyond 1e6 m.
+
+    Parameters
+    ----------
+    text, count, what
+        As in `finite`.
+
+    Raises
+    ------
+    RobotError
+        Without a place: shapes that cannot be read are collected.
+    """
     values = finite(text, count, what, "")
     if not np.all(np.abs(values) <= _LARGEST):
         raise RobotError(f"{what} is beyond {_LARGEST:g} m")
@@ -257,7 +296,18 @@ def bounded(text: str | None, count: int, what: str) -> Array:
 
 
 def sizes(text: str | None, count: int, what: str) -> tuple[float, ...]:
-    """Read positive lengths, m; see `bounded`."""
+    """Read positive lengths, m.
+
+    Parameters
+    ----------
+    text, count, what
+        As in `bounded`.
+
+    Raises
+    ------
+    RobotError
+        Likewise.
+    """
     values = bounded(text, count, what)
     for bad in values[~(values > 0.0)]:
         raise RobotError(f"{what} = {bad:g} is not positive")
@@ -309,7 +359,15 @@ def stated_dynamics(
 
 
 def rotors(element: Element, joint: str, kind: str | None, where: str) -> Iterator[JointDynamics]:
-    """Iterate over the rotor inertias below an element, which Drake states as an extension."""
+    """Iterate over the rotor inertias below an element, which Drake states as an extension.
+
+    Parameters
+    ----------
+    element : Element
+        A joint or a transmission.
+    joint, kind, where
+        As in `stated_dynamics`.
+    """
     for rotor in element.iter("drake:rotor_inertia"):
         # Both ways of stating a number: an attribute, and the element's text.
         text = rotor.get("value", rotor.text)

@@ -99,7 +99,7 @@ def lone_links(text: str, where: str) -> tuple[Description, tuple[Link, ...]]:
     if any(one.source == "geometry" for one in contents.inertials.values()):
         bodies = drake_bodies(understood(contents, format_.drake, where))
     links = tuple(
-        Link(name, -1, np.eye(3), np.zeros(3), phi, source)
+        Link(name=name, joint=-1, R=np.eye(3), p=np.zeros(3), phi=phi, source=source)
         for name, phi, source in with_geometry(contents, bodies)
         if name in contents.inertials
     )

@@ -1,4 +1,8 @@
-"""SDF (SDFormat)."""
+"""SDF (SDFormat), a single model of which is read.
+
+The poses of links and joints relative to frames are left to Drake's parser; those of inertias
+and shapes are in their link's frame.
+"""
 
 from __future__ import annotations
 

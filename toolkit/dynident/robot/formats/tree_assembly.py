@@ -24,7 +24,7 @@ from dynident.robot.formats.xmltree import Element, closest, to_text
 from dynident.robot.tree import Joint, Link
 
 WORLD = "world"
-_KINDS = {"revolute": "revolute", "prismatic": "prismatic", "weld": "fixed"}
+_KINDS = ("revolute", "prismatic", "weld")
 # Of a message in Drake's words, which may quote the whole file.
 _LONGEST = 200
 
@@ -57,6 +57,14 @@ def drake_plant(copy: Element, file_type: str) -> Any:
 
 def understood(contents: Contents, file_type: str, where: str) -> Any:
     """Return a plant that holds the sanitised copy of a description.
+
+    Parameters
+    ----------
+    contents : Contents
+    file_type : str
+        By which Drake's parser knows the format.
+    where : str
+        The file, for messages.
 
     Raises
     ------
@@ -127,30 +135,9 @@ def assemble(
     wanted = _choose(contents, wanted, where)
     plant = understood(contents, file_type, where)
     bodies = drake_bodies(plant)
-    connections = [plant.get_joint(i) for i in plant.GetJointIndices()]
-    below: dict[str, list[Any]] = {}
-    for one in connections:
-        if one.type_name() not in _KINDS:
-            raise UnsupportedError(
-                f"is of type '{one.type_name()}', which is not supported",
-                f"{where}: joint '{one.name()}'",
-                "use revolute, prismatic and fixed joints",
-            )
-        below.setdefault(one.parent_body().name(), []).append(one)
-    parents = refuse_closed_chains(
-        ((one.name(), one.parent_body().name(), one.child_body().name()) for one in connections),
-        where,
-    )
-    roots = [name for name in bodies if name not in parents]
-    if len(roots) + (WORLD in below) > 1:
-        loose = ", ".join(roots) + (" to the world" if WORLD in below else "")
-        raise UnsupportedError(
-            f"has several roots: nothing attaches {loose}",
-            where,
-            "join them by a fixed joint, or put each robot in its own file",
-        )
+    below, roots = _connections(plant, bodies, where)
     # Where a body is: the joint that carries it, and its pose in that joint's frame.
-    places = {WORLD: (-1, RigidTransform())}
+    places: dict[str, tuple[int, Any]] = {WORLD: (-1, RigidTransform())}
     places |= {n: (-1, plant.GetDefaultFloatingBaseBodyPose(bodies[n])) for n in roots}
     joints: dict[int, Joint] = {}
     waiting = list(places)
@@ -173,12 +160,41 @@ def assemble(
             child = one.child_body().name()
             places[child] = (number, X)
             waiting.append(child)
-    links = (
-        Link(name, places[name][0], *_pose(places[name][1]), phi, source)
-        for name, phi, source in with_geometry(contents, bodies)
-    )
+    links = []
+    for name, phi, source in with_geometry(contents, bodies):
+        number, X = places[name]
+        R, p = X.rotation().matrix(), X.translation()
+        links.append(Link(name=name, joint=number, R=R, p=p, phi=phi, source=source))
     locked = tuple(name for name in contents.joints if name not in wanted)
     return Tree(tuple(joints[index] for index in range(len(wanted))), tuple(links), locked)
+
+
+def _connections(
+    plant: Any, bodies: dict[str, Any], where: str
+) -> tuple[dict[str, list[Any]], list[str]]:
+    """Return Drake's joints by the name of their parent body, and the bodies without a parent."""
+    below: dict[str, list[Any]] = {}
+    ends = []
+    for one in (plant.get_joint(i) for i in plant.GetJointIndices()):
+        if one.type_name() not in _KINDS:
+            raise UnsupportedError(
+                f"is of type '{one.type_name()}', which is not supported",
+                f"{where}: joint '{one.name()}'",
+                "use revolute, prismatic and fixed joints",
+            )
+        parent, child = one.parent_body().name(), one.child_body().name()
+        below.setdefault(parent, []).append(one)
+        ends.append((one.name(), parent, child))
+    parents = refuse_closed_chains(ends, where)
+    roots = [name for name in bodies if name not in parents]
+    if len(roots) + (WORLD in below) > 1:
+        loose = ", ".join(roots) + (" to the world" if WORLD in below else "")
+        raise UnsupportedError(
+            f"has several roots: nothing attaches {loose}",
+            where,
+            "join them by a fixed joint, or put each robot in its own file",
+        )
+    return below, roots
 
 
 def _choose(contents: Contents, wanted: tuple[str, ...] | None, where: str) -> tuple[str, ...]:
@@ -199,22 +215,17 @@ def _choose(contents: Contents, wanted: tuple[str, ...] | None, where: str) -> t
     return wanted
 
 
-def _pose(X: Any) -> tuple[Any, Any]:
-    return X.rotation().matrix(), X.translation()
-
-
 def _joint(one: Any, parent: int, X: Any, effort: float) -> Joint:
     """Return a joint of Drake's, whose frame has the pose X in that of the parent's joint."""
     kind = one.type_name()
-    R, p = _pose(X)
     axis = one.revolute_axis() if kind == "revolute" else one.translation_axis()
     velocity = float(one.velocity_upper_limits()[0])
     return Joint(
         name=one.name(),
         kind=kind,
         parent=parent,
-        R=R,
-        p=p,
+        R=X.rotation().matrix(),
+        p=X.translation(),
         axis=one.frame_on_child().GetFixedPoseInBodyFrame().rotation().matrix() @ axis,
         lower=float(one.position_lower_limits()[0]),
         upper=float(one.position_upper_limits()[0]),

@@ -1,4 +1,7 @@
-"""URDF."""
+"""URDF, read as it is written: no default inertia, and any limit or effort may be absent.
+
+Drake's and Pinocchio's parsers replace a broken inertia, and demand meshes that are not there.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,7 @@ from dynident.robot.formats.elements import (
     symmetric,
 )
 from dynident.robot.formats.format import Contents, Format, Inertial, JointDynamics, Shape
-from dynident.robot.formats.xmltree import Element, attribute, finite, only, reals
+from dynident.robot.formats.xmltree import Element, finite, only, reals
 
 _REMEDIES = {
     "floating": "fix the base: remove the floating joint, or make it fixed",
@@ -89,13 +92,16 @@ def _inertial(link: Element, where: str) -> Inertial:
         R = from_rpy(reals(origin.get("rpy", "0 0 0"), 3, "inertial origin rpy", where))
     mass, tensor = required(inertial, where, '<mass value="..."/>')
 
-    def entry(key: str) -> float:
-        # The moments must be stated; products of inertia may be left out where they are zero.
-        if key not in tensor.attrib and key in ("ixy", "ixz", "iyz"):
-            return 0.0
-        return attribute(tensor, key, "inertia", where)
+    def number(element: Element, name: str) -> float:
+        if name not in element.attrib:
+            # The moments must be stated; products of inertia may be left out where they are zero.
+            if name in ("ixy", "ixz", "iyz"):
+                return 0.0
+            raise RobotError(f"{element.tag} has no '{name}'", where)
+        return float(reals(element.get(name), 1, f"{element.tag} {name}", where)[0])
 
-    return stated(attribute(mass, "value", "mass", where), xyz, R, symmetric(entry))
+    inertia = symmetric(lambda name: number(tensor, name))
+    return stated(number(mass, "value"), xyz, R, inertia)
 
 
 def _joint(joint: Element, where: str) -> Element:

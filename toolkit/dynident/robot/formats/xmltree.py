@@ -111,7 +111,21 @@ def to_text(root: Element) -> str:
 
 
 def only(element: Element, tag: str, where: str) -> Element | None:
-    """Return the child of that name, None if absent; two are an error."""
+    """Return the one child of that tag, None if it is absent.
+
+    Parameters
+    ----------
+    element : Element
+    tag : str
+        Of the child.
+    where : str
+        For messages.
+
+    Raises
+    ------
+    RobotError
+        If there are two.
+    """
     found = element.findall(tag)
     if len(found) > 1:
         raise RobotError(f"has {len(found)} <{tag}> elements", where, "keep one")
@@ -120,6 +134,16 @@ def only(element: Element, tag: str, where: str) -> Element | None:
 
 def reals(text: str | None, count: int, what: str, where: str) -> NDArray[np.float64]:
     """Read `count` numbers separated by blanks; NaN and infinities pass, for a later check.
+
+    Parameters
+    ----------
+    text : str or None
+    count : int
+        How many numbers there have to be.
+    what : str
+        What they are, for messages.
+    where : str
+        For messages.
 
     Raises
     ------
@@ -139,18 +163,22 @@ def reals(text: str | None, count: int, what: str, where: str) -> NDArray[np.flo
 
 
 def finite(text: str | None, count: int, what: str, where: str) -> NDArray[np.float64]:
-    """Read `count` finite numbers; see `reals`."""
+    """Read `count` finite numbers.
+
+    Parameters
+    ----------
+    text, count, what, where
+        As in `reals`.
+
+    Raises
+    ------
+    RobotError
+        As in `reals`, or if one is not finite.
+    """
     values = reals(text, count, what, where)
     if not np.all(np.isfinite(values)):
         raise RobotError(f"{what} = '{(text or '').strip()}' is not finite", where)
     return values
-
-
-def attribute(element: Element, name: str, what: str, where: str) -> float:
-    """Read one number from an attribute that must be there."""
-    if name not in element.attrib:
-        raise RobotError(f"{what} has no '{name}'", where)
-    return float(reals(element.get(name), 1, f"{what} {name}", where)[0])
 
 
 def closest(name: str, valid: Iterable[str]) -> str:

@@ -35,7 +35,7 @@ class MjcfBody:
             yield joint.get("name") or self.name + suffix, joint
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class MjcfModel:
     """An MJCF with its settings.
 
@@ -61,7 +61,13 @@ class MjcfModel:
 
     @staticmethod
     def read(root: Element, where: str) -> MjcfModel:
-        """Read the settings; RobotError if one is unknown."""
+        """Read the settings.
+
+        Raises
+        ------
+        RobotError
+            If one is unknown.
+        """
         compiler = compiler_of(root)
         unit = compiler.get("angle", "degree")
         if unit not in ("degree", "radian"):
@@ -69,8 +75,13 @@ class MjcfModel:
         sequence = compiler.get("eulerseq", "xyz")
         if len(sequence) != 3 or set(sequence) - set("xyzXYZ"):
             raise RobotError(f"has compiler eulerseq '{sequence}'", where, "use three of xyzXYZ")
-        angle = np.pi / 180.0 if unit == "degree" else 1.0
-        return MjcfModel(root, compiler, _classes(root, where), angle, sequence)
+        return MjcfModel(
+            root=root,
+            compiler=compiler,
+            classes=_classes(root, where),
+            angle=np.pi / 180.0 if unit == "degree" else 1.0,
+            sequence=sequence,
+        )
 
     def bodies(self) -> Iterator[MjcfBody]:
         """Iterate over the bodies, each after its parent, in the order of the text."""
@@ -115,7 +126,12 @@ class MjcfModel:
     def orientation(self, attributes: dict[str, str], where: str) -> Array:
         """Return the (3, 3) orientation stated by quat, axisangle, xyaxes, zaxis or euler.
 
-        NaN passes into the result; a direction of length zero, or two statements, are refused.
+        NaN passes into the result.
+
+        Raises
+        ------
+        RobotError
+            If a direction has length zero, or there are two statements.
         """
         given = [name for name in ORIENTATIONS if name in attributes]
         if not given:
@@ -168,7 +184,7 @@ def _classes(root: Element, where: str) -> _Classes:
     """Return the default classes of all <default> sections."""
     classes: _Classes = {"main": {tag: {} for tag in _TAGS}}
 
-    def walk(section: Element, names: set[str], inherited: dict[str, dict[str, str]]) -> None:
+    def add(section: Element, names: set[str], inherited: dict[str, dict[str, str]]) -> None:
         settings = {tag: dict(inherited[tag]) for tag in _TAGS}
         for tag in _TAGS:
             for element in section.findall(tag):
@@ -177,9 +193,9 @@ def _classes(root: Element, where: str) -> _Classes:
         for child in section.findall("default"):
             if not child.get("class"):
                 raise RobotError("has a nested <default> without a class", where, "name its class")
-            walk(child, {child.attrib["class"]}, settings)
+            add(child, {child.attrib["class"]}, settings)
 
     for section in root.findall("default"):
         # The outermost class may have a name of its own.
-        walk(section, {"main", section.get("class") or "main"}, classes["main"])
+        add(section, {"main", section.get("class") or "main"}, classes["main"])
     return classes

@@ -30,7 +30,13 @@ _DYNAMICS = {"damping": "damping", "frictionloss": "friction", "armature": "roto
 
 
 def read(root: Element, where: str) -> Contents:
-    """Take an MJCF apart; see `Format`."""
+    """Take an MJCF apart; see `Format`.
+
+    Raises
+    ------
+    RobotError
+        Naming the body or joint that is broken or not supported.
+    """
     _refuse(root, where)
     model = MjcfModel.read(root, where)
     copy = Element("mujoco", {"model": root.get("model") or "robot"})
@@ -226,7 +232,20 @@ def detach(root: Element) -> None:
 
 
 def inertial_lines(properties: MassProperties, root: Element, where: str) -> list[str]:
-    """Return an inertial element, unless the model takes inertias from shapes; see `Format`."""
+    """Return the inertial element that states an inertia; see `Format`.
+
+    Parameters
+    ----------
+    properties : MassProperties
+    root : Element
+    where : str
+        The body, for messages.
+
+    Raises
+    ------
+    RobotError
+        If the model takes inertias from shapes.
+    """
     if any(c.get("inertiafromgeom") == "true" for c in root.findall("compiler")):
         raise RobotError(
             'cannot state an inertia under compiler inertiafromgeom="true"',

@@ -28,7 +28,21 @@ def _kind(attributes: dict[str, str]) -> str:
 
 
 def sanitised_pose(model: MjcfModel, attributes: dict[str, str], where: str) -> dict[str, str]:
-    """Return the attributes that state a pose, checked to be finite."""
+    """Return the attributes that state a pose.
+
+    Parameters
+    ----------
+    model : MjcfModel
+    attributes : dict
+        Of a body or a geom.
+    where : str
+        For messages.
+
+    Raises
+    ------
+    RobotError
+        If the pose is no number, not finite, or stated twice.
+    """
     finite(attributes.get("pos", "0 0 0"), 3, "pos", where)
     if not np.all(np.isfinite(model.orientation(attributes, where))):
         raise RobotError("has an orientation that is not finite", where)
@@ -37,6 +51,13 @@ def sanitised_pose(model: MjcfModel, attributes: dict[str, str], where: str) -> 
 
 def heavy_geoms(model: MjcfModel, body: MjcfBody, where: str) -> Iterator[Element]:
     """Iterate over sanitised copies of the geoms that have mass, from which a body has its inertia.
+
+    Parameters
+    ----------
+    model : MjcfModel
+    body : MjcfBody
+    where : str
+        The body, for messages.
 
     Raises
     ------
