@@ -109,7 +109,7 @@ def chain_case(
     prior = Prior(model.robot, distance, spread)
     rows, at = prior.rows(space, np.append(space.given[: 10 * n], x_hat[10 * n :]))
     b = np.append(A @ x_hat, at)
-    problem = Problem(space, np.vstack([A, rows]), b, within, prior.entropy(space))
+    problem = Problem(space, np.vstack([A, rows]), b, within, entropy=prior.entropy(space))
     return Case(problem.reduced(), x_hat)
 
 

@@ -15,7 +15,7 @@ from dynident.nlp import Bound, Multipliers, Problem, Status, certify, lower_bou
 from dynident.nlp.certificate import OPTIMAL
 from dynident.nlp.problem import TOLERANCE
 
-SOLVED = Status("test", "solved", "by hand", 0, 0.0)
+SOLVED = Status("test", "solved", "by hand")
 SETS = (
     TotalMass(9.0, 9.5),
     CentreInBox("l0", [-0.1] * 3, [0.06] * 3),

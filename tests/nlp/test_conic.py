@@ -81,7 +81,7 @@ def test_no_other_program_finds_a_better_entropic_body(seed) -> None:
     rng = np.random.default_rng(seed)
     phi = impossible(seed)
     near = one_body(phi, Within("full"), rng.normal(size=(6, 10)))
-    problem = Problem(near.space, near.A, near.b, near.within, Entropy(0.3, ROUND[None]))
+    problem = Problem(near.space, near.A, near.b, near.within, entropy=Entropy(0.3, ROUND[None]))
     answer = solve(problem, "conic")
     assert answer.certificate.gap <= 1e-6 and least(answer.x, "full") > 0
     starts = [log_cholesky(ROUND) + 0.3 * rng.normal(size=10) for _ in range(5)]
@@ -95,7 +95,7 @@ def test_the_entropic_objective_is_the_log_det_divergence() -> None:
     P, Q = B @ B.T + np.eye(4), np.diag([1.0, 2.0, 3.0, 4.0])
     near = one_body(from_pseudo_inertia(P), Within(), np.zeros((0, 10)))
     entropy = Entropy(2.0, from_pseudo_inertia(Q)[None])
-    problem = Problem(near.space, near.A, near.b, near.within, entropy)
+    problem = Problem(near.space, near.A, near.b, near.within, entropy=entropy)
     ratio = np.linalg.inv(Q) @ P
     want = 2 * (np.trace(ratio) - np.log(np.linalg.det(ratio)) - 4)
     x = from_pseudo_inertia(P)

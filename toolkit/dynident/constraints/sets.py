@@ -43,7 +43,7 @@ class Linear:
     A: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
-    unit: str = ""
+    unit: str = field(default="", kw_only=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +159,7 @@ class CentreInBox:
         # m low <= h <= m high, which is linear: the centre of mass itself is not.
         A[:3, start], A[3:, start] = -low, high
         A[:3, start + 1 : start + 4], A[3:, start + 1 : start + 4] = np.eye(3), -np.eye(3)
-        return (Linear(f"{where} in a box", A, np.zeros(6), np.full(6, np.inf), "kg m"),)
+        return (Linear(f"{where} in a box", A, np.zeros(6), np.full(6, np.inf), unit="kg m"),)
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,4 +275,4 @@ def _combination(
     for parameter, weight in weights.items():
         A[0, space.index(parameter)] = weight
     unit = space.units[space.index(next(iter(weights)))] if weights else ""
-    return Linear(name, A, np.array([lower]), np.array([upper]), unit)
+    return Linear(name, A, np.array([lower]), np.array([upper]), unit=unit)

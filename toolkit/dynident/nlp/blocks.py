@@ -65,11 +65,11 @@ class Variable(_Rows):
     name: str
     rows: int = 1
     unit: str | tuple[str, ...] = ""
-    lower: Any = -np.inf
-    upper: Any = np.inf
-    start: Any = 0.0
-    scale: Any = 1.0
-    symbol: Any = None
+    lower: Any = field(default=-np.inf, kw_only=True)
+    upper: Any = field(default=np.inf, kw_only=True)
+    start: Any = field(default=0.0, kw_only=True)
+    scale: Any = field(default=1.0, kw_only=True)
+    symbol: Any = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         rows, where = self.rows, f"variable {self.name}"
@@ -208,7 +208,7 @@ Block = Variable | Residual | Cost | Constraint
 
 
 def numbers_of(given: ArrayLike, size: int, where: str, what: str) -> np.ndarray:
-    """Numbers as (size,), none of them NaN.
+    """Return numbers as (size,), none of them NaN.
 
     Parameters
     ----------

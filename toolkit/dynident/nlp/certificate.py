@@ -125,7 +125,7 @@ def certify(
     bound: Bound | None,
     starts: tuple[float, ...] = (),
 ) -> Certificate:
-    """State what is proved about an answer.
+    """Return what is proved about an answer.
 
     Parameters
     ----------

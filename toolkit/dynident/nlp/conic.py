@@ -74,12 +74,13 @@ class ConicProgram:
         result = ClarabelSolver().Solve(self.program, None, options)
         seconds = time.perf_counter() - start
         details: Any = result.get_solver_details()
+        iterations = details.iterations
         word = next((w for key, w in _WORDS.items() if details.status == key), None)
         if word is None:
             infeasible = "PrimalInfeasible" in details.status
             unbounded = "DualInfeasible" in details.status
             word = "infeasible" if infeasible else "unbounded" if unbounded else "failed"
-        status = Status("Clarabel", word, details.status, details.iterations, seconds)
+        status = Status("Clarabel", word, details.status, iterations=iterations, seconds=seconds)
         if word not in ("solved", "inaccurate"):
             return ConicSolution(np.full(self.problem.space.size, np.nan), status, None)
         x = self.origin + self.problem.space.scale * result.GetSolution(self.z)

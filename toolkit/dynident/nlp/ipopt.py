@@ -81,7 +81,7 @@ class Attempt:
 def solve_scaled(
     program: ScaledProgram, starts: Sequence[np.ndarray], tolerance: float, max_iterations: int
 ) -> tuple[Attempt, ...]:
-    """Solve a program from each start; a start that fails raises nothing.
+    """Solve a program from each start; return where each ended. One that fails raises nothing.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def _nowhere(program: ScaledProgram, start: np.ndarray, terms: np.ndarray, name:
     """A start from which there is no way."""
     return Attempt(
         start=start,
-        status=Status("Ipopt", "failed", f"{name} is not finite at the start", 0, 0.0),
+        status=Status("Ipopt", "failed", f"{name} is not finite at the start"),
         x=start,
         terms=terms,
         objective=np.nan,
@@ -163,10 +163,16 @@ def _run(program: ScaledProgram, solver: Any, scales: np.ndarray, start: np.ndar
     stationarity = _largest(np.abs(remaining - of_bounds)) / here.scale
     complementarity = _largest(products) / here.scale
     message = str(stats["return_status"])
-    word = _word(message, stationarity, max(violation, stationarity, complementarity))
+    status = Status(
+        "Ipopt",
+        _word(message, stationarity, max(violation, stationarity, complementarity)),
+        message.replace("_", " "),
+        iterations=int(stats["iter_count"]),
+        seconds=seconds,
+    )
     return Attempt(
         start=start,
-        status=Status("Ipopt", word, message.replace("_", " "), int(stats["iter_count"]), seconds),
+        status=status,
         x=z * program.scale,
         terms=here.terms,
         objective=float(np.sum(here.terms)),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -52,7 +52,7 @@ class Problem:
     A: np.ndarray
     b: np.ndarray
     within: Within
-    entropy: Entropy | None = None
+    entropy: Entropy | None = field(default=None, kw_only=True)
 
     # --- objective -----------------------------------------------------------------------------
 

@@ -214,7 +214,7 @@ class Program(_Printed):
         tolerance: float = 1e-10,
         max_iterations: int = 500,
     ) -> ProgramSolution:
-        """Solve the program by Ipopt with exact Hessian.
+        """Solve the program by Ipopt with exact Hessian, and return the best of the starts.
 
         A start that fails raises nothing: ask `status`, or call `ProgramSolution.require`.
 

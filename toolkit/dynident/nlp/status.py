@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 
 @dataclass(frozen=True)
@@ -21,8 +21,8 @@ class Status:
     solver: str
     word: str
     message: str
-    iterations: int
-    seconds: float
+    iterations: int = field(default=0, kw_only=True)
+    seconds: float = field(default=0.0, kw_only=True)
 
     @property
     def ok(self) -> bool:

@@ -88,7 +88,7 @@ class Constrained:
             np.vstack([data, held]),
             np.concatenate([R[:p, p], held_at]),
             self.within,
-            prior.entropy(space),
+            entropy=prior.entropy(space),
         )
         answer = solve(problem, self.solver)
         active = active_set(problem, answer.x)

@@ -51,7 +51,7 @@ def posterior(
         within = replace(within, sets=(*within.sets, Vanishing(mapping[off])))
         notes = (*notes, f"Irrelevant, and kept at zero: {', '.join(metric.irrelevant)}.")
     A, b = np.vstack([rows, held]), np.concatenate([rows @ x_hat, held_at])
-    return Problem(space, A, b, within, prior.entropy(space)), (*metric.notes, *notes)
+    return Problem(space, A, b, within, entropy=prior.entropy(space)), (*metric.notes, *notes)
 
 
 def mapping_of(space: ParameterSpace, metric: Metric, names: tuple[str, ...]) -> np.ndarray:

@@ -67,7 +67,7 @@ def solve(problem: Problem, solver: Solver, stay: np.ndarray | None = None) -> C
     problem.require_held()
     free = problem.unconstrained
     if free is not None and problem.feasible(free):
-        status = Status("least squares", "solved", "no constraint is active", 0, 0.0)
+        status = Status("least squares", "solved", "no constraint is active")
         bound = unconstrained_bound(problem, free)
         return CertifiedPoint(free, certify(problem, free, status, "linear least squares", bound))
     conic = solve_conic(problem)
@@ -110,7 +110,7 @@ def _kept(problem: Problem, x: np.ndarray, stay: np.ndarray | None) -> np.ndarra
 
 def trivial(problem: Problem, x: np.ndarray) -> CertifiedPoint:
     """The answer to a projection of a point x (s,) that is within already: itself."""
-    status = Status("none", "solved", "already within", 0, 0.0)
+    status = Status("none", "solved", "already within")
     centred = replace(problem, b=problem.A @ x, entropy=None)
     return CertifiedPoint(
         x, certify(centred, x, status, "none needed: it lies within already", None)

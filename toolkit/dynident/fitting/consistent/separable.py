@@ -86,7 +86,7 @@ def _solve_one(problem: Problem, solver: Solver, x_hat: np.ndarray) -> Certified
     edge = problem.retracted(x_hat)
     if problem.body_violation(x_hat) == 0 and problem.feasible(edge):
         # On the edge already (an inertia without mass): as far inside as rounding demands.
-        status = Status("none", "solved", "on the edge already", 0, 0.0)
+        status = Status("none", "solved", "on the edge already")
         return CertifiedPoint(edge, certify(problem, edge, status, "a step off the edge", None))
     return solve(problem, solver, x_hat)
 
