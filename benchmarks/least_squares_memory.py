@@ -23,7 +23,7 @@ from dynident.robot import Robot
 
 PIECE = 100_000
 RATE_HZ = 1000.0
-FULL_RATE = Filter(None, None, None, edge_s=(0.01, 0.01))
+FULL_RATE = Filter(position_cutoff_hz=None, cutoff_hz=None, rate_hz=None, edge_s=(0.01, 0.01))
 
 
 def arm() -> Robot:

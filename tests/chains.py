@@ -21,7 +21,7 @@ from synthetic import smooth_motion
 
 SOLVERS = ("conic", "nlp")
 
-QUIET = Filter(None, None, 50.0, edge_s=(0.02, 0.02))
+QUIET = Filter(position_cutoff_hz=None, cutoff_hz=None, rate_hz=50.0, edge_s=(0.02, 0.02))
 
 COUNTEREXAMPLE = np.array([1.0, 0, 0, 0, 1, 0, 1, 0, 0, 3])
 """Virtual parameters [1, 0, 0, 0, 1, 0, 0, 1, 0, sqrt 3, 0]: mass 1 and I = diag(1, 1, 3)."""

@@ -345,7 +345,7 @@ ROBOTS = {
     ),
     "NaN inertia": (
         edited(('izz="0.06"', 'izz="nan"'), text=ARM),
-        r"arm.urdf: link 'upper': its inertia is not finite. mend",
+        r"arm.urdf: link 'upper': its inertia is not finite. fix",
     ),
     "text for a number": (edited(('value="4"', 'value="heavy"'), text=ARM), r"'heavy'"),
     "unknown parent": (edited(('parent link="base"', 'parent link="bas"'), text=ARM), r"'bas'"),

@@ -37,22 +37,22 @@ def consistent(path) -> bool:
 
 
 def test_a_broken_robot_is_mended(run, broken, tmp_path):
-    done = run("refit", broken, "--out", "mended.urdf")
+    done = run("refit", broken, "--out", "refitted.urdf")
     assert done.status == 0 and done.err == ""
     for words in (
         "Made fully consistent: 1 of 2 links moved.",
         r"upper .*triangle -0.18",
         "This is the optimum",
-        r"Written: mended.urdf \(only inertial elements changed\).",
+        r"Written: refitted.urdf \(only inertial elements changed\).",
         "All 3 links are fully consistent",
         "Drake read joints and inertias from the file, and simulated",
         "Pinocchio read joints and inertias from the file",
     ):
         assert re.search(words, done.out), words
-    assert consistent(tmp_path / "mended.urdf") and broken.read_text() == BROKEN
-    again = run("refit", "mended.urdf", "--out", "mended.urdf")
-    assert "Nothing to mend" in again.out and "unchanged, to the byte" in again.out
-    assert run("check", "mended.urdf").status == 0
+    assert consistent(tmp_path / "refitted.urdf") and broken.read_text() == BROKEN
+    again = run("refit", "refitted.urdf", "--out", "refitted.urdf")
+    assert "Nothing to fix" in again.out and "unchanged, to the byte" in again.out
+    assert run("check", "refitted.urdf").status == 0
 
 
 def test_the_file_itself_may_be_replaced(run, broken, tmp_path):
@@ -209,6 +209,6 @@ def test_unusable_input(run, study, broken, tmp_path, kind):
 
 def test_help(run):
     said = " ".join(run("refit", "--help").out.split())
-    assert "Example: dynident refit robot.urdf --out mended.urdf" in said and "--json" in said
-    done = run("refit", "robot.urdf", "--out", "mended.urdf")
+    assert "Example: dynident refit robot.urdf --out refitted.urdf" in said and "--json" in said
+    done = run("refit", "robot.urdf", "--out", "refitted.urdf")
     assert done.status == 2 and "robot.urdf: no such file" in done.err

@@ -16,7 +16,7 @@ ROBOT = chain(3, 1)
 PLAIN = Model(ROBOT) + "viscous_friction" + "coulomb_friction"
 VISCOUS, DRY = 0.3, 0.2
 RATE = 200.0
-BARE = Filter(None, None, None)
+BARE = Filter(position_cutoff_hz=None, cutoff_hz=None, rate_hz=None)
 
 
 def exact(label: str, values: tuple[float, ...], t, q, v, a) -> np.ndarray:
@@ -68,7 +68,7 @@ def test_a_delay_between_samples_is_found_to_the_accuracy_of_a_spline() -> None:
     t, q, _, _ = smooth_motion(3, 0, 500.0, 8.0, 8.0)
     torque = ROBOT.inverse_dynamics(*smooth_motion_at(t - late))
     recording = Recording(t, q, torque, ROBOT.names)
-    ends = Filter(None, None, None, edge_s=(0.05, 0.05))
+    ends = Filter(position_cutoff_hz=None, cutoff_hz=None, rate_hz=None, edge_s=(0.05, 0.05))
     found = fit(Model(ROBOT) + "torque_delay", Dataset((recording,), ends))
     np.testing.assert_allclose(found.effect_values("torque_delay"), late, rtol=1e-3)
 

@@ -29,7 +29,7 @@ from dynident.recording import Dataset, Filter
 from dynident.robot import Robot
 from synthetic import smooth_motion, synthetic, true_values
 
-QUIET = Filter(None, None, 50.0, edge_s=(0.02, 0.02))
+QUIET = Filter(position_cutoff_hz=None, cutoff_hz=None, rate_hz=50.0, edge_s=(0.02, 0.02))
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,10 @@ def constrained(model: Model, truth: np.ndarray) -> Estimate:
 def test_noise_free_truth_is_recovered(model, truth, solver) -> None:
     """From a description that is off by a tenth, which a wide prior lets go of."""
     prior = Prior(off_description(model), spread=10.0)
-    data = Dataset((synthetic(model, truth, 1, duration=8.0),), Filter(None, None, 100.0))
+    data = Dataset(
+        (synthetic(model, truth, 1, duration=8.0),),
+        Filter(position_cutoff_hz=None, cutoff_hz=None, rate_hz=100.0),
+    )
     found = fit(model, data, Constrained(prior=prior, solver=solver))
     free = fit(model, data, LeastSquares())
     assert found.error < free.error + 1e-4, "what differentiation leaves, no more"

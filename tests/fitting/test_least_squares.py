@@ -14,7 +14,7 @@ from dynident.recording import Dataset, Filter
 from dynident.robot import Robot
 from synthetic import arm, smooth_motion, synthetic, true_values
 
-QUIET = Filter(None, None, 100.0, edge_s=(0.02, 0.02))
+QUIET = Filter(position_cutoff_hz=None, cutoff_hz=None, rate_hz=100.0, edge_s=(0.02, 0.02))
 
 
 @pytest.fixture(scope="module")

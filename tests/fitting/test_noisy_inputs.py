@@ -24,7 +24,7 @@ from dynident.regression.names import REGRESSIONS
 from synthetic import arm, synthetic, true_values
 
 STD = 2e-4
-ROUGH = di.Filter(80.0, 60.0, 250.0)
+ROUGH = di.Filter(position_cutoff_hz=80.0, cutoff_hz=60.0, rate_hz=250.0)
 """Lets much of the encoders' noise through."""
 KNOWN = di.recording.Noise(np.full(2, STD), np.full(2, 0.1))
 

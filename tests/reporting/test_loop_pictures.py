@@ -16,12 +16,11 @@ from dynident.errors import DynidentError
 from dynident.fitting.history import Convergence, Ending, Round
 from dynident.reporting.html import page
 from dynident.reporting.loop_content import loop_trace
-from dynident.reporting.loop_page import loop_section
+from dynident.reporting.loop_page import loop_quantity, loop_section
 from dynident.reporting.pictures.convergence import convergence
-from dynident.reporting.pictures.loop_pictures import loop_quantity
 from dynident.reporting.pictures.loop_plots import simulated_loop
 from dynident.reporting.pictures.plots import save
-from dynident.validation.loop_errors import QUANTITIES
+from dynident.validation.loop_errors import QUANTITIES, Quantity
 from dynident.validation.validation_result import Skipped, Unsimulated, Validation
 from reporting.fabricated import diagnosis
 from reporting.fabricated_loop import validation
@@ -51,10 +50,11 @@ def test_thinning_keeps_the_extremes_of_the_differences(found):
 
 
 def test_moving_picture(found):
-    for quantity, unit, yardstick in (
+    cases: tuple[tuple[Quantity, str, str], ...] = (
         ("position", "rad", "reference"),
         ("torque", "N m", "by the control law"),
-    ):
+    )
+    for quantity, unit, yardstick in cases:
         figure = loop_quantity(loop_trace(found, found.runs[1], 1, quantity))
         titles = [axis.title.text for axis in figure.select_yaxes()]
         assert titles == [f"{quantity} ({unit})", f"difference ({unit})"]

@@ -103,7 +103,7 @@ def half_widths(table):
 
 def test_intervals_are_those_of_the_noise_where_the_model_holds(found):
     assert widening_after(found) is None
-    half = half_widths(parameter_table(found.after, None, noise_known=True))
+    half = half_widths(parameter_table(found.after, None, "given"))
     sigma = found.after.sigma[found.after.identified]
     assert half == pytest.approx(1.96 * sigma, rel=0.1)  # as written, rounded
 
@@ -114,7 +114,7 @@ def test_intervals_of_a_rejected_model_are_wider_by_the_birge_ratio(found):
     assert wider is not None
     assert wider.joints == pytest.approx({"shoulder": 1.0, "elbow": np.sqrt(10.0)})
     assert wider.overall == pytest.approx(np.sqrt(11.0 / 2.0))
-    tables = [parameter_table(one.after, x, noise_known=True) for x in (None, wider)]
+    tables = [parameter_table(one.after, x, "given") for x in (None, wider)]
     grown = half_widths(tables[1]) / half_widths(tables[0])
     names = [row[0] for row in tables[0].rows if row[2] != "-"]
     for name, ratio in zip(names, grown, strict=True):

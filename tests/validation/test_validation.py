@@ -180,10 +180,12 @@ def test_a_healthy_model_is_not_called_poor_within_the_noise(stated: bool) -> No
     assert found.noise_source == ("given" if stated else "unknown")
     # The encoder's noise is found, stated or not: twice, but for what the filters make of it.
     silent = validate(estimate(), dataset(made), CONTROLLER)
-    np.testing.assert_allclose(found.position_noise, silent.position_noise, rtol=1.0)
+    np.testing.assert_allclose(
+        found.judgement.errors.position_noise, silent.judgement.errors.position_noise, rtol=1.0
+    )
     assert found.verdict == "follows"
     (run,) = found.runs
-    off = shifted(run.simulated, 0.5 * found.position_noise)
+    off = shifted(run.simulated, 0.5 * noise)
     doubtful = replace(found, runs=(replace(run, simulated=off, reference=run.simulated),))
     assert np.all(doubtful.errors.joints[0] > doubtful.without_model.joints[0])
     assert doubtful.verdict == "follows" and "it cannot be told whether" in doubtful.sentence

@@ -1,13 +1,13 @@
 """The one root of every error that dynident raises on purpose.
 
-A message says what is wrong, where (file, joint, row), and the mend.
+A message says what is wrong, where (file, joint, row), and the remedy.
 """
 
 from __future__ import annotations
 
 
 class DynidentError(Exception):
-    """Something the user can mend.
+    """Something the user can put right.
 
     Parameters
     ----------
@@ -15,7 +15,7 @@ class DynidentError(Exception):
         What is wrong, in one clause.
     where : str, optional
         File, joint, row or key at which it is wrong.
-    mend : str, optional
+    remedy : str, optional
         What to do about it.
     """
 
@@ -70,7 +70,7 @@ class SimulationError(DynidentError):
 
     Parameters
     ----------
-    what, where, mend : see `DynidentError`.
+    what, where, remedy : see `DynidentError`.
     reason : str
         In one word, for programs that go on without it: "setting", "reference" (none, or unfit),
         "clock", "inertia" (M(q) is not positive definite), "massless" (a first moment without

@@ -1,4 +1,8 @@
-"""TOML files checked against a schema, with complaints that name the key and the mend."""
+"""TOML files checked against a schema, with complaints that name the key and the remedy.
+
+The check is pydantic's; ours is the one line in which its first complaint reaches a user, with
+the key that was meant, which pydantic does not guess.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +49,14 @@ def read_toml(path: str | Path, schema: type[T]) -> T:
 
 
 def nearest(word: str, valid: tuple[str, ...] | list[str], kind: str) -> str:
-    """Return a mend for a misspelt word: the valid word that it resembles, else all of them."""
+    """Return a remedy for a misspelt word: the valid word that it resembles, else all of them.
+
+    Parameters
+    ----------
+    word : as it was written.
+    valid : words in its place.
+    kind : what they are, in the plural.
+    """
     close = difflib.get_close_matches(word, valid, n=1)
     return f"did you mean '{close[0]}'?" if close else f"{kind}: {', '.join(valid)}"
 

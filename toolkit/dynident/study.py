@@ -22,7 +22,6 @@ from dynident.criteria import DEFAULTS, Criteria
 from dynident.effects import FRICTION_WIDTH, Effect, effects_of
 from dynident.errors import DynidentError, RobotError, StudyError
 from dynident.model import Model
-from dynident.places import find_data
 from dynident.recording import (
     Column,
     Dataset,
@@ -94,7 +93,7 @@ class _StudyFile(SettingsTable):
         return columns
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Study:
     """What a study file says.
 
@@ -128,7 +127,7 @@ def load(path: str | Path) -> Study:
     Raises
     ------
     StudyError
-        If the file is not a study: it names the key, and the mend.
+        If the file is not a study: it names the key, and the remedy.
     DynidentError
         If the robot or a recording that it names is unusable.
     """
@@ -167,7 +166,14 @@ def load(path: str | Path) -> Study:
     controller = None
     if said.controller:
         controller = said.controller.controller(robot, f"{path}: controller")
-    return Study(path, model, sets["train"], sets["test"], controller, criteria)
+    return Study(
+        path=path,
+        model=model,
+        train=sets["train"],
+        test=sets["test"],
+        controller=controller,
+        criteria=criteria,
+    )
 
 
 def add_effects(path: str | Path, effects: tuple[Effect, ...]) -> None:
@@ -245,7 +251,7 @@ def _robot(said: _StudyFile, path: Path) -> Robot:
         raise StudyError(str(error), f"{path}: joints") from None
     for link in robot.links:
         if not np.all(np.isfinite(link.phi)):
-            what, remedy = "its inertia is not finite", "mend the numbers of its inertial element"
+            what, remedy = "its inertia is not finite", "fix the numbers of its inertial element"
             raise RobotError(what, f"{file}: link '{link.name}'", remedy)
     return robot
 
@@ -259,7 +265,7 @@ def _recordings(said: _StudyFile, path: Path, robot: Robot) -> list[Recording]:
     known: dict[tuple[Path, str | None], Recording] = {}
     found = []
     for number, entry in enumerate(said.recordings, start=1):
-        file = find_data(entry.file, path.parent)
+        file = files.find_data(entry.file, path.parent)
         key = (file, entry.record)
         if key not in known:
             known[key] = read(file, robot.names, columns, robot.kinds, entry.record)

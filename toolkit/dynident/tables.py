@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from html import escape
+from typing import Any
 
 WIDTH = 110
 """Characters of a line where no terminal says how wide it is."""
@@ -123,4 +124,10 @@ def _is_number(cell: str) -> bool:
 
 def finite(value: float) -> float | None:
     """A number as JSON has it: None where it is not finite."""
-    return value if math.isfinite(value) else None
+    return float(value) if math.isfinite(value) else None
+
+
+def json_row(record: Any) -> dict[str, Any]:
+    """The fields of a flat dataclass as JSON has them."""
+    values = {field.name: getattr(record, field.name) for field in fields(record)}
+    return {k: finite(x) if isinstance(x, float) else x for k, x in values.items()}

@@ -112,7 +112,7 @@ def test_noise_is_measured_and_carried_to_honest_intervals(model, truth):
 @pytest.mark.parametrize("position_cutoff", [None, 30.0])
 @pytest.mark.slow
 def test_intervals_hold_behind_filters_and_decimation(model, truth, position_cutoff):
-    filter = Filter(position_cutoff, 15.0, 50.0)
+    filter = Filter(position_cutoff_hz=position_cutoff, cutoff_hz=15.0, rate_hz=50.0)
     true = synthetic(model, truth, 3, rate_hz=200.0, duration=6.0)
     instrument = true.replace(window=(1.0, 5.0))
     # What differences and filters make of the motion itself is not noise.

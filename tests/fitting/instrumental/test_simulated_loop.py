@@ -16,7 +16,7 @@ from dynident.fitting.history import Ending
 from dynident.model import Model
 from dynident.recording import Dataset, Filter
 
-FILTERED = Filter(20.0, 8.0, 20.0)
+FILTERED = Filter(position_cutoff_hz=20.0, cutoff_hz=8.0, rate_hz=20.0)
 TIGHT = 1e-12
 
 

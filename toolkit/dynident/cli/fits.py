@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from dynident.cli.group import Answer, answered, collected, commands
+from dynident.cli.group import CommandAnswer, answered, collected, commands
 from dynident.cli.methods import Chosen, method_options
 from dynident.cli.output import progress
 from dynident.cli.work import STUDY, load_study, require_picture, require_places
@@ -133,7 +133,7 @@ class _More:
 @method_options
 @click.option("--plot", type=_PATH, help="Also write this picture of iv's iterations.")
 @collected(kind=_Kind, more=_More, to=_Files)
-def fit(study: Path, chosen: Chosen, kind: _Kind, more: _More, to: _Files) -> Answer:
+def fit(study: Path, chosen: Chosen, kind: _Kind, more: _More, to: _Files) -> CommandAnswer:
     """Identify the parameters from the training recordings.
 
     With --method iv the instruments come from the simulated loop of the study's [controller]; the
@@ -155,7 +155,7 @@ def fit(study: Path, chosen: Chosen, kind: _Kind, more: _More, to: _Files) -> An
         estimate = fit_model(loaded.model, loaded.train, method)
         tables, content = more.of(estimate, chosen, loaded)
     to.write(estimate)
-    return Answer(
+    return CommandAnswer(
         content=lambda: estimate.to_dict() | content,
         parts=lambda: (*estimate.tables(), *tables),
     )

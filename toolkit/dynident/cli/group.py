@@ -32,7 +32,7 @@ def commands() -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Answer:
+class CommandAnswer:
     """What a command has to say, worked out in the form that is asked for.
 
     Attributes
@@ -49,8 +49,8 @@ class Answer:
     status: int = 0
 
 
-def answered(command: Callable[..., Answer]) -> Callable[..., int]:
-    """Give a command the option --json, and print the `Answer` that it returns."""
+def answered(command: Callable[..., CommandAnswer]) -> Callable[..., int]:
+    """Give a command the option --json, and print the `CommandAnswer` that it returns."""
 
     @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
     @wraps(command)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from dynident import files
-from dynident.cli.group import Answer, answered, commands
+from dynident.cli.group import CommandAnswer, answered, commands
 from dynident.cli.methods import Chosen, method_options, require_rate
 from dynident.cli.output import progress
 from dynident.cli.work import command_line, load_study, require_picture, require_places
@@ -45,7 +45,7 @@ def simulate(
     plot: Path | None,
     out: Path | None,
     chosen: Chosen,
-) -> Answer:
+) -> CommandAnswer:
     """Simulate the identified robot in the loop that was recorded, and compare the motion.
 
     STUDY needs a [controller], and recordings with their reference (q_ref). Errors of position,
@@ -82,14 +82,14 @@ def simulate(
     _write(found, report, plot)
     words = {"train": ("No recording is for testing: these are the training recordings.",)}
     failed = any(one.status != "no_reference" for one in found.skipped)
-    return Answer(
+    return CommandAnswer(
         content=lambda: {"recordings_used": used, **found.to_dict()},
         parts=lambda: (*found.tables(), *words.get(used, ())),
         status=1 if failed or found.verdict != "follows" else 0,
     )
 
 
-def _make(file: Path, out: Path) -> Answer:
+def _make(file: Path, out: Path) -> CommandAnswer:
     """Make virtual measurements."""
     from dynident.closed_loop import load_experiment, write_experiment
 
@@ -97,7 +97,7 @@ def _make(file: Path, out: Path) -> Answer:
     with progress("simulating") as show_progress:
         written = write_experiment(loaded, out, progress=show_progress)
     paths = tuple(map(str, written))
-    return Answer(content=lambda: {"written": list(paths)}, lines=paths)
+    return CommandAnswer(content=lambda: {"written": list(paths)}, lines=paths)
 
 
 def _kind(path: Path) -> Literal["study", "experiment"]:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dynident.study import Study
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Chosen:
     """What the options say.
 
@@ -56,7 +56,14 @@ class Chosen:
     def estimator(
         self, study: Study, weighting: Literal["joint", "none"], show_progress: Callable[..., Any]
     ) -> Method:
-        """Return the estimator of a study; raises what `iv` raises."""
+        """Return the estimator of a study; raises what `iv` raises.
+
+        Parameters
+        ----------
+        study : for controller and recordings.
+        weighting : of the joints.
+        show_progress : called from round to round of the instruments.
+        """
         from dynident.fitting import LeastSquares, Regression
 
         if self.method == "iv":
@@ -84,6 +91,10 @@ class Chosen:
         self, study: Study, weighting: Literal["joint", "none"], show_progress: Callable[..., Any]
     ) -> IV:
         """Return the instrumental variable estimator of a study.
+
+        Parameters
+        ----------
+        study, weighting, show_progress : as in `estimator`.
 
         Raises
         ------

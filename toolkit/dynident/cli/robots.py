@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from dynident import files
-from dynident.cli.group import Answer, answered, collected, commands
+from dynident.cli.group import CommandAnswer, answered, collected, commands
 from dynident.cli.output import progress
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ _PATH = click.Path(path_type=Path)
 @click.argument("robot", metavar="ROBOT|ESTIMATE", type=_PATH)
 @click.option("--all", "every_rule", is_flag=True, help="Print the margin of every rule, too.")
 @answered
-def check(robot: Path, every_rule: bool) -> Answer:
+def check(robot: Path, every_rule: bool) -> CommandAnswer:
     """Say whether a robot can exist: the margin of every rule, link by link, worst first.
 
     ROBOT is a robot description (URDF, SDF or MJCF), ESTIMATE a saved estimate. Exit status 1 if a
@@ -37,7 +37,7 @@ def check(robot: Path, every_rule: bool) -> Answer:
 
     with progress("checking"):
         found = check_robot(robot)
-    return Answer(
+    return CommandAnswer(
         content=found.to_dict,
         parts=lambda: (*((found.margin_table(),) if every_rule else ()), *found.tables()),
         status=0 if found.consistent else 1,
@@ -89,9 +89,7 @@ class _Problem:
 @click.argument("what", metavar="ROBOT|ESTIMATE|CSV", type=_PATH)
 @click.option("--out", type=_PATH, required=True, help="The robot description to write.")
 @click.option("--study", type=_PATH, help="Recordings: move what they do not mind.")
-@click.option(
-    "--robot", type=_PATH, help="Description that is believed in, and whose parameters a CSV has."
-)
+@click.option("--robot", type=_PATH, help="Prior; also the description whose parameters a CSV has.")
 @click.option("--order", help="Of a CSV without names: dynident or paper.")
 @click.option(
     "--consistency", type=click.Choice(["full", "semi"]), default="full", show_default=True
@@ -101,13 +99,13 @@ class _Problem:
     type=click.Choice(["quadratic", "entropic"]),
     default="quadratic",
     show_default=True,
-    help="From the description that is believed in.",
+    help="From the prior.",
 )
 @click.option("--spread", default=0.3, show_default=True, help="Relative doubt about it.")
 @click.option("--solver", type=click.Choice(["conic", "nlp"]), default="conic", show_default=True)
 @answered
 @collected(inputs=_Inputs, problem=_Problem)
-def refit(what: Path, out: Path, inputs: _Inputs, problem: _Problem) -> Answer:
+def refit(what: Path, out: Path, inputs: _Inputs, problem: _Problem) -> CommandAnswer:
     """Write the nearest robot that can exist, and the proof that it is the nearest.
 
     ROBOT is a robot description (URDF, SDF or MJCF), ESTIMATE a saved estimate, CSV a list of
@@ -117,7 +115,7 @@ def refit(what: Path, out: Path, inputs: _Inputs, problem: _Problem) -> Answer:
     OUT is replaced only after what was written has been read back, is consistent, and moves in
     Drake and Pinocchio; it may be ROBOT itself.
 
-    Example: dynident refit robot.urdf --out mended.urdf
+    Example: dynident refit robot.urdf --out refitted.urdf
     """
     from dynident.constraints import Within
     from dynident.refitting import refit as refit_robot
@@ -132,7 +130,7 @@ def refit(what: Path, out: Path, inputs: _Inputs, problem: _Problem) -> Answer:
         found = refit_robot(subject, loaded, problem.prior(centre), within, problem.solver)
     with progress("verifying"):
         verified = found.write_robot(out)
-    return Answer(
+    return CommandAnswer(
         content=lambda: {"out": str(out), "verified": verified.to_dict(), **found.to_dict()},
         parts=lambda: (*found.tables(), *verified.sentences),
     )

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from dynident.cli.group import Answer, answered, commands
+from dynident.cli.group import CommandAnswer, answered, commands
 from dynident.cli.work import (
     STUDY,
     comparison_of,
@@ -24,7 +24,7 @@ _PATH = click.Path(path_type=Path)
 @STUDY
 @answered
 @click.option("--report", type=_PATH, help="Also write this HTML report.")
-def explain(study: Path, report: Path | None) -> Answer:
+def explain(study: Path, report: Path | None) -> CommandAnswer:
     """Run the whole loop: compare, diagnose, add, refit, compare. The study stays as it is.
 
     Example: dynident explain study.toml --report report.html
@@ -33,7 +33,7 @@ def explain(study: Path, report: Path | None) -> Answer:
     loaded = load_study(study)
     diagnosis = diagnosis_of(loaded)
     write_report(loaded, diagnosis, report)
-    return Answer(
+    return CommandAnswer(
         content=diagnosis.to_dict,
         parts=lambda: (*diagnosis.tables(), diagnosis.after.parameter_table()),
     )
@@ -42,13 +42,13 @@ def explain(study: Path, report: Path | None) -> Answer:
 @commands.command()
 @STUDY
 @answered
-def diagnose(study: Path) -> Answer:
+def diagnose(study: Path) -> CommandAnswer:
     """Say where the model fails and which effects it lacks.
 
     Example: dynident diagnose study.toml --json
     """
     diagnosis = diagnosis_of(load_study(study))
-    return Answer(content=diagnosis.to_dict, parts=diagnosis.tables)
+    return CommandAnswer(content=diagnosis.to_dict, parts=diagnosis.tables)
 
 
 @commands.command()
@@ -61,21 +61,21 @@ def diagnose(study: Path) -> Answer:
     metavar="EFFECT[@JOINT]",
     help="Compare with the model that has this effect too; may be repeated.",
 )
-def compare(study: Path, additions: tuple[str, ...]) -> Answer:
+def compare(study: Path, additions: tuple[str, ...]) -> CommandAnswer:
     """Compare the model with measurements that it was not fitted to.
 
     Example: dynident compare study.toml --with stribeck_friction@elbow
     """
     loaded = load_study(study)
     comparison = comparison_of(loaded, additions)
-    return Answer(content=comparison.to_dict, parts=comparison.tables)
+    return CommandAnswer(content=comparison.to_dict, parts=comparison.tables)
 
 
 @commands.command()
 @STUDY
 @click.argument("effect", metavar="EFFECT[@JOINT[:SOURCE]]")
 @answered
-def add(study: Path, effect: str) -> Answer:
+def add(study: Path, effect: str) -> CommandAnswer:
     """Write an effect into the study file; print the error before and after.
 
     Example: dynident add study.toml stribeck_friction@elbow
@@ -95,7 +95,7 @@ def add(study: Path, effect: str) -> Answer:
             raise StudyError("no recording carries a payload", str(study), remedy)
     comparison = comparison_of(loaded, (effect,))
     add_effects(study, fresh)
-    return Answer(
+    return CommandAnswer(
         content=lambda: {"added": [one.label for one in fresh], **comparison.to_dict()},
         parts=lambda: (*comparison.tables()[:1], f"Written into {study}."),
     )
@@ -105,7 +105,7 @@ def add(study: Path, effect: str) -> Answer:
 @STUDY
 @answered
 @click.option("--to", type=_PATH, default=Path("report.html"), show_default=True)
-def report(study: Path, to: Path) -> Answer:
+def report(study: Path, to: Path) -> CommandAnswer:
     """Diagnose, and write the HTML report.
 
     Example: dynident report study.toml --to report.html
@@ -114,7 +114,7 @@ def report(study: Path, to: Path) -> Answer:
     loaded = load_study(study)
     diagnosis = diagnosis_of(loaded)
     write_report(loaded, diagnosis, to)
-    return Answer(
+    return CommandAnswer(
         content=lambda: {"report": str(to), **diagnosis.to_dict()}, lines=(diagnosis.sentence,)
     )
 
@@ -122,7 +122,7 @@ def report(study: Path, to: Path) -> Answer:
 @commands.command()
 @answered
 @click.option("--to", type=_PATH, default=Path("demo.report.html"), show_default=True)
-def demo(to: Path) -> Answer:
+def demo(to: Path) -> CommandAnswer:
     """Find the effect hidden in the data of an embedded two-link arm.
 
     Example: dynident demo
@@ -132,7 +132,7 @@ def demo(to: Path) -> Answer:
     loaded = load_study(study)
     diagnosis = diagnosis_of(loaded)
     write_report(loaded, diagnosis, to)
-    return Answer(
+    return CommandAnswer(
         content=diagnosis.to_dict,
         parts=lambda: (*diagnosis.tables(), f"The report to open: {to.resolve()}"),
     )

@@ -82,7 +82,14 @@ def _missing(label: str, study: Study):
 
 
 def write_report(study: Study, diagnosis: Diagnosis, to: Path | None) -> None:
-    """Write the HTML report, with the final model's loop where the study knows its controller."""
+    """Write the HTML report, with the final model's loop where the study knows its controller.
+
+    Parameters
+    ----------
+    study : for its path, its controller and its recordings.
+    diagnosis : what is reported.
+    to : the file; None for no report.
+    """
     if to is None:
         return
     from dynident.reporting import report as write

@@ -13,8 +13,10 @@ from dynident.robot.formats.reading import broken_numbers, joint_dynamics
 from dynident.robot.geometry import LinkGeometry, link_geometry
 from dynident.robot.hull import Hull
 
+_GRAVITY = 9.81
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class CheckedBody:
     """One thing to check.
 
@@ -41,12 +43,26 @@ class CheckedBody:
     not_checked: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Scale:
     """What is typical of a robot: the mass of a link, kg, and its extent, m."""
 
     mass: float
     length: float
+
+    def of(self, unit: str) -> float:
+        """Return the size of a quantity in that unit, made of mass, length and gravity."""
+        time = float(np.sqrt(self.length / _GRAVITY))
+        units = {"kg": self.mass, "m": self.length, "s": time, "rad": 1.0}
+        units["N"] = self.mass * _GRAVITY
+        size, above = 1.0, True
+        for part in unit.replace("/", " / ").split():
+            if part == "/":
+                above = False
+                continue
+            name, _, power = part.partition("^")
+            size *= units.get(name, 1.0) ** (float(power or 1.0) * (1.0 if above else -1.0))
+        return size
 
 
 def of_links(
@@ -93,18 +109,27 @@ def of_links(
             link.phi, hull, reaches.get(link.joint, 0.0), scale.length, not shapes.not_read
         )
         body = Body(
-            link.name,
-            link.phi,
-            length,
-            length_from,
-            scale.mass,
-            hull,
-            not shapes.not_read,
-            broken.get(link.name, ()) if link.source != "set" else (),
+            name=link.name,
+            phi=link.phi,
+            length=length,
+            length_from=length_from,
+            typical_mass=scale.mass,
+            hull=hull,
+            whole=not shapes.not_read,
+            broken_numbers=broken.get(link.name, ()) if link.source != "set" else (),
             onward=_onward(link, robot) if robot is not None else None,
         )
         carrier = robot.bodies[link.joint] if robot is not None and link.joint >= 0 else ""
-        subjects.append(CheckedBody(body, "link", carrier, (), link.source, shapes.not_read))
+        subjects.append(
+            CheckedBody(
+                body=body,
+                kind="link",
+                carrier=carrier,
+                links=(),
+                source=link.source,
+                not_checked=shapes.not_read,
+            )
+        )
     if robot is not None:
         subjects += _moving(robot, reaches, scale, rotors, subjects)
     # Lengths are made of the extents that are known, here of none.
@@ -124,7 +149,7 @@ def _length(
         return (reach, "joints") if reach >= typical else (typical, "robot")
     if typical > 0.0:
         return typical, "robot"
-    # Nothing but the inertia itself tells: the extent of a box that has it.
+    # Nothing is left but the inertia itself: the extent of a box that has it.
     if np.all(np.abs(phi) < LARGEST) and phi[0] != 0.0:
         properties = to_com(phi)
         size = float(np.sqrt(6.0 * abs(np.trace(properties.inertia_com) / phi[0])))
@@ -189,8 +214,24 @@ def _moving(
             scale.length,
             True,
         )
-        body = Body(name, phi, length, length_from, scale.mass, weightless=weightless)
-        found.append(CheckedBody(body, "moving body", name, parts, "sum", ()))
+        body = Body(
+            name=name,
+            phi=phi,
+            length=length,
+            length_from=length_from,
+            typical_mass=scale.mass,
+            weightless=weightless,
+        )
+        found.append(
+            CheckedBody(
+                body=body,
+                kind="moving body",
+                carrier=name,
+                links=parts,
+                source="sum",
+                not_checked=(),
+            )
+        )
     return found
 
 

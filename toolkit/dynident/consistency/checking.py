@@ -11,7 +11,7 @@ from dynident import files
 from dynident.consistency.checked_bodies import CheckedBody, of_links
 from dynident.consistency.findings import Check
 from dynident.consistency.hints import hints
-from dynident.consistency.joint_parameters import JointCheck, Size, of_description, of_estimate
+from dynident.consistency.joint_parameters import JointCheck, of_description, of_estimate
 from dynident.consistency.link import LinkCheck
 from dynident.consistency.remedy import remedy
 from dynident.consistency.rules import TITLES, judge
@@ -128,12 +128,11 @@ def _check(
 ) -> Check:
     subjects, scale = of_links(links, description, robot, _rotors(estimate))
     found = tuple(sorted((_link(one) for one in subjects), key=_order))
-    size = Size(scale.mass, scale.length)
     joints: tuple[JointCheck, ...] = ()
     if description is not None:
-        joints = of_description(joint_dynamics(description), size)
+        joints = of_description(joint_dynamics(description), scale)
     if estimate is not None:
-        joints += of_estimate(estimate, size)
+        joints += of_estimate(estimate, scale)
     mute = [link.name for link in links if link.source == "absent"]
     if mute and len(mute) == len(links):
         notes = ("The description states no inertia of any link.", *notes)
@@ -145,12 +144,14 @@ def _check(
     if not_read:
         notes = (*notes, "Geometry not checked: " + ". ".join(not_read) + ".")
     return Check(
-        name,
-        source,
-        tuple(one for one in found if one.kind == "link"),
-        tuple(one for one in found if one.kind != "link"),
-        tuple(sorted(joints, key=lambda one: _worst(one.relative) if one.broken else np.inf)),
-        notes,
+        name=name,
+        source=source,
+        links=tuple(one for one in found if one.kind == "link"),
+        bodies=tuple(one for one in found if one.kind != "link"),
+        joints=tuple(
+            sorted(joints, key=lambda one: _worst(one.relative) if one.broken else np.inf)
+        ),
+        notes=notes,
     )
 
 
@@ -180,20 +181,20 @@ def _link(subject: CheckedBody) -> LinkCheck:
     # Finite numbers are no margin to speak of once they are finite.
     rules.sort(key=lambda one: one.rule == "finite" and not one.broken)
     broken = any(one.broken for one in rules)
-    told = list(hints(body, verdicts))
+    suspicions = list(hints(body, verdicts))
     if body.phi[0] == 0.0 and not broken and subject.source == "inertial element":
-        told.append("its mass is stated as zero")
+        suspicions.append("its mass is stated as zero")
     return LinkCheck(
-        body.name,
-        subject.kind,
-        subject.carrier,
-        subject.links,
-        body.length,
-        body.length_from,
-        tuple(rules),
-        (*subject.not_checked, *verdicts.not_checked),
-        tuple(told),
-        remedy(body) if broken else (),
+        name=body.name,
+        kind=subject.kind,
+        body=subject.carrier,
+        parts=subject.links,
+        length=body.length,
+        length_from=body.length_from,
+        rules=tuple(rules),
+        not_checked=(*subject.not_checked, *verdicts.not_checked),
+        hints=tuple(suspicions),
+        remedy=remedy(body) if broken else (),
     )
 
 

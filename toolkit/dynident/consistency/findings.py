@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from dynident.consistency.joint_parameters import JointCheck
-from dynident.consistency.link import LinkCheck, finite
+from dynident.consistency.link import LinkCheck
 from dynident.consistency.rules import TITLES, RuleMargin
 from dynident.consistency.spread import IMPOSSIBLE_SPREAD
 from dynident.errors import ConsistencyError
-from dynident.tables import Table, number, percent, print_tables
+from dynident.tables import Table, json_row, number, percent, print_tables
 
 _RELATIVE = (
     "relative: a mass to the robot's typical mass, a length to the link's extent l, a "
@@ -18,7 +18,7 @@ _RELATIVE = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Check:
     """Which links of a robot are impossible, by which rule and by how much.
 
@@ -156,9 +156,9 @@ class Check:
             )
             for one in self.joints
         )
-        told = tuple(f"{one.name}: {one.words}." for one in self.joints if one.broken)
+        notes = tuple(f"{one.name}: {one.words}." for one in self.joints if one.broken)
         columns = ("joint", "quantity", "value", "unit", "verdict")
-        return Table("Friction and rotors (none may be negative)", columns, rows, told)
+        return Table("Friction and rotors (none may be negative)", columns, rows, notes)
 
     def _hidden(self) -> list[str]:
         """Broken links that a consistent moving body hides, and the reverse."""
@@ -181,19 +181,7 @@ class Check:
             "consistent": self.consistent,
             "links": [one.to_dict() for one in self.links],
             "bodies": [one.to_dict() for one in self.bodies],
-            "joints": [
-                {
-                    "name": one.name,
-                    "quantity": one.quantity,
-                    "value": finite(one.value),
-                    "unit": one.unit,
-                    "relative": finite(one.relative),
-                    "sigma": None if one.sigma is None else finite(one.sigma),
-                    "broken": one.broken,
-                    "words": one.words,
-                }
-                for one in self.joints
-            ],
+            "joints": [json_row(one) for one in self.joints],
             "notes": [*self._hidden(), *self.notes],
         }
 

@@ -129,8 +129,8 @@ def _units(ratio: float, which: str) -> str:
     near = {name: abs(np.log10(factor / value)) for name, value in _UNITS.items()}
     likely = sorted((name for name, far in near.items() if far < 0.75), key=near.__getitem__)[:2]
     # The extent is no exact measure: if a unit explains it, its factor is the better figure.
-    told = _UNITS[likely[0]] if likely else factor
-    text = f"about {_power(told)} times too {which} for the mass and the extent: units?"
+    times = _UNITS[likely[0]] if likely else factor
+    text = f"about {_power(times)} times too {which} for the mass and the extent: units?"
     if not likely:
         return text
     if which == "large":
@@ -164,7 +164,13 @@ def _holds(body: Body, inertia: Array) -> bool:
     properties = to_com(body.phi)
     phi = from_com(properties.mass, properties.com, inertia)
     changed = Body(
-        body.name, phi, body.length, body.length_from, body.typical_mass, body.hull, body.whole
+        name=body.name,
+        phi=phi,
+        length=body.length,
+        length_from=body.length_from,
+        typical_mass=body.typical_mass,
+        hull=body.hull,
+        whole=body.whole,
     )
     return not any(one.broken or one.doubtful for one in judge(changed).rules)
 

@@ -7,38 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dynident.consistency.checked_bodies import Scale
 from dynident.robot.formats.format import JointDynamics
 
 if TYPE_CHECKING:
     from dynident.effects import Parameter
     from dynident.fitting import Estimate
 
-_GRAVITY = 9.81
 
-
-@dataclass(frozen=True)
-class Size:
-    """What is large for a robot: its typical mass, kg, and extent of a link, m."""
-
-    mass: float
-    length: float
-
-    def of(self, unit: str) -> float:
-        """Return the size of a quantity in that unit, made of mass, length and gravity."""
-        time = float(np.sqrt(self.length / _GRAVITY))
-        units = {"kg": self.mass, "m": self.length, "s": time, "rad": 1.0}
-        units["N"] = self.mass * _GRAVITY
-        size, above = 1.0, True
-        for part in unit.replace("/", " / ").split():
-            if part == "/":
-                above = False
-                continue
-            name, _, power = part.partition("^")
-            size *= units.get(name, 1.0) ** (float(power or 1.0) * (1.0 if above else -1.0))
-        return size
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class JointCheck:
     """The margin of one quantity at a joint (or of an effect of the whole robot).
 
@@ -69,7 +46,7 @@ class JointCheck:
     words: str = ""
 
 
-def of_description(dynamics: tuple[JointDynamics, ...], size: Size) -> tuple[JointCheck, ...]:
+def of_description(dynamics: tuple[JointDynamics, ...], scale: Scale) -> tuple[JointCheck, ...]:
     """Judge what a description states of its joints."""
     found = []
     for one in dynamics:
@@ -81,14 +58,23 @@ def of_description(dynamics: tuple[JointDynamics, ...], size: Size) -> tuple[Joi
                 words = (
                     f"{one.quantity} is negative: {one.value:.4g} {one.unit} (nearest possible: 0)"
                 )
-        relative = one.value / size.of(one.unit)
+        relative = one.value / scale.of(one.unit)
         found.append(
-            JointCheck(one.joint, one.quantity, one.value, one.unit, relative, None, broken, words)
+            JointCheck(
+                name=one.joint,
+                quantity=one.quantity,
+                value=one.value,
+                unit=one.unit,
+                relative=relative,
+                sigma=None,
+                broken=broken,
+                words=words,
+            )
         )
     return tuple(found)
 
 
-def of_estimate(estimate: Estimate, size: Size) -> tuple[JointCheck, ...]:
+def of_estimate(estimate: Estimate, scale: Scale) -> tuple[JointCheck, ...]:
     """Judge the parameters of an estimate's effects against their physical bounds."""
     model, sigmas = estimate.model, estimate.sigma
     found = []
@@ -99,15 +85,22 @@ def of_estimate(estimate: Estimate, size: Size) -> tuple[JointCheck, ...]:
                 continue
             value, sigma = float(estimate.values[index]), float(sigmas[index])
             margin = min(value - parameter.lower, parameter.upper - value)
-            scale = size.of(parameter.unit)
+            large = scale.of(parameter.unit)
             # Rounding of a constrained fit is forgiven.
-            broken = not margin >= -1e-9 * scale
+            broken = not margin >= -1e-9 * large
             apart = margin / sigma if sigma > 0.0 else None
             name = model.names[index]
             words = _words(effect.name, value, parameter, apart) if broken else ""
             found.append(
                 JointCheck(
-                    name, effect.name, value, parameter.unit, margin / scale, apart, broken, words
+                    name=name,
+                    quantity=effect.name,
+                    value=value,
+                    unit=parameter.unit,
+                    relative=margin / large,
+                    sigma=apart,
+                    broken=broken,
+                    words=words,
                 )
             )
     return tuple(found)

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from textwrap import fill
 from typing import Any
 
-import numpy as np
-
 from dynident.consistency.remedy import Change
 from dynident.consistency.rules import TITLES, RuleMargin
-from dynident.tables import WIDTH
+from dynident.tables import WIDTH, json_row
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class LinkCheck:
     """The findings on one link, or on the links that move as one.
 
@@ -36,7 +34,7 @@ class LinkCheck:
         What could not be judged, and why.
     hints : tuple of str
         What may have gone wrong.
-    mend : tuple of Change
+    remedy : tuple of Change
         The smallest change after which every rule holds; empty where nothing is broken or no
         such change is known.
     """
@@ -86,28 +84,10 @@ class LinkCheck:
             "length": self.length,
             "length_from": self.length_from,
             "broken": bool(self.broken),
-            "rules": [
-                {
-                    "rule": one.rule,
-                    "value": finite(one.value),
-                    "unit": one.unit,
-                    "relative": finite(one.relative),
-                    "broken": one.broken,
-                    "words": one.words,
-                }
-                for one in self.rules
-            ],
+            "rules": [json_row(one) for one in self.rules],
             "not_checked": list(self.not_checked),
             "hints": list(self.hints),
-            "mend": [
-                {
-                    "name": one.name,
-                    "before": finite(one.before),
-                    "after": finite(one.after),
-                    "unit": one.unit,
-                }
-                for one in self.remedy
-            ],
+            "mend": [json_row(one) for one in self.remedy],
         }
 
     @property
@@ -116,7 +96,7 @@ class LinkCheck:
         return "BROKEN" if self.broken else "look at it" if self.hints else "holds"
 
     def details(self) -> str:
-        """Return what is broken on it, why that may be, and what mends it, in words."""
+        """Return what is broken on it, why that may be, and what remedies it, in words."""
         lines = [f"{self.title}:"]
         for rule in sorted(self.broken, key=lambda rule: list(TITLES).index(rule.rule)):
             if rule.rule == "pseudo_inertia" and len(self.broken) > 1:
@@ -125,11 +105,11 @@ class LinkCheck:
         lines += [f"  {hint}" for hint in self.hints]
         if self.remedy:
             changes = [str(change) for change in self.remedy if change.shows]
-            lines.append("  smallest change that mends it (moments about the centre of mass):")
+            lines.append("  smallest change that fixes it (moments about the centre of mass):")
             # Three to a line fit 110 columns.
             lines += [f"    {', '.join(changes[i : i + 3])}" for i in range(0, len(changes), 3)]
         elif not any(rule.rule == "finite" for rule in self.broken) and self.kind == "link":
-            lines.append("  no small change mends it: state its mass and inertia anew")
+            lines.append("  no small change fixes it: state its mass and inertia anew")
         return "\n".join(_wrapped(line) for line in lines)
 
 
@@ -137,8 +117,3 @@ def _wrapped(line: str) -> str:
     """A long line broken under its own indentation."""
     indent = " " * (len(line) - len(line.lstrip()) + 4)
     return fill(line, WIDTH - 1, subsequent_indent=indent, break_long_words=False)
-
-
-def finite(value: float) -> float | None:
-    """Return a number as JSON can hold it."""
-    return float(value) if np.isfinite(value) else None

@@ -62,10 +62,10 @@ def remedy(body: Body) -> tuple[Change, ...]:
     except (DynidentError, np.linalg.LinAlgError):
         return ()  # numbers beyond what can be solved for: nothing near them is possible
     if body.hull is not None and phi[0] > 0.0:
-        mended = replace(body, phi=phi)
-        broken = {one.rule for one in judge(mended).rules if one.broken}
+        remedied = replace(body, phi=phi)
+        broken = {one.rule for one in judge(remedied).rules if one.broken}
         if broken & {"centre_of_mass", "spread"}:
-            phi = _within(mended, body.hull, "centre_of_mass" in broken)
+            phi = _within(remedied, body.hull, "centre_of_mass" in broken)
     if any(one.broken for one in judge(replace(body, phi=phi)).rules):
         return ()
     return _changes(body, phi)

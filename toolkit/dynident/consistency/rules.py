@@ -28,7 +28,7 @@ TITLES = {
 _DRAWN = 1e-6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RuleMargin:
     """How far a body is inside (positive) or outside (negative) of one rule.
 
@@ -61,7 +61,7 @@ class RuleMargin:
         return bool(self.words) and not self.broken
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Body:
     """A link, or the links that move as one, as the rules see it.
 
@@ -143,14 +143,21 @@ def judge(body: Body) -> Verdicts:
 
 def _finite(body: Body) -> RuleMargin:
     if body.readable:
-        return RuleMargin("finite", 1.0, "", 1.0, False)
+        return RuleMargin(rule="finite", value=1.0, unit="", relative=1.0, broken=False)
     names = body.broken_numbers or tuple(
         f"{name} = {value:g}"
         for name, value in zip(PARAMETERS, body.phi, strict=True)
         if not abs(value) < LARGEST
     )
     nan = float("nan")
-    return RuleMargin("finite", nan, "", nan, True, f"not a usable number: {', '.join(names)}")
+    return RuleMargin(
+        rule="finite",
+        value=nan,
+        unit="",
+        relative=nan,
+        broken=True,
+        words=f"not a usable number: {', '.join(names)}",
+    )
 
 
 def _consistency(body: Body) -> list[RuleMargin]:
@@ -179,12 +186,12 @@ def _consistency(body: Body) -> list[RuleMargin]:
             f"a principal moment exceeds the sum of the others: {largest}",
         ),
         RuleMargin(
-            "pseudo_inertia",
-            found.pseudo_inertia_min_eig,
-            "kg, kg m, kg m^2",
-            float(_eigenvalues(scaled)[0]),
-            (found.mass < 0.0 and mass.broken) or turning or triangle,
-            "no distribution of mass has these parameters" if turning or triangle else "",
+            rule="pseudo_inertia",
+            value=found.pseudo_inertia_min_eig,
+            unit="kg, kg m, kg m^2",
+            relative=float(_eigenvalues(scaled)[0]),
+            broken=(found.mass < 0.0 and mass.broken) or turning or triangle,
+            words="no distribution of mass has these parameters" if turning or triangle else "",
         ),
     ]
 
@@ -225,8 +232,8 @@ def _negative_moment(phi: Array, found: Margins) -> str:
         return "there is a first moment of mass but no mass, so there is no centre of mass"
     diagonal = np.diag(to_com(phi).inertia_com)
     named = [f"i{a}{a} = {x:.4g}" for a, x in zip("xyz", diagonal, strict=True) if x < 0.0]
-    told = f" ({', '.join(named)})" if named else ""
-    return f"a principal moment is negative: {least:.4g} kg m^2{told}"
+    which = f" ({', '.join(named)})" if named else ""
+    return f"a principal moment is negative: {least:.4g} kg m^2{which}"
 
 
 def _inside(body: Body, hull: Hull) -> RuleMargin:
@@ -250,14 +257,21 @@ def _spread(body: Body, hull: Hull) -> RuleMargin:
         f"{excess:.3g} kg m^2"
     )
     return RuleMargin(
-        "spread",
-        -excess,
-        "kg m^2",
-        -excess / body.moment,
-        exceeded and relative_spread(body.phi, hull) > IMPOSSIBLE_SPREAD,
-        words if exceeded else "",
+        rule="spread",
+        value=-excess,
+        unit="kg m^2",
+        relative=-excess / body.moment,
+        broken=exceeded and relative_spread(body.phi, hull) > IMPOSSIBLE_SPREAD,
+        words=words if exceeded else "",
     )
 
 
 def _rule(name: str, value: float, unit: str, scale: float, broken: bool, words: str) -> RuleMargin:
-    return RuleMargin(name, value, unit, value / scale, broken, words if broken else "")
+    return RuleMargin(
+        rule=name,
+        value=value,
+        unit=unit,
+        relative=value / scale,
+        broken=broken,
+        words=words if broken else "",
+    )

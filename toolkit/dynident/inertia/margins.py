@@ -20,7 +20,7 @@ _DIGITS = 1e-6
 _ROUNDING = 1e-9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Margins:
     """The margin of every rule of physical consistency for one body.
 
@@ -99,7 +99,14 @@ def margins(phi: ArrayLike) -> Margins:
     phi = np.asarray(phi, dtype=float)
     if not np.all(np.isfinite(phi)):
         nan = float("nan")
-        return Margins(float(phi[0]), nan, nan, nan, 1.0, 1.0)
+        return Margins(
+            mass=float(phi[0]),
+            inertia_com_min_eig=nan,
+            triangle=nan,
+            pseudo_inertia_min_eig=nan,
+            scale=1.0,
+            inertia_scale=1.0,
+        )
     scale = float(np.max(np.abs(phi)))
     inertia_com = to_com(_without_lost_mass(phi, _ROUNDING * scale)).inertia_com
     if np.all(np.isfinite(inertia_com)):

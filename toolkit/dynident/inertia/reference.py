@@ -1,4 +1,4 @@
-"""A body that surely exists, of the size of a given one: the unit of distance between inertias."""
+"""A reference body, possible and of the size of a given one: the unit of inertias' distances."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _BASIS = np.array([pseudo_inertia(unit) for unit in np.eye(10)])
 def reference_body(phi: ArrayLike, mass: float, length: float) -> NDArray[np.float64]:
     """Return the parameters (10,) of a consistent body of the size of a given one.
 
-    It keeps what can be believed of the given one: a positive mass, a centre of mass within reach,
+    It keeps what is possible of the given one: a positive mass, a centre of mass within reach,
     and the second moments of mass, each radius of gyration brought between a tenth of the length
     and the length. Turning the frame, or changing the units, turns or changes the result alike.
 

@@ -21,11 +21,15 @@ from dynident.recording.formats.columns import Column
 from dynident.recording.formats.read import SUFFIXES, read
 from dynident.recording.formats.write import write
 from dynident.recording.masks import away_from_edges, moving, within
-from dynident.recording.motion_check import require_motion, require_torque, warn_of_missing_torque
 from dynident.recording.parallel import FilterBlock, ParallelFilter, choose_factor
 from dynident.recording.periods import Periods, mismatch, periods, require_repetition
+from dynident.recording.plausibility import (
+    require_motion,
+    require_torque,
+    resolution,
+    warn_of_missing_torque,
+)
 from dynident.recording.recording import SIGNALS, Provenance, Recording
-from dynident.recording.resolution import resolution
 from dynident.recording.uniform import uniform
 
 __all__ = [

@@ -17,7 +17,7 @@ _LEAST_SHARE = 1e-6
 """Cut-off over sampling rate below which a filter's coefficients run out of digits."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Filter:
     """How a recording is filtered, differentiated and decimated.
 
@@ -73,7 +73,7 @@ class Filter:
         return ", ".join(part for part in parts if part) or "none"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Motion:
     """Filtered positions and their derivatives, at the recording's own rate.
 
@@ -109,7 +109,13 @@ def default_filter(rate_hz: float) -> Filter:
     """
     share = min(1.0, rate_hz / 200.0)
     edge = 3.0 / (40.0 * share)
-    return Filter(40.0 * share, 18.0 * share, 50.0 * share, "pick", (edge, edge))
+    return Filter(
+        position_cutoff_hz=40.0 * share,
+        cutoff_hz=18.0 * share,
+        rate_hz=50.0 * share,
+        decimation="pick",
+        edge_s=(edge, edge),
+    )
 
 
 def lowpass(
@@ -147,6 +153,16 @@ def butterworth(
 
     Sections rather than numerator and denominator: these lose digits at low cut-offs.
 
+    Parameters
+    ----------
+    rate_hz, cutoff_hz : of the samples, and of half the power.
+    order : of the filter.
+    where : file, for messages.
+
+    Returns
+    -------
+    (order / 2, 6) sections, as `scipy.signal.butter` gives them.
+
     Raises
     ------
     RecordingError
@@ -167,7 +183,18 @@ def butterworth(
 def zero_phase(
     x: np.ndarray, sections: np.ndarray, padding: int, where: str | None = None
 ) -> np.ndarray:
-    """Filter forward and backward along axis 0; `padding` samples of reflection at each end.
+    """Filter forward and backward along axis 0.
+
+    Parameters
+    ----------
+    x : (T, ...) of any quantity.
+    sections : of the filter, see `butterworth`.
+    padding : samples of point reflection at each end.
+    where : file, for messages.
+
+    Returns
+    -------
+    (T, ...) filtered twice, without delay.
 
     Raises
     ------
@@ -253,4 +280,12 @@ def differentiate(recording: Recording, filter: Filter) -> Motion:
             where,
             "record longer, or choose a smaller edge_s",
         )
-    return Motion(recording.t[kept], q[kept], v[kept], a[kept], tau[kept], rate, first)
+    return Motion(
+        t=recording.t[kept],
+        q=q[kept],
+        v=v[kept],
+        a=a[kept],
+        tau=tau[kept],
+        rate_hz=rate,
+        first=first,
+    )

@@ -51,6 +51,11 @@ def away_from_edges(t: np.ndarray, before: float, after: float | None = None) ->
 
     For the transients of a filter: `ParallelFilter.transient` says how long they are.
 
+    Parameters
+    ----------
+    t : (T,) s, increasing.
+    before, after : s; without `after`, both ends lose `before`.
+
     Returns
     -------
     (T,) bool.

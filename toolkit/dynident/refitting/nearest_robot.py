@@ -51,10 +51,14 @@ def refit(
     what : see `read_subject`.
     study : recordings, and effects that the torque has beside the rigid body. Effects' parameters
         that are not given are fitted to the torque that the given inertias leave.
-    prior : what is believed where data do not decide; default: the study's description, else that
+    prior : decides where data do not; default: the study's description, else that
         of the parameters.
     within : default: fully consistent links.
     solver : "conic" or "nlp", see `project`.
+
+    Returns
+    -------
+    The nearest consistent parameters, with the proof that they are the nearest.
 
     Raises
     ------
@@ -98,10 +102,12 @@ def refit(
 def _refit(
     subject: RefitSubject, found: Projection, within: Within, errors: TorqueErrors | None = None
 ) -> Refit:
-    # What is written is the given description, also where another one is believed in.
+    # What is written is the given description, also where another one is the prior.
     robot = subject.robot.with_links(found.estimate.links or {})
     consistency = "semi" if within.consistency == "semi" else "full"
-    return Refit(found, robot, consistency, errors, subject.source)
+    return Refit(
+        projection=found, robot=robot, consistency=consistency, errors=errors, source=subject.source
+    )
 
 
 def _prior(prior: Robot | Prior | None, robot: Robot) -> Robot | Prior:

@@ -65,7 +65,7 @@ class TorqueErrors:
 _OF_SHAPES = {"centre_of_mass", "spread"}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Refit:
     """Given parameters, made consistent.
 
@@ -94,7 +94,7 @@ class Refit:
         """The outcome in words."""
         notion = "fully consistent" if self.consistency == "full" else "semi-consistent"
         if self.unchanged:
-            return f"Nothing to mend: all that is given is {notion} already."
+            return f"Nothing to fix: all that is given is {notion} already."
         space, step = self.projection.space, self.projection.x - self.projection.x_before
         inertial = step[: space.rigid].reshape(-1, 10)
         links = [name for name, d in zip(space.bodies, inertial, strict=True) if np.any(d)]
@@ -121,7 +121,7 @@ class Refit:
             for link in check(self.robot).links
             if any(rule.rule in _OF_SHAPES for rule in link.broken)
         ]
-        # Which semi-consistent bodies no mass distribution has is told by the certificate.
+        # Which semi-consistent bodies no mass distribution has is in the certificate.
         beyond = beyond if self.consistency == "full" else []
         if beyond:
             names = ", ".join(beyond)

@@ -19,14 +19,14 @@ from dynident.robot import Robot
 _DESCRIPTIONS = (".urdf", ".sdf", ".xml", ".mjcf", ".xacro")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class RefitSubject:
     """Given parameters.
 
     Attributes
     ----------
     robot : the description that is written back, with the given inertial parameters.
-    described : the description with its own parameters: what is believed, if nothing else is.
+    described : the description with its own parameters: the prior, if nothing else is.
     effects : values of effects' parameters that are given, by name ("Fv@elbow").
     estimate : where the parameters were estimated; its covariance says how well.
     source : the file of the description, if the parameters are the description's own.
@@ -91,6 +91,10 @@ def read_subject(
     model : of whom the parameters in a CSV are; with effects, if some may be among them.
     order : of numbers without names in a CSV, see `read_parameters`.
 
+    Returns
+    -------
+    The given parameters in their description.
+
     Raises
     ------
     FileError
@@ -99,7 +103,7 @@ def read_subject(
         If it is not a supported description, or not an estimate.
     """
     if isinstance(what, Robot):
-        return RefitSubject(what, what)
+        return RefitSubject(robot=what, described=what)
     if isinstance(what, Estimate):
         return _estimated(what)
     if isinstance(what, GivenParameters):
@@ -127,7 +131,7 @@ def _read(path: Path, model: Model | Robot | None, order: str | None) -> RefitSu
         raise FileError("is no CSV file, and says its own order", str(path), remedy)
     if start == "<":
         robot = Robot.from_text(text, str(path))
-        return RefitSubject(robot, robot, source=path)
+        return RefitSubject(robot=robot, described=robot, source=path)
     if start == "{":
         return _estimated(load_estimate(path))
     if model is None:
@@ -138,6 +142,12 @@ def _read(path: Path, model: Model | Robot | None, order: str | None) -> RefitSu
 
 def aligned(robot: Robot, like: Robot, where: str) -> Robot:
     """Return a robot with the joints of another, in their order, and its gravity.
+
+    Parameters
+    ----------
+    robot : to be aligned.
+    like : with the joints that are wanted.
+    where : file or argument, for messages.
 
     Raises
     ------
@@ -176,8 +186,8 @@ def in_study(subject: RefitSubject, model: Model) -> RefitSubject:
 
 
 def _estimated(estimate: Estimate) -> RefitSubject:
-    return RefitSubject(estimate.robot, estimate.model.robot, estimate=estimate)
+    return RefitSubject(robot=estimate.robot, described=estimate.model.robot, estimate=estimate)
 
 
 def _listed(given: GivenParameters) -> RefitSubject:
-    return RefitSubject(given.robot, given.described, given.effects)
+    return RefitSubject(robot=given.robot, described=given.described, effects=given.effects)

@@ -1,7 +1,8 @@
-"""Pictures and the HTML report: the only room that imports plotting libraries.
+"""The report and its pictures: the only room that imports plotting libraries.
 
-`html.report` writes the page, `pictures` draws with plotly (notebooks, the page), `plots` with
-matplotlib (static pictures).
+In: a `Diagnosis` or a `Validation`. Out: one HTML file (`html.report`), whose parts are the tables
+(`diagnosis_tables`, `intervals`), the words (`glossary`, `joint_states`, `next_steps`) and the
+figures (`pictures`, `loop_page`) of the same subject.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ AFTER_COLOUR = "#1f7fc4"
 GREY = "#808080"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Bar:
     """One row of the waterfall: an error, or the part of it that an effect takes away.
 
@@ -43,14 +43,32 @@ class Bar:
 def bars(diagnosis: Diagnosis) -> tuple[Bar, ...]:
     """Rows of the waterfall of held-out error, from the model as given to the final one."""
     error = diagnosis.test_error
-    found = [Bar((GIVEN,), 0.0, 100 * error.before, "given", f"{100 * error.before:.2f} %")]
+    found = [
+        Bar(
+            lines=(GIVEN,),
+            start=0.0,
+            stop=100 * error.before,
+            kind="given",
+            text=f"{100 * error.before:.2f} %",
+        )
+    ]
     for step in diagnosis.steps:
         before, after = 100 * step.test_error_before, 100 * step.test_error_after
         change = f"{after - before:+.2f}".replace("-", "\u2212")
-        found.append(Bar(_step_lines(step), after, before, "added", change))
+        found.append(
+            Bar(lines=_step_lines(step), start=after, stop=before, kind="added", text=change)
+        )
     if diagnosis.steps:
         name = "with all of these" if len(diagnosis.steps) > 1 else "with it added"
-        found.append(Bar((name,), 0.0, 100 * error.after, "final", f"{100 * error.after:.2f} %"))
+        found.append(
+            Bar(
+                lines=(name,),
+                start=0.0,
+                stop=100 * error.after,
+                kind="final",
+                text=f"{100 * error.after:.2f} %",
+            )
+        )
     return tuple(found)
 
 

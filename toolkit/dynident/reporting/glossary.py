@@ -46,7 +46,7 @@ _SHOWS: dict[str, str] = {
     "position": "Gravity, springs and whatever depends on the position show here.",
     "acceleration": "Inertia shows here.",
     "load": "Load is the torque predicted: a wrong gain of the drive shows here.",
-    "time": "Warming up, drifting and single bumps show here.",
+    "time": "Warming up, drifting and single disturbance pulses show here.",
     "cycles per revolution": "What comes back several times in each turn, as teeth and magnets do, "
     "shows here as a narrow peak.",
 }

@@ -51,7 +51,7 @@ _KINDS = {
 """Class of the page by verdict: its colour."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _JointMaps:
     """Residual maps of one joint, each with the name of its figure.
 
@@ -112,7 +112,16 @@ def page(
     command: str = "",
     study: str | Path | None = None,
 ) -> str:
-    """Return the report as a string of HTML; see `report`."""
+    """The report as a string of HTML.
+
+    Parameters
+    ----------
+    found, loop, command, study : as in `report`.
+
+    Returns
+    -------
+    The page, complete in itself.
+    """
     if isinstance(found, Validation):
         return _validation_page(found, command)
     tables = provenance(found, command, None if study is None else Path(study))
@@ -141,7 +150,7 @@ def _diagnosis_page(
     order = sorted(range(len(names)), key=lambda i: place[diagnosis.traces[i].joint])
     known = diagnosis.noise_source != "unknown"
     given_parameters = parameter_table(
-        diagnosis.before, widening_before(diagnosis), noise_known=known
+        diagnosis.before, widening_before(diagnosis), diagnosis.noise_source
     )
     parts = packed(figures)
     return _template("report.html").render(
@@ -161,7 +170,9 @@ def _diagnosis_page(
         weaker=candidate_table(diagnosis, ranked(diagnosis, len(diagnosis.candidates))[10:]),
         remaining=remaining_table(diagnosis),
         not_identifiable=not_identifiable_table(diagnosis),
-        parameters=parameter_table(diagnosis.after, widening_after(diagnosis), noise_known=known),
+        parameters=parameter_table(
+            diagnosis.after, widening_after(diagnosis), diagnosis.noise_source
+        ),
         fit_error=diagnosis.after.error_table(),
         given_parameters=given_parameters if diagnosis.steps else None,
         provenance=made,
@@ -227,11 +238,11 @@ def _joint_maps(diagnosis: Diagnosis) -> tuple[_JointMaps, ...]:
     numbered = [(f"map-{i}", one) for i, one in enumerate(diagnosis.maps)]
     groups = (
         _JointMaps(
-            one.joint.name,
-            one.state,
-            one.words,
-            one.joint.name in shown,
-            tuple(pair for pair in numbered if pair[1].joint == one.joint.name),
+            joint=one.joint.name,
+            state=one.state,
+            words=one.words,
+            shown=one.joint.name in shown,
+            maps=tuple(pair for pair in numbered if pair[1].joint == one.joint.name),
         )
         for one in states(diagnosis)
     )

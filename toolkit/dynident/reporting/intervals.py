@@ -8,6 +8,7 @@ import numpy as np
 
 from dynident.diagnosis.result import Diagnosis
 from dynident.fitting.estimate import Estimate
+from dynident.recording.dataset import NoiseSource
 from dynident.tables import Table, number, percent
 
 _QUANTILE = 1.959964
@@ -58,14 +59,18 @@ def _widening(ratios: dict[str, float | None]) -> Widening | None:
     return Widening(joints, float(np.sqrt(np.mean(list(squares.values())))))
 
 
-def parameter_table(estimate: Estimate, widening: Widening | None, *, noise_known: bool) -> Table:
+def parameter_table(estimate: Estimate, widening: Widening | None, noise: NoiseSource) -> Table:
     """Values with 95 % intervals.
 
     Parameters
     ----------
     estimate : of the diagnosis.
     widening : None where the model is not rejected.
-    noise_known : else the intervals rest on the residual.
+    noise : where the noise is known from; "unknown": the intervals rest on the residual.
+
+    Returns
+    -------
+    A row for each parameter, in the order of the model.
     """
     model = estimate.model
     values = np.array(estimate.values)
@@ -91,7 +96,7 @@ def parameter_table(estimate: Estimate, widening: Widening | None, *, noise_know
         for i, name in enumerate(model.names)
     )
     columns = ("parameter", "value", "95 % interval", "\u00b1 relative", "unit", "stands for")
-    notes = (_in_words(widening, noise_known=noise_known), estimate.parameter_table().notes[0])
+    notes = (_in_words(widening, noise), estimate.parameter_table().notes[0])
     return Table("Parameters", columns, rows, notes)
 
 
@@ -105,8 +110,8 @@ def _interval(value: float, half: float) -> str:
     return f"{number(value - half, digits)} to {number(value + half, digits)}"
 
 
-def _in_words(widening: Widening | None, *, noise_known: bool) -> str:
-    if widening is None and noise_known:
+def _in_words(widening: Widening | None, noise: NoiseSource) -> str:
+    if widening is None and noise != "unknown":
         return (
             "The intervals carry the noise of the measurement, as they should: what is left of the "
             "torque is within the noise."

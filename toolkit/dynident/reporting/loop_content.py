@@ -54,6 +54,10 @@ def loop_trace(validation: Validation, run: LoopRun, joint: int, quantity: Quant
     run : one of its recordings.
     joint : place of the joint.
     quantity : "position", "velocity", "acceleration" or "torque".
+
+    Returns
+    -------
+    The signals in their units.
     """
     unit = validation.units[joint]
     units = {

@@ -1,4 +1,4 @@
-"""The section of the report on the simulated loop, and a page of its own."""
+"""The section of the report on the simulated loop: its words, tables and plotly pictures."""
 
 from __future__ import annotations
 
@@ -7,8 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 import plotly.graph_objects as go
 
-from dynident.reporting.loop_content import loop_trace
-from dynident.reporting.pictures.loop_pictures import loop_quantity
+from dynident.reporting.content import AFTER_COLOUR, GREY
+from dynident.reporting.loop_content import (
+    MEASURED,
+    REFERENCE_COLOUR,
+    SIMULATED,
+    LoopTrace,
+    loop_trace,
+)
+from dynident.reporting.pictures.look import FAINT, look, plain, single_precision
 from dynident.tables import Table
 from dynident.validation.loop_errors import QUANTITIES, Quantity
 from dynident.validation.validation_result import Unsimulated, Validation
@@ -19,9 +26,10 @@ _BYTES_PER_POINT = 32
 """Five lines over one time, in single precision and base 64."""
 _MOST_PICTURED = 8
 """Joints times recordings that have pictures."""
+_NOISE = "noise (2 rms)"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class LoopSection:
     """What the section shows.
 
@@ -81,3 +89,66 @@ def loop_section(found: Validation | Unsimulated | None) -> LoopSection | None:
         left_out=len(found.runs) - len(runs),
         figures=tuple(figures),
     )
+
+
+def loop_quantity(trace: LoopTrace) -> go.Figure:
+    """One quantity of one joint: the signals, and below them the differences."""
+    below = [
+        {**line, "yaxis": "y2", "showlegend": line["name"] == _NOISE}
+        for line in _differences(trace)
+    ]
+    # Made at once, not subplot by subplot: a page has many of them.
+    layout = {
+        "xaxis": {"anchor": "y2", "title": {"text": "time (s)"}},
+        "yaxis": {"domain": [0.45, 1.0], "title": {"text": f"{trace.quantity} ({trace.unit})"}},
+        "yaxis2": {"domain": [0.0, 0.38], "title": {"text": f"difference ({trace.unit})"}},
+        "legend": {"y": -0.16, "yanchor": "top"},
+        **look(430, top=34),
+    }
+    return go.Figure([*_signals(trace), *below], layout)
+
+
+def _signals(trace: LoopTrace) -> list[dict]:
+    drawn = (
+        (MEASURED, trace.measured, {"color": GREY, "width": 3}),
+        (trace.yardstick_name, trace.yardstick, {"color": REFERENCE_COLOUR, "dash": "dash"}),
+        (SIMULATED, trace.simulated, {"color": AFTER_COLOUR, "width": 1.6}),
+    )
+    return [_line(trace, name, values, line) for name, values, line in drawn]
+
+
+def _differences(trace: LoopTrace) -> list[dict]:
+    drawn = (
+        (trace.yardstick_name, trace.yardstick, {"color": REFERENCE_COLOUR, "dash": "dash"}),
+        (SIMULATED, trace.simulated, {"color": AFTER_COLOUR, "width": 1.3}),
+    )
+    found = [_line(trace, name, trace.measured - values, line) for name, values, line in drawn]
+    if trace.noise is None:
+        return found
+    ends = single_precision(trace.t[[0, -1, -1, 0]])
+    edge = 2 * trace.noise * np.array([1, 1, -1, -1])
+    band = {
+        "type": "scatter",
+        "x": ends,
+        "y": edge,
+        "fill": "toself",
+        "fillcolor": FAINT,
+        "mode": "lines",
+        "line": {"width": 0},
+        "hoverinfo": "skip",
+        "name": _NOISE,
+    }
+    return [band, *found]
+
+
+def _line(trace: LoopTrace, name: str, values: np.ndarray, line: dict) -> dict:
+    return {
+        "type": "scatter",
+        "x": single_precision(trace.t),
+        "y": single_precision(values),
+        "mode": "lines",
+        "name": plain(name),
+        "legendgroup": name,
+        "line": {"width": 1.5, **line},
+        "hovertemplate": "%{x:.4g} s: %{y:.5g}",
+    }

@@ -1,4 +1,8 @@
-"""Figures as JSON in a page: what several of them share is written once."""
+"""Figures as JSON in a page: what several of them share is written once.
+
+Plotly writes each figure whole, template and times included; a page of fifty would be five times
+as large.
+"""
 
 from __future__ import annotations
 

@@ -69,6 +69,10 @@ def law_torque(recording: Recording, controller: Controller, nominal: Robot) -> 
     recording : T samples with a reference.
     controller : the law.
     nominal : the robot inside a computed torque or a feed-forward.
+
+    Returns
+    -------
+    (T, n) N m or N.
     """
     from scipy.interpolate import CubicSpline
 

@@ -105,7 +105,17 @@ class Errors:
 
     @staticmethod
     def of_squares(square: np.ndarray, power: np.ndarray, units: tuple[str, ...]) -> Errors:
-        """Errors from sums of squares, (4, n) each; units (n,) of the joints' positions."""
+        """Errors from sums of squares.
+
+        Parameters
+        ----------
+        square, power : (4, n) of the differences, and of what they are held against.
+        units : (n,) of the joints' positions.
+
+        Returns
+        -------
+        Roots of their ratios; NaN where the power is zero.
+        """
         with np.errstate(divide="ignore", invalid="ignore"):
             joints = np.where(power > 0, np.sqrt(square / power), np.nan)
             together = np.sqrt(square.sum(axis=1) / power.sum(axis=1))

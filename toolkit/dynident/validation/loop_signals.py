@@ -31,7 +31,24 @@ def filtered_run(
     settling: float,
     criteria: LoopCriteria,
 ) -> LoopRun:
-    """Pass measurement, simulation and reference through the same filters."""
+    """Pass measurement, simulation and reference through the same filters.
+
+    Parameters
+    ----------
+    recording, again : as it was measured, and its loop as it was simulated.
+    controller, model : of the simulated loop.
+    dataset : for its filter and the stated noise.
+    settling : s to drop at the start.
+
+    Returns
+    -------
+    The three at the same instants, with the noise of the measurement.
+
+    Raises
+    ------
+    RecordingError
+        If nothing is left after the settling time, or of the filters' transients.
+    """
     assert recording.q_ref is not None
     first = recording.t[0] + settling
     window = (first, np.inf)

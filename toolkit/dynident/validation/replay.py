@@ -17,6 +17,7 @@ from dynident.fitting.least_squares import sources_of
 from dynident.model import Model
 from dynident.recording import Dataset, Recording, uniform
 from dynident.recording.dataset import NoiseSource
+from dynident.robot import Robot
 from dynident.threads import single_threaded
 from dynident.validation.control_law import time_constant
 from dynident.validation.loop_errors import LoopRun
@@ -56,6 +57,10 @@ def validate(
     controller : of the loop in which they were made.
     criteria : what the errors mean.
     progress : called now and then with the seconds simulated, and the seconds to simulate.
+
+    Returns
+    -------
+    Four errors of every joint, what they are held against, and a verdict.
 
     Raises
     ------
@@ -132,19 +137,23 @@ def simulate_again(
     criteria: LoopCriteria,
     progress: Progress | None = None,
 ) -> Validation:
-    """`validate` for any model with values."""
+    """Simulate the recorded loops of any model with values.
+
+    Parameters
+    ----------
+    judged, dataset, controller, criteria, progress : as in `validate`.
+
+    Returns
+    -------
+    As of `validate`.
+
+    Raises
+    ------
+    SimulationError
+        As `validate`.
+    """
     robot = judged.model.robot
-    controller.simulated_rate()
-    if controller.n != robot.n:
-        what = f"a controller of {controller.n} joints for a robot of {robot.n}"
-        raise SimulationError(what, "controller", "give one gain per joint")
-    if not has_reference(dataset):
-        what = "no recording to compare with"
-        if dataset.recordings:
-            what = f"no recording has the reference that the controller followed ({_column(robot)})"
-        where = ", ".join(r.where for r in dataset.recordings) or None
-        remedy = f"record it as the column {_column(robot)}, or map it to one in [columns]"
-        raise SimulationError(what, where, remedy)
+    _require_loop(robot, dataset, controller)
     usable = [uniform(r) for r in dataset.recordings if r.q_ref is not None]
     nothing = Validation(
         criteria=criteria,
@@ -200,6 +209,21 @@ def simulate_again(
         noise_source=_noise_source(runs, usable),
         remarks=(*_beyond_limit(usable, controller), *remarks),
     )
+
+
+def _require_loop(robot: Robot, dataset: Dataset, controller: Controller) -> None:
+    """Refuse a controller that is another robot's or has no rate, and data without a reference."""
+    controller.simulated_rate()
+    if controller.n != robot.n:
+        what = f"a controller of {controller.n} joints for a robot of {robot.n}"
+        raise SimulationError(what, "controller", "give one gain per joint")
+    if not has_reference(dataset):
+        what = "no recording to compare with"
+        if dataset.recordings:
+            what = f"no recording has the reference that the controller followed ({_column(robot)})"
+        where = ", ".join(r.where for r in dataset.recordings) or None
+        remedy = f"record it as the column {_column(robot)}, or map it to one in [columns]"
+        raise SimulationError(what, where, remedy)
 
 
 def _beyond_limit(recordings: list[Recording], controller: Controller) -> list[str]:
@@ -272,7 +296,7 @@ def _retraced(
     return found, failed, tuple(loop.notes)
 
 
-def _column(robot) -> str:
+def _column(robot: Robot) -> str:
     return f"q_ref.{robot.names[0]}" if robot.n == 1 else "q_ref.<joint>"
 
 

@@ -273,7 +273,17 @@ Loop = Validation | Unsimulated | None
 def loop_table(
     names: tuple[str, ...], loops: tuple[Loop, ...], joints: tuple[str, ...]
 ) -> Table | None:
-    """Errors of torque and position of each model in closed loop; None where there is no loop."""
+    """Errors of torque and position of several models in closed loop.
+
+    Parameters
+    ----------
+    names, loops : of the models, in one order.
+    joints : names.
+
+    Returns
+    -------
+    Two columns a model; None where there is no loop.
+    """
     if all(loop is None for loop in loops):
         return None
     alone = len(names) == 1

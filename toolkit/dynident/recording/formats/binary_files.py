@@ -1,7 +1,8 @@
-"""NPZ, MAT and Parquet files in. Nothing is ever unpickled."""
+"""NPZ, MAT and Parquet files in, also one of several records. Nothing is ever unpickled."""
 
 from __future__ import annotations
 
+import difflib
 import io
 import warnings
 import zipfile
@@ -12,6 +13,8 @@ import numpy as np
 from dynident.errors import DynidentError, RecordingError
 from dynident.recording.formats.columns import ColumnTable
 
+COLUMNS = "columns"
+"""Array of text, in the same file, that names the columns of every record."""
 _COMPLETE = "is the file complete, and of this format?"
 
 
@@ -141,3 +144,54 @@ def _damaged(what: str, file: str, error: Exception) -> DynidentError:
     return RecordingError(
         f"cannot be read as {what.removeprefix('the ')} ({reason})", file, _COMPLETE
     )
+
+
+def pick(table: ColumnTable, record: str) -> ColumnTable:
+    """Return one record of a file as a table of its own.
+
+    Parameters
+    ----------
+    table : of a file with one two-dimensional array for each record (a row a sample), and their
+        columns named by the array `columns`.
+    record : name of the array.
+
+    Raises
+    ------
+    RecordingError
+        If there is no such record, it is no table of numbers, or its columns are not named.
+    """
+    if COLUMNS not in table.names:
+        what = f"record '{record}' is asked for, and no array '{COLUMNS}' names its columns"
+        remedy = "records are for NPZ and MAT files; else map the columns, as name[0]"
+        raise RecordingError(what, table.file, remedy)
+    records = [name for name in table.names if name != COLUMNS]
+    if record not in records:
+        close = difflib.get_close_matches(record, records, 1)
+        shown = ", ".join(records[:20]) + (", ..." if len(records) > 20 else "")
+        remedy = f"did you mean '{close[0]}'?" if close else f"it holds {shown or 'none'}"
+        raise RecordingError(f"no record '{record}'", table.file, remedy)
+    names = _column_names(table)
+    where = f"{table.file}, record {record}"
+
+    def load(wanted: Sequence[str]) -> dict[str, np.ndarray]:
+        x = table.load([record])[record]
+        if x.ndim != 2 or x.shape[1] != len(names):
+            what = f"has the shape {x.shape}, and {len(names)} columns are named"
+            raise RecordingError(what, where, "save one row a sample and one column a name")
+        return {name: x[:, names.index(name)] for name in wanted}
+
+    return ColumnTable(where, names, load)
+
+
+def _column_names(table: ColumnTable) -> tuple[str, ...]:
+    array = table.load([COLUMNS])[COLUMNS]
+    if array.dtype.kind != "U" or not array.size:
+        what = f"'{COLUMNS}' does not hold names (it is {array.dtype})"
+        raise RecordingError(what, table.file, "save it as an array of text")
+    # MATLAB pads the rows of a table of letters to one length.
+    names = tuple(str(name).strip() for name in array.ravel())
+    for name in names:
+        if names.count(name) > 1:
+            what = f"'{COLUMNS}' holds the name '{name}' twice"
+            raise RecordingError(what, table.file, "name each column once")
+    return names

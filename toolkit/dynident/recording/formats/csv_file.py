@@ -1,4 +1,9 @@
-"""CSV files in: a header line, then one line of numbers a sample."""
+"""CSV files in: a header line, then one line of numbers a sample.
+
+Pandas reads a file in which nothing is odd. It forgives a missing cell, a comment, text that is no
+number, and does not say in which line: so what it may not forgive is looked for first, and a file
+that it cannot read is read again by lines, for an error that names line and column.
+"""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from dynident import files
 from dynident.errors import RecordingError
-from dynident.recording.formats.binary_files import open_mat, open_npz, open_parquet
+from dynident.recording.formats.binary_files import open_mat, open_npz, open_parquet, pick
 from dynident.recording.formats.columns import (
     OPTIONAL,
     PARTIAL,
@@ -22,9 +22,8 @@ from dynident.recording.formats.columns import (
     resolve,
 )
 from dynident.recording.formats.csv_file import open_csv
-from dynident.recording.formats.records import pick
+from dynident.recording.plausibility import warn_of_units
 from dynident.recording.recording import Provenance, Recording, _joint_names
-from dynident.recording.units_check import warn_of_units
 
 _OPENERS = {".csv": open_csv, ".npz": open_npz, ".mat": open_mat, ".parquet": open_parquet}
 SUFFIXES = tuple(_OPENERS)

@@ -26,7 +26,7 @@ from dynident.reporting.content import (
     x_title,
     y_title,
 )
-from dynident.reporting.pictures.look import FAINT, dressed, mark, plain
+from dynident.reporting.pictures.look import FAINT, dressed, mark, plain, single_precision
 
 
 def waterfall(diagnosis: Diagnosis) -> go.Figure:
@@ -148,9 +148,13 @@ def measured_and_predicted(diagnosis: Diagnosis, trace: Trace, points: int = 400
     diagnosis : for the names of its models and the noise.
     trace : one of `Diagnosis.traces`.
     points : about how many samples are drawn; the extremes are kept.
+
+    Returns
+    -------
+    Figure of two rows.
     """
     kept = thinned(trace, points)
-    t, measured = _small(trace.t[kept]), trace.measured[kept]
+    t, measured = single_precision(trace.t[kept]), trace.measured[kept]
     models = [(GIVEN, trace.before[kept], BEFORE_COLOUR, "dash")]
     if diagnosis.steps:
         models.append((after_name(diagnosis), trace.after[kept], AFTER_COLOUR, "solid"))
@@ -158,7 +162,9 @@ def measured_and_predicted(diagnosis: Diagnosis, trace: Trace, points: int = 400
         rows=2, cols=1, shared_xaxes=True, row_heights=[0.6, 0.4], vertical_spacing=0.06
     )
     line = {"color": GREY, "width": 3}
-    figure.add_trace(go.Scatter(x=t, y=_small(measured), name="measured", line=line), row=1, col=1)
+    figure.add_trace(
+        go.Scatter(x=t, y=single_precision(measured), name="measured", line=line), row=1, col=1
+    )
     noise = noise_of(diagnosis, trace.joint)
     if noise is not None:
         ends = np.array([t[0], t[-1], t[-1], t[0]])
@@ -167,9 +173,11 @@ def measured_and_predicted(diagnosis: Diagnosis, trace: Trace, points: int = 400
     for name, predicted, colour, dash in models:
         line = {"color": colour, "width": 1.8, "dash": dash}
         group = {"name": plain(name), "legendgroup": name}
-        figure.add_trace(go.Scatter(x=t, y=_small(predicted), line=line, **group), row=1, col=1)
+        figure.add_trace(
+            go.Scatter(x=t, y=single_precision(predicted), line=line, **group), row=1, col=1
+        )
         line = {"color": colour, "width": 1.2}
-        left = _small(measured - predicted)
+        left = single_precision(measured - predicted)
         figure.add_trace(
             go.Scatter(x=t, y=left, line=line, showlegend=False, **group), row=2, col=1
         )
@@ -248,8 +256,3 @@ def _bracket(figure: go.Figure, members: list[int]) -> None:
         y=(members[0] + members[-1]) / 2,
         showarrow=False,
     )
-
-
-def _small(values: np.ndarray) -> np.ndarray:
-    # Single precision is finer than any screen, and halves the page.
-    return np.asarray(values, dtype=np.float32)

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -18,13 +17,8 @@ from dynident.reporting.pictures.plots import Picture, plain
 from dynident.reporting.pictures.solids import Solid, poses, solid, solids
 from dynident.reporting.pictures.strokes import (
     IMPOSSIBLE_COLOUR,
+    Sketch,
     View,
-    draw_body,
-    draw_cross,
-    draw_labels,
-    draw_outline,
-    draw_skeleton,
-    draw_spikes,
     tips,
 )
 from dynident.robot import Robot
@@ -51,6 +45,10 @@ def inertia_ellipsoids(
     q : (n,) posture, rad or m; default zero, or the middle of the limits where zero is outside.
     view : azimuth and elevation of the eye, degrees.
 
+    Returns
+    -------
+    Figure with a panel for each robot.
+
     Raises
     ------
     DynidentError
@@ -76,10 +74,11 @@ def inertia_ellipsoids(
         broken = sum(bool(one.fault) for one in found)
         count = f"{broken} of {len(found)} bodies impossible" if broken else "all bodies possible"
         axes.set_title(f"{plain(name)}: {count}", fontsize="large")
-        draw_skeleton(axes, robot, posture, eye)
+        sketch = Sketch(axes, eye)
+        sketch.skeleton(robot, posture)
         for one in sorted(found, key=lambda s: float(np.nan_to_num(s.centre) @ eye.towards)):
-            draw_body(axes, one, eye, IMPOSSIBLE_COLOUR if one.fault else AFTER_COLOUR)
-        draw_labels(axes, found, eye, high[0] + 0.1 * wide, min(0.07 * tall, tall / len(found)))
+            sketch.body(one, IMPOSSIBLE_COLOUR if one.fault else AFTER_COLOUR)
+        sketch.labels(found, high[0] + 0.1 * wide, min(0.07 * tall, tall / len(found)))
     blue: dict[str, Any] = {"facecolor": "#d3e5f3", "edgecolor": AFTER_COLOUR}
     _legend(figure, [Patch(**blue, label="possible body")], [s for f in every.values() for s in f])
     return figure
@@ -118,7 +117,7 @@ def inertia_sections(robots: Mapping[str, Robot], plane: str = "xz") -> Figure:
     for axes in grid[first.n :]:
         axes.set_visible(False)
     for axes, *shown in zip(grid[: first.n], *every.values(), strict=True):
-        _panel(axes, shown, eye)
+        _panel(Sketch(axes, eye), shown)
         axes.set_xlabel(f"{plane[0]} (m)")
         axes.set_ylabel(f"{plane[1]} (m)")
     handles = []
@@ -129,16 +128,17 @@ def inertia_sections(robots: Mapping[str, Robot], plane: str = "xz") -> Figure:
     return figure
 
 
-def _panel(axes: Axes, shown: list[Solid], eye: View) -> None:
+def _panel(sketch: Sketch, shown: list[Solid]) -> None:
     """One body in several robots."""
+    axes, eye = sketch.axes, sketch.eye
     points = [np.zeros((1, 2))]
     for k, one in enumerate(shown):
         if not one.drawable:
-            draw_cross(axes, one, eye)
+            sketch.cross(one)
             continue
         colour = IMPOSSIBLE_COLOUR if one.fault else _colour(k)
-        draw_outline(axes, one, eye, colour, _line(k))
-        draw_spikes(axes, one, eye)
+        sketch.outline(one, colour, _line(k))
+        sketch.spikes(one)
         axes.plot(*eye(one.centre), marker="o", ms=3, color=colour, zorder=5)
         points.append(eye(tips(one)))
     low, high = np.min(np.vstack(points), axis=0), np.max(np.vstack(points), axis=0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from html import escape
 
+import numpy as np
 import plotly.graph_objects as go
 
 from dynident.reporting.content import AFTER_COLOUR, GREY
@@ -38,11 +39,35 @@ def mark(colour: str, symbol: str) -> dict:
 
 
 def look(height: int, top: int = 10, right: int = 16) -> dict:
-    """The package's look, as settings of a layout; sizes in pixels, the width is the screen's."""
+    """The package's look, as settings of a layout.
+
+    Parameters
+    ----------
+    height, top, right : of the picture and of its margins, pixels; the width is the screen's.
+
+    Returns
+    -------
+    Settings for `plotly.graph_objects.Layout`.
+    """
     margin = {"l": 62, "r": right, "t": top, "b": 46}
     return {"template": _LOOK, "height": height, "margin": margin}
 
 
 def dressed(figure: go.Figure, height: int, top: int = 10, right: int = 16) -> go.Figure:
-    """Give a figure the package's look; sizes in pixels, the width is the screen's."""
+    """Give a figure the package's `look`, and return it.
+
+    Parameters
+    ----------
+    figure : is changed.
+    height, top, right : as in `look`.
+
+    Returns
+    -------
+    The figure.
+    """
     return figure.update_layout(**look(height, top, right))
+
+
+def single_precision(values: np.ndarray) -> np.ndarray:
+    """Values as a page has them: single precision is finer than any screen, and half the bytes."""
+    return np.asarray(values, dtype=np.float32)

@@ -81,6 +81,10 @@ def residual_maps(diagnosis: Diagnosis, joint: str, given: str = GIVEN) -> Figur
     diagnosis, joint : which maps.
     given : what the legend calls the model that was diagnosed.
 
+    Returns
+    -------
+    Figure with three maps a row.
+
     Raises
     ------
     DynidentError

@@ -17,7 +17,7 @@ from dynident.inertia import margins, to_com
 from dynident.robot import Robot
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Solid:
     """A body's inertia as an ellipsoid of uniform density, or what of it exists.
 
@@ -58,7 +58,14 @@ class Solid:
     def moved(self, R: np.ndarray, p: np.ndarray) -> Solid:
         """Return the solid in frame A, from the one in frame B: x_A = R x_B + p."""
         joint, centre = R @ self.joint + p, R @ self.centre + p
-        return Solid(self.body, joint, centre, R @ self.axes, self.mean_square, self.fault)
+        return Solid(
+            body=self.body,
+            joint=joint,
+            centre=centre,
+            axes=R @ self.axes,
+            mean_square=self.mean_square,
+            fault=self.fault,
+        )
 
 
 def solid(body: str, phi: ArrayLike) -> Solid:
@@ -71,10 +78,24 @@ def solid(body: str, phi: ArrayLike) -> Solid:
         found = to_com(phi)
     # A body with nothing in it has no extent; any other needs a mass for its extent to mean much.
     if not np.all(np.isfinite(phi)) or not mass > 0.0:
-        return Solid(body, np.zeros(3), nothing, np.eye(3), nothing, fault)
+        return Solid(
+            body=body,
+            joint=np.zeros(3),
+            centre=nothing,
+            axes=np.eye(3),
+            mean_square=nothing,
+            fault=fault,
+        )
     inertia = found.inertia_com
     if not np.all(np.isfinite(inertia)):
-        return Solid(body, np.zeros(3), nothing, np.eye(3), nothing, fault)
+        return Solid(
+            body=body,
+            joint=np.zeros(3),
+            centre=nothing,
+            axes=np.eye(3),
+            mean_square=nothing,
+            fault=fault,
+        )
     second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
     moments, axes = np.linalg.eigh(second)
     mean_square = moments / mass
@@ -82,7 +103,14 @@ def solid(body: str, phi: ArrayLike) -> Solid:
         fault = f"mean square {signed(mean_square[0])} m²"
     elif not fault:
         mean_square = np.clip(mean_square, 0.0, None)
-    return Solid(body, np.zeros(3), found.com, axes, mean_square, fault)
+    return Solid(
+        body=body,
+        joint=np.zeros(3),
+        centre=found.com,
+        axes=axes,
+        mean_square=mean_square,
+        fault=fault,
+    )
 
 
 def solids(robot: Robot, q: np.ndarray) -> tuple[Solid, ...]:
