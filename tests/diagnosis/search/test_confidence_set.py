@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.criteria import DEFAULTS
-from dynident.diagnosis.search.confidence_set import confidence_set
+from dynident.diagnosis.search.selection import confidence_set
 
 BLOCKS = 20
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynident.diagnosis.assembly import Found
-from dynident.diagnosis.search.pruning import without_superfluous
 from dynident.diagnosis.search.ranking import candidates, rank
-from dynident.diagnosis.search.selection import choose
+from dynident.diagnosis.search.selection import AddedEffect, choose, without_superfluous
 from dynident.effects import effects_of
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
@@ -33,7 +31,7 @@ def evidence_of(seeds: range, drag: float, offset: float) -> Evidence:
     return Evidence(PLAIN, gather(Dataset(made)), candidates=every)
 
 
-def added(evidence: Evidence, *labels: str) -> tuple[EvidenceFit, list[Found]]:
+def added(evidence: Evidence, *labels: str) -> tuple[EvidenceFit, list[AddedEffect]]:
     """The model with effects added one after the other, as the diagnosis adds them."""
     fitted, found = fit_evidence(evidence, PLAIN), []
     for label in labels:
@@ -73,7 +71,7 @@ def test_what_another_effect_explains_as_well_goes() -> None:
         effects_of(DRAG, PLAIN.robot)[0],
     )
     ranking = rank(evidence, plain, 0, only=(ripple, drag))
-    found = [Found(s, 0.0, ()) for s in sorted(ranking.scores, key=lambda s: s.drop)]
+    found = [AddedEffect(s, 0.0, ()) for s in sorted(ranking.scores, key=lambda s: s.drop)]
     model = PLAIN
     for one in found:
         model = model + one.score.effect

@@ -1,4 +1,8 @@
-"""A search put into words and numbers: the `Diagnosis`."""
+"""A search assembled into words and numbers: the `Diagnosis`.
+
+In: what the search did (`Search`). Out: errors on held-out data before and after, the verdict, each
+effect with the experiment that would show it or distinguish it, residual maps, estimates.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +16,8 @@ from dynident.diagnosis.nuisances.contacts import Disturbance, contact_candidate
 from dynident.diagnosis.nuisances.quantisation import rounding_notes, with_rounding
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.ranking import Ranking
-from dynident.diagnosis.search.scoring import Score
+from dynident.diagnosis.search.selection import AddedEffect
 from dynident.diagnosis.verdict import noise_source, notes_on, verdict_of
-from dynident.effects import Effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import HeldOut, on_blocks, on_recordings, with_noise_of
@@ -35,16 +38,7 @@ _METHODS: dict[NoiseSource, str] = {
 }
 
 
-@dataclass(frozen=True)
-class Found:
-    """An effect that the search has added, with what was said of it then."""
-
-    score: Score
-    p_value: float
-    indistinguishable: tuple[Effect, ...]
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Search:
     """What a search did: the evidence, the fits, the effects added, the ranking of each round.
 
@@ -57,13 +51,15 @@ class Search:
     evidence: Evidence
     start: EvidenceFit
     final: EvidenceFit
-    found: tuple[Found, ...]
+    found: tuple[AddedEffect, ...]
     rounds: tuple[Ranking, ...]
     disturbances: tuple[Disturbance, ...] = ()
     notes: tuple[str, ...] = ()
 
 
-def told(search: Search, train: Dataset, test: Dataset | None, held: Evidence | None) -> Diagnosis:
+def assemble(
+    search: Search, train: Dataset, test: Dataset | None, held: Evidence | None
+) -> Diagnosis:
     """Put what a search found into words and numbers.
 
     Parameters
@@ -80,7 +76,7 @@ def told(search: Search, train: Dataset, test: Dataset | None, held: Evidence | 
         wider = stages[-1].model + by_label[one.score.effect.label]
         stages.append(fit_evidence(evidence, wider.with_shapes(fitted.model.effects), stages[-1]))
     if found:
-        # With its dry friction blunted where that was called for later.
+        # With another friction width where that was called for later.
         stages.append(fitted)
     judged = [
         with_noise_of(on_recordings(held, s), on_recordings(evidence, s), evidence.criteria.noise)
@@ -144,7 +140,7 @@ def _advised(steps: tuple[Step, ...], adviser: Adviser) -> tuple[Step, ...]:
 def _revealed(
     candidates: tuple[Candidate, ...], evidence: Evidence, fitted: EvidenceFit
 ) -> tuple[Candidate, ...]:
-    """Say which experiment would show what is absorbed."""
+    """Say which experiment would show what is not identifiable."""
     if not any(one.status == "absorbed" for one in candidates):
         return candidates
     adviser = Adviser.of(evidence, fitted)
@@ -208,9 +204,9 @@ def _estimate(evidence: Evidence, fitted: EvidenceFit, train: Dataset) -> Estima
     """The fit of the diagnosis as an `Estimate`."""
     judged = on_recordings(evidence, fitted)
     model = fitted.model
-    # Rows that span what the data tell: directions in which the columns are noise are not told.
-    told = fitted.solution.basis.T @ fitted.moments.sums()[1][:-1, :-1]
-    basis = base_parameters(told, model.names, _RANK_TOLERANCE)
+    # Rows that span what the data show: not the directions in which the columns are noise.
+    shown = fitted.solution.basis.T @ fitted.moments.sums()[1][:-1, :-1]
+    basis = base_parameters(shown, model.names, _RANK_TOLERANCE)
     kept, combination = list(basis.independent), basis.combination
     covariance = np.zeros((model.size, model.size))
     covariance[np.ix_(kept, kept)] = combination @ fitted.covariance @ combination.T
@@ -222,7 +218,7 @@ def _estimate(evidence: Evidence, fitted: EvidenceFit, train: Dataset) -> Estima
         torque_std=judged.residual_rms,
         joint_errors=judged.joint_errors,
         error=judged.error,
-        condition_number=float(np.linalg.cond(told[:, kept])),
+        condition_number=float(np.linalg.cond(shown[:, kept])),
         rows=fitted.rows,
         method=_method(evidence),
         status="solved",

@@ -1,4 +1,16 @@
-"""The loop: compare, find what is missing, add it, fit again, compare."""
+"""The way of data through a diagnosis: compare -> rank -> add -> refit -> judge.
+
+- *compare*: the model as given is fitted to the recordings, where they repeat with one repetition
+  as the instrument of another, so that noise in the columns does no harm. What is no missing physics
+  is allowed for: contacts are left out, dry friction may reverse over another width.
+- *rank*: every effect that the model lacks is scored by what it would take off the residual; the
+  best are refined in their shapes and cross-validated; gates say which are significant and relevant.
+- *add*: the best of these, or a simpler one that explains nearly as much.
+- *refit*: all parameters anew, shapes too; then rank again, until no effect passes the gates. Where a
+  residual remains, a search through all shapes of effects that ring or have backlash follows.
+- *judge*: what the others have made superfluous is dropped; errors before and after, and the verdict,
+  are those on recordings (or blocks of time) that were not fitted.
+"""
 
 from __future__ import annotations
 
@@ -9,16 +21,21 @@ import numpy as np
 
 from dynident.closed_loop import Controller
 from dynident.criteria import DEFAULTS, Criteria
-from dynident.diagnosis.assembly import Found, Search, told
+from dynident.diagnosis.assembly import Search, assemble
 from dynident.diagnosis.nuisances.contacts import Contacts
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.nuisances.quantisation import nothing_but_rounding
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.global_search import RankedModel, global_search
 from dynident.diagnosis.search.payload_recordings import with_payload, with_payload_decided
-from dynident.diagnosis.search.pruning import without_superfluous
 from dynident.diagnosis.search.ranking import Ranking, candidates, rank
-from dynident.diagnosis.search.selection import alternatives_only, breaks_its_promise, choose
+from dynident.diagnosis.search.selection import (
+    AddedEffect,
+    alternatives_only,
+    breaks_its_promise,
+    choose,
+    without_superfluous,
+)
 from dynident.diagnosis.search.shaped_fit import refitted, shaped
 from dynident.effects import Effect
 from dynident.evidence.columns import Evidence
@@ -55,7 +72,11 @@ def diagnose(
         loop gives the instruments.
     most : effects that are added at most; None for `SearchCriteria.most_effects`.
     criteria : the numbers that decide the answer, see `dynident.criteria`.
-    tell : told what is being done, for a progress display.
+    progress : is called with what is being done, for a display.
+
+    Returns
+    -------
+    Errors before and after, the effects added, every candidate, and the verdict.
 
     Raises
     ------
@@ -67,119 +88,161 @@ def diagnose(
         per_joint = criteria.search.most_effects_per_joint * given.robot.n
         most = max(criteria.search.most_effects, per_joint)
     train, *others = numbered(train, *([] if test is None else [test]))
-    test = others[0] if others else None
-    progress("reading the motion")
-    loop = motion_of_loop(given, train, controller, progress, criteria)
-    runs = loop.runs or gather(train, criteria.noise)
-    evidence = Evidence(given, runs, criteria, _candidates(given))
+    task = _Task(train=train, test=others[0] if others else None, most=most, progress=progress)
+    start = _compare(given, controller, criteria, task)
+    extended = _extend(_rank(start, task), task)
+    return _judge(_search_globally(start, extended, task), task)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Task:
+    """What is asked: see `diagnose`."""
+
+    train: Dataset
+    test: Dataset | None
+    most: int
+    progress: Callable[[str], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Stage:
+    """The model as far as it is extended, and the evidence that it is fitted to.
+
+    Attributes
+    ----------
+    evidence, held : of the training and of the test recordings, contacts left out; `held` is None
+        where blocks of time are held out.
+    loop : behind the simulated motion in the evidence, where there is one.
+    contacts : those that were left out.
+    start, fitted : fits of the model as given, and of the one with all effects added.
+    found : these effects.
+    rounds : the ranking after each of them, the first one before any.
+    """
+
+    evidence: Evidence
+    held: Evidence | None
+    loop: SimulatedMotion
+    contacts: Contacts
+    start: EvidenceFit
+    fitted: EvidenceFit
+    found: tuple[AddedEffect, ...] = ()
+    rounds: tuple[Ranking, ...] = ()
+
+    @property
+    def ranked(self) -> RankedModel:
+        """The model with its latest ranking."""
+        return RankedModel(self.fitted, self.rounds[-1])
+
+
+def _compare(
+    given: Model, controller: Controller | None, criteria: Criteria, task: _Task
+) -> _Stage:
+    """Gather the evidence, and fit the model as given to it."""
+    task.progress("reading the motion")
+    loop = motion_of_loop(given, task.train, controller, task.progress, criteria)
+    runs = loop.runs or gather(task.train, criteria.noise)
+    evidence = Evidence(given, runs, criteria, _variants(given))
     held = None
-    if test is not None and len(test):
-        held = Evidence(given, gather(test, criteria.noise), criteria)
-    progress("evaluating every effect")
+    if task.test is not None and len(task.test):
+        held = Evidence(given, gather(task.test, criteria.noise), criteria)
+    task.progress("evaluating every effect")
     start = with_friction_width(evidence, shaped(evidence, given))
-    progress("looking for contacts")
+    task.progress("looking for contacts")
     contacts = Contacts.find(evidence, held, start)
     evidence, held = contacts.left_out(evidence), contacts.left_out_of_test(held)
     if contacts.pulses:
         start = with_friction_width(evidence, shaped(evidence, given))
-    grown = _Growth(train, start, most, progress).run(evidence, loop)
-    evidence, fitted, found, rounds = grown.evidence, grown.fitted, grown.found, grown.rounds
-    if held is not None:
-        held = with_payload_decided(held, fitted)
-    kept = without_superfluous(evidence, held, fitted, found, progress)
-    if len(kept.found) < len(found):
-        rounds.append(rank(evidence, kept.final, len(kept.found), progress))
-    sure = contacts.confirmed(evidence, held, kept.final)
-    evidence, held = sure.left_out(evidence), sure.left_out_of_test(held)
-    if sure.pulses != contacts.pulses:
-        start = fit_evidence(evidence, start.model, start)
-        kept = replace(kept, final=fit_evidence(evidence, kept.final.model, kept.final))
-    disturbances = sure.disturbances(evidence, held, start)
-    notes = grown.loop.notes
-    search = Search(
-        evidence, start, kept.final, tuple(kept.found), tuple(rounds), disturbances, notes
+    return _Stage(
+        evidence=evidence, held=held, loop=loop, contacts=contacts, start=start, fitted=start
     )
-    return told(search, train, test, held)
 
 
-def _candidates(given: Model) -> tuple[Effect, ...]:
+def _variants(given: Model) -> tuple[Effect, ...]:
     """Every variant of every effect that is asked about in each round."""
     return tuple(v for effect in candidates(given) for v in effect.variants(given.robot))
 
 
-@dataclass(frozen=True)
-class _Grown:
-    """A model with the effects that were added, and the ranking of each round.
+def _rank(stage: _Stage, task: _Task) -> _Stage:
+    """Rank every effect that the model lacks; drop alternatives that are significant beside it."""
+    ranking = rank(stage.evidence, stage.fitted, len(stage.found), task.progress)
+    found = stage.found
+    if found:
+        found = (*found[:-1], alternatives_only(found[-1], ranking))
+    return replace(stage, found=found, rounds=(*stage.rounds, ranking))
 
-    Attributes
-    ----------
-    evidence : with the payload where it was found to be, and the latest simulated motion.
-    loop : behind that motion.
+
+def _extend(stage: _Stage, task: _Task) -> _Stage:
+    """Add the best effect, refit, and rank again, until none passes every gate."""
+    while len(stage.found) < task.most and not _resolved(stage, task):
+        best = choose(stage.evidence, stage.fitted, stage.rounds[-1])
+        wider = None if best is None else _add_and_refit(stage, best, task)
+        if wider is None:
+            break
+        stage = _rank(wider, task)
+    return stage
+
+
+def _add_and_refit(stage: _Stage, best: AddedEffect, task: _Task) -> _Stage | None:
+    """Return the model with one effect more, all of it fitted anew.
+
+    None where the effect explains in the model next to nothing of what it explained beside it.
     """
+    task.progress(f"adding {best.score.effect.label}")
+    evidence, loop, before = with_payload(stage.evidence, best.score), stage.loop, stage.fitted
+    wider = refitted(evidence, before.model + best.score.effect, before)
+    fitted = with_friction_width(evidence, wider)
+    if breaks_its_promise(before, fitted, best.score):
+        return None
+    if _has_changed(evidence, stage.start, fitted):
+        evidence = evidence.looked_at_anew()
+    loop, moved = loop.renewed(evidence, fitted)
+    if moved is not evidence:
+        evidence = moved
+        fitted = with_friction_width(evidence, refitted(evidence, fitted.model, fitted))
+    found = (*stage.found, best)
+    return replace(stage, evidence=evidence, loop=loop, fitted=fitted, found=found)
 
-    evidence: Evidence
-    loop: SimulatedMotion
-    fitted: EvidenceFit
-    found: list[Found]
-    rounds: list[Ranking]
 
-    @property
-    def asked(self) -> RankedModel:
-        return RankedModel(self.fitted, self.rounds[-1])
+def _search_globally(start: _Stage, extended: _Stage, task: _Task) -> _Stage:
+    """Look through all shapes where a residual remains, and extend again with what was missed."""
+    if not task.most or start.loop.runs:
+        return extended  # simulated motions are renewed as the model grows: there is no way back
+    first = replace(start, rounds=extended.rounds[:1])
+    missed = global_search(extended.evidence, first.ranked, extended.ranked, task.progress)
+    if missed is None:
+        return extended
+    base = extended
+    if missed.fitted is not extended.fitted:
+        # What was kept of the first ranking belongs to the other branch.
+        base = replace(first, evidence=start.evidence.looked_at_anew())
+    other = _extend(replace(base, rounds=(*base.rounds[:-1], missed.ranking)), task)
+    better = other.fitted.misfit(start.start) < extended.fitted.misfit(start.start)
+    return other if better else extended
 
 
-@dataclass(frozen=True)
-class _Growth:
-    """The addition of effects; see `diagnose`."""
-
-    train: Dataset
-    start: EvidenceFit
-    most: int
-    progress: Callable[[str], None]
-
-    def run(self, evidence: Evidence, loop: SimulatedMotion) -> _Grown:
-        """Grow a model from the first one, and again if a global search finds what was missed."""
-        first = rank(evidence, self.start, 0, self.progress)
-        nothing = _Grown(evidence, loop, self.start, [], [first])
-        grown = self.grown(nothing)
-        if not self.most or loop.runs:
-            return grown  # simulated motions are renewed as the model grows: there is no way back
-        again = global_search(grown.evidence, nothing.asked, grown.asked, self.progress)
-        if again is None:
-            return grown
-        base = grown
-        if again.fitted is not grown.fitted:
-            # What was kept of a first look belongs to the other branch.
-            base = replace(nothing, evidence=evidence.looked_at_anew())
-        other = self.grown(replace(base, rounds=[*base.rounds[:-1], again.ranking]))
-        return other if other.fitted.misfit(self.start) < grown.fitted.misfit(self.start) else grown
-
-    def grown(self, one: _Grown) -> _Grown:
-        """Add the best effect and ask again, until nothing is material any more."""
-        evidence, loop, fitted = one.evidence, one.loop, one.fitted
-        found, rounds = list(one.found), list(one.rounds)
-        while len(found) < self.most and not _resolved(evidence, fitted, self.train):
-            chosen = choose(evidence, fitted, rounds[-1])
-            if chosen is None:
-                break
-            self.progress(f"adding {chosen.score.effect.label}")
-            evidence = with_payload(evidence, chosen.score)
-            wider = with_friction_width(
-                evidence, refitted(evidence, fitted.model + chosen.score.effect, fitted)
-            )
-            if breaks_its_promise(fitted, wider, chosen.score):
-                break
-            found.append(chosen)
-            fitted = wider
-            if _has_changed(evidence, self.start, fitted):
-                evidence = evidence.looked_at_anew()
-            loop, moved = loop.renewed(evidence, fitted)
-            if moved is not evidence:
-                evidence = moved
-                fitted = with_friction_width(evidence, refitted(evidence, fitted.model, fitted))
-            rounds.append(rank(evidence, fitted, len(found), self.progress))
-            found[-1] = alternatives_only(chosen, rounds[-1])
-        return _Grown(evidence, loop, fitted, found, rounds)
+def _judge(stage: _Stage, task: _Task) -> Diagnosis:
+    """Drop what is superfluous, confirm contacts, and say what held-out data say."""
+    evidence, start, rounds = stage.evidence, stage.start, stage.rounds
+    held = None if stage.held is None else with_payload_decided(stage.held, stage.fitted)
+    kept = without_superfluous(evidence, held, stage.fitted, list(stage.found), task.progress)
+    final = kept.final
+    if len(kept.found) < len(stage.found):
+        rounds = (*rounds, rank(evidence, final, len(kept.found), task.progress))
+    contacts = stage.contacts.confirmed(evidence, held, final)
+    evidence, held = contacts.left_out(evidence), contacts.left_out_of_test(held)
+    if contacts.pulses != stage.contacts.pulses:
+        start = fit_evidence(evidence, start.model, start)
+        final = fit_evidence(evidence, final.model, final)
+    search = Search(
+        evidence=evidence,
+        start=start,
+        final=final,
+        found=tuple(kept.found),
+        rounds=rounds,
+        disturbances=contacts.disturbances(evidence, held, start),
+        notes=stage.loop.notes,
+    )
+    return assemble(search, task.train, task.test, held)
 
 
 def _has_changed(evidence: Evidence, start: EvidenceFit, fitted: EvidenceFit) -> bool:
@@ -188,8 +251,9 @@ def _has_changed(evidence: Evidence, start: EvidenceFit, fitted: EvidenceFit) ->
     return now.error < before.error - evidence.criteria.search.another_model
 
 
-def _resolved(evidence: Evidence, fitted: EvidenceFit, train: Dataset) -> bool:
+def _resolved(stage: _Stage, task: _Task) -> bool:
     """Whether what is left is what the processing cannot resolve, or what encoders' steps leave."""
-    judged = on_recordings(evidence, fitted)
-    small = np.all(judged.residual_rms <= evidence.criteria.verdict.resolution * judged.torque_rms)
-    return bool(small) or nothing_but_rounding(judged, fitted, train)
+    judged = on_recordings(stage.evidence, stage.fitted)
+    least = stage.evidence.criteria.verdict.resolution
+    small = np.all(judged.residual_rms <= least * judged.torque_rms)
+    return bool(small) or nothing_but_rounding(judged, stage.fitted, task.train)

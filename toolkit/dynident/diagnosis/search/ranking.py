@@ -8,9 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from dynident.criteria import SearchCriteria
 from dynident.diagnosis.search.candidate_shapes import refined
-from dynident.diagnosis.search.confidence_set import confidence_set
 from dynident.diagnosis.search.scoring import (
     Score,
     candidate_moments,
@@ -134,35 +132,6 @@ def joints_below_noise(evidence: Evidence, fitted: EvidenceFit) -> frozenset[str
         if systematic < evidence.criteria.search.below_noise**2 * noise:
             found.append(name)
     return frozenset(found)
-
-
-def indistinguishable(
-    ranking: Ranking, winner: Score, criteria: SearchCriteria
-) -> tuple[Effect, ...]:
-    """Effects that the data cannot tell from the winner.
-
-    Those of the model confidence set of all material effects, and those that explain the same. An
-    effect that contains the winner and adds nothing to it is not named.
-    """
-    rivals = [
-        other
-        for other in ranking.material
-        if other.losses is not None
-        and other.effect != winner.effect
-        and not (
-            other.effect.joint == winner.effect.joint
-            and winner.effect.name in other.effect.contains
-        )
-    ]
-    if not rivals:
-        return ()
-    losses = np.column_stack([one.losses for one in (winner, *rivals) if one.losses is not None])
-    kept = confidence_set(losses, criteria)
-    return tuple(
-        other.effect
-        for k, other in enumerate(rivals, 1)
-        if k in kept or abs(winner.drop - other.drop) <= criteria.alike * winner.drop
-    )
 
 
 def payload_choices(runs: tuple[Run, ...], most: int) -> list[tuple[bool, ...]]:

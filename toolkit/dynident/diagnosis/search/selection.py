@@ -1,19 +1,56 @@
-"""Which effect is added next, and what is named with it."""
+"""Which effect is added next, what cannot be told from it, and what is dropped again.
+
+Of the effects that pass every gate the one that explains most is added, or a simpler one that does
+nearly as much. Beside it stand those that the data cannot tell from it. At the end, effects that
+the others have made superfluous are dropped.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
-from dynident.diagnosis.assembly import Found
-from dynident.diagnosis.search.ranking import Ranking, indistinguishable
+import numpy as np
+
+from dynident.criteria import SearchCriteria
+from dynident.diagnosis.search.ranking import Ranking, rank
 from dynident.diagnosis.search.scoring import Score
 from dynident.effects import Effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
+from dynident.evidence.held_out import on_recordings
+
+_SEED = 20_110  # of the bootstrap
 
 
-def choose(evidence: Evidence, fitted: EvidenceFit, ranking: Ranking) -> Found | None:
-    """The best material effect; or the simpler one in it, where that does most of the work."""
+@dataclass(frozen=True)
+class AddedEffect:
+    """An effect that the search has added, with what was known of it then.
+
+    Attributes
+    ----------
+    score : what it would bring, with its shape.
+    p_value : corrected for the number of tests.
+    indistinguishable : effects that explain the same.
+    """
+
+    score: Score
+    p_value: float
+    indistinguishable: tuple[Effect, ...]
+
+
+def choose(evidence: Evidence, fitted: EvidenceFit, ranking: Ranking) -> AddedEffect | None:
+    """Return the effect to add; None where none passes every gate.
+
+    Parameters
+    ----------
+    evidence, fitted : the data, and the model as it fits them.
+    ranking : of the candidates on that model.
+
+    Returns
+    -------
+    The effect that explains most; or the simpler one in it, where that does most of the work.
+    """
     material, criteria = ranking.material, evidence.criteria.search
     if not material:
         return None
@@ -27,7 +64,7 @@ def choose(evidence: Evidence, fitted: EvidenceFit, ranking: Ranking) -> Found |
     ]
     if simpler:
         # The column that they share is the same whoever it belongs to: both are named.
-        return Found(simpler[0], ranking.corrected(simpler[0]), (best.effect,))
+        return AddedEffect(simpler[0], ranking.corrected(simpler[0]), (best.effect,))
     alike = {
         *indistinguishable(ranking, best, criteria),
         *_alike_once_fitted(evidence, fitted, ranking),
@@ -36,7 +73,7 @@ def choose(evidence: Evidence, fitted: EvidenceFit, ranking: Ranking) -> Found |
     as_good = [s for s in among if s.drop >= criteria.simpler_share * best.drop]
     chosen = min(as_good, key=_size)  # the first of the simplest: they stand in order
     others = tuple(s.effect for s in among if s is not chosen)
-    return Found(chosen, ranking.corrected(chosen), others)
+    return AddedEffect(chosen, ranking.corrected(chosen), others)
 
 
 def _alike_once_fitted(
@@ -68,7 +105,7 @@ def _alike_once_fitted(
 
 
 def breaks_its_promise(fitted: EvidenceFit, wider: EvidenceFit, one: Score) -> bool:
-    """Whether a driven response does not explain in a model what it explained beside it.
+    """Whether a filtered dynamic regressor explains less in a model than it did beside it.
 
     With it the bodies change, and with them the response, which may not follow.
     """
@@ -84,8 +121,8 @@ def _size(one: Score) -> int:
     return len(one.values) + len(one.effect.shape)
 
 
-def alternatives_only(one: Found, following: Ranking) -> Found:
-    """Leave out effects that stay material beside the one added: they are more, not instead."""
+def alternatives_only(one: AddedEffect, following: Ranking) -> AddedEffect:
+    """Leave out effects that stay significant beside the one added: they are more, not instead."""
     still = {s.effect.label for s in following.material}
     alternatives = tuple(
         e
@@ -93,3 +130,148 @@ def alternatives_only(one: Found, following: Ranking) -> Found:
         if e.label not in still or one.score.effect.name in e.contains
     )
     return replace(one, indistinguishable=alternatives)
+
+
+# --- what cannot be told from it -----------------------------------------------------------------
+
+
+def indistinguishable(
+    ranking: Ranking, winner: Score, criteria: SearchCriteria
+) -> tuple[Effect, ...]:
+    """Effects that the data cannot tell from the winner.
+
+    Parameters
+    ----------
+    ranking, winner : of a round, and its best effect.
+    criteria : what counts as alike.
+
+    Returns
+    -------
+    Those of the model confidence set of all effects that pass every gate, and those that explain
+    the same. An effect that contains the winner and adds nothing to it is not named.
+    """
+    rivals = [
+        other
+        for other in ranking.material
+        if other.losses is not None
+        and other.effect != winner.effect
+        and not (
+            other.effect.joint == winner.effect.joint
+            and winner.effect.name in other.effect.contains
+        )
+    ]
+    if not rivals:
+        return ()
+    losses = np.column_stack([one.losses for one in (winner, *rivals) if one.losses is not None])
+    kept = confidence_set(losses, criteria)
+    return tuple(
+        other.effect
+        for k, other in enumerate(rivals, 1)
+        if k in kept or abs(winner.drop - other.drop) <= criteria.alike * winner.drop
+    )
+
+
+def confidence_set(losses: np.ndarray, criteria: SearchCriteria) -> tuple[int, ...]:
+    """Return the columns that may be the best: the model confidence set.
+
+    Models are taken out of the set, the worst first, as long as the differences between their
+    held-out losses are more than chance (Hansen, Lunde and Nason 2011). What stays contains the
+    best model with the confidence asked for.
+
+    Parameters
+    ----------
+    losses : (B, k)
+        Held-out loss of each model in each block of time.
+    criteria : chance that the best one is left out, and the bootstrap.
+
+    Returns
+    -------
+    Indices of columns, ascending.
+    """
+    if losses.shape[1] < 2 or losses.shape[0] < 3:
+        return tuple(range(losses.shape[1]))
+    # Loaded where two effects compete: it takes a second.
+    from arch.bootstrap import MCS
+
+    varied = losses - losses.mean(axis=1, keepdims=True)
+    if not np.any(varied):
+        return tuple(range(losses.shape[1]))
+    found = MCS(
+        losses,
+        size=criteria.set_level,
+        reps=criteria.set_draws,
+        block_size=criteria.set_block,
+        method="max",
+        seed=_SEED,
+    )
+    found.compute()
+    return tuple(sorted(int(str(i)) for i in found.included))
+
+
+# --- what is dropped again -----------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What is left when superfluous effects are dropped."""
+
+    final: EvidenceFit
+    found: list[AddedEffect]
+
+
+def without_superfluous(
+    evidence: Evidence,
+    held: Evidence | None,
+    fitted: EvidenceFit,
+    found: list[AddedEffect],
+    progress: Callable[[str], None],
+) -> Kept:
+    """Drop every added effect that the others have made superfluous, or that helps nowhere else.
+
+    Parameters
+    ----------
+    evidence : of the training recordings.
+    held : of the test recordings; None where blocks of time are held out.
+    fitted, found : the model with all effects, and these in the order in which they were added.
+    progress : is called with what is being done.
+
+    Returns
+    -------
+    The model with the effects that are needed.
+    """
+    kept = list(found)
+    for one in found:
+        if _belongs(one.score.effect, kept):
+            continue
+        effect = next(e for e in fitted.model.effects if e.label == one.score.effect.label)
+        rest = fit_evidence(evidence, fitted.model - effect, fitted)
+        progress(f"doing without {effect.label}")
+        needed = len(kept) == 1 or rank(evidence, rest, len(kept) - 1, only=(effect,)).material
+        if not needed or not _helps(held, rest, fitted):
+            kept.remove(one)
+            fitted = rest
+    return Kept(fitted, kept)
+
+
+def _helps(held: Evidence | None, without: EvidenceFit, fitted: EvidenceFit) -> bool:
+    """Whether an effect lowers the residual of the test recordings at any joint.
+
+    The whole of it, or what of it repeats: columns that carry noise may take the latter away and
+    add to the former.
+    """
+    if held is None:
+        return True  # its gain was cross-validated
+    before, after = (on_recordings(held, one) for one in (without, fitted))
+    falls = [before.residual_rms**2 - after.residual_rms**2]
+    scale = after.residual_rms
+    if after.noise_std is not None and after.ratio is not None:
+        assert before.noise_std is not None and before.ratio is not None
+        scale = before.noise_std
+        falls.append((before.ratio * before.noise_std) ** 2 - (after.ratio * after.noise_std) ** 2)
+    return any(bool(np.any(fall > held.criteria.search.least_fall * scale**2)) for fall in falls)
+
+
+def _belongs(effect: Effect, found: list[AddedEffect]) -> bool:
+    """Whether an effect is part of another one: without it the other would bring it back."""
+    others = (one.score.effect for one in found)
+    return any(effect.name in o.contains and effect.joint == o.joint for o in others)
