@@ -1,15 +1,16 @@
 """The way of data through a diagnosis: compare -> rank -> add -> refit -> judge.
 
 - *compare*: the model as given is fitted to the recordings, where they repeat with one repetition
-  as the instrument of another, so that noise in the columns does no harm. What is no missing physics
-  is allowed for: contacts are left out, dry friction may reverse over another width.
+  as the instrument of another, so that noise in the columns does no harm. What is no missing
+  physics is allowed for: contacts are left out, dry friction may reverse over another width.
 - *rank*: every effect that the model lacks is scored by what it would take off the residual; the
-  best are refined in their shapes and cross-validated; gates say which are significant and relevant.
+  best are refined in their shapes and cross-validated; gates say which are significant and
+  relevant.
 - *add*: the best of these, or a simpler one that explains nearly as much.
-- *refit*: all parameters anew, shapes too; then rank again, until no effect passes the gates. Where a
-  residual remains, a search through all shapes of effects that ring or have backlash follows.
-- *judge*: what the others have made superfluous is dropped; errors before and after, and the verdict,
-  are those on recordings (or blocks of time) that were not fitted.
+- *refit*: all parameters anew, shapes too; then rank again, until no effect passes the gates. Where
+  a residual remains, a search through all shapes of effects that ring or have backlash follows.
+- *judge*: what the others have made superfluous is dropped; errors before and after, and the
+  verdict, are those on recordings (or blocks of time) that were not fitted.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Contacts in a diagnosis: found, left out of everything else, and reported as steps of their own."""
+"""Contacts in a diagnosis: found, left out of everything else, reported as steps of their own."""
 
 from __future__ import annotations
 
