@@ -67,6 +67,10 @@ def assemble(
     search : the search.
     train, test : the recordings, for their provenance.
     held : evidence of the test recordings; None where blocks of time are held out.
+
+    Returns
+    -------
+    What is known of the model, effect by effect and joint by joint, and the verdict.
     """
     evidence, start, fitted = search.evidence, search.start, search.final
     found, rounds, given = search.found, search.rounds, search.start.model
