@@ -111,6 +111,19 @@ def test_visual_and_collision_both_count():
     assert Hull(geometry("urdf", near + far).points).depth(np.array([0.5, 0, 0])) > 0.09
 
 
+def test_a_shape_that_cannot_be_read_hides_no_other():
+    shapes = '<geom type="box" fromto="0 0 0 1 0 0" size="1 1"/><geom type="sphere" size="0.1"/>'
+    found = geometry("mjcf", shapes)
+    assert found.not_read == ("shape 'box' between two points",)
+    assert len(found.points) and np.abs(found.points).max() < 0.11
+
+
+def test_directions_of_any_length_are_directions():
+    plain = geometry("mjcf", '<geom type="cylinder" size="0.1 0.2" quat="1 0 0.5 0"/>')
+    huge = geometry("mjcf", '<geom type="cylinder" size="0.1 0.2" quat="2e200 0 1e200 0"/>')
+    np.testing.assert_allclose(huge.points, plain.points, atol=1e-12)
+
+
 def test_mjcf_defaults_capsules_between_points_and_meshes(tmp_path):
     rest = (
         '<default><geom type="capsule" size="0.1"/><mesh scale="0.001 0.001 0.001"/></default>'

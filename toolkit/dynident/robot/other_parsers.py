@@ -2,8 +2,7 @@
 
 They are shown the copy that our reader makes (joints and links, without shapes and plugins, whose
 files may be missing), with the inertial elements of the description put back as they are written.
-Only descriptions whose inertias have been checked belong here: neither parser tells the truth
-about a broken one.
+Only descriptions whose inertias have been checked belong here: both parsers replace broken ones.
 """
 
 from __future__ import annotations

@@ -50,7 +50,13 @@ def write(robot: Robot, path: str | Path) -> Path:
 
 
 def patched(robot: Robot) -> str:
-    """Return the text that `write` writes; raises as `write` does."""
+    """Return the text that `write` writes.
+
+    Raises
+    ------
+    RobotError
+        As `write` does.
+    """
     if robot.description is None:
         raise RobotError(
             "was not read from a description, so there is nothing to patch",

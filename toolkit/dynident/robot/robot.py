@@ -74,7 +74,7 @@ class Robot:
         joints: Sequence[str] | None = None,
         gravity: ArrayLike | None = None,
     ) -> Robot:
-        """Read a robot description: URDF, SDF or MJCF, told apart by its root element.
+        """Read a robot description: URDF, SDF or MJCF, known by its root element.
 
         Parameters
         ----------

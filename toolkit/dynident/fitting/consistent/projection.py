@@ -75,7 +75,7 @@ class Projection:
         return self.estimate.values
 
     def write_robot(self, path: str | Path) -> Path:
-        """Write the robot description with the projected parameters; see `robot.write.write`."""
+        """Write the robot description with the projected parameters; see `robot.patching.write`."""
         return write(self.robot, path)
 
     @property

@@ -147,7 +147,7 @@ class MjcfModel:
             directions = [values[:3], values[3:], np.cross(values[:3], values[3:])]
         elif kind != "euler":
             directions = [values[:3] if kind == "axisangle" else values]
-        if any(np.linalg.norm(direction) < 1e-12 for direction in directions):
+        if any(np.max(np.abs(direction)) < 1e-12 for direction in directions):
             raise RobotError(f"{kind} = '{attributes[kind]}' has no direction", where)
         if kind == "quat":
             return from_quaternion(values)
