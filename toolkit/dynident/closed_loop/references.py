@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from dynident.errors import SimulationError
-
-if TYPE_CHECKING:
-    from dynident.recording import Recording
+from dynident.recording import Recording
 
 SETTLING = 0.1
 """s, time constant with which a sampled reference comes to rest beyond its samples."""

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dynident.errors import SimulationError
-
-if TYPE_CHECKING:
-    from dynident.robot import Robot
+from dynident.robot import Robot
 
 SHARE = 0.8
 """Share of a joint's limits that a random trajectory uses where nothing is said."""

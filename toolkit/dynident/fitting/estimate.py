@@ -280,6 +280,17 @@ class Estimate:
         )
 
 
+def unidentified(basis: BaseParameters) -> tuple[str, ...]:
+    """Return the caveat that data leave parameters open; empty where they identify all."""
+    if not basis.dependent:
+        return ()
+    lost = ", ".join(basis.names[i] for i in basis.dependent)
+    return (
+        f"The data do not excite every parameter: rank {basis.rank} of {len(basis.names)}. Not "
+        f"identified on their own, only in combination: {lost}.",
+    )
+
+
 def _decision(basis: BaseParameters) -> str:
     """How the rank was decided, in words."""
     if basis.rank == len(basis.names):

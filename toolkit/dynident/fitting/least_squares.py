@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from dynident.errors import FitError
-from dynident.fitting.estimate import DataSource, Estimate
+from dynident.fitting.estimate import DataSource, Estimate, unidentified
 from dynident.fitting.fixed_point import FixedPoint, not_converged
 from dynident.fitting.sampling import rows
 from dynident.model import Model
@@ -124,20 +124,13 @@ def _solve(model: Model, factors: TriangularFactors, weights: np.ndarray) -> Lin
     covariance = np.zeros((p, p))
     covariance[np.ix_(kept, kept)] = variance * inverse @ inverse.T
     values = basis.lift(found, model.given_values())
-    notes = ()
-    if basis.dependent:
-        lost = ", ".join(model.names[i] for i in basis.dependent)
-        notes = (
-            f"The data do not excite every parameter: rank {rank} of {p}. Not identified on their "
-            f"own, only in combination: {lost}.",
-        )
     return LinearSolution(
         values=values,
         covariance=covariance,
         basis=basis,
         torque_std=np.zeros(len(factors.counts)),
         condition_number=float(np.linalg.cond(triangle)),
-        notes=notes,
+        notes=unidentified(basis),
     )
 
 

@@ -13,6 +13,7 @@ from dynident.effects import FRICTION_WIDTH, catalogue
 from dynident.errors import FileError, SimulationError
 from dynident.recording import write as write_recording
 from dynident.robot import Robot
+from dynident.robot.patching import patched
 
 STUDY = "study.toml"
 
@@ -56,16 +57,10 @@ def write_experiment(
         raise FileError(f"cannot be made ({error.strerror or error})", str(folder)) from None
     written = [write_recording(one, folder / one.name) for one in recordings]
     description = folder / _description_name(nominal)
-    written.append(files.write_text(description, _description_text(nominal)))
+    written.append(files.write_text(description, patched(nominal)))
     text = tomlkit.dumps(_study(experiment, nominal, description.name))
     written.append(files.write_text(folder / STUDY, text))
     return written
-
-
-def _description_text(robot: Robot) -> str:
-    from dynident.robot.patching import patched
-
-    return patched(robot)
 
 
 def _description_name(robot: Robot) -> str:
@@ -84,7 +79,7 @@ def _study(experiment: Experiment, nominal: Robot, description: str) -> tomlkit.
     document["torque"] = experiment.torque
     if experiment.friction_width != FRICTION_WIDTH:
         document["friction_width"] = experiment.friction_width
-    stated = Robot.from_text(_description_text(nominal), description, nominal.names)
+    stated = Robot.from_text(patched(nominal), description, nominal.names)
     if (stated.gravity != nominal.gravity).any():
         document["gravity"] = [float(g) for g in nominal.gravity]
     entries = tomlkit.aot()

@@ -19,9 +19,9 @@ from dynident.fitting.consistent.programs import (
     Solver,
     require_solver,
     solve,
+    solve_apart,
     trivial,
 )
-from dynident.fitting.consistent.separable import solve_apart
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.given import given_estimate, prior_model
 from dynident.inertia import distance_rows, margins

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from dynident.fitting.estimate import Estimate
+from dynident.fitting.estimate import Estimate, unidentified
 from dynident.fitting.history import Convergence
 from dynident.fitting.instrumental.bias import ExpectedBias, expected_bias
 from dynident.fitting.instrumental.covariance import carried_covariance, textbook_covariance
 from dynident.fitting.instrumental.iv_iterations import Iterations
 from dynident.fitting.instrumental.noise_level import NoiseLevel, position_noise, torque_noise
-from dynident.fitting.instrumental.normal_equations import residual_std
+from dynident.fitting.instrumental.normal_equations import InstrumentalSolution, residual_std
 from dynident.fitting.instrumental.source import InstrumentSource
 from dynident.fitting.least_squares import sources_of
 from dynident.model import Model
@@ -95,14 +95,10 @@ def _noise(
     return NoiseLevel(position, torque, "measured"), bias
 
 
-def _notes(model: Model, solution, history: Convergence, bias: ExpectedBias) -> tuple[str, ...]:
-    notes = []
-    if solution.basis.dependent:
-        lost = ", ".join(model.names[i] for i in solution.basis.dependent)
-        notes.append(
-            f"The data do not excite every parameter: rank {solution.rank} of {model.size}. Not "
-            f"identified on their own, only in combination: {lost}."
-        )
+def _notes(
+    model: Model, solution: InstrumentalSolution, history: Convergence, bias: ExpectedBias
+) -> tuple[str, ...]:
+    notes = [*unidentified(solution.basis)]
     if history.message:
         notes.append(f"{history.ending.value.capitalize()}: {history.message}.".replace("?.", "?"))
     if any(one.way.projected for one in history.rounds):
@@ -126,24 +122,24 @@ def _notes(model: Model, solution, history: Convergence, bias: ExpectedBias) -> 
             "See the expected bias."
         )
     if reported.size:
-        listed = ", ".join(
-            f"{model.names[i]} {number(float(bias.values[i]), 2)} {model.units[i]}"
-            for i in reported
-        )
         notes.append(
             "Expected bias, from adding encoder noise of this size to the instruments' own "
-            f"motion (not subtracted): {listed}."
+            f"motion (not subtracted): {_listed(model, bias.values, reported)}."
         )
     clock = np.flatnonzero(np.abs(bias.sampling) > history.sigma)
     if clock.size:
-        listed = ", ".join(
-            f"{model.names[i]} {number(float(bias.sampling[i]), 2)} {model.units[i]}" for i in clock
-        )
         notes.append(
             "Sampling (central differences, held torques, filters) shifts some parameters by more "
-            f"than their noise, which the intervals do not hold (not subtracted): {listed}."
+            f"than their noise, which the intervals do not hold (not subtracted): "
+            f"{_listed(model, bias.sampling, clock)}."
         )
     return tuple(notes)
+
+
+def _listed(model: Model, values: np.ndarray, which: np.ndarray) -> str:
+    return ", ".join(
+        f"{model.names[i]} {number(float(values[i]), 2)} {model.units[i]}" for i in which
+    )
 
 
 def _sure(bias: ExpectedBias) -> np.ndarray:
