@@ -168,7 +168,7 @@ class Model:
         block : Block
             With its rigid-body regressor, as `Model.block` makes it.
         values : (p,), optional
-            Parameter values at which columns that depend on the present model are taken; without
+            Parameter values at which columns that depend on the fitted model are taken; without
             them those that depend on its torque are zero, and its bodies are as described.
         known : label -> (T, n, k), optional
             Columns of effects that need the whole recording, see `whole_columns`; without them
@@ -244,7 +244,7 @@ class Model:
         return self.columns(block, values) @ values
 
     def relaxed(self, at: np.ndarray, found: np.ndarray) -> np.ndarray:
-        """Values at which to take columns that depend on the present model next.
+        """Values at which to take columns that depend on the fitted model next.
 
         Where a share e is added to the torque, the plain repetition (at `found`) shrinks its error
         by -e only, and grows it from e = 1 on. This step shrinks it by e / (2 + e) at worst.

@@ -32,11 +32,11 @@ class Block:
     carries_payload : whether the payload under study is on the robot.
     tip : column of the joint that carries the last link, where a payload is mounted.
     rigid : (T, n, 10 n) the rigid-body regressor; None where no effect in use needs it.
-    torque : (T, n) N m or N, torque that the present model predicts; None where none needs it.
-    body : the robot with the inertias of the present model, and with its payload where that is on
+    torque : (T, n) N m or N, torque that the fitted model predicts; None where none needs it.
+    body : the robot with the inertias of the fitted model, and with its payload where that is on
         board; None where no effect in use needs it.
     empty : the same robot without its payload, with `body`.
-    rotor : (n,) kg m^2 or kg, motor inertia that the present model adds to the bodies'; with
+    rotor : (n,) kg m^2 or kg, motor inertia that the fitted model adds to the bodies'; with
         `body`.
     period : s after which the motion repeats; None where it does not, or for a part of a recording.
     number : of the recording in its study, from 1; 0 where that does not matter.
@@ -68,8 +68,8 @@ class Block:
             raise EffectError(f"no joint '{joint}'", remedy=f"joints: {', '.join(self.names)}")
         return self.names.index(joint)
 
-    def present(self, label: str) -> Robot:
-        """The present model's robot; `label` names the effect that needs it.
+    def fitted_robot(self, label: str) -> Robot:
+        """The fitted model's robot; `label` names the effect that needs it.
 
         Raises
         ------
@@ -77,13 +77,13 @@ class Block:
             If the block has none.
         """
         if self.body is None:
-            raise EffectError("needs the present model's robot in the block", label)
+            raise EffectError("needs the fitted model's robot in the block", label)
         return self.body
 
     @cached_property
     def derivatives(self) -> TorqueDerivatives:
         """Derivatives of the torque of `body` by q, v and a; made once, for all effects."""
-        return self.present("the derivatives of the torque").torque_derivatives(
+        return self.fitted_robot("the derivatives of the torque").torque_derivatives(
             self.q, self.v, self.a
         )
 

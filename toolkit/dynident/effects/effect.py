@@ -165,7 +165,7 @@ class Effect(EffectTraits, SimulatedEffect, ABC):
         return ""
 
     def suited(self, block: Block) -> Self:
-        """Return the effect with those shapes that the present model in a block suggests."""
+        """Return the effect with those shapes that the fitted model in a block suggests."""
         return self
 
     def at(self, values: Sequence[float]) -> Self:

@@ -165,7 +165,7 @@ def _beginning(model: Model, near: EvidenceFit | None) -> np.ndarray:
 def _held(model: Model, values: np.ndarray) -> np.ndarray:
     """Values, but where a column is that of a whole response at a value: that value.
 
-    Another gap is another motion of the link: it is sought as shapes are, not iterated on.
+    Another dead zone is another motion of the link: it is sought as shapes are, not iterated on.
     """
     held = np.array(values)
     for effect in model.effects:

@@ -171,7 +171,7 @@ def _doubt(columns: np.ndarray, fitted: EvidenceFit | Estimate) -> float:
 def _variance(residual: np.ndarray, kind: Kind, criteria: NoiseCriteria) -> float:
     """Variance of `systematic_square` (P, S), by the noise alone: what is missing is no chance.
 
-    With noise of variance s^2, which may change in time, and what the versions have in common
+    With noise of variance s^2, which may change in time, and what the replicates have in common
     being m: mean (2 s^4 / (P (P - 1)) + 4 m^2 s^2 / P) / S, times what the colour of the noise
     costs.
     """

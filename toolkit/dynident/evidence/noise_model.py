@@ -1,6 +1,6 @@
 """The noise of a torque residual: its size, how it grows at low speed, and its colour.
 
-Everything is measured on differences between versions of the same motion, in which what the model
+Everything is measured on differences between replicates of the same motion, in which what the model
 lacks cancels; never on the residual itself, which would explain the missing effect away as noise.
 """
 
@@ -16,12 +16,12 @@ from dynident.moments.replicated import Kind
 
 
 def differences(residual: np.ndarray, kind: Kind) -> np.ndarray:
-    """Noise of one version, from the differences between versions.
+    """Noise of one replicate, from the differences between replicates.
 
     Parameters
     ----------
     residual : (P, S)
-        Residual of one joint in P versions of the same motion.
+        Residual of one joint in P replicates of the same motion.
     kind : Kind
         What the versions are; not "single", in which there is nothing to compare.
 

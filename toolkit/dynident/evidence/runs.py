@@ -1,4 +1,4 @@
-"""Recordings in versions that can be compared.
+"""Recordings in replicates that can be compared.
 
 The repetitions of a period; or the record and copies with more of the stated noise; or the bare
 record where neither is known. To these comes the same motion simulated, where nothing repeats and
@@ -30,20 +30,20 @@ from dynident.recording import (
 )
 
 Signals = list[np.ndarray]
-"""One array per version of a recording, (T, J, k): rows, joints of the effect, columns."""
+"""One array per replicate of a recording, (T, J, k): rows, joints of the effect, columns."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """One recording and its versions.
+    """One recording and its replicates.
 
     Attributes
     ----------
-    kind : how the versions come about, which tells the noise.
-    versions : the measured record, its noisy copies where there are any, and last the simulated
+    kind : how the replicates come about, which tells the noise.
+    replicates : the measured record, its noisy copies where there are any, and last the simulated
         motion where there is one.
     index : (P, S) rows that belong together: repetition p, instant s. For copies, P counts the
-        versions but for the simulated one and every row of `index` is the same.
+        replicates but for the simulated one and every row of `index` is the same.
     edges : (B + 1,) blocks of instants.
     columns_from : whose motion the columns of the regression are taken along.
     left_out : (T,) rows that are not to be judged, a contact in them; None for none.
@@ -82,7 +82,7 @@ class Run:
         return model.block(first.t + start, *motion, rigid=False, temperature=temperature)
 
     def fold(self, signals: Sequence[np.ndarray]) -> np.ndarray:
-        """Arrange measured signals, (T, ...) for each version, as (P, S, ...)."""
+        """Arrange measured signals, (T, ...) for each replicate, as (P, S, ...)."""
         if self.kind == "repeated":
             return signals[0][self.index]
         return np.stack([one[rows] for one, rows in zip(signals, self.index, strict=False)])
@@ -92,14 +92,14 @@ class Run:
 
         Instrumental variables V' (y - W x) = 0, with columns W along the measured motion and V
         along the simulated one, are not symmetric. They are the least squares of y - (W - V) x on
-        V, taken at the x that they find. So the simulated version's torque becomes that at the
+        V, taken at the x that they find. So the simulated replicate's torque becomes that at the
         latest x, and everything that follows is plain regression on columns without noise. What
         another column would bring is then its instrumental moment with the residual y - W x: zero
         in the mean if nothing is missing, wherever the simulated motion may lie.
 
         Parameters
         ----------
-        signals : columns of the model and the torque at a joint, (T, p + 1) for each version.
+        signals : columns of the model and the torque at a joint, (T, p + 1) for each replicate.
         values : (p,) the latest parameters.
         """
         if self.columns_from == "recording":
@@ -109,9 +109,9 @@ class Run:
         return [*signals[:-1], simulated]
 
     def whitened(self, signals: Sequence[np.ndarray], joint: int, noise: NoiseModel) -> np.ndarray:
-        """Whiten columns, (T, k) for each version, of a joint, and fold them into (P, S, k).
+        """Whiten columns, (T, k) for each replicate, of a joint, and fold them into (P, S, k).
 
-        Of a simulated motion there is one version, without noise.
+        Of a simulated motion there is one replicate, without noise.
         """
         if self.columns_from == "simulation":
             speed = self.replicates[-1].v[:, joint]
@@ -132,7 +132,7 @@ def gather(
     simulated: Dataset | None = None,
     seed: int = 0,
 ) -> tuple[Run, ...]:
-    """Arrange the recordings of a dataset in versions; see the module.
+    """Arrange the recordings of a dataset in replicates; see the module.
 
     Parameters
     ----------

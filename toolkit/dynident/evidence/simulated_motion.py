@@ -1,7 +1,7 @@
 """Motion without noise, from the closed loop simulated: instruments where nothing repeats.
 
 The columns of a noisy motion are biased. Where a motion repeats, each repetition is an instrument
-for the others. Where it does not, but the controller and its references are known, the present
+for the others. Where it does not, but the controller and its references are known, the fitted
 model is simulated in the same loop, with ideal sensors: its motion is near the true one and knows
 nothing of the noise. How the two enter the regression is said in `Run.moved`.
 """
@@ -29,16 +29,16 @@ from dynident.recording import Dataset
 
 @dataclass(frozen=True, eq=False)
 class SimulatedMotion:
-    """The recordings' references in the simulated loop of the present model.
+    """The recordings' references in the simulated loop of the fitted model.
 
     Attributes
     ----------
-    runs : the recordings with the simulated motion as their last version; empty where none could
+    runs : the recordings with the simulated motion as their last replicate; empty where none could
         be simulated, or none is needed.
     notes : caveats, for the reader of the diagnosis.
     controller : of the loop.
     measured : the recordings behind `runs`.
-    left_out : effects of the present model that are not in its simulation.
+    left_out : effects of the fitted model that are not in its simulation.
     """
 
     runs: tuple[Run, ...] = ()

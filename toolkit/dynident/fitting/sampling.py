@@ -88,7 +88,7 @@ class Sampled:
 
         Parameters
         ----------
-        values : (p,) parameters at which columns that depend on the present model are taken.
+        values : (p,) parameters at which columns that depend on the fitted model are taken.
         """
         known = self.whole_columns(model, values)
         for plan in self._plans(BLOCK):
@@ -190,7 +190,7 @@ def rows(
 
     Parameters
     ----------
-    values : (p,) parameters at which columns that depend on the present model are taken.
+    values : (p,) parameters at which columns that depend on the fitted model are taken.
 
     Yields
     ------

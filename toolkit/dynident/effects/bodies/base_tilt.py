@@ -39,7 +39,7 @@ class BaseTilt(Forceless):
         return (Parameter("rx", "rad", -1.0, 1.0), Parameter("ry", "rad", -1.0, 1.0))
 
     def columns(self, block: Block) -> np.ndarray:
-        body = block.present(self.label)
+        body = block.fitted_robot(self.label)
         rx, ry = self.point or (0.0, 0.0)
         first, second = _sine_and_cosine(float(np.hypot(rx, ry)))
         r = np.array([rx, ry, 0.0])

@@ -8,7 +8,7 @@ from dynident.effects.effect import Block, JointEffect, Parameter, ShapeParamete
 
 
 class Contact(JointEffect):
-    """A bump A exp(-((t - time) / width)^2 / 2) in the recording of one number.
+    """A disturbance pulse A exp(-((t - time) / width)^2 / 2) in the recording of one number.
 
     It is no part of the robot: it is found in what differs between repetitions of a period, and
     keeps that one disturbance out of everything else.

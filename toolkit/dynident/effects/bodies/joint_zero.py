@@ -36,7 +36,7 @@ class JointZero(Forceless):
         return (Parameter("offset", unit, -1.0, 1.0),)
 
     def columns(self, block: Block) -> np.ndarray:
-        body, j = block.present(self.label), block.index(self.joint)
+        body, j = block.fitted_robot(self.label), block.index(self.joint)
         (offset,) = self.point or (0.0,)
         if offset == 0.0:
             return block.derivatives.by_q[:, :, [j]]

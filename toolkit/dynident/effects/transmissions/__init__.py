@@ -1,1 +1,1 @@
-"""Transmissions that give way: springs and gaps between a motor and its link."""
+"""Transmissions that give way: springs and dead zones between a motor and its link."""

@@ -1,4 +1,4 @@
-"""The present model's rigid robot along a motion, for effects that depend on it."""
+"""The fitted model's rigid robot along a motion, for effects that depend on it."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ _MEAN: weakref.WeakKeyDictionary[Robot, np.ndarray] = weakref.WeakKeyDictionary(
 
 
 def along_motion(block: Block) -> tuple[Robot, Along]:
-    """Return the present model's robot, and what it does along a motion."""
+    """Return the fitted model's robot, and what it does along a motion."""
     if block.body is None:
-        raise EffectError("needs the present model's bodies", remedy="give the block a body")
+        raise EffectError("needs the fitted model's bodies", remedy="give the block a body")
     robot, key = block.body, id(block.q)
     kept = _ALONG.get(key)
     if kept is not None and kept[1] is block.v and kept[2] is block.a:
@@ -76,7 +76,7 @@ def mean_inertia(robot: Robot, joint: int) -> float:
 
 
 def share_of_rotor(block: Block, joint: int) -> float | None:
-    """Return the motor's share of a joint's inertia in the present model; None if unknown."""
+    """Return the motor's share of a joint's inertia in the fitted model; None if unknown."""
     if block.body is None or block.rotor is None or not block.rotor[joint] > 0:
         return None
     rotor = float(block.rotor[joint])

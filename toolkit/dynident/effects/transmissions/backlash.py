@@ -30,7 +30,7 @@ class Backlash(FlexibleJoint):
     """
 
     name = "backlash"
-    law = "driven response of the link in a gap"
+    law = "response of the link in a dead zone"
     sign_of = "bursts where the load reverses"
     confounded_with = ("joint_elasticity", "presliding", "coulomb_friction")
     shown_by = "load"

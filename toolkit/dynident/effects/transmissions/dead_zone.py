@@ -1,4 +1,4 @@
-"""A link in the gap of a transmission: the recursion in time, step by step."""
+"""A link in the dead zone of a transmission: the recursion in time, step by step."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Transmitting:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DeadZoneLink:
-    """A link behind a transmission with a gap, in steps of time.
+    """A link behind a transmission with a dead zone, in steps of time.
 
     Attributes
     ----------
@@ -61,9 +61,9 @@ class DeadZoneLink:
 
 @dataclass(frozen=True, eq=False)
 class DeadZoneMotion:
-    """Deflection of a link in a gap (S,), not finite where it ran away, and the side it touches.
+    """Deflection of a link in a dead zone (S,), and the side that it touches: -1, 0 or 1.
 
-    The side is -1, 0 or 1.
+    The deflection is not finite where the link ran away.
     """
 
     d: np.ndarray
@@ -71,7 +71,7 @@ class DeadZoneMotion:
 
 
 def through_dead_zones(links: Sequence[DeadZoneLink]) -> list[DeadZoneMotion]:
-    """Return how links move in gaps: together, as a step costs the same for one and for dozens."""
+    """Return how links move in dead zones: a step costs the same for one and for dozens."""
     longest = max(len(link.m) for link in links)
     most = max(1, _TOGETHER // longest)
     if len(links) > most:

@@ -30,7 +30,7 @@ class DrivenLink:
 
     Parameters
     ----------
-    block : whole recording, with the present model's body and rotor inertias.
+    block : whole recording, with the fitted model's body and rotor inertias.
     joint : column of the joint.
 
     Attributes

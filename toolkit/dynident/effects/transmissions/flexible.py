@@ -1,4 +1,4 @@
-"""What a spring and a gap between a motor and its link have in common."""
+"""What a spring and a dead zone between a motor and its link have in common."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ROTOR_SHARE = ShapeParameter("rotor_share", "1", (0.3,), 0.005, 0.95)
 
 
 class FlexibleJoint(Forceless):
-    """A compliant transmission between the motor and the link of a joint, perhaps with a gap.
+    """A compliant transmission between the motor and the link of a joint, perhaps with a dead zone.
 
     Its column is a filtered dynamic regressor, the response of the link behind it. The torque of
     every joint changes, as all feel the link's acceleration. See

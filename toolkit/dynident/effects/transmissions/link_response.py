@@ -79,7 +79,7 @@ class Response:
     ----------
     m, load : (S,) inertia behind the transmission, and the torque that the link needs where nothing
         gives way.
-    walked : the deflection of a link in a gap, found step by step; None without a gap.
+    walked : the deflection of a link in a dead zone, found step by step; None without a gap.
     """
 
     def __init__(self, link: DrivenLink, fine: Fine, gear: Transmitting) -> None:
