@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from dynident import criteria
 from dynident.criteria import DEFAULTS, Criteria, GateCriteria
 from dynident.criteria.criterion import about
 from dynident.errors import CriteriaError
@@ -26,6 +29,14 @@ def test_each_says_what_it_is_its_unit_and_where_it_comes_from(group: str, one) 
     assert not known.objection(known.default)
 
 
+def test_each_is_read_somewhere() -> None:
+    room = Path(criteria.__file__).parent
+    files = [p for p in room.parent.rglob("*.py") if room not in p.parents]
+    source = "\n".join(p.read_text() for p in files)
+    unread = [one.name for _, one in EVERY if not re.search(rf"\.{one.name}\b", source)]
+    assert unread == []
+
+
 def test_the_table_lists_each_of_them() -> None:
     rows = DEFAULTS.table().rows
     assert [row[0] for row in rows] == [f"{group}.{one.name}" for group, one in EVERY]
@@ -33,12 +44,12 @@ def test_the_table_lists_each_of_them() -> None:
 
 
 def test_what_is_changed_is_named_with_its_default() -> None:
-    criteria = Criteria.with_values({"gates": {"level": 0.005}, "contacts": {"tails": [0.9, 0.99]}})
-    assert [str(one) for one in criteria.changed] == [
+    other = Criteria.with_values({"gates": {"level": 0.005}, "contacts": {"tails": [0.9, 0.99]}})
+    assert [str(one) for one in other.changed] == [
         "gates.level = 0.005 (default 0.01)",
         "contacts.tails = [0.9, 0.99] (default [0.95, 0.99, 0.997])",
     ]
-    assert criteria == Criteria(gates=GateCriteria(level=0.005), contacts=criteria.contacts)
+    assert other == Criteria(gates=GateCriteria(level=0.005), contacts=other.contacts)
     assert DEFAULTS.changed == () and repr(DEFAULTS) == "Criteria()"
 
 

@@ -62,13 +62,6 @@ class NoiseCriteria(CriteriaGroup):
     blocks_per_recording: int = criterion(
         3, "blocks", "blocks of time that every recording has at least", least=2
     )
-    reliable: float = criterion(
-        0.05,
-        "1",
-        "share of signal in the square of a direction, below which the direction is noise",
-        over=0,
-        most=1,
-    )
 
 
 @dataclass(frozen=True, kw_only=True)

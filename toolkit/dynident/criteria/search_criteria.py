@@ -31,7 +31,10 @@ class SearchCriteria(CriteriaGroup):
         "systematic residual over noise below which filtered dynamic regressors are not evaluated",
     )
     payload_recordings: int = criterion(
-        6, "recordings", "recordings up to which every choice of payload carriers is tried", least=1
+        6,
+        "recordings",
+        "recordings up to which every choice of those with payload is tried",
+        least=1,
     )
     another_model: float = criterion(
         0.1,

@@ -132,7 +132,7 @@ def assemble(
 
 
 def _advised(steps: tuple[Step, ...], adviser: Adviser) -> tuple[Step, ...]:
-    """Say which experiment would tell an effect from those that cannot be told from it."""
+    """Say which experiment would distinguish an effect from those that explain the same."""
     return tuple(
         replace(one, advice=adviser.separating((one.effect, *one.indistinguishable), one.values))
         if one.indistinguishable

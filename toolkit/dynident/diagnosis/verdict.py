@@ -19,7 +19,7 @@ def verdict_of(
 ) -> Verdict:
     """Return the verdict on a search, from held-out data before and after and its last ranking."""
     if after.least_ratio is None or after.ratio is None or before.ratio is None:
-        if last.material:
+        if last.passing:
             return "unexplained"
         return "explained" if steps else "nothing_missing"
     if within_noise(after, criteria):

@@ -1,4 +1,4 @@
-"""Which experiment would show an effect, or tell effects apart: in words, with numbers."""
+"""Which experiment would show an effect, or distinguish effects: in words, with numbers."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Adviser:
         return f"no motion of this robot shows {effect.title}: {why}"
 
     def separating(self, effects: Sequence[Effect], values: Sequence[float]) -> str:
-        """Say which experiment would tell effects apart.
+        """Say which experiment would distinguish effects.
 
         The one in which the torque of the first is furthest from what any other, together with the
         model, can make of it.
@@ -268,5 +268,5 @@ def separating(
     values: np.ndarray,
     recorded: Recorded,
 ) -> str:
-    """Say which experiment would tell effects apart; see `Adviser.separating`."""
+    """Say which experiment would distinguish effects; see `Adviser.separating`."""
     return Adviser(CandidateExperiments(model, values, recorded)).separating(effects, own)

@@ -1,4 +1,4 @@
-"""What one repetition does not share with the others, whitened, and bumps fitted to it.
+"""What one repetition does not share with the others, whitened, and pulses fitted to it.
 
 What changes slowly, a level or friction that falls as a drive warms up, is taken out of every
 repetition before. Bursts are to have no say in the noise model.
@@ -68,14 +68,14 @@ class Changes:
     reach: float
 
     def certainty(self, row: float, width: float) -> float:
-        """Share of a bump's z value that is left for two doubts.
+        """Share of a pulse's z value that is left for two doubts.
 
-        The slow changes are not known exactly. And one sample that is far out is no bump: what is
+        The slow changes are not known exactly. And one sample that is far out is no pulse: what is
         left of z without the sample that speaks for it most.
 
         Parameters
         ----------
-        row, width : of the bump, in rows.
+        row, width : of the pulse, in rows.
         """
         instants = len(self.kept)
         p = int(row // instants)
@@ -96,7 +96,7 @@ class Changes:
         return float(np.clip(alone, 0.0, 1.0) / np.sqrt(1.0 + unknown / power))
 
     def match(self, signal: np.ndarray, rows: np.ndarray, width: float) -> np.ndarray:
-        """Fit bumps of a width (in rows) at rows (M,), any real numbers, to a signal (P S,).
+        """Fit pulses of a width (in rows) at rows (M,), any real numbers, to a signal (P S,).
 
         Returns
         -------
@@ -122,7 +122,7 @@ def scanned(one: Changes, width: float) -> np.ndarray:
     white = np.asarray(lfilter(one.colour, [1.0], one.change * one.still))
     back = np.asarray(lfilter(one.colour, [1.0], white[::-1]))[::-1] * one.still
     product = _convolved(back, pulse)
-    # The whitened bump's square: over the lags that the filter mixes.
+    # The whitened pulse's square: over the lags that the filter mixes.
     power = np.zeros(len(back))
     for lag in range(min(len(one.colour), len(pulse))):
         both = float(one.colour[: len(one.colour) - lag] @ one.colour[lag:])
@@ -252,8 +252,8 @@ def degrees_of_freedom(z: np.ndarray, criteria: ContactCriteria) -> float:
 def chance_of(z: float, degrees: float, width: float) -> float:
     """Probability of a value as large as z at one place.
 
-    A bump of many rows is a mean of so many samples, whose excess kurtosis falls with their number;
-    half of them count, because noise comes in flocks.
+    A pulse of many rows is a mean of so many samples, whose excess kurtosis falls with their
+    number; half of them count, because noise comes in flocks.
     """
     more = max(degrees - 4.0, 0.5) * max(1.0, width / 2)
     wide = max(degrees, 4.0 + more) if width > 2 else degrees

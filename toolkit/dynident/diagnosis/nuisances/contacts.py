@@ -142,7 +142,7 @@ def _masked(
     pulses: Sequence[DisturbancePulse],
     criteria: ContactCriteria,
 ) -> tuple[Run, ...]:
-    """Runs as they are now, with these bumps and no others left out."""
+    """Runs as they are now, with these pulses and no others left out."""
     found = []
     for r, (run, original) in enumerate(zip(runs, whole, strict=True)):
         again = replace(run, index=original.index, edges=original.edges, left_out=None)

@@ -1,7 +1,7 @@
 """Dry friction that reverses less or more sharply than its law: a nuisance, no missing effect.
 
 A drive that feeds encoder noise into its torque dithers the joint, and dithered dry friction is
-blunter than friction at rest from noise; so is friction seen through noisy velocities. And the
+wider than that of a robot without noise; so is friction seen through noisy velocities. And the
 width that a study states may be wider or narrower than a joint's. Without a word for it, healthy
 robots would be said to lack something. So the diagnosis lets a share of a joint's dry friction
 reverse over another range of speeds, where the data call for it by the same tests as for any
@@ -28,7 +28,7 @@ _SHARPER = ("sharper", "The study's friction_width is larger than the joint's.")
 class FrictionWidthColumn(JointEffect):
     """A share of the dry friction that reverses over k times the width: no loss at speed.
 
-    With k below 1 it is sharper than the law, with k above 1 blunter.
+    With k below 1 it is sharper than the law, with k above 1 less sharp.
     """
 
     name = "blunted_friction"
@@ -49,20 +49,20 @@ class FrictionWidthColumn(JointEffect):
 
 
 def with_friction_width(evidence: Evidence, fitted: EvidenceFit) -> EvidenceFit:
-    """Return the fit with dry friction blunted at the joints where the data call for it."""
+    """Return the fit with another friction width at the joints where the data call for it."""
     model = fitted.model
     dry = [e.joint for e in model.effects if e.name == "coulomb_friction"]
     wanted = tuple(FrictionWidthColumn(joint).on(model.robot) for joint in dry)
     wanted = tuple(effect for effect in wanted if effect not in model)
     if not wanted:
         return fitted
-    for score in rank(evidence, fitted, 0, only=wanted, least=0.0).material:
+    for score in rank(evidence, fitted, 0, only=wanted, least=0.0).passing:
         model = model + score.effect
     return fitted if model is fitted.model else fit_evidence(evidence, model)
 
 
 def friction_width_notes(fitted: EvidenceFit) -> tuple[str, ...]:
-    """What was blunted, in plain words."""
+    """Joints whose dry friction has another width, in plain words."""
     model, notes = fitted.model, []
     for effect in model.effects:
         if isinstance(effect, FrictionWidthColumn):

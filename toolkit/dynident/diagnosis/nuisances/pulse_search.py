@@ -3,7 +3,7 @@
 What a model lacks is the same in every repetition and cancels in their differences; so does not a
 push. What changes slowly, a level or friction that falls as a drive warms up, is taken out of
 every repetition before. The rest is whitened by a noise model that a burst cannot inflate, and
-searched by matched filters: Gaussian bumps of many widths at all times.
+searched by matched filters: Gaussian pulses of many widths at all times.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def find_contacts(evidence: Evidence, fitted: EvidenceFit) -> tuple[DisturbanceP
 
     Parameters
     ----------
-    evidence, present : the runs, and the model whose residual is compared; a poor model will do.
+    evidence, fitted : the runs, and the model whose residual is compared; a poor model will do.
 
     Returns
     -------
@@ -87,7 +87,7 @@ def find_contacts(evidence: Evidence, fitted: EvidenceFit) -> tuple[DisturbanceP
 
 
 def pulses_in(data: Sequence[Repeated], criteria: Criteria) -> tuple[DisturbancePulse, ...]:
-    """Find bumps in residuals of any joints and recordings; the most significant first."""
+    """Find pulses in residuals of any joints and recordings; the most significant first."""
     left, found = list(data), []
     while len(found) < criteria.contacts.most:
         best = _best(left, criteria)
@@ -99,14 +99,14 @@ def pulses_in(data: Sequence[Repeated], criteria: Criteria) -> tuple[Disturbance
 
 
 def without(run: Run, pulses: Sequence[DisturbancePulse], criteria: ContactCriteria) -> Run:
-    """Return a run without the instants of bumps, in all repetitions.
+    """Return a run without the instants of pulses, in all repetitions.
 
     That is some widths on either side, or a share of the repetition where that is less.
 
     Parameters
     ----------
     run : Run
-    bumps : of this run; others must not be among them.
+    pulses : of this run; others must not be among them.
     criteria : how much is left out.
     """
     if not pulses:
@@ -128,7 +128,7 @@ def without(run: Run, pulses: Sequence[DisturbancePulse], criteria: ContactCrite
 
 
 def _best(data: Sequence[Repeated], criteria: Criteria) -> DisturbancePulse | None:
-    """The most significant bump, whether it is or not."""
+    """The most significant pulse, whether it is or not."""
     by_joint = {one.joint: [s for s in data if s.joint == one.joint] for one in data}
     found, positions = [], 0
     for series in by_joint.values():
@@ -154,7 +154,7 @@ def _best(data: Sequence[Repeated], criteria: Criteria) -> DisturbancePulse | No
 
 @dataclass(frozen=True, order=True)
 class _PulsePlace:
-    """The place at which a bump of one width stands out most.
+    """The place at which a pulse of one width stands out most.
 
     Attributes
     ----------
@@ -222,7 +222,7 @@ class _Tried:
     instants: np.ndarray
 
     def witnesses(self, width: float, criteria: ContactCriteria) -> np.ndarray:
-        """Which places tell the noise: not those about the peaks, in any repetition of these."""
+        """Which places show the noise: not those about the peaks, in any repetition of these."""
         kept = np.ones(len(self.z), dtype=bool)
         for _ in range(criteria.peaks):
             peak = np.argmax(np.where(kept, self.z, -1.0))
@@ -235,7 +235,7 @@ class _Tried:
 
 
 def _tried(prepared: Sequence[Changes], width: float, criteria: ContactCriteria) -> _Tried | None:
-    """Try bumps of a width (s) everywhere; None where it is too wide for every series."""
+    """Try pulses of a width (s) everywhere; None where it is too wide for every series."""
     parts = []
     for k, one in enumerate(prepared):
         repetitions, instants = one.of.residual.shape
@@ -259,7 +259,7 @@ def _usual(z: np.ndarray, rows: np.ndarray, reach: float) -> float:
 
 
 def _refined(place: _PulsePlace, p_value: float, criteria: ContactCriteria) -> DisturbancePulse:
-    """The bump with its best time and width, in the repetition where it is."""
+    """The pulse with its best time and width, in the repetition where it is."""
     one, row, width = place.of, place.row, place.width
     least = criteria.narrowest / one.of.step
     most = criteria.widest_share * one.of.residual.shape[1]
@@ -295,7 +295,7 @@ def _refined(place: _PulsePlace, p_value: float, criteria: ContactCriteria) -> D
 
 
 def _cleared(one: Repeated, pulse: DisturbancePulse) -> Repeated:
-    """Return a series without a bump that was found in it."""
+    """Return a series without a pulse that was found in it."""
     if (one.run, one.joint) != (pulse.run, pulse.joint):
         return one
     shape = np.exp(-(((one.t - pulse.time) / pulse.width) ** 2) / 2)

@@ -43,7 +43,7 @@ def rounding_power(fitted: EvidenceFit, dataset: Dataset) -> np.ndarray:
 
     Parameters
     ----------
-    present : the fitted model.
+    fitted : the model.
     dataset : recordings; positions that lie on no lattice count as not rounded.
     """
     n = fitted.model.robot.n

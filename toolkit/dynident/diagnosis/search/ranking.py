@@ -36,7 +36,7 @@ class Ranking:
     ----------
     scores : one for each effect and place.
     tests : number of effects and shapes tried.
-    refusals : why a score is not material; empty where it is.
+    refusals : which gate a score does not pass; empty where it passes all.
     """
 
     scores: tuple[Score, ...]
@@ -44,7 +44,7 @@ class Ranking:
     refusals: tuple[str, ...]
 
     @property
-    def material(self) -> tuple[Score, ...]:
+    def passing(self) -> tuple[Score, ...]:
         """Scores that pass every gate, best first."""
         pairs = zip(self.scores, self.refusals, strict=True)
         return tuple(s for s, refusal in pairs if not refusal and not s.not_identifiable)
@@ -77,7 +77,7 @@ def rank(
     ----------
     evidence, fitted : recordings and their columns, and the model as it fits them.
     added : number of effects added so far; later ones must explain more.
-    tell : told what is being done, for a progress display.
+    progress : is called with what is being done, for a display.
     only : candidates, where not the whole catalogue is meant.
     least : share of the squared residual that they must explain; None for that of the criteria.
     """
@@ -112,7 +112,7 @@ def rank(
 
 
 def _unseen(one: Score, noisy: bool) -> str:
-    """Why a driven response was not evaluated; empty where it was."""
+    """Why a filtered dynamic regressor was not evaluated; empty where it was."""
     if one.drop != 0 or one.not_identifiable or not one.effect.is_dynamic_response:
         return ""
     return _NOISY if noisy else f"nothing is left to explain at {one.effect.joint}"
@@ -182,7 +182,7 @@ def _seen(fitted: EvidenceFit, effect: Effect) -> Block:
 
 
 def judged(evidence: Evidence, fitted: EvidenceFit, one: Score, tests: int) -> tuple[Score, str]:
-    """Return a score refined and cross-validated, and why it is not material; empty if it is."""
+    """Return a score refined and cross-validated, and the gate that it does not pass, if any."""
     one = _confirm(evidence, fitted, one)
     return one, _refusal(one, evidence, fitted, tests, evidence.criteria.gates.first_share)
 

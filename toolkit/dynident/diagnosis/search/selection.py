@@ -51,13 +51,13 @@ def choose(evidence: Evidence, fitted: EvidenceFit, ranking: Ranking) -> AddedEf
     -------
     The effect that explains most; or the simpler one in it, where that does most of the work.
     """
-    material, criteria = ranking.material, evidence.criteria.search
-    if not material:
+    passing, criteria = ranking.passing, evidence.criteria.search
+    if not passing:
         return None
-    best = material[0]
+    best = passing[0]
     simpler = [
         s
-        for s in material
+        for s in passing
         if s.effect.name in best.effect.stands_in_for
         and s.effect.joint == best.effect.joint
         and s.drop >= criteria.simpler_share * best.drop
@@ -69,7 +69,7 @@ def choose(evidence: Evidence, fitted: EvidenceFit, ranking: Ranking) -> AddedEf
         *indistinguishable(ranking, best, criteria),
         *_alike_once_fitted(evidence, fitted, ranking),
     }
-    among = [s for s in material if s is best or s.effect in alike]
+    among = [s for s in passing if s is best or s.effect in alike]
     as_good = [s for s in among if s.drop >= criteria.simpler_share * best.drop]
     chosen = min(as_good, key=_size)  # the first of the simplest: they stand in order
     others = tuple(s.effect for s in among if s is not chosen)
@@ -84,7 +84,7 @@ def _alike_once_fitted(
     Before, columns that are not linear in their values are those of a first guess.
     """
     criteria = evidence.criteria.search
-    best, *others = ranking.material
+    best, *others = ranking.passing
     rivals = [
         s
         for s in others
@@ -123,7 +123,7 @@ def _size(one: Score) -> int:
 
 def alternatives_only(one: AddedEffect, following: Ranking) -> AddedEffect:
     """Leave out effects that stay significant beside the one added: they are more, not instead."""
-    still = {s.effect.label for s in following.material}
+    still = {s.effect.label for s in following.passing}
     alternatives = tuple(
         e
         for e in one.indistinguishable
@@ -152,7 +152,7 @@ def indistinguishable(
     """
     rivals = [
         other
-        for other in ranking.material
+        for other in ranking.passing
         if other.losses is not None
         and other.effect != winner.effect
         and not (
@@ -246,7 +246,7 @@ def without_superfluous(
         effect = next(e for e in fitted.model.effects if e.label == one.score.effect.label)
         rest = fit_evidence(evidence, fitted.model - effect, fitted)
         progress(f"doing without {effect.label}")
-        needed = len(kept) == 1 or rank(evidence, rest, len(kept) - 1, only=(effect,)).material
+        needed = len(kept) == 1 or rank(evidence, rest, len(kept) - 1, only=(effect,)).passing
         if not needed or not _helps(held, rest, fitted):
             kept.remove(one)
             fitted = rest
