@@ -1,0 +1,222 @@
+"""Parameters of a robot with effects: names, units, places, and the robot that they describe."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+
+from dynident.effects import FRICTION_WIDTH, Effect, effects_of
+from dynident.errors import EffectError
+from dynident.robot import BaseParameters, Robot, nearest_parameters, structural_base
+
+
+@dataclass(frozen=True)
+class Parametrisation:
+    """A robot and its effects as parameters.
+
+    They are the robot's base parameters (structurally identifiable combinations of the standard
+    inertial parameters), then those of each effect in turn.
+
+    Attributes
+    ----------
+    robot : the tree of joints and links.
+    effects : at most one of a label.
+    friction_width : rad/s or m/s, see `dynident.effects.FRICTION_WIDTH`.
+    """
+
+    robot: Robot
+    effects: tuple[Effect, ...] = ()
+    friction_width: float = FRICTION_WIDTH
+
+    def __post_init__(self) -> None:
+        checked = tuple(effect.on(self.robot) for effect in self.effects)
+        labels = [effect.label for effect in checked]
+        for label in labels:
+            if labels.count(label) > 1:
+                raise EffectError("is in the model twice", label, "name it once")
+        if not self.friction_width > 0:
+            raise EffectError(
+                f"friction_width = {self.friction_width:g}", remedy="choose it above 0"
+            )
+        object.__setattr__(self, "effects", checked)
+
+    # --- with other effects --------------------------------------------------------------------
+
+    def __add__(self, addition: Effect | str | tuple[Effect, ...]) -> Self:
+        """Return the model with an effect more (`name`, `name@joint`, an effect or several)."""
+        if isinstance(addition, str):
+            addition = effects_of(addition, self.robot)
+        more = addition if isinstance(addition, tuple) else (addition,)
+        return replace(self, effects=(*self.effects, *more))
+
+    def __sub__(self, effect: Effect | str) -> Self:
+        """Return the model without an effect, given as itself or by its label."""
+        label = effect if isinstance(effect, str) else effect.label
+        kept = tuple(one for one in self.effects if one.label != label)
+        if len(kept) == len(self.effects):
+            raise EffectError("is not in the model", label)
+        return replace(self, effects=kept)
+
+    def __contains__(self, effect: Effect | str) -> bool:
+        label = effect if isinstance(effect, str) else effect.label
+        return any(one.label == label for one in self.effects)
+
+    def with_shapes(self, effects: tuple[Effect, ...]) -> Self:
+        """Return the model with these effects in place of those of the same labels."""
+        by_label = {effect.label: effect for effect in effects}
+        made = replace(self, effects=tuple(by_label.get(e.label, e) for e in self.effects))
+        made.__dict__["base"] = self.base  # the costly part, and the same
+        return made
+
+    def at(self, values: np.ndarray) -> Self:
+        """Return the model linearised at other values, (p,), where it is not linear in them."""
+        moved = tuple(
+            effect.at(plain(values[self.slices[effect.label]]))
+            for effect in self.effects
+            if effect.nonlinear
+        )
+        return self.with_shapes(moved) if moved else self
+
+    # --- parameters ----------------------------------------------------------------------------
+
+    @cached_property
+    def base(self) -> BaseParameters:
+        """Structurally identifiable combinations of the rigid body's standard parameters."""
+        return structural_base(self.robot)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters, those of effects as `Fv@joint`."""
+        return (*(self.base.names[i] for i in self.base.independent), *self._of_effects("name"))
+
+    @cached_property
+    def expressions(self) -> tuple[str, ...]:
+        """Each parameter as a combination of standard parameters."""
+        return (*self.base.expressions, *self._of_effects("name"))
+
+    @cached_property
+    def units(self) -> tuple[str, ...]:
+        """Unit of each parameter."""
+        rigid = (self.robot.parameter_units[i] for i in self.base.independent)
+        return (*rigid, *self._of_effects("unit"))
+
+    @cached_property
+    def slices(self) -> dict[str, slice]:
+        """Columns of each effect, by its label."""
+        found, start = {}, len(self.base.independent)
+        for effect in self.effects:
+            stop = start + len(effect.parameters(self.robot))
+            found[effect.label] = slice(start, stop)
+            start = stop
+        return found
+
+    @property
+    def size(self) -> int:
+        """Number of columns."""
+        return len(self.names)
+
+    @cached_property
+    def needs_values(self) -> bool:
+        """Whether some columns depend on the parameters: they are taken at values, and again."""
+        return any(e.nonlinear or e.depends_on_fit for e in self.effects)
+
+    def linearisation_point(self) -> np.ndarray:
+        """Values at which columns that are not linear in them are taken, all others zero, (p,)."""
+        values = np.zeros(self.size)
+        for effect in self.effects:
+            if effect.point:
+                values[self.slices[effect.label]] = effect.point
+        return values
+
+    def given_values(self) -> np.ndarray:
+        """Parameter values of the robot description, effects at zero, (p,)."""
+        values = np.zeros(self.size)
+        values[: len(self.base.independent)] = self.base.coordinates(self.robot.theta)
+        return values
+
+    def relaxed(self, at: np.ndarray, found: np.ndarray) -> np.ndarray:
+        """Values at which to take columns that depend on the fitted model next.
+
+        Where a share e is added to the torque, the plain repetition (at `found`) shrinks its error
+        by -e only, and grows it from e = 1 on. This step shrinks it by e / (2 + e) at worst.
+
+        Parameters
+        ----------
+        at : (p,) values at which these columns were taken.
+        found : (p,) values fitted with them.
+        """
+        loads = (found[self.slices[e.label]] for e in self.effects if e.linear_in_torque)
+        shares = np.concatenate([np.zeros(1), *loads])
+        return at + 2.0 / max(2.0 + shares.min() + shares.max(), 0.1) * (found - at)
+
+    def _of_effects(self, attribute: str) -> tuple[str, ...]:
+        found = []
+        for effect in self.effects:
+            for parameter in effect.parameters(self.robot):
+                place = effect.label.partition("@")[2]
+                tail = f"@{place}" if place and attribute == "name" else ""
+                head = str(getattr(parameter, attribute))
+                if attribute == "name" and not place:
+                    head = f"{effect.name}.{head}"
+                found.append(head + tail)
+        return tuple(found)
+
+    # --- the robot that the parameters describe -------------------------------------------------
+
+    def current_robot(
+        self, values: np.ndarray, before: Effect | None = None, *, carries_payload: bool = False
+    ) -> Robot:
+        """Return the robot with the bodies, and the changes of them, that the parameters say.
+
+        Each effect that changes the robot builds on those before it in the model, so that
+        together they are the torque of the robot with all of them.
+
+        Parameters
+        ----------
+        values : (p,); what base parameters leave open is as near to the description as it can be.
+        before : an effect of the model: without it and those after it.
+        carries_payload : whether the payload is on board.
+        """
+        robot = self._bodies(values, carries_payload=carries_payload)
+        for effect in self.effects:
+            if before is not None and effect.label == before.label:
+                break
+            if effect.needs_bodies:
+                robot = effect.simulated_robot(plain(values[self.slices[effect.label]]), robot)
+        return robot
+
+    def rotor(self, values: np.ndarray) -> np.ndarray:
+        """Inertia that effects add at each joint, (n,) kg m^2 or kg."""
+        total = np.zeros(self.robot.n)
+        for effect in self.effects:
+            own = plain(values[self.slices[effect.label]])
+            total += np.diag(effect.simulated_inertia(own, self.robot))
+        return total
+
+    def _bodies(self, values: np.ndarray, *, carries_payload: bool) -> Robot:
+        """The robot with its base parameters and payload; the last ones asked for are kept."""
+        key = (values.tobytes(), carries_payload)
+        if key not in self._made:
+            if len(self._made) > 1:
+                self._made.clear()
+            base = values[: self.base.rank]
+            robot = self.robot.with_theta(
+                nearest_parameters(self.base, self.robot.theta, np.asarray(base))
+            )
+            for effect in self.effects:
+                if effect.is_payload and carries_payload:
+                    robot = effect.simulated_robot(plain(values[self.slices[effect.label]]), robot)
+            self._made[key] = robot
+        return self._made[key]
+
+    @cached_property
+    def _made(self) -> dict[tuple[bytes, bool], Robot]:
+        return {}
+
+
+def plain(values: np.ndarray) -> tuple[float, ...]:
+    """Return values as effects take them."""
+    return tuple(float(x) for x in values)
