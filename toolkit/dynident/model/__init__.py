@@ -1,6 +1,6 @@
 """A model: a robot and the physical effects that it is said to have.
 
-In: a robot and effects. Out: the parameters in which the torque is linear (`parametrisation`),
+In: a robot and effects. Out: the parameters in which the torque is linear (`parametrised_robot`),
 the robot that their values describe, and the columns of the regression (`torque_model`). This is
 the one place that knows in which order columns can be evaluated: those of effects that make the
 torque, along the bodies that the values describe, then those of effects that depend on the

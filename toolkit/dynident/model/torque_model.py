@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dynident.effects import Block, Effect, Needs
-from dynident.model.parametrisation import Parametrisation
+from dynident.model.parametrised_robot import ParametrisedRobot
 
 
 @dataclass(frozen=True)
-class Model(Parametrisation):
+class Model(ParametrisedRobot):
     """A robot and its effects, as a torque that is linear in its parameters.
 
     The parameters are the robot's base parameters (structurally identifiable combinations of the

@@ -14,7 +14,7 @@ from dynident.robot import BaseParameters, Robot, nearest_parameters, structural
 
 
 @dataclass(frozen=True)
-class Parametrisation:
+class ParametrisedRobot:
     """A robot and its effects as parameters.
 
     They are the robot's base parameters (structurally identifiable combinations of the standard
