@@ -27,7 +27,6 @@ PLAIN_FACTS: dict[str, str] = {
     "carries": "the same of a recording",
     "payload": "the same of a recording, None where it is not known",
     "named": "whether the answer adds an effect: of it the record of such answers is looked up",
-    "noise_known": "whether the noise was measured or stated",
 }
 """Boolean arguments that say how things are and choose no behaviour, with the reason."""
 
