@@ -89,7 +89,12 @@ def kind_of(verdict: str, *, named: bool, over_floor: float) -> tuple[Said, Size
 
 
 def track_record(verdict: str, *, named: bool, over_floor: float) -> TrackRecord | None:
-    """Return the record of answers like this; None where there are too few."""
+    """Return the record of answers like this; None where there are too few.
+
+    Parameters
+    ----------
+    verdict, named, over_floor : see `kind_of`.
+    """
     kind = kind_of(verdict, named=named, over_floor=over_floor)
     if kind not in _COUNTS:
         return None

@@ -17,7 +17,15 @@ from dynident.recording.dataset import NoiseSource
 def verdict_of(
     before: HeldOut, after: HeldOut, steps, last: Ranking, criteria: VerdictCriteria
 ) -> Verdict:
-    """Return the verdict on a search, from held-out data before and after and its last ranking."""
+    """Return the verdict on a search, from held-out data before and after and its last ranking.
+
+    Parameters
+    ----------
+    before, after : what the given and the final model miss on held-out data.
+    steps : the effects added.
+    last : the last ranking.
+    criteria : of the verdict.
+    """
     if after.least_ratio is None or after.ratio is None or before.ratio is None:
         if last.passing:
             return "unexplained"
@@ -51,7 +59,14 @@ def noise_source(evidence: Evidence, held: Evidence | None) -> NoiseSource:
 
 
 def notes_on(evidence, held, fitted: EvidenceFit, source: NoiseSource) -> tuple[str, ...]:
-    """Return the caveats that belong to a verdict, in plain words."""
+    """Return the caveats that belong to a verdict, in plain words.
+
+    Parameters
+    ----------
+    evidence, held : of the training and of the test recordings; `held` may be None.
+    fitted : the final model.
+    source : where the noise floor comes from.
+    """
     notes = []
     if held is None:
         notes.append("No test recordings: errors are those of held-out blocks of time.")

@@ -257,7 +257,18 @@ class _Separation:
 
 
 def revealing(effect: Effect, model: Model, values: np.ndarray, recorded: Recorded) -> str:
-    """Say which experiment would show an effect; see `Adviser.revealing`."""
+    """Say which experiment would show an effect; see `Adviser.revealing`.
+
+    Parameters
+    ----------
+    effect : that the recordings do not show.
+    model, values : the fitted model and its parameters, (p,).
+    recorded : what motion there is already.
+
+    Returns
+    -------
+    One sentence without a full stop.
+    """
     return Adviser(CandidateExperiments(model, values, recorded)).revealing(effect)
 
 
@@ -268,5 +279,16 @@ def separating(
     values: np.ndarray,
     recorded: Recorded,
 ) -> str:
-    """Say which experiment would distinguish effects; see `Adviser.separating`."""
+    """Say which experiment would distinguish effects; see `Adviser.separating`.
+
+    Parameters
+    ----------
+    effects, own : the one that was added with those that explain the same; its values.
+    model, values : the fitted model and its parameters, (p,).
+    recorded : what motion there is already.
+
+    Returns
+    -------
+    One sentence without a full stop.
+    """
     return Adviser(CandidateExperiments(model, values, recorded)).separating(effects, own)

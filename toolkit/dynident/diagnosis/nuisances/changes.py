@@ -145,6 +145,16 @@ def changes_of(
     """Differences of all series of one joint, with the noise that they have in common.
 
     `left_out` are the instants (S,) of each series that are no witnesses of the noise.
+
+    Parameters
+    ----------
+    series : of one joint.
+    left_out : instants (S,) of each that say nothing of the noise.
+    criteria : of contacts and of the noise.
+
+    Returns
+    -------
+    One for each series.
     """
     own_criteria, order = criteria.contacts, criteria.noise.order
     kept = [~np.tile(out, len(s.t)) for s, out in zip(series, left_out, strict=True)]
@@ -254,6 +264,16 @@ def chance_of(z: float, degrees: float, width: float) -> float:
 
     A pulse of many rows is a mean of so many samples, whose excess kurtosis falls with their
     number; half of them count, because noise comes in flocks.
+
+    Parameters
+    ----------
+    z : the value, over the standard deviation of the noise.
+    degrees : of freedom, see `degrees_of_freedom`.
+    width : of the pulse, in rows.
+
+    Returns
+    -------
+    Two-sided probability.
     """
     more = max(degrees - 4.0, 0.5) * max(1.0, width / 2)
     wide = max(degrees, 4.0 + more) if width > 2 else degrees

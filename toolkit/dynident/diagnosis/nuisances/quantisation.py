@@ -23,14 +23,32 @@ _DRAWS = 2  # whose product has no noise in the mean
 
 
 def with_rounding(judged: HeldOut, fitted: EvidenceFit, dataset: Dataset) -> HeldOut:
-    """Return a judgement that knows what the encoders' steps do, where anything is left at all."""
+    """Return a judgement that knows what the encoders' steps do, where anything is left at all.
+
+    Parameters
+    ----------
+    judged : what the model misses.
+    fitted : the model.
+    dataset : the recordings behind `judged`.
+    """
     if judged.least_ratio is None or within_noise(judged, fitted.criteria.verdict):
         return judged
     return replace(judged, rounding=rounding_power(fitted, dataset))
 
 
 def nothing_but_rounding(judged: HeldOut, fitted: EvidenceFit, dataset: Dataset) -> bool:
-    """Whether a residual beyond the noise is no more than encoders' steps leave."""
+    """Whether a residual beyond the noise is no more than encoders' steps leave.
+
+    Parameters
+    ----------
+    judged : what the model misses.
+    fitted : the model.
+    dataset : the recordings behind `judged`.
+
+    Returns
+    -------
+    False where nothing is beyond the noise, as nothing is looked at then.
+    """
     rounded = with_rounding(judged, fitted, dataset)
     return rounded.rounding is not None and within_noise(rounded, fitted.criteria.verdict)
 
@@ -97,7 +115,18 @@ def _predicted(
 def rounding_notes(
     judged: HeldOut, names: tuple[str, ...], criteria: VerdictCriteria
 ) -> tuple[str, ...]:
-    """Say where the steps of an encoder leave a part of the residual, in plain words."""
+    """Say where the steps of an encoder leave a part of the residual, in plain words.
+
+    Parameters
+    ----------
+    judged : what the final model misses.
+    names : of the joints.
+    criteria : from which part of the noise it is said.
+
+    Returns
+    -------
+    A sentence for each joint concerned.
+    """
     if judged.rounding is None or judged.noise_std is None:
         return ()
     share = np.sqrt(judged.rounding) / np.where(judged.noise_std > 0, judged.noise_std, np.inf)

@@ -80,6 +80,10 @@ def rank(
     progress : is called with what is being done, for a display.
     only : candidates, where not the whole catalogue is meant.
     least : share of the squared residual that they must explain; None for that of the criteria.
+
+    Returns
+    -------
+    Every effect at its best shape, best first, with the gate that it does not pass.
     """
     criteria, best, tests = evidence.criteria, [], 0
     below_noise = joints_below_noise(evidence, fitted)
@@ -182,7 +186,14 @@ def _seen(fitted: EvidenceFit, effect: Effect) -> Block:
 
 
 def judged(evidence: Evidence, fitted: EvidenceFit, one: Score, tests: int) -> tuple[Score, str]:
-    """Return a score refined and cross-validated, and the gate that it does not pass, if any."""
+    """Return a score refined and cross-validated, and the gate that it does not pass, if any.
+
+    Parameters
+    ----------
+    evidence, fitted : the data, and the model as it fits them.
+    one : the score.
+    tests : number of effects and shapes tried.
+    """
     one = _confirm(evidence, fitted, one)
     return one, _refusal(one, evidence, fitted, tests, evidence.criteria.gates.first_share)
 

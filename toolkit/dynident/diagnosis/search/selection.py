@@ -108,6 +108,15 @@ def breaks_its_promise(fitted: EvidenceFit, wider: EvidenceFit, one: Score) -> b
     """Whether a filtered dynamic regressor explains less in a model than it did beside it.
 
     With it the bodies change, and with them the response, which may not follow.
+
+    Parameters
+    ----------
+    fitted, wider : the model without the effect, and with it.
+    one : its score beside the first.
+
+    Returns
+    -------
+    False for any other effect, and where the noise is unknown.
     """
     if not (one.effect.is_dynamic_response and fitted.noise_known):
         return False
