@@ -75,9 +75,10 @@ def first_named(found: Diagnosis) -> set[str]:
         ("thermal_friction@shoulder", (0.8, 0.9), (30.0,)),
         ("torque_drift@elbow", (0.01,), ()),
         ("joint_elasticity@shoulder", (2e-3,), (9.0, 0.08, 0.3)),
-        pytest.param("backlash@shoulder", (0.003,), (20.0, 0.1, 0.3), marks=pytest.mark.slow),
+        ("backlash@shoulder", (0.003,), (20.0, 0.1, 0.3)),
     ],
 )
+@pytest.mark.slow
 def test_a_hidden_effect_is_found(
     label: str, values: tuple[float, ...], shape: tuple[float, ...]
 ) -> None:
@@ -89,6 +90,7 @@ def test_a_hidden_effect_is_found(
     assert found.test_error.after < 1.15 * found.test_error.noise_floor
 
 
+@pytest.mark.slow
 def test_a_shape_that_is_given_is_refined_though_it_is_one_that_is_screened() -> None:
     made = recordings(*truth("joint_elasticity@shoulder", (2e-3,), (9.0, 0.08, 0.3)))
     (given,) = effects_of("joint_elasticity@shoulder", PLAIN.robot)

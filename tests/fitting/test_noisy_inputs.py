@@ -48,6 +48,7 @@ def noisy(seed: int = 3, position_std: float = STD) -> di.Dataset:
 
 
 @pytest.mark.parametrize("name", [name for name in REGRESSIONS if name != "corrected"])
+@pytest.mark.slow
 def test_every_regression_finds_the_truth_where_there_is_no_input_noise(name: str) -> None:
     found = di.fit(model(), noisy(3, 0.0), di.Regression(name))
     size = np.abs(truth()).max()

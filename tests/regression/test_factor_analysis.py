@@ -75,6 +75,7 @@ def test_golden_case() -> None:
 
 
 @pytest.mark.parametrize("prior", [None, Gamma()])
+@pytest.mark.slow
 def test_the_bound_never_falls(prior: Gamma | None) -> None:
     for seed in range(200):
         problem = random_problem(seed)

@@ -40,6 +40,7 @@ def data(seed: int, rows: int, mixing: np.ndarray | None = None) -> tuple[np.nda
     ],
     ids=["factors", "bayes", "corrected", "corrected, correlated inputs"],
 )
+@pytest.mark.slow
 def test_the_error_falls_with_the_data_while_that_of_least_squares_stays(regression, mixing):
     def errors(rows: int) -> tuple[float, float]:
         squares = np.zeros(2)
@@ -192,6 +193,7 @@ def test_bounds_are_other_optima_only_where_they_converged() -> None:
     assert "not converged" in sensitivity(True, False)
 
 
+@pytest.mark.slow
 def test_a_flat_ridge_is_told_with_what_is_left_along_it() -> None:
     """A single input: nothing but the prior speaks of its reliability, and that hardly."""
     rng = np.random.default_rng(1)
