@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dynident.moments import SecondMoments
 from dynident.regression.factor_analysis import Gamma, start_of
 from dynident.regression.iterations import analyse
-from dynident.regression.statistics import Statistics
 from dynident.threads import single_threaded
 
 BLOCK = 8192
@@ -44,16 +44,16 @@ class Rows:
 
 
 @single_threaded
-def one_pass(data: Rows) -> tuple[Statistics, float, float]:
+def one_pass(data: Rows) -> tuple[SecondMoments, float, float]:
     """The statistics, their CPU time and that of X'X, block by block in turn, s."""
-    found: Statistics | None = None
+    found: SecondMoments | None = None
     total = np.zeros((data.inputs, data.inputs))
     ours = bare = 0.0
     for X, y in data.blocks():
         start = time.process_time()
         total += X.T @ X
         middle = time.process_time()
-        here = Statistics.of(X, y)
+        here = SecondMoments.of(X, y)
         found = here if found is None else found + here
         ours += time.process_time() - middle
         bare += middle - start
@@ -63,10 +63,10 @@ def one_pass(data: Rows) -> tuple[Statistics, float, float]:
 
 
 @single_threaded
-def iterations(statistics: Statistics) -> float:
+def iterations(statistics: SecondMoments) -> float:
     """CPU time of one iteration on the statistics, s."""
     unit = statistics.scaled(1.0 / statistics.scale)
-    unit = Statistics(unit.count, np.zeros_like(unit.mean), unit.scatter)
+    unit = SecondMoments(unit.total, unit.count)
     prior, known = Gamma(), np.zeros(unit.inputs, dtype=bool)
     start = start_of(unit, 0.8, prior)
     began = time.process_time()
@@ -106,7 +106,7 @@ def main() -> None:
     print(f"iteration over rows    {1e3 * iteration_over_rows(data):8.0f} ms")
     for rows in (asked.rows // 10, asked.rows):
         tracemalloc.start()
-        Statistics.over(Rows(rows, asked.inputs).blocks())
+        SecondMoments.over(Rows(rows, asked.inputs).blocks())
         print(f"peak memory, {rows:>8} rows {tracemalloc.get_traced_memory()[1] / 2**20:7.1f} MiB")
         tracemalloc.stop()
 

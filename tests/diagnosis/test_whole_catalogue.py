@@ -102,7 +102,7 @@ def test_a_shape_that_is_given_is_refined_though_it_is_one_that_is_screened() ->
 
 @pytest.mark.slow
 def test_a_gap_that_is_given_is_refined() -> None:
-    """From the few shapes of the first look, as it is not missing: 0.053 without it."""
+    """From the few shapes of the grid, as it is not missing: 0.053 without it."""
     made = recordings(*truth("backlash@shoulder", (0.003,), (20.0, 0.1, 0.3)))
     found = find(PLAIN + "backlash@shoulder", Dataset(tuple(made[:-1])), Dataset(tuple(made[-1:])))
     assert found.test_error.before < 0.03

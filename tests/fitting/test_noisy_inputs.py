@@ -16,9 +16,9 @@ import dynident as di
 from dynident.errors import FitError
 from dynident.fitting import load_estimate, rows
 from dynident.fitting.noisy_inputs import encoder_noise, input_noise
-from dynident.fitting.noisy_inputs.compressed import compress
 from dynident.fitting.noisy_inputs.posed import pieces_of
-from dynident.moments import TriangularFactors, factorise
+from dynident.fitting.noisy_inputs.regressors import few_rows
+from dynident.moments.factors import TriangularFactors, factorise, in_pieces, products_of
 from dynident.regression.bayesian_factors import BayesianFactorRegression
 from dynident.regression.names import REGRESSIONS
 from synthetic import arm, synthetic, true_values
@@ -181,10 +181,11 @@ def test_few_rows_stand_for_many() -> None:
     parts: list[TriangularFactors] = [
         factorise([(X[piece == k][:, None], y[piece == k][:, None])]) for k in range(4)
     ]
-    few = compress(parts, np.ones(1))
-    assert len(few.X) == 4 * 2 * 7 and few.count == 4000
+    pieces = in_pieces(parts, np.ones(1))
+    few = few_rows(pieces)
+    assert len(few.X) == 4 * 2 * 7 and pieces.rows == 4000
     both = np.column_stack([X, y])
-    np.testing.assert_allclose(few.statistics.scatter, both.T @ both, rtol=1e-10, atol=1e-8)
+    np.testing.assert_allclose(products_of(pieces).total, both.T @ both, rtol=1e-10, atol=1e-8)
     np.testing.assert_allclose(few.X.mean(axis=0), 0.0, atol=1e-12)
 
     on_few, on_all = PredefinedSplit(few.piece), PredefinedSplit(piece)

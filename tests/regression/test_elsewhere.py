@@ -1,4 +1,4 @@
-"""Statistics that are made in other processes, and add up here."""
+"""Moments that are made in other processes, and add up here."""
 
 from __future__ import annotations
 
@@ -21,15 +21,17 @@ def test_the_package_goes_by_its_name() -> None:
 
 
 def test_statistics_of_other_processes_add_up() -> None:
-    def of_piece(seed: int) -> di.regression.Statistics:
+    def of_piece(seed: int) -> di.regression.SecondMoments:
         rng = np.random.default_rng(seed)
         X = rng.standard_normal((200, 4)) + seed
-        return di.regression.Statistics.of(X, X @ [1.0, 2.0, 0.0, -1.0] + rng.standard_normal(200))
+        return di.regression.SecondMoments.of(
+            X, X @ [1.0, 2.0, 0.0, -1.0] + rng.standard_normal(200)
+        )
 
     each: list[Any] = list(Parallel(n_jobs=2)(delayed(of_piece)(seed) for seed in range(4)))
     here: list[Any] = [of_piece(seed) for seed in range(4)]
     total = reduce(add, each)
-    np.testing.assert_allclose(total.scatter, reduce(add, here).scatter, rtol=1e-12, atol=1e-9)
+    np.testing.assert_allclose(total.total, reduce(add, here).total, rtol=1e-12, atol=1e-9)
     assert total.count == 800
     found = di.regression.BayesianFactorRegression().fit_statistics(total)
     np.testing.assert_allclose(found.coef_, [1.0, 2.0, 0.0, -1.0], atol=0.15)

@@ -15,11 +15,11 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from dynident.errors import DynidentWarning, FitError
+from dynident.moments import SecondMoments
 from dynident.regression.bayesian_factors import BayesianFactorRegression
 from dynident.regression.corrected import CorrectedLeastSquares
 from dynident.regression.joint_factors import JointFactorRegression
 from dynident.regression.ordinary import TruncatedLeastSquares
-from dynident.regression.statistics import Statistics
 from dynident.regression.statistics_regressor import StatisticsRegressor
 from dynident.regression.stepwise import StepwiseRegression
 from dynident.regression.total import TotalLeastSquares
@@ -70,7 +70,7 @@ def test_blocks_give_what_all_rows_give(regression: StatisticsRegressor) -> None
         parts.partial_fit(X[a : a + 60], y[a : a + 60])
     np.testing.assert_allclose(parts.coef_, whole.coef_, rtol=1e-9, atol=1e-11)
     assert parts.intercept_ == pytest.approx(whole.intercept_, abs=1e-10)
-    summed = Statistics.of(X[:40], y[:40]) + Statistics.of(X[40:], y[40:])
+    summed = SecondMoments.of(X[:40], y[:40]) + SecondMoments.of(X[40:], y[40:])
     elsewhere = regression.another().fit_statistics(summed)
     np.testing.assert_allclose(elsewhere.predict(X), whole.predict(X), atol=1e-9)
 
@@ -186,7 +186,7 @@ def test_one_row_is_refused(regression: StatisticsRegressor) -> None:
     with pytest.raises(ValueError, match="n_samples = 1"):
         regression.another().fit([[1.0, 2.0]], [3.0])
     with pytest.raises(FitError, match="two rows"):
-        regression.another().fit_statistics(Statistics.of(np.ones((1, 2)), np.ones(1)))
+        regression.another().fit_statistics(SecondMoments.of(np.ones((1, 2)), np.ones(1)))
 
 
 @every
@@ -246,8 +246,8 @@ def test_a_fit_that_is_refused_leaves_the_one_before(regression: StatisticsRegre
     found = regression.another().fit(X, y)
     before = found.predict(X)
     with pytest.raises(FitError, match="two rows"):
-        found.fit_statistics(Statistics.of(np.ones((1, 2)), np.ones(1)))
-    bad = Statistics(100, np.zeros(4), np.full((4, 4), np.nan))
+        found.fit_statistics(SecondMoments.of(np.ones((1, 2)), np.ones(1)))
+    bad = SecondMoments(np.full((4, 4), np.nan), 100)
     with pytest.raises(FitError, match="not finite"):
         found.fit_statistics(bad)
     assert found.n_features_in_ == 5

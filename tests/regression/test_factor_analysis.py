@@ -9,25 +9,27 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from dynident.moments import SecondMoments
 from dynident.regression.factor_analysis import Gamma, Loadings, Posterior, begun, start_of
 from dynident.regression.iterations import Analysis, AnalysisEnding, _leap, analyse
-from dynident.regression.statistics import Statistics
 
 
-def standardised(X: np.ndarray, y: np.ndarray) -> Statistics:
-    found = Statistics.of(X, y)
+def standardised(X: np.ndarray, y: np.ndarray) -> SecondMoments:
+    found = SecondMoments.of(X, y)
     unit = found.scaled(1.0 / found.scale)
-    return Statistics(unit.count, np.zeros_like(unit.mean), unit.scatter)
+    return SecondMoments(unit.total, unit.count)
 
 
-def analysed(statistics: Statistics, prior: Gamma | None, reliability=0.8, known=False, **options):
+def analysed(
+    statistics: SecondMoments, prior: Gamma | None, reliability=0.8, known=False, **options
+):
     d = statistics.inputs
     options = {"rounds": 20_000, "tolerance": 1e-7, **options}
     start = start_of(statistics, reliability, prior)
     return analyse(statistics, start, prior, np.full(d, known), **options)
 
 
-def random_problem(seed: int) -> Statistics:
+def random_problem(seed: int) -> SecondMoments:
     """Any mixture of relevant, redundant and irrelevant noisy inputs, few or many rows."""
     rng = np.random.default_rng([5, seed])
     d, N = int(rng.integers(1, 12)), int(rng.integers(4, 200))
@@ -45,7 +47,7 @@ def test_golden_case() -> None:
     G = np.array([[100.0, 20.0, 5.0], [20.0, 100.0, 10.0], [5.0, 10.0, 100.0]])
     c = np.array([60.0, 30.0, 1.0])
     scatter = np.block([[G, c[:, None]], [c[None], np.array([[100.0]])]])
-    statistics, prior = Statistics(100, np.zeros(4), scatter), Gamma(1e-8, 1e-8)
+    statistics, prior = SecondMoments(scatter, 100), Gamma(1e-8, 1e-8)
     wz = np.array([0.6241129877, 0.2125492585, -0.0408715201])
     same, none = np.ones(3), np.zeros(3)
     weights = Loadings(
@@ -126,7 +128,7 @@ def test_the_likelihood_is_that_of_a_gaussian() -> None:
     spread = np.diag(f.wx**2 + f.px)
     own = np.sum(f.wz**2 + f.pz) + f.py
     covariance = np.block([[spread, across[:, None]], [across[None], np.array([[own]])]])
-    N, S = statistics.count, statistics.scatter
+    N, S = statistics.count, statistics.total
     # Sum of log densities over samples with this scatter about zero.
     constant = cast(Any, stats.multivariate_normal).logpdf(np.zeros(4), cov=covariance) * N
     expected = constant - 0.5 * np.trace(np.linalg.solve(covariance, S))

@@ -7,6 +7,7 @@ import pytest
 from sklearn.exceptions import NotFittedError
 
 from dynident.errors import FitError
+from dynident.moments import SecondMoments
 from dynident.regression.bayesian_factors import BayesianFactorRegression
 from dynident.regression.corrected import CorrectedLeastSquares
 from dynident.regression.identifiability import (
@@ -16,7 +17,6 @@ from dynident.regression.identifiability import (
 )
 from dynident.regression.joint_factors import JointFactorRegression
 from dynident.regression.ordinary import TruncatedLeastSquares
-from dynident.regression.statistics import Statistics
 
 TRUE = np.array([1.0, -2.0, 0.5, 0.0])
 NOISE = 0.25
@@ -199,7 +199,7 @@ def test_a_flat_ridge_is_told_with_what_is_left_along_it() -> None:
     rng = np.random.default_rng(1)
     t = rng.standard_normal(100_000)
     X, y = (t + 0.5 * rng.standard_normal(len(t)))[:, None], 2 * t + rng.standard_normal(len(t))
-    statistics = Statistics.of(X, y)
+    statistics = SecondMoments.of(X, y)
     starts = (0.8, 0.95)
     usual = [BayesianFactorRegression(reliability=r).fit_statistics(statistics) for r in starts]
     patient = [
@@ -287,7 +287,7 @@ def test_rounds_that_do_not_suffice_are_told() -> None:
 
 def test_statistics_of_recordings_suffice() -> None:
     X, y = data(8, 600)
-    parts = [Statistics.of(X[k::3], y[k::3]) for k in range(3)]
+    parts = [SecondMoments.of(X[k::3], y[k::3]) for k in range(3)]
     # As many rounds for both: rounding may end one of them a round sooner.
     one = BayesianFactorRegression(NOISE, max_iter=200).fit(X, y)
     other = BayesianFactorRegression(NOISE, max_iter=200).fit_statistics(

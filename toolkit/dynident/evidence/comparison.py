@@ -15,7 +15,7 @@ from dynident.evidence.held_out import HeldOut, on_blocks, on_recordings
 from dynident.evidence.maps import residual_maps
 from dynident.evidence.runs import gather
 from dynident.fitting.estimate import Estimate
-from dynident.fitting.shape_search import refine_shapes, shaped_effects
+from dynident.fitting.row_objective import refine_shapes, shaped_effects
 from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.tables import Table, finite, percent, print_tables

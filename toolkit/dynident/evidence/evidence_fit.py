@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
+from operator import add
 
 import numpy as np
 
@@ -13,13 +15,9 @@ from dynident.evidence.noise_model import NoiseModel, flat_noise
 from dynident.evidence.runs import Signals
 from dynident.fitting.fixed_point import FixedPoint
 from dynident.model import Model
-from dynident.moments.replicated import (
-    Moments,
-    MomentSolution,
-    TimeVarying,
-    solve,
-    time_varying_moments,
-)
+from dynident.moments.replicates import TimeVarying, time_varying_products
+from dynident.moments.second_moments import SecondMoments
+from dynident.moments.solution import MomentSolution, regress
 
 
 @dataclass(frozen=True)
@@ -37,7 +35,6 @@ class EvidenceFit:
     noise_known : whether `noise` was measured or given; otherwise it is the residual.
     white : per run and joint, whitened columns and torque, (P, S, p + 1).
     moments : (B, p + 1, p + 1) of columns and torque, over all joints.
-    rows : number of whitened rows, over all repetitions and joints; noisy copies do not count.
     error_signal : squared systematic residual, whitened: what no noise explains, in this metric.
     squares : (n,) mean systematic square of the residual, (N m)^2 or N^2.
     variances : (n,) of the noise; of the torque, where the noise is unknown or zero.
@@ -51,8 +48,7 @@ class EvidenceFit:
     noise: tuple[NoiseModel, ...]
     noise_known: bool
     white: tuple[tuple[np.ndarray, ...], ...]
-    moments: Moments
-    rows: int
+    moments: SecondMoments
     error_signal: float
     squares: np.ndarray
     variances: np.ndarray
@@ -66,10 +62,15 @@ class EvidenceFit:
         return float(np.sum(self.squares / over.variances))
 
     @property
+    def rows(self) -> int:
+        """Whitened rows, over all repetitions and joints; noisy copies do not count."""
+        return self.moments.count
+
+    @property
     def error_total(self) -> float:
         """Squared residual, whitened, with its noise."""
         combination = np.append(-self.values, 1.0)
-        return float(combination @ self.moments.sums()[1] @ combination)
+        return float(combination @ self.moments.pooled().total @ combination)
 
 
 def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = None) -> EvidenceFit:
@@ -113,7 +114,8 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
                 [model_columns(evidence, model, r, j, at) for j in range(n)]
                 for r in range(len(evidence.runs))
             ]
-        values, _ = _solve(_moments(evidence, model, _whiten(evidence, columns, noise, values)))
+        white = _whiten(evidence, columns, noise, values)
+        values = regress(_moments(evidence, model, white).pooled()).values
         if round == 0 and near is None:
             # Along a robot without bodies their columns are rounding errors, and any value fits.
             values = _keeping_dependent(model, at, values)
@@ -125,12 +127,8 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
         at = _held(model, fixed_point.following(model, at, values))
     white = _whiten(evidence, columns, noise, values)
     summed = _moments(evidence, model, white)
-    values, solution = _solve(summed)
-    rows = sum(
-        part.shape[1] * (1 if run.kind == "noise_augmented" else part.shape[0])
-        for run, joints in zip(evidence.runs, white, strict=True)
-        for part in joints
-    )
+    solution = regress(summed.pooled())
+    values = solution.values
     left = [JointResidual.of(evidence, columns, values, j) for j in range(n)]
     return EvidenceFit(
         evidence.criteria,
@@ -142,7 +140,6 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
         known,
         white,
         summed,
-        rows,
         _signal(evidence, white, values),
         np.array([one.square for one in left]),
         np.array([one.variance or s**2 or 1.0 for one, s in zip(left, torque_std, strict=True)]),
@@ -244,18 +241,16 @@ def _whiten(evidence: Evidence, columns, noise, values) -> tuple[tuple[np.ndarra
     )
 
 
-def _moments(evidence: Evidence, model: Model, white) -> Moments:
-    found, time_varying = None, time_varying_mask(model)
+def _moments(evidence: Evidence, model: Model, white) -> SecondMoments:
+    found, time_varying = [], time_varying_mask(model)
     for r, (run, joints) in enumerate(zip(evidence.runs, white, strict=True)):
-        parts = [run.moments(w, w) for w in joints]
-        here = Moments(np.sum([p.signal for p in parts], 0), np.sum([p.total for p in parts], 0))
+        here = reduce(add, (run.moments(w, w) for w in joints))
         if run.kind == "repeated" and time_varying.any():
             own = [time_varying_columns(evidence, model, r, w) for w in joints]
-            other = np.sum([time_varying_moments(one, one, run.edges) for one in own], axis=0)
+            other = np.sum([time_varying_products(one, one, run.edges) for one in own], axis=0)
             here = here.where(time_varying[:, None] | time_varying[None, :], other)
-        found = here if found is None else found + here
-    assert found is not None
-    return found
+        found.append(here)
+    return SecondMoments.stacked(found)
 
 
 def _signal(evidence: Evidence, white, values: np.ndarray) -> float:
@@ -298,9 +293,3 @@ def time_varying_mask(model: Model) -> np.ndarray:
     for effect in model.effects:
         mask[model.slices[effect.label]] = effect.time_varying
     return mask
-
-
-def _solve(summed: Moments) -> tuple[np.ndarray, MomentSolution]:
-    signal, total = summed.sums()
-    solution = solve(signal[:-1, :-1], total[:-1, :-1], signal[:-1, -1])
-    return solution.values, solution

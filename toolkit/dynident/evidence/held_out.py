@@ -12,7 +12,8 @@ from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, model_columns
 from dynident.evidence.noise_model import differences, inflation, systematic_square
 from dynident.fitting.estimate import Estimate
-from dynident.moments.replicated import Kind, solve
+from dynident.moments.replicates import Kind
+from dynident.moments.solution import regress
 
 
 @dataclass(frozen=True)
@@ -110,8 +111,7 @@ def on_blocks(evidence: Evidence, fitted: EvidenceFit) -> HeldOut:
         columns = np.stack([run.fold(c) for c in joints], axis=2)  # (P, S, n, p + 1)
         residual = np.empty(columns.shape[:3])
         for start, stop in zip(run.edges[:-1], run.edges[1:], strict=True):
-            signal, total = fitted.moments.without(block)
-            values = solve(signal[:-1, :-1], total[:-1, :-1], signal[:-1, -1]).values
+            values = regress(fitted.moments.without(block)).values
             residual[:, start:stop] = columns[:, start:stop] @ np.append(-values, 1.0)
             block += 1
         measured = 1 if run.kind == "noise_augmented" else len(residual)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import solve_toeplitz
 
 from dynident.criteria import NoiseCriteria
-from dynident.moments.replicated import Kind
+from dynident.moments.replicates import Kind
 
 
 def differences(residual: np.ndarray, kind: Kind) -> np.ndarray:

@@ -18,7 +18,8 @@ from dynident.effects import Block
 from dynident.evidence.noise_model import NoiseModel
 from dynident.fitting.sampling import Sampled, flagged, sample
 from dynident.model import Model
-from dynident.moments.replicated import Kind, Moments, moments
+from dynident.moments.replicates import Kind, replicate_moments
+from dynident.moments.second_moments import SecondMoments
 from dynident.recording import (
     Dataset,
     Noise,
@@ -119,10 +120,10 @@ class Run:
         speed = self.replicates[0].v[:, joint]
         return self.fold([noise.whiten(one, speed) for one in signals])
 
-    def moments(self, left: np.ndarray, right: np.ndarray) -> Moments:
+    def moments(self, left: np.ndarray, right: np.ndarray) -> SecondMoments:
         """Second moments of whitened columns, (P, S, a) and (P, S, b)."""
         plain = self.columns_from == "simulation"
-        return moments(left, right, self.edges, "single" if plain else self.kind)
+        return replicate_moments(left, right, self.edges, "single" if plain else self.kind)
 
 
 def gather(

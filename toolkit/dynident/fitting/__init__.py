@@ -24,8 +24,8 @@ from dynident.fitting.noisy_inputs import Regression
 from dynident.fitting.noisy_inputs.encoder_noise import encoder_noise
 from dynident.fitting.noisy_inputs.measured import InputNoise, input_noise
 from dynident.fitting.parameter_file import GivenParameters, read_parameters
+from dynident.fitting.row_objective import refine_shapes, shaped_effects
 from dynident.fitting.sampling import Sampled, rows, sample
-from dynident.fitting.shape_search import refine_shapes, shaped_effects
 
 __all__ = [
     "IV",

@@ -10,9 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
-from dynident.fitting.least_squares import solve_factors
+from dynident.fitting.least_squares import solve_columns, solve_factors
 from dynident.model import Model
 from dynident.moments.factors import TriangularFactors
 from dynident.tables import Table, number, percent
@@ -77,7 +76,9 @@ def essential_parameters(
     R = factors.pooled(1.0 / full.torque_std)
     kept, dropped = list(full.basis.independent), []
     while True:
-        values, sigma = _solve(R, kept, factors.rows)
+        found = solve_columns(R, kept, factors.rows)
+        values = found.values
+        sigma = np.sqrt(found.variance * np.sum(found.inverse**2, axis=1))
         with np.errstate(divide="ignore"):
             relative = sigma / np.abs(values)
         worst = int(np.argmax(relative))
@@ -95,12 +96,3 @@ def essential_parameters(
         error_before=float(np.linalg.norm(factors.residual_norms(full.values))) / norm,
         error_after=float(np.linalg.norm(factors.residual_norms(everything))) / norm,
     )
-
-
-def _solve(R: np.ndarray, kept: list[int], rows: int) -> tuple[np.ndarray, np.ndarray]:
-    Q, triangle = np.linalg.qr(R[:, kept])
-    values = solve_triangular(triangle, Q.T @ R[:, -1])
-    residual = R[:, -1] - R[:, kept] @ values
-    inverse = solve_triangular(triangle, np.eye(len(kept)))
-    variance = float(residual @ residual) / (rows - len(kept))
-    return values, np.sqrt(variance * np.sum(inverse**2, axis=1))

@@ -7,7 +7,7 @@ from typing import ClassVar, Protocol
 
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import LeastSquares
-from dynident.fitting.shape_search import refine_shapes, shaped_effects
+from dynident.fitting.row_objective import refine_shapes, shaped_effects
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
 from dynident.threads import single_threaded

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal
 
@@ -13,13 +14,10 @@ from dynident.fitting.estimate import DataSource, Estimate, unidentified
 from dynident.fitting.fixed_point import FixedPoint, not_converged
 from dynident.fitting.sampling import rows
 from dynident.model import Model
-from dynident.moments.factors import TriangularFactors, factorise
+from dynident.moments.factors import RANK_TOLERANCE, TriangularFactors, factorise
 from dynident.recording import Dataset, default_filter
 from dynident.robot import BaseParameters, base_parameters
 from dynident.threads import single_threaded
-
-RANK_TOLERANCE = 1e-8
-"""Share of the largest diagonal of R (unit columns) below which data do not excite a direction."""
 
 _ROUNDS = 30  # of columns that depend on the model's own values, until they settle
 _TOLERANCE = 1e-9
@@ -96,17 +94,60 @@ def solve_factors(
     FitError
         If there are fewer equations than parameters, or the torque is zero throughout.
     """
-    if factors.rows <= model.size:
-        what = f"{factors.rows} equations for {model.size} parameters"
-        raise FitError(what, remedy="record longer, or raise rate_hz in [filter]")
-    if not np.any(factors.torque_norms > 0):
-        raise FitError("the torque is zero throughout", remedy="is it the right column?")
+    require_rows(factors)
     ordinary = _solve(model, factors, np.ones(len(factors.counts)))
-    std = residual_std(factors, ordinary)
+    std = residual_std(factors, ordinary.values, ordinary.basis.rank)
     if weighting == "none" or len(std) == 1:
         return replace(ordinary, torque_std=std)
     weighted = _solve(model, factors, 1.0 / std)
-    return replace(weighted, torque_std=residual_std(factors, weighted))
+    std = residual_std(factors, weighted.values, weighted.basis.rank)
+    return replace(weighted, torque_std=std)
+
+
+def require_rows(factors: TriangularFactors) -> None:
+    """Raise FitError if there are fewer equations than parameters, or the torque is zero."""
+    if factors.rows <= factors.size:
+        what = f"{factors.rows} equations for {factors.size} parameters"
+        raise FitError(what, remedy="record longer, or raise rate_hz in [filter]")
+    if not np.any(factors.torque_norms > 0):
+        raise FitError("the torque is zero throughout", remedy="is it the right column?")
+
+
+@dataclass(frozen=True, eq=False)
+class TriangularSolution:
+    """Least squares on some columns of a factor.
+
+    Attributes
+    ----------
+    values : (r,) of these columns.
+    triangle : (r, r) their factor.
+    inverse : (r, r) of it.
+    variance : of the residual.
+    """
+
+    values: np.ndarray
+    triangle: np.ndarray
+    inverse: np.ndarray
+    variance: float
+
+
+def solve_columns(R: np.ndarray, kept: Sequence[int], rows: int) -> TriangularSolution:
+    """Solve for independent columns of a factor; its last one is the torque.
+
+    Parameters
+    ----------
+    R : (m, m) as of `TriangularFactors.pooled`.
+    kept : numbers of the columns.
+    rows : behind the factor, which the variance is per degree of freedom of.
+    """
+    # The kept columns of a triangle are no triangle: factorise once more.
+    Q, triangle = np.linalg.qr(R[:, kept])
+    values = solve_triangular(triangle, Q.T @ R[:, -1])
+    residual = R[:, -1] - R[:, kept] @ values
+    variance = float(residual @ residual) / (rows - len(kept))
+    return TriangularSolution(
+        values, triangle, solve_triangular(triangle, np.eye(len(kept))), variance
+    )
 
 
 def _solve(model: Model, factors: TriangularFactors, weights: np.ndarray) -> LinearSolution:
@@ -114,30 +155,35 @@ def _solve(model: Model, factors: TriangularFactors, weights: np.ndarray) -> Lin
     R = factors.pooled(weights)
     basis = base_parameters(R[:p, :p], model.names, RANK_TOLERANCE)
     kept = list(basis.independent)
-    # The kept columns of a triangle are no triangle: factorise once more.
-    Q, triangle = np.linalg.qr(R[:, kept])
-    rank = len(kept)
-    found = solve_triangular(triangle, Q.T @ R[:, p])
-    residual = R[:, p] - R[:, kept] @ found
-    variance = float(residual @ residual) / (factors.rows - rank)
-    inverse = solve_triangular(triangle, np.eye(rank))
+    found = solve_columns(R, kept, factors.rows)
     covariance = np.zeros((p, p))
-    covariance[np.ix_(kept, kept)] = variance * inverse @ inverse.T
-    values = basis.lift(found, model.given_values())
+    covariance[np.ix_(kept, kept)] = found.variance * found.inverse @ found.inverse.T
+    values = basis.lift(found.values, model.given_values())
     return LinearSolution(
         values=values,
         covariance=covariance,
         basis=basis,
         torque_std=np.zeros(len(factors.counts)),
-        condition_number=float(np.linalg.cond(triangle)),
+        condition_number=float(np.linalg.cond(found.triangle)),
         notes=unidentified(basis),
     )
 
 
-def residual_std(factors: TriangularFactors, solution: LinearSolution) -> np.ndarray:
-    """Standard deviation of each joint's residual, its share of the parameters accounted for."""
-    share = solution.basis.rank / len(factors.counts)
-    std = factors.residual_norms(solution.values) / np.sqrt(np.maximum(factors.counts - share, 1.0))
+def residual_std(factors: TriangularFactors, values: np.ndarray, rank: int) -> np.ndarray:
+    """Standard deviation of each joint's residual, its share of the parameters accounted for.
+
+    Parameters
+    ----------
+    factors : joint by joint.
+    values : (p,) whose residual it is.
+    rank : number of combinations that were fitted.
+
+    Returns
+    -------
+    (n,) in N m or N
+    """
+    share = rank / len(factors.counts)
+    std = factors.residual_norms(values) / np.sqrt(np.maximum(factors.counts - share, 1.0))
     least = 1e-12 * np.max(factors.torque_norms / np.sqrt(factors.counts))
     return np.maximum(std, least)
 

@@ -1,6 +1,6 @@
 """Linear regression from sufficient statistics: noise of the inputs, and what it is compared with.
 
-In: rows, or their `Statistics`. Out: estimators with scikit-learn's interface. They are imported
+In: rows, or their `SecondMoments`. Out: estimators with scikit-learn's interface. They are imported
 when they are asked for, since that library takes its time.
 """
 

@@ -6,6 +6,6 @@ from .identifiability import reliability_profile as reliability_profile
 from .identifiability import start_sensitivity as start_sensitivity
 from .joint_factors import JointFactorRegression as JointFactorRegression
 from .ordinary import TruncatedLeastSquares as TruncatedLeastSquares
-from .statistics import Statistics as Statistics
+from .statistics_regressor import SecondMoments as SecondMoments
 from .stepwise import StepwiseRegression as StepwiseRegression
 from .total import TotalLeastSquares as TotalLeastSquares

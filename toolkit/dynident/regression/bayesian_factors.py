@@ -7,10 +7,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynident.moments import SecondMoments
 from dynident.regression.factor_analysis import LEAST_RELIABILITY, Gamma
 from dynident.regression.iterations import Analysis
 from dynident.regression.joint_factors import JointFactorRegression
-from dynident.regression.statistics import Statistics
 
 _EXPLAINS = 2.0
 """Standard errors of an input alone, below which its coefficient explains no more than noise."""
@@ -65,7 +65,7 @@ class BayesianFactorRegression(JointFactorRegression):
         for setting in ("relevance_shape", "relevance_rate"):
             self._require(setting, 1e-300, 1e300)
 
-    def _unfolded(self, analysis: Analysis, unit: Statistics, inputs: np.ndarray) -> np.ndarray:
+    def _unfolded(self, analysis: Analysis, unit: SecondMoments, inputs: np.ndarray) -> np.ndarray:
         low = (analysis.factors.reliability < LEAST_RELIABILITY) & ~self.known_[inputs]
         b = analysis.coefficients
         alone = np.sqrt(unit.residual(b) / unit.count / np.diag(unit.gram))
@@ -75,7 +75,7 @@ class BayesianFactorRegression(JointFactorRegression):
         true = np.where(low, analysis.factors.noisy / LEAST_RELIABILITY, true)
         return np.where(self.pruned_[inputs], 0.0, true)
 
-    def _keep(self, analysis: Analysis, unit: Statistics, inputs: np.ndarray) -> None:
+    def _keep(self, analysis: Analysis, unit: SecondMoments, inputs: np.ndarray) -> None:
         super()._keep(analysis, unit, inputs)
         self.relevance_ = np.full(len(self._scale) - 1, np.inf)
         self.relevance_[inputs] = analysis.factors.relevance

@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike
 from scipy.linalg import eigh
 
 from dynident.errors import FitError
+from dynident.moments import SecondMoments
 from dynident.regression.given_noise import covariance_of
-from dynident.regression.statistics import Statistics
 from dynident.regression.statistics_regressor import StatisticsRegressor
 
 LEAST_SHARE = 4.0
@@ -49,7 +49,7 @@ class CorrectedLeastSquares(StatisticsRegressor):
         super().__init__(fit_intercept=fit_intercept)
         self.input_noise = input_noise
 
-    def _solve(self, unit: Statistics, inputs: np.ndarray) -> None:
+    def _solve(self, unit: SecondMoments, inputs: np.ndarray) -> None:
         N, scale = unit.count, self._scale
         own = np.ix_(inputs, inputs)
         psi = covariance_of(self.input_noise, len(scale) - 1)[own]

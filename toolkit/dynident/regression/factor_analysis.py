@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import digamma, gammaln
 
-from dynident.regression.statistics import Statistics
+from dynident.moments import SecondMoments
 
 LEAST_VARIANCE = 1e-9
 """Variance that none falls below, in units of the input's or the output's own: below it the bound
@@ -71,7 +71,7 @@ class Gamma:
 
 
 def start_of(
-    statistics: Statistics, reliability: np.ndarray | float, prior: Gamma | None
+    statistics: SecondMoments, reliability: np.ndarray | float, prior: Gamma | None
 ) -> Loadings:
     """Return factors that predict as least squares does, with a reliability of each input.
 
@@ -136,7 +136,7 @@ class Posterior:
     <t_i> = ct x_i + e <z_i>.
     """
 
-    def __init__(self, factors: Loadings, statistics: Statistics) -> None:
+    def __init__(self, factors: Loadings, statistics: SecondMoments) -> None:
         self.factors, self.statistics = factors, statistics
         f = factors
         mz, mx, pz, px, py = f.wz, f.wx, f.pz, f.px, f.py

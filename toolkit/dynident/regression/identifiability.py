@@ -10,9 +10,9 @@ import numpy as np
 from sklearn.utils.validation import check_is_fitted
 
 from dynident.errors import FitError
+from dynident.moments import SecondMoments
 from dynident.regression.given_noise import variances_of
 from dynident.regression.joint_factors import RELIABILITIES, JointFactorRegression
-from dynident.regression.statistics import Statistics
 from dynident.tables import Table, number
 
 DISTINCT = 1.92
@@ -197,7 +197,7 @@ def _checked(regression: JointFactorRegression, reliabilities: Sequence[float]) 
         raise FitError(what, remedy="give at least one, each between 0 and 1")
 
 
-def _used(regression: JointFactorRegression) -> Statistics:
+def _used(regression: JointFactorRegression) -> SecondMoments:
     statistics = regression.statistics_
     return statistics if regression.fit_intercept else statistics.about_origin()
 
@@ -246,7 +246,7 @@ def reliability_profile(
     )
 
 
-def _correlation(statistics: Statistics) -> float:
+def _correlation(statistics: SecondMoments) -> float:
     """Largest correlation between two inputs that vary, in size."""
     varied = statistics.keeping(statistics.scale[:-1] > 0)
     size = np.sqrt(np.diag(varied.gram))

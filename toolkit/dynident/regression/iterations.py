@@ -18,8 +18,8 @@ from enum import Enum
 
 import numpy as np
 
+from dynident.moments import SecondMoments
 from dynident.regression.factor_analysis import LEAST_VARIANCE, Gamma, Loadings, Posterior
-from dynident.regression.statistics import Statistics
 
 _PATIENCE = 5
 """Leaps in a row that gain next to nothing: one may just have been unlucky."""
@@ -74,7 +74,7 @@ class Analysis:
 
 
 def analyse(
-    statistics: Statistics,
+    statistics: SecondMoments,
     start: Loadings,
     prior: Gamma | None,
     known: np.ndarray,

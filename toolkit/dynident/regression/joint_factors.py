@@ -10,13 +10,13 @@ from scipy import stats
 from sklearn.utils.validation import check_is_fitted
 
 from dynident.errors import FitError
+from dynident.moments import SecondMoments
 from dynident.regression.corrected import CorrectedLeastSquares
 from dynident.regression.factor_analysis import Gamma, start_of
 from dynident.regression.factor_tables import factor_tables
 from dynident.regression.given_noise import variances_of
 from dynident.regression.iterations import Analysis, AnalysisEnding, analyse
 from dynident.regression.ordinary import identified, ordinary
-from dynident.regression.statistics import Statistics
 from dynident.regression.statistics_regressor import StatisticsRegressor
 
 RELIABILITIES = (1e-3, 1.0 - 1e-6)
@@ -126,7 +126,7 @@ class JointFactorRegression(StatisticsRegressor):
         check_is_fitted(self)
         return "\n".join(str(part) for part in factor_tables(self))
 
-    def _solve(self, unit: Statistics, inputs: np.ndarray) -> None:
+    def _solve(self, unit: SecondMoments, inputs: np.ndarray) -> None:
         self._check()
         d = len(self._scale) - 1
         known = variances_of(self.input_noise, d)
@@ -155,7 +155,7 @@ class JointFactorRegression(StatisticsRegressor):
         self._require("max_iter", 1, np.inf)
         self._require("tol", 1e-300, np.inf)
 
-    def _keep(self, analysis: Analysis, unit: Statistics, inputs: np.ndarray) -> None:
+    def _keep(self, analysis: Analysis, unit: SecondMoments, inputs: np.ndarray) -> None:
         d, factors = len(self._scale) - 1, analysis.factors
         self.bounds_, self.n_iter_ = analysis.bounds, analysis.rounds
         self.ending_ = analysis.ending.value
@@ -171,12 +171,12 @@ class JointFactorRegression(StatisticsRegressor):
         self._correct(unit)
         self._set(self.coef_noisy_ if self.queries == "noisy" else self.coef_true_)
 
-    def _unfolded(self, analysis: Analysis, unit: Statistics, inputs: np.ndarray) -> np.ndarray:
+    def _unfolded(self, analysis: Analysis, unit: SecondMoments, inputs: np.ndarray) -> np.ndarray:
         """Return b_true = wz / wx of standardised inputs; zero where both are."""
         wz, wx = analysis.factors.wz, analysis.factors.wx
         return np.divide(wz, wx, out=np.zeros_like(wz), where=wx != 0)
 
-    def _least_squares(self, unit: Statistics, inputs: np.ndarray) -> None:
+    def _least_squares(self, unit: SecondMoments, inputs: np.ndarray) -> None:
         """Set ordinary least squares, with its standard deviations and degrees of freedom."""
         self.basis_ = identified(unit, tuple(self.input_names()[m] for m in inputs))
         self.freedom_ = self._freedom(unit, self.basis_.rank if self.basis_ else 0)
@@ -190,7 +190,7 @@ class JointFactorRegression(StatisticsRegressor):
         self.least_squares_[own] = found.values * units
         self.sigma_noisy_[own] = found.sigma * units
 
-    def _correct(self, unit: Statistics) -> None:
+    def _correct(self, unit: SecondMoments) -> None:
         """Set corrected least squares, and what it says of b_true."""
         self.corrected_: CorrectedLeastSquares | None = None
         self.sigma_true_ = np.full(len(self._scale) - 1, np.nan)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynident.regression.statistics import Statistics
+from dynident.moments import SecondMoments
 from dynident.regression.statistics_regressor import StatisticsRegressor
 from dynident.robot import BaseParameters, base_parameters
 
@@ -19,7 +19,7 @@ _ROUNDING = 10.0 * np.finfo(float).eps
 _DEPENDENT = 1e-7  # share of an input that the others leave, below which it is their combination
 
 
-def squared_tolerance(unit: Statistics, rcond: float) -> float:
+def squared_tolerance(unit: SecondMoments, rcond: float) -> float:
     """Share of the largest eigenvalue of X'X below which one is zero."""
     return max(rcond**2, _ROUNDING * max(unit.inputs, 1))
 
@@ -44,7 +44,7 @@ class TruncatedLeastSquares(StatisticsRegressor):
         super().__init__(fit_intercept=fit_intercept)
         self.rcond = rcond
 
-    def _solve(self, unit: Statistics, inputs: np.ndarray) -> None:
+    def _solve(self, unit: SecondMoments, inputs: np.ndarray) -> None:
         self._require("rcond", 0.0, 0.5)
         values, vectors = np.linalg.eigh(unit.gram)
         kept = values > squared_tolerance(unit, self.rcond) * values.max(initial=0.0)
@@ -68,7 +68,7 @@ class Ordinary:
     sigma: np.ndarray
 
 
-def identified(unit: Statistics, names: tuple[str, ...]) -> BaseParameters | None:
+def identified(unit: SecondMoments, names: tuple[str, ...]) -> BaseParameters | None:
     """Return which inputs are combinations of the others; None without inputs.
 
     Parameters
@@ -85,7 +85,7 @@ def identified(unit: Statistics, names: tuple[str, ...]) -> BaseParameters | Non
     return base_parameters(root, names, max(_DEPENDENT, hidden))
 
 
-def ordinary(unit: Statistics, basis: BaseParameters, freedom: int) -> Ordinary:
+def ordinary(unit: SecondMoments, basis: BaseParameters, freedom: int) -> Ordinary:
     """Return ordinary least squares of the identified inputs.
 
     What is a combination of other inputs has no value of its own, nor have those its parts.

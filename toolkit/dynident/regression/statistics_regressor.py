@@ -13,7 +13,7 @@ from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from dynident.errors import DynidentWarning, FitError
-from dynident.regression.statistics import Statistics
+from dynident.moments import SecondMoments
 
 _checked: Any = validate_data  # whose signature names strings only
 
@@ -67,7 +67,7 @@ class StatisticsRegressor(RegressorMixin, BaseEstimator):
         """Add rows X (N, d) and y (N,) to those seen before, and fit to all; raises as `fit`.
 
         While the rows are too few, no more than inputs, a warning says what is missing, and the
-        estimator is not fitted. Each block is a fit: add `Statistics` up where only the last one
+        estimator is not fitted. Each block is a fit: add `SecondMoments` up where only the last one
         is wanted.
         """
         first = not hasattr(self, "statistics_")
@@ -82,7 +82,7 @@ class StatisticsRegressor(RegressorMixin, BaseEstimator):
         self.statistics_ = seen
         return self
 
-    def fit_statistics(self, statistics: Statistics) -> Self:
+    def fit_statistics(self, statistics: SecondMoments) -> Self:
         """Fit to the sufficient statistics of the data.
 
         Raises
@@ -94,7 +94,7 @@ class StatisticsRegressor(RegressorMixin, BaseEstimator):
         if statistics.count < 2:
             what = f"n_samples = {statistics.count} says nothing of a slope"
             raise FitError(what, remedy="give at least two rows")
-        if not np.all(np.isfinite(statistics.scatter)) or not np.all(np.isfinite(statistics.mean)):
+        if not np.all(np.isfinite(statistics.total)) or not np.all(np.isfinite(statistics.centre)):
             raise FitError("the statistics are not finite", remedy="clean or scale the data first")
         before = dict(vars(self))
         try:
@@ -105,18 +105,18 @@ class StatisticsRegressor(RegressorMixin, BaseEstimator):
             raise
         return self
 
-    def _fit(self, statistics: Statistics) -> None:
+    def _fit(self, statistics: SecondMoments) -> None:
         used = statistics if self.fit_intercept else statistics.about_origin()
         scale = used.scale
         self.constant_ = scale[:-1] == 0
         inputs = np.flatnonzero(~self.constant_)
         varied = used.keeping(inputs)
         kept = np.append(scale[:-1][inputs], scale[-1] or 1.0)
-        scatter = varied.scaled(1.0 / kept).scatter
+        scatter = varied.scaled(1.0 / kept).total
         if scale[-1] == 0:
             scatter[-1], scatter[:, -1] = 0.0, 0.0  # of a constant output only rounding is left
-        unit = Statistics(varied.count, np.zeros(len(kept)), scatter)
-        self._scale, self._mean, self._seen = scale, used.mean, statistics
+        unit = SecondMoments(scatter, varied.count)
+        self._scale, self._mean, self._seen = scale, used.centre, statistics
         self.n_features_in_ = statistics.inputs
         if len(getattr(self, "feature_names_in_", ())) not in (0, statistics.inputs):
             delattr(self, "feature_names_in_")
@@ -129,11 +129,11 @@ class StatisticsRegressor(RegressorMixin, BaseEstimator):
         rows = _checked(self, X, reset=False, dtype=np.float64)
         return rows @ self.coef_ + self.intercept_
 
-    def _solve(self, unit: Statistics, inputs: np.ndarray) -> None:
+    def _solve(self, unit: SecondMoments, inputs: np.ndarray) -> None:
         """Set the attributes from standardised statistics of the inputs that vary, by number."""
         raise NotImplementedError
 
-    def _freedom(self, unit: Statistics, used: int) -> int:
+    def _freedom(self, unit: SecondMoments, used: int) -> int:
         """Degrees of freedom that some coefficients and the constant leave."""
         return unit.count - used - int(self.fit_intercept)
 
@@ -151,11 +151,11 @@ class StatisticsRegressor(RegressorMixin, BaseEstimator):
         found[inputs] = standardised * self._scale[-1] / self._scale[inputs]
         return found
 
-    def _statistics_of(self, X: ArrayLike, y: ArrayLike, *, reset: bool) -> Statistics:
+    def _statistics_of(self, X: ArrayLike, y: ArrayLike, *, reset: bool) -> SecondMoments:
         rows, output = _checked(
             self, X, y, reset=reset, dtype=np.float64, y_numeric=True, ensure_min_samples=1
         )
-        return Statistics.of(rows, output)
+        return SecondMoments.of(rows, output)
 
     def _require(self, setting: str, least: float, most: float) -> None:
         """Raise FitError unless a setting is a number, at least and at most so large."""

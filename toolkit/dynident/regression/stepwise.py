@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
-from dynident.regression.statistics import Statistics
+from dynident.moments import SecondMoments
 from dynident.regression.statistics_regressor import StatisticsRegressor
 
 _DEPENDENT = (
@@ -49,7 +49,7 @@ class StepwiseRegression(StatisticsRegressor):
         self.leave = leave
         self.max_iter = max_iter
 
-    def _solve(self, unit: Statistics, inputs: np.ndarray) -> None:
+    def _solve(self, unit: SecondMoments, inputs: np.ndarray) -> None:
         for setting, least, most in (("enter", 1e-300, 0.999), ("max_iter", 1, np.inf)):
             self._require(setting, least, most)
         self._require("leave", self.enter, 0.999)
@@ -71,7 +71,7 @@ class StepwiseRegression(StatisticsRegressor):
         found[chosen] = _solved(unit, chosen)
         self._set(self._in_units(found, inputs))
 
-    def _entering(self, unit: Statistics, chosen: list[int]) -> int | None:
+    def _entering(self, unit: SecondMoments, chosen: list[int]) -> int | None:
         """The input whose F test is clearest, if it is clear enough."""
         G, c = unit.gram, unit.cross
         weights = np.linalg.solve(G[np.ix_(chosen, chosen)], G[chosen]) if chosen else G[:0]
@@ -87,7 +87,7 @@ class StepwiseRegression(StatisticsRegressor):
         p = self._p_value(unit, gain[best], left, len(chosen) + 1)
         return best if p < self.enter else None
 
-    def _leaving(self, unit: Statistics, chosen: list[int]) -> int | None:
+    def _leaving(self, unit: SecondMoments, chosen: list[int]) -> int | None:
         """The chosen input whose F test is least clear, if it is not clear any more."""
         if len(chosen) < 2:
             return None
@@ -98,7 +98,7 @@ class StepwiseRegression(StatisticsRegressor):
         p = self._p_value(unit, loss[worst], left, len(chosen))
         return chosen[worst] if p > self.leave else None
 
-    def _p_value(self, unit: Statistics, gain: float, left: float, used: int) -> float:
+    def _p_value(self, unit: SecondMoments, gain: float, left: float, used: int) -> float:
         freedom = self._freedom(unit, used)
         if freedom <= 0:
             return 1.0
@@ -106,11 +106,11 @@ class StepwiseRegression(StatisticsRegressor):
         return float(stats.f.sf(F, 1, freedom))
 
 
-def _solved(unit: Statistics, chosen: list[int]) -> np.ndarray:
+def _solved(unit: SecondMoments, chosen: list[int]) -> np.ndarray:
     return np.linalg.solve(unit.gram[np.ix_(chosen, chosen)], unit.cross[chosen])
 
 
-def _at(unit: Statistics, chosen: list[int], values: np.ndarray) -> np.ndarray:
+def _at(unit: SecondMoments, chosen: list[int], values: np.ndarray) -> np.ndarray:
     found = np.zeros(unit.inputs)
     found[chosen] = values
     return found

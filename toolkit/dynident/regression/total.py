@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.errors import FitError
+from dynident.moments import SecondMoments
 from dynident.regression.ordinary import squared_tolerance
-from dynident.regression.statistics import Statistics
 from dynident.regression.statistics_regressor import StatisticsRegressor
 
 _NO_OUTPUT = 1e-8  # part of the output in the null direction, below which there is no solution
@@ -36,13 +36,13 @@ class TotalLeastSquares(StatisticsRegressor):
         super().__init__(fit_intercept=fit_intercept)
         self.rcond = rcond
 
-    def _solve(self, unit: Statistics, inputs: np.ndarray) -> None:
+    def _solve(self, unit: SecondMoments, inputs: np.ndarray) -> None:
         self._require("rcond", 0.0, 0.5)
         spectrum = np.linalg.eigvalsh(unit.gram)
         self.rank_ = int(
             np.sum(spectrum > squared_tolerance(unit, self.rcond) * spectrum.max(initial=0.0))
         )
-        values, vectors = np.linalg.eigh(unit.scatter)
+        values, vectors = np.linalg.eigh(unit.total)
         null = vectors[:, : len(spectrum) + 1 - self.rank_]
         self.noise_share_ = float(max(values[len(spectrum) - self.rank_], 0.0) / unit.count)
         output = null[-1]

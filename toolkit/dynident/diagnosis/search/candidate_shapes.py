@@ -1,26 +1,19 @@
-"""Shape parameters and points of secants at which a candidate explains most."""
+"""Shape parameters and linearisation points at which a candidate explains most."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import fminbound, minimize, minimize_scalar
 
-from dynident.diagnosis.search.gradient import by_gradient, grid_of
-from dynident.diagnosis.search.scoring import (
-    Columns,
-    Score,
-    candidate_moments,
-    impossible,
-    moments_with_payload,
-    score,
-)
+from dynident.diagnosis.search.moment_objective import MomentObjective
+from dynident.diagnosis.search.scoring import Columns, Score, candidate_moments, score
 from dynident.effects import Effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.runs import Signals
+from dynident.fitting.shape_search import Bracket, Simplex, TrustRegion, search
 from dynident.model import Model
 
 
@@ -42,84 +35,60 @@ class Beside:
         return self.evidence.columns(variants, self.whole.model, self.whole.values)
 
 
-def score_at(
-    evidence: Evidence,
-    fitted: EvidenceFit,
-    effect: Effect,
-    like: Score,
-    grid: int,
-    columns_of: Columns | None = None,
-) -> Score:
-    """Score an effect with other columns; carriers of a payload as in `like`."""
-    (parts,) = candidate_moments(evidence, fitted, [effect], columns_of)
-    if like.payload_recordings is not None:
-        parts = tuple(
-            moments_with_payload(part, evidence, like.payload_recordings) for part in parts
-        )
-    return score(fitted, effect, *parts, grid=grid, payload_recordings=like.payload_recordings)
-
-
 def refined(
     evidence: Evidence, fitted: EvidenceFit, one: Score, columns_of: Columns | None = None
 ) -> Score:
-    """Return a score at the shape parameters and secants that fit best."""
+    """Return a score at the shape parameters and linearisation points that fit best.
+
+    Parameters
+    ----------
+    evidence, fitted : the evidence, and the model without the effect as it fits it.
+    one : the score that is refined.
+    columns_of : where columns come from; `Evidence.of` by default.
+    """
     if not one.drop > 0:
         return one
+    objective, criteria = MomentObjective(evidence, fitted, one, columns_of), fitted.criteria.shapes
     if not one.effect.shape_parameters(fitted.model.robot):
-        return _at_its_values(evidence, fitted, one, columns_of) if one.effect.nonlinear else one
-    has_slopes = type(one.effect).sensitivities is not Effect.sensitivities
-    search = by_gradient if has_slopes else _by_trial
+        return _at_its_values(objective) if one.effect.nonlinear else one
     if one.effect.point:
-        one = _at_best_value(evidence, fitted, one, columns_of)
-    return _better(one, search(evidence, fitted, one, columns_of))
+        # A column that changes with the value as that of a burst does cannot be iterated on.
+        solver = Bracket(evaluations=criteria.values_tried)
+        found = search(objective.by_value(criteria.value_range), solver).best
+        objective = replace(objective, one=_better(one, *(trial.found for trial in found)))
+    if type(one.effect).sensitivities is not Effect.sensitivities:
+        # A flat metric hides what matters in a sharp one: hence the small fall.
+        solver = TrustRegion(
+            criteria.gradient_precision,
+            fall=criteria.gradient_fall,
+            evaluations=criteria.evaluations,
+        )
+        found = search(objective.by_derivatives(), solver).best
+        return _better(objective.one, *(trial.found for trial in found))
+    return _better(objective.one, _by_trial(objective))
 
 
-def _better(one: Score, other: Score) -> Score:
-    return other if other.drop_at_point > one.drop_at_point else one
+def _better(one: Score, *others: Score) -> Score:
+    """The score that explains more at the value where its column is taken; the first of equals."""
+    return max((one, *others), key=lambda each: each.drop_at_point)
 
 
-def _at_its_values(
-    evidence: Evidence, fitted: EvidenceFit, one: Score, columns_of: Columns | None
-) -> Score:
-    """Take secants through the values found, until they settle."""
-    criteria = fitted.criteria.shapes
+def _at_its_values(objective: MomentObjective) -> Score:
+    """Linearise at the values found, until they converge."""
+    one, criteria = objective.one, objective.fitted.criteria.shapes
     for _ in range(criteria.linearisations):
         if not one.values or not np.any(one.values):
             return one
-        effect = one.effect.at(_within_bounds(one, fitted))
+        effect = one.effect.at(_within_bounds(one, objective.fitted))
         old = one.effect.point or (0.0,) * len(effect.point)
         change = np.linalg.norm(np.subtract(effect.point, old))
         if change <= criteria.converged * np.linalg.norm(effect.point):
             break
-        better = score_at(evidence, fitted, effect, one, grid_of(effect, fitted), columns_of)
+        better = objective.score_at(effect)
         if not better.drop > criteria.least_explained * one.drop:
-            break  # the secant has left the range in which the law is what it is
+            break  # the point has left the range in which the law is what it is
         one = better
     return one
-
-
-def _at_best_value(
-    evidence: Evidence, fitted: EvidenceFit, one: Score, columns_of: Columns | None
-) -> Score:
-    """Seek the value at which the column that is taken there fits best.
-
-    Columns that change with the value as those of bursts do cannot be iterated on.
-    """
-    best = one
-
-    def loss(logarithm: float) -> float:
-        nonlocal best
-        effect = one.effect.at([float(np.exp(logarithm))])
-        found = score_at(evidence, fitted, effect, one, grid_of(effect, fitted), columns_of)
-        if found.drop_at_point > best.drop_at_point and not impossible(found, fitted):
-            best = found
-        return -found.drop_at_point
-
-    (start,) = np.log(one.effect.point)
-    criteria = fitted.criteria.shapes
-    span = (start - criteria.value_range, start + criteria.value_range)
-    minimize_scalar(loss, bounds=span, method="bounded", options={"maxiter": criteria.values_tried})
-    return best
 
 
 def _within_bounds(one: Score, fitted: EvidenceFit) -> list[float]:
@@ -127,30 +96,16 @@ def _within_bounds(one: Score, fitted: EvidenceFit) -> list[float]:
     return np.clip(one.values, [p.lower for p in limits], [p.upper for p in limits]).tolist()
 
 
-def _by_trial(
-    evidence: Evidence, fitted: EvidenceFit, one: Score, columns_of: Columns | None
-) -> Score:
-    shapes = one.effect.shape_parameters(fitted.model.robot)
-    grid = grid_of(one.effect, fitted)
-
-    def at(shape: np.ndarray) -> Score:
-        effect = one.effect.shaped(*np.exp(np.atleast_1d(shape)))
-        result = score_at(evidence, fitted, effect, one, grid, columns_of)
-        return result
-
-    def loss(shape: np.ndarray) -> float:
-        return -at(shape).drop
-
-    return at(_minimum(loss, shapes, one.effect.shape, fitted.criteria.shapes.precision))
-
-
-def _minimum(loss: Callable[[np.ndarray], float], shapes, start, precision: float) -> np.ndarray:
+def _by_trial(objective: MomentObjective) -> Score:
+    """The best score where no derivatives are known; of one shape, between its neighbours."""
+    effect, precision = objective.one.effect, objective.fitted.criteria.shapes.precision
+    shapes = effect.shape_parameters(objective.fitted.model.robot)
     if len(shapes) == 1:
-        low, high = _neighbours(shapes[0], start[0])
-        span = (float(np.log(low)), float(np.log(high)))
-        return np.atleast_1d(np.asarray(fminbound(loss, *span, xtol=2 * precision)))
-    bounds = [(np.log(s.lower), np.log(s.upper)) for s in shapes]
-    return minimize(loss, np.log(start), bounds=bounds, method="Nelder-Mead").x
+        limits, solver = [_neighbours(shapes[0], effect.shape[0])], Bracket(2 * precision)
+    else:
+        limits, solver = [(s.lower, s.upper) for s in shapes], Simplex()
+    lower, upper = np.log(limits).T
+    return search(objective.by_trial(lower, upper), solver).best[0].found
 
 
 def reshaped(evidence: Evidence, others: EvidenceFit, whole: EvidenceFit, effect: Effect) -> Score:
@@ -163,7 +118,7 @@ def reshaped(evidence: Evidence, others: EvidenceFit, whole: EvidenceFit, effect
     """
     beside = Beside(evidence, whole).columns
     blank = Score(effect, None, not_identifiable=False)
-    now = score_at(evidence, others, effect, blank, grid_of(effect, others), beside)
+    now = MomentObjective(evidence, others, blank, beside).score_at(effect)
     return refined(evidence, others, now, beside)
 
 

@@ -1,20 +1,20 @@
-"""A second look, at every shape there may be, where the first one leaves a residual unexplained.
+"""The global search, over all shapes, where the ranking leaves a residual unexplained.
 
-A response in a gap fits where its shape is nearly the true one and nowhere else: the few shapes of
-the first look may all miss it. Differential evolution (Storn and Price 1997) seeks it on one
-recording, all shapes of a generation in the same steps of time; all recordings are asked about the
-best that it finds. What tells a true one is that the value found is the one at which its column was
-taken, which no accident brings about.
+A response with backlash fits where its shape is nearly the true one and nowhere else: the few
+shapes of the grid may all miss it. Differential evolution seeks it on one recording, all shapes of
+a generation in the same steps of time; all recordings are asked about the best that it finds. What
+tells a true one is that the value found is the one at which its column was taken, which no accident
+brings about.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import OptimizeResult, differential_evolution
 
+from dynident.diagnosis.search.moment_objective import ScoreTrial
 from dynident.diagnosis.search.ranking import Ranking, candidates, joints_below_noise, judged
 from dynident.diagnosis.search.scoring import Score, candidate_moments, impossible, score
 from dynident.diagnosis.verdict import within_noise
@@ -23,12 +23,13 @@ from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, residuals
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.noise_model import systematic_square
+from dynident.fitting.shape_search import Evolution, ShapeProblem, ShapeSolution, search
 from dynident.model import Model
 
 
 @dataclass(frozen=True)
 class RankedModel:
-    """A model, and what is missing from it by a first or a second look."""
+    """A model, and what is missing from it by the ranking or the global search."""
 
     fitted: EvidenceFit
     ranking: Ranking
@@ -68,8 +69,8 @@ def global_search(
     if not part[1].error_signal > 0:
         return None
     for effect in sought:
-        progress(f"{effect.label}, a second look")
-        searches.append(_GlobalSearch.run(*part, effect))
+        progress(f"{effect.label}, the global search")
+        searches.append(_shapes_on(*part, effect))
     finals = [
         _final(evidence, one.fitted, searches) if one.fitted.error_signal > 0 else None
         for one in bases
@@ -78,7 +79,7 @@ def global_search(
     if not found:
         return None
     one, base = max(found, key=lambda pair: pair[0].fall / pair[1].fitted.error_signal)
-    tests = base.ranking.tests + sum(search.tried for search in searches)
+    tests = base.ranking.tests + sum(found.evaluations for found in searches)
     best, refusal = judged(evidence, base.fitted, one, tests)
     return (
         None
@@ -97,15 +98,17 @@ def _sought(evidence: Evidence, model: Model, last: EvidenceFit) -> list[Effect]
     return added or [one for one in every if one.joint not in below_noise]
 
 
-def _final(evidence: Evidence, fitted: EvidenceFit, searches: list[_GlobalSearch]) -> Score | None:
+def _final(
+    evidence: Evidence, fitted: EvidenceFit, searches: list[ShapeSolution[ScoreTrial]]
+) -> Score | None:
     """The best of what was found on one recording, by all of them; None if it explains little."""
     scores = [
-        score
-        for search in searches
-        if search.finalists
-        for score in _scores(evidence, fitted, search.finalists)
-        if not impossible(score, fitted)
-        and score.drop_at_point > evidence.criteria.global_search.least * fitted.error_signal
+        one
+        for found in searches
+        if found.best
+        for one in _scores(evidence, fitted, [trial.found.effect for trial in found.best])
+        if not impossible(one, fitted)
+        and one.drop_at_point > evidence.criteria.global_search.least * fitted.error_signal
     ]
     return max(scores, key=lambda one: one.fall, default=None)
 
@@ -136,64 +139,29 @@ def _worst_recording(evidence: Evidence, fitted: EvidenceFit) -> tuple[Evidence,
     return alone, fit_evidence(alone, fitted.model, fitted)
 
 
-@dataclass
-class _GlobalSearch:
-    """A search over the shapes of one effect, and over the values at which its column is taken."""
+def _shapes_on(
+    evidence: Evidence, fitted: EvidenceFit, effect: Effect
+) -> ShapeSolution[ScoreTrial]:
+    """Search all shapes of an effect, and the values at which its column is taken."""
+    shapes = len(effect.shape_parameters(fitted.model.robot))
+    lower, upper = np.log(effect.sought_in(fitted.model.robot)).T
 
-    evidence: Evidence
-    fitted: EvidenceFit
-    effect: Effect
-    best: list[Score] = field(default_factory=list)
-    tried: int = 0
-    generations: int = 0
+    def evaluate(points: Sequence[np.ndarray]) -> list[ScoreTrial]:
+        tried = [effect.shaped(*x[:shapes]).at(x[shapes:]) for x in np.exp(points)]
+        scores = _scores(evidence, fitted, tried)
+        return [ScoreTrial(one, -one.fall, not impossible(one, fitted)) for one in scores]
 
-    @classmethod
-    def run(cls, evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> _GlobalSearch:
-        """Search through all shapes, until enough is explained or no more is to be hoped for."""
-        search, criteria = cls(evidence, fitted, effect), evidence.criteria.global_search
-        differential_evolution(
-            search.loss,
-            np.log(effect.sought_in(fitted.model.robot)),
-            popsize=criteria.population,
-            maxiter=criteria.generations,
-            init="sobol",
-            rng=0,
-            polish=False,
-            updating="deferred",
-            vectorized=True,
-            callback=search.ends,
-        )
-        return search
-
-    @property
-    def explained(self) -> float:
-        """Share of the systematic square that the best shape takes away."""
-        return self.best[0].fall / self.fitted.error_signal if self.best else 0.0
-
-    @property
-    def finalists(self) -> list[Effect]:
-        """The best shapes, about which the other recordings are asked."""
-        return [one.effect for one in self.best]
-
-    def loss(self, logs: np.ndarray) -> np.ndarray:
-        """What the shapes in the columns of `logs` (unknowns, V) leave, (V,)."""
-        shapes = len(self.effect.shape_parameters(self.fitted.model.robot))
-        tried = [self.effect.shaped(*x[:shapes]).at(x[shapes:]) for x in np.exp(logs.T)]
-        scores = _scores(self.evidence, self.fitted, tried)
-        self.tried += len(tried)
-        possible = [one for one in scores if not impossible(one, self.fitted)]
-        best = sorted([*self.best, *possible], key=lambda s: -s.fall)
-        self.best = best[: self.evidence.criteria.global_search.finalists]
-        # How wrong a wrong one is does not matter, and may be beyond all numbers.
-        worst = -self.fitted.error_signal
-        return np.array([-max(one.fall, worst) for one in scores])
-
-    def ends(self, intermediate_result: OptimizeResult) -> bool:
-        """Whether enough is explained, or nothing after so long."""
-        criteria = self.evidence.criteria.global_search
-        self.generations += 1
-        hopeless = self.generations >= criteria.patience and self.explained < criteria.least
-        return hopeless or self.explained > criteria.enough
+    systematic, criteria = fitted.error_signal, evidence.criteria.global_search
+    solver = Evolution(
+        population=criteria.population,
+        generations=criteria.generations,
+        enough=-criteria.enough * systematic,
+        hope=-criteria.least * systematic,
+        patience=criteria.patience,
+        worst=systematic,
+        finalists=criteria.finalists,
+    )
+    return search(ShapeProblem(lower, upper, (lower + upper) / 2, evaluate), solver)
 
 
 def _scores(evidence: Evidence, fitted: EvidenceFit, tried: list[Effect]) -> list[Score]:

@@ -23,7 +23,7 @@ from dynident.evidence.evidence_fit import EvidenceFit, residuals
 from dynident.evidence.noise_model import differences, systematic_square
 from dynident.evidence.runs import Run
 from dynident.model import Model
-from dynident.moments.replicated import Kind
+from dynident.moments.replicates import Kind
 
 _NOISY = "plain least squares takes it for the noise in accelerations: record a repeated motion"
 

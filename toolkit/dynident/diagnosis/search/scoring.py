@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import add
 
 import numpy as np
 from scipy import stats
@@ -13,7 +15,9 @@ from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, time_varying_columns, time_varying_mask
 from dynident.evidence.runs import Signals
 from dynident.model import Model
-from dynident.moments.replicated import Moments, TimeVarying, solve, time_varying_moments
+from dynident.moments.replicates import TimeVarying, time_varying_products
+from dynident.moments.second_moments import SecondMoments
+from dynident.moments.solution import orthonormal_directions, regress, solve_products
 
 Columns = Callable[[Sequence[Effect], Model, np.ndarray], list[list[Signals]]]
 """Columns of variants of an effect, for a model and its values, as `Evidence.columns`."""
@@ -70,7 +74,7 @@ def candidate_moments(
     fitted: EvidenceFit,
     variants: Sequence[Effect],
     columns_of: Columns | None = None,
-) -> list[tuple[Moments, Moments]]:
+) -> list[tuple[SecondMoments, SecondMoments]]:
     """Moments of columns with the model's and the torque, and with themselves.
 
     A payload counts as carried in every run; see `moments_with_payload`.
@@ -87,8 +91,7 @@ def candidate_moments(
     joints = variants[0].acting_at(fitted.model.robot)
     time_varying = time_varying_mask(fitted.model)
     mixed = variants[0].time_varying or time_varying.any()
-    with_model, with_self = None, None
-    width = 0
+    with_model, with_self, width = [], [], 0
     columns = (columns_of or evidence.columns)(variants, fitted.model, fitted.values)
     for r, (run, each) in enumerate(zip(evidence.runs, columns, strict=True)):
         width = each[0][0].shape[2]
@@ -105,23 +108,16 @@ def candidate_moments(
                 )
                 old = time_varying_columns(evidence, fitted.model, r, known)
                 chosen = time_varying[:, None] | np.full(white.shape[2], variants[0].time_varying)
-                one[-1] = one[-1].where(chosen, time_varying_moments(old, new, run.edges))
+                one[-1] = one[-1].where(chosen, time_varying_products(old, new, run.edges))
                 if variants[0].time_varying:
                     two[-1] = two[-1].where(
-                        np.array(True), time_varying_moments(new, new, run.edges)
+                        np.array(True), time_varying_products(new, new, run.edges)
                     )
-        sums = [
-            Moments(np.sum([m.signal for m in part], 0), np.sum([m.total for m in part], 0))
-            for part in (one, two)
-        ]
-        with_model = sums[0] if with_model is None else with_model + sums[0]
-        with_self = sums[1] if with_self is None else with_self + sums[1]
-    assert with_model is not None and with_self is not None
-    starts = range(0, width * len(variants), width)
-    return [
-        (_columns(with_model, slice(i, i + width)), _block(with_self, slice(i, i + width)))
-        for i in starts
-    ]
+        with_model.append(reduce(add, one))
+        with_self.append(reduce(add, two))
+    beside, own = SecondMoments.stacked(with_model), SecondMoments.stacked(with_self)
+    parts = [slice(i, i + width) for i in range(0, width * len(variants), width)]
+    return [(beside.columns(part), own.among(part)) for part in parts]
 
 
 def _time_factors(evidence: Evidence, variants: Sequence[Effect], run: int) -> np.ndarray:
@@ -133,72 +129,58 @@ def _time_factors(evidence: Evidence, variants: Sequence[Effect], run: int) -> n
     return np.stack(factors, axis=2)
 
 
-def _columns(part: Moments, columns: slice) -> Moments:
-    return Moments(part.signal[:, :, columns], part.total[:, :, columns])
-
-
-def _block(part: Moments, columns: slice) -> Moments:
-    return Moments(part.signal[:, columns, columns], part.total[:, columns, columns])
-
-
 def moments_with_payload(
-    part: Moments, evidence: Evidence, payload_recordings: tuple[bool, ...]
-) -> Moments:
+    part: SecondMoments, evidence: Evidence, payload_recordings: tuple[bool, ...]
+) -> SecondMoments:
     """Moments of columns that are zero in the runs which do not carry the payload."""
     blocks = [
         np.full(len(run.edges) - 1, c)
         for run, c in zip(evidence.runs, payload_recordings, strict=True)
     ]
-    mask = np.concatenate(blocks).astype(float)[:, None, None]
-    return Moments(part.signal * mask, part.total * mask)
+    return part.weighted(np.concatenate(blocks).astype(float))
 
 
 def score(
     fitted: EvidenceFit,
     effect: Effect,
-    with_model: Moments,
-    with_self: Moments,
+    with_model: SecondMoments,
+    with_self: SecondMoments,
     grid: int,
     payload_recordings: tuple[bool, ...] | None = None,
 ) -> Score:
     """Score an effect from its moments; `grid` is the number of shapes that were tried."""
     p = len(fitted.values)
     solution = fitted.solution
-    signal, total = with_model.sums()
-    own_signal, own_total = with_self.sums()
+    beside, own, known = with_model.pooled(), with_self.pooled(), fitted.moments.pooled()
+    signal, total = beside.signal, beside.total
     back = solution.project(signal[:p])  # the model's share of the columns
-    left_signal = own_signal - signal[:p].T @ back
-    model_total = fitted.moments.sums()[1][:p, :p]
+    left_signal = own.signal - signal[:p].T @ back
     cross = back.T @ total[:p]
-    left_total = own_total - cross - cross.T + back.T @ model_total @ back
-    scale = np.sqrt(np.clip(np.diag(own_signal), 0.0, None))
+    left_total = own.total - cross - cross.T + back.T @ known.gram @ back
+    scale = np.sqrt(np.clip(np.diag(own.signal), 0.0, None))
     seen = _seen(effect, fitted, scale)
     if not np.any(seen):
         return Score(effect, payload_recordings, not_identifiable=True)
     scale = np.where(seen, scale, 1.0)
     # Directions of the columns, by what is left of them beside the model.
-    size, directions = np.linalg.eigh(own_signal * np.outer(seen, seen) / np.outer(scale, scale))
-    keep = size > 1e-9 * size[-1]
-    white = directions[:, keep] / np.sqrt(size[keep]) / scale[:, None]
+    white = orthonormal_directions(own.signal * np.outer(seen, seen), scale)
     left, turn = np.linalg.eigh(white.T @ left_signal @ white)
     visible = left > fitted.criteria.gates.not_identifiable**2
     if not np.any(visible):
         return Score(effect, payload_recordings, not_identifiable=True)
     directions = white @ turn[:, visible]
-    part = solve(
-        directions.T @ left_signal @ directions,
-        directions.T @ left_total @ directions,
-        directions.T @ (signal[p] - back.T @ fitted.moments.sums()[0][:p, p]),
+    moment = directions.T @ (signal[p] - back.T @ known.signal[:p, p])
+    part = solve_products(
+        directions.T @ left_signal @ directions, directions.T @ left_total @ directions, moment
     )
     if part.rank == 0:
         return Score(effect, payload_recordings, not_identifiable=False)
     values = directions @ part.values
-    moment = directions.T @ (signal[p] - back.T @ fitted.moments.sums()[0][:p, p])
     drop = float(part.values @ moment)
     covariance = directions @ part.covariance @ directions.T
     at = np.array(effect.point) if len(effect.point) == len(values) else values
     combination = np.append(-fitted.values, 1.0)
-    with_model_columns = (combination @ fitted.moments.sums()[1])[:p]
+    with_model_columns = (combination @ known.total)[:p]
     with_noise = combination @ total - with_model_columns @ back
     shapes = len(effect.shape_parameters(fitted.model.robot))
     price = (part.rank + shapes) * np.log(fitted.rows) + 2.0 * np.log(grid)
@@ -244,28 +226,24 @@ def impossible(one: Score, fitted: EvidenceFit) -> str:
 
 
 def cross_validate(
-    fitted: EvidenceFit, with_model: Moments, with_self: Moments
+    fitted: EvidenceFit, with_model: SecondMoments, with_self: SecondMoments
 ) -> tuple[np.ndarray, np.ndarray]:
     """Held-out squared residuals per block, without and with an effect, (B,) each."""
-    signal = _joined(fitted.moments.signal, with_model.signal, with_self.signal)
-    total = _joined(fitted.moments.total, with_model.total, with_self.total)
-    p = len(fitted.values)
-    both = Moments(signal, total)
-    without = np.r_[0:p, signal.shape[1] - 1]
-    return (
-        held_out_losses(
-            Moments(signal[:, without][:, :, without], total[:, without][:, :, without])
-        ),
-        held_out_losses(both),
+    both = SecondMoments(
+        _joined(fitted.moments.total, with_model.total, with_self.total),
+        fitted.moments.counts,
+        None,
+        _joined(fitted.moments.signal, with_model.signal, with_self.signal),
     )
+    without = np.r_[0 : len(fitted.values), both.inputs]
+    return held_out_losses(both.among(without)), held_out_losses(both)
 
 
-def held_out_losses(summed: Moments) -> np.ndarray:
+def held_out_losses(summed: SecondMoments) -> np.ndarray:
     """Squared residual of each block under the fit to all others, free of noise in the mean."""
     found = []
     for block in range(len(summed.signal)):
-        signal, total = summed.without(block)
-        values = solve(signal[:-1, :-1], total[:-1, :-1], signal[:-1, -1]).values
+        values = regress(summed.without(block)).values
         combination = np.append(-values, 1.0)
         found.append(combination @ summed.signal[block] @ combination)
     return np.array(found)
@@ -283,8 +261,8 @@ def _joined(model: np.ndarray, cross: np.ndarray, own: np.ndarray) -> np.ndarray
 
 def _block_scores(
     fitted: EvidenceFit,
-    with_model: Moments,
-    with_self: Moments,
+    with_model: SecondMoments,
+    with_self: SecondMoments,
     back: np.ndarray,
     values: np.ndarray,
 ) -> np.ndarray:

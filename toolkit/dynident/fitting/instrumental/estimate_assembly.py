@@ -12,9 +12,9 @@ from dynident.fitting.instrumental.bias import ExpectedBias, expected_bias
 from dynident.fitting.instrumental.covariance import carried_covariance, textbook_covariance
 from dynident.fitting.instrumental.iv_iterations import Iterations
 from dynident.fitting.instrumental.noise_level import NoiseLevel, position_noise, torque_noise
-from dynident.fitting.instrumental.normal_equations import InstrumentalSolution, residual_std
+from dynident.fitting.instrumental.normal_equations import InstrumentalSolution
 from dynident.fitting.instrumental.source import InstrumentSource
-from dynident.fitting.least_squares import sources_of
+from dynident.fitting.least_squares import residual_std, sources_of
 from dynident.model import Model
 from dynident.tables import number
 
@@ -34,10 +34,10 @@ def assemble(method: str, iterations: Iterations) -> Estimate:
     noise, bias = _noise(model, source, iterations)
     covariance = carried_covariance(model, values, iterations.instruments, solution, noise)
     norms = found.residual_norms(values)
-    freedom = found.factors.rows - solution.rank
+    freedom = found.rows - solution.rank
     variance = float(np.sum((norms * solution.weights) ** 2)) / freedom
     textbook = textbook_covariance(model, solution, variance)
-    torques = found.factors.torque_norms
+    torques = found.torque_norms
     history = Convergence(
         names=model.names,
         units=model.units,
@@ -59,11 +59,11 @@ def assemble(method: str, iterations: Iterations) -> Estimate:
         values=values,
         covariance=covariance,
         basis=solution.basis,
-        torque_std=residual_std(found, solution),
+        torque_std=residual_std(found, solution.values, solution.rank),
         joint_errors=norms / np.where(torques > 0, torques, np.nan),
         error=found.relative(norms),
         condition_number=solution.condition_number,
-        rows=found.factors.rows,
+        rows=found.rows,
         method=method,
         status=history.sentence,
         notes=(*_notes(model, solution, history, bias), *source.notes),
@@ -89,7 +89,7 @@ def _noise(
     if given:
         torque = np.asarray(given.torque_std, dtype=float)
         return NoiseLevel(position, torque, "given"), bias
-    counts = iterations.found.factors.counts
+    counts = iterations.found.counts
     variance = iterations.found.residual_norms(iterations.values) ** 2 / counts
     torque = torque_noise(measured, variance, bias.residual_variance, counts)
     return NoiseLevel(position, torque, "measured"), bias

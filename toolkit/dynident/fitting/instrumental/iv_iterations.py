@@ -16,14 +16,14 @@ from dynident.errors import DynidentError, SimulationError
 from dynident.fitting.fixed_point import FixedPoint
 from dynident.fitting.history import Ending, Round, Way
 from dynident.fitting.instrumental.normal_equations import (
-    InstrumentalFactors,
     InstrumentalSolution,
-    moments,
-    solve,
+    factorise_instruments,
+    solve_instruments,
 )
 from dynident.fitting.instrumental.simulated_loop import LoopSource
 from dynident.fitting.instrumental.source import InstrumentSource, ProgressCallback, silent
 from dynident.model import Model
+from dynident.moments.factors import TriangularFactors
 from dynident.recording import Dataset
 
 _HALVINGS = 5
@@ -47,7 +47,7 @@ class _Found:
 
     values: np.ndarray
     simulated: np.ndarray | None
-    found: InstrumentalFactors
+    found: TriangularFactors
     solution: InstrumentalSolution
     instruments: Dataset
     rounds: list[Round]
@@ -88,7 +88,7 @@ class Iterations:
         self.rounds: list[Round] = []
         self._past: list[_Found] = []
         self.ending, self.message = Ending.ROUNDS_EXHAUSTED, ""
-        self.found: InstrumentalFactors
+        self.found: TriangularFactors
         self.solution: InstrumentalSolution
         self.instruments: Dataset
 
@@ -184,7 +184,7 @@ class Iterations:
                     found, solution = self._solved()
                     values = self._fixed_point.following(model, self.values, solution.values)
             self.model = model.at(values)
-        R = found.factors.pooled(solution.weights)[: model.size, : model.size]
+        R = found.pooled(solution.weights)[: model.size, : model.size]
         self.found, self.solution, self._root, self.values = found, solution, R, values
         self.rounds.append(
             Round(
@@ -200,12 +200,14 @@ class Iterations:
             _Found(values, self.simulated, found, solution, self.instruments, list(self.rounds))
         )
 
-    def _solved(self) -> tuple[InstrumentalFactors, InstrumentalSolution]:
+    def _solved(self) -> tuple[TriangularFactors, InstrumentalSolution]:
         """The solution with columns at the values so far."""
         self.model = self.model.at(self.values)
-        found = moments(self.model, self.source.measured, self.instruments, self.values)
+        found = factorise_instruments(
+            self.model, self.source.measured, self.instruments, self.values
+        )
         given, weighting = self.model.given_values(), self._settings.weighting
-        return found, solve(found, self.model.names, given, weighting)
+        return found, solve_instruments(found, self.model.names, given, weighting)
 
     def _converged(self) -> bool:
         """Whether the residual stays, at estimates that were simulated as they are."""

@@ -1,4 +1,4 @@
-"""Triangular factors of instruments, regressor and torque side by side, and their solution.
+"""Triangular factors of instruments, regressor and torque side by side, solved.
 
 Everything that an instrumental variable estimate needs (the estimate, the ranks, both residuals)
 is in the R of a QR factorisation of [V, W, y], so that neither matrix is ever kept.
@@ -13,43 +13,17 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from dynident.errors import FitError
-from dynident.fitting.least_squares import RANK_TOLERANCE
+from dynident.fitting.least_squares import require_rows, residual_std
 from dynident.fitting.sampling import sample
 from dynident.model import Model
-from dynident.moments.factors import TriangularFactors, factorise
+from dynident.moments.factors import RANK_TOLERANCE, TriangularFactors, factorise
 from dynident.recording import Dataset
 from dynident.robot import BaseParameters, base_parameters
 
 
-@dataclass(frozen=True, eq=False)
-class InstrumentalFactors:
-    """The factor of [V, W, y], joint by joint.
-
-    Attributes
-    ----------
-    factors : of 2 p + 1 columns: p instruments, p columns of the regressor, the torque.
-    size : p.
-    """
-
-    factors: TriangularFactors
-    size: int
-
-    def residual_norms(self, values: np.ndarray) -> np.ndarray:
-        """Norm of y - W values per joint, (n,): the regressor as it was measured."""
-        return self.factors.residual_norms(np.concatenate([np.zeros(self.size), values]))
-
-    def simulated_norms(self, values: np.ndarray) -> np.ndarray:
-        """Norm of y - V values per joint, (n,): the instruments in place of the regressor."""
-        return self.factors.residual_norms(np.concatenate([values, np.zeros(self.size)]))
-
-    def relative(self, norms: np.ndarray) -> float:
-        """A residual over all joints, relative to the torque."""
-        return float(np.linalg.norm(norms) / np.linalg.norm(self.factors.torque_norms))
-
-
-def moments(
+def factorise_instruments(
     model: Model, measured: Dataset, instruments: Dataset, values: np.ndarray | None = None
-) -> InstrumentalFactors:
+) -> TriangularFactors:
     """Factorise the rows of measured recordings beside those of their instruments.
 
     Parameters
@@ -59,7 +33,7 @@ def moments(
     instruments : the same recordings with other positions, on the same time stamps.
     values : (p,) at which columns that depend on the predicted torque are taken.
     """
-    return InstrumentalFactors(factorise(_rows(model, measured, instruments, values)), model.size)
+    return factorise(_rows(model, measured, instruments, values), model.size)
 
 
 def _rows(
@@ -103,8 +77,8 @@ class InstrumentalSolution:
         return self.basis.rank
 
 
-def solve(
-    found: InstrumentalFactors, names: tuple[str, ...], given: np.ndarray, weighting: str
+def solve_instruments(
+    factors: TriangularFactors, names: tuple[str, ...], given: np.ndarray, weighting: str
 ) -> InstrumentalSolution:
     """Solve V' O^-1 W x = V' O^-1 y through two QR factorisations.
 
@@ -113,7 +87,7 @@ def solve(
 
     Parameters
     ----------
-    found : factors of [V, W, y].
+    factors : of [V, W, y].
     names : of the p parameters.
     given : (p,) values of what the data do not tell.
     weighting : "joint": O holds the variance of each joint's residual in the ordinary solution;
@@ -125,32 +99,19 @@ def solve(
         If there are too few rows, the torque is zero, or the instruments do not reach every
         direction of the regressor that they excite.
     """
-    factors = found.factors
-    if factors.rows <= found.size:
-        what = f"{factors.rows} equations for {found.size} parameters"
-        raise FitError(what, remedy="record longer, or raise rate_hz in [filter]")
-    if not np.any(factors.torque_norms > 0):
-        raise FitError("the torque is zero throughout", remedy="is it the right column?")
-    ordinary = _solve(found, names, given, np.ones(len(factors.counts)))
+    require_rows(factors)
+    ordinary = _solve(factors, names, given, np.ones(len(factors.counts)))
     if weighting == "none" or len(factors.counts) == 1:
         return ordinary
-    return _solve(found, names, given, 1.0 / residual_std(found, ordinary))
-
-
-def residual_std(found: InstrumentalFactors, solution: InstrumentalSolution) -> np.ndarray:
-    """Standard deviation of y - W x of each joint, (n,)."""
-    counts = found.factors.counts
-    share = solution.rank / len(counts)
-    std = found.residual_norms(solution.values) / np.sqrt(np.maximum(counts - share, 1.0))
-    least = 1e-12 * np.max(found.factors.torque_norms / np.sqrt(counts))
-    return np.maximum(std, least)
+    std = residual_std(factors, ordinary.values, ordinary.rank)
+    return _solve(factors, names, given, 1.0 / std)
 
 
 def _solve(
-    found: InstrumentalFactors, names: tuple[str, ...], given: np.ndarray, weights: np.ndarray
+    factors: TriangularFactors, names: tuple[str, ...], given: np.ndarray, weights: np.ndarray
 ) -> InstrumentalSolution:
-    p = found.size
-    R = found.factors.pooled(weights)
+    p = factors.size
+    R = factors.pooled(weights)
     # Noise gives the measured regressor full rank whatever the motion: the instruments decide.
     basis = base_parameters(R[:p, :p], names, RANK_TOLERANCE)
     kept = list(basis.independent)

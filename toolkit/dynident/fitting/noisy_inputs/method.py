@@ -73,7 +73,9 @@ class Regression:
             basis=posed.basis,
             notes=(*posed.first.notes, *found.notes),
         )
-        solution = replace(solution, torque_std=residual_std(posed.factors, solution))
+        solution = replace(
+            solution, torque_std=residual_std(posed.factors, solution.values, solution.basis.rank)
+        )
         estimate = estimate_of(found.words, "joint", posed.model, dataset, posed.factors, solution)
         return replace(
             estimate,
@@ -99,7 +101,7 @@ class Regression:
 
         regressor = named(self.estimator)
         if regressor is None:
-            what = f"{self.estimator} is scikit-learn's, fitted to compressed rows"
+            what = f"{self.estimator} is scikit-learn's, fitted to rows"
             raise FitError(
                 what, remedy="choose bayes, factors, corrected, truncated, stepwise or total"
             )

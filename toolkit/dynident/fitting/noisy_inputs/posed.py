@@ -1,17 +1,16 @@
-"""The regression that a model and data pose: their rows, compressed piece by piece."""
+"""The regression that a model and data pose: the factors of its rows, piece by piece."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from dynident.fitting.least_squares import LeastSquares, LinearSolution, solve_factors
-from dynident.fitting.noisy_inputs.compressed import Compressed, compress
 from dynident.fitting.sampling import rows, sample
 from dynident.model import Model
-from dynident.moments.factors import TriangularFactors, factorise
+from dynident.moments.factors import TriangularFactors, combine, factorise, in_pieces
 from dynident.recording import Dataset
 from dynident.robot import BaseParameters
 
@@ -31,7 +30,7 @@ class PosedRegression:
     factors : of all data.
     first : least squares' solution.
     kept : numbers of the parameters that are identified.
-    compressed : their rows, in units of each joint's residual.
+    pieces : their rows in consecutive pieces, in units of each joint's residual.
     """
 
     model: Model
@@ -40,7 +39,7 @@ class PosedRegression:
     factors: TriangularFactors
     first: LinearSolution
     kept: list[int]
-    compressed: Compressed
+    pieces: TriangularFactors
 
 
 def pose(model: Model, dataset: Dataset) -> PosedRegression:
@@ -48,11 +47,9 @@ def pose(model: Model, dataset: Dataset) -> PosedRegression:
     relaxed = LeastSquares().fit(model, dataset)
     model, kept = relaxed.model, list(relaxed.basis.independent)
     values = relaxed.values if model.needs_values else None
-    pieces = pieces_of(model, dataset, values)
-    factors = _whole(pieces)
+    parts = pieces_of(model, dataset, values)
+    factors = combine(parts)
     first = solve_factors(model, factors)
-    compressed = compress(pieces, 1.0 / first.torque_std)
-    compressed = replace(compressed, X=compressed.X[:, kept])
     return PosedRegression(
         model=model,
         basis=relaxed.basis,
@@ -60,12 +57,12 @@ def pose(model: Model, dataset: Dataset) -> PosedRegression:
         factors=factors,
         first=first,
         kept=kept,
-        compressed=compressed,
+        pieces=in_pieces(parts, 1.0 / first.torque_std).keeping(kept),
     )
 
 
 def pieces_of(model: Model, dataset: Dataset, values: np.ndarray | None) -> list[TriangularFactors]:
-    """TriangularFactors of consecutive pieces of the data, equally long to a row."""
+    """Factors, joint by joint, of consecutive pieces of the data, equally long to a row."""
     total = sum(len(sample(one, dataset.filter).t) for one in dataset.recordings)
     borders = np.round(np.arange(1, PIECES + 1) * total / PIECES).astype(int)
     pieces: list[list[TriangularFactors]] = [[] for _ in borders]
@@ -78,15 +75,4 @@ def pieces_of(model: Model, dataset: Dataset, values: np.ndarray | None) -> list
             piece = int(np.searchsorted(borders, start, side="right"))
             pieces[piece].append(factorise([(columns[part], torque[part])]))
         first = last
-    return [_whole(parts) for parts in pieces if parts]
-
-
-def _whole(parts: list[TriangularFactors]) -> TriangularFactors:
-    """TriangularFactors of all the parts together."""
-    R = np.stack(
-        [
-            np.linalg.qr(np.vstack([part.R[j] for part in parts]), mode="r")
-            for j in range(len(parts[0].counts))
-        ]
-    )
-    return TriangularFactors(R, np.sum([part.counts for part in parts], axis=0))
+    return [combine(parts) for parts in pieces if parts]

@@ -1,4 +1,4 @@
-"""The regressions at work: fitted to the compressed rows, and what an estimate takes from them.
+"""The regressions at work: fitted to pieces of the data, and what an estimate takes from them.
 
 In: a regression as it was posed, an estimator or its name, and the covariance of the inputs' noise.
 Out: a `RegressionResult`. It loads scikit-learn, and is imported when a regression is fitted.
@@ -17,8 +17,9 @@ from sklearn.linear_model import LassoCV, RidgeCV
 from sklearn.model_selection import GridSearchCV, PredefinedSplit
 
 from dynident.errors import FitError
-from dynident.fitting.noisy_inputs.compressed import Compressed, OutputNoise, output_noise, sandwich
+from dynident.fitting.noisy_inputs.between_pieces import OutputNoise, output_noise, sandwich
 from dynident.fitting.noisy_inputs.posed import PIECES, PosedRegression
+from dynident.moments.factors import TriangularFactors, products_of
 from dynident.regression.bayesian_factors import BayesianFactorRegression
 from dynident.regression.corrected import LEAST_SHARE, CorrectedLeastSquares
 from dynident.regression.factor_tables import factor_tables
@@ -120,20 +121,20 @@ def fitted(
     if psi is not None:
         regressor.set_params(input_noise=psi)
     names = [posed.model.names[i] for i in posed.kept]
-    found = regressor.named(names).fit_statistics(posed.compressed.statistics)
+    found = regressor.named(names).fit_statistics(products_of(posed.pieces))
     if psi is not None:
-        _cluster(found, posed.compressed, psi)
+        _cluster(found, posed.pieces, psi)
     return found
 
 
-def _cluster(regressor: StatisticsRegressor, compressed: Compressed, psi: np.ndarray) -> None:
+def _cluster(regressor: StatisticsRegressor, pieces: TriangularFactors, psi: np.ndarray) -> None:
     """Take standard deviations from the scatter between pieces: rows are not independent."""
     if isinstance(regressor, CorrectedLeastSquares):
-        regressor.covariance_ = sandwich(compressed, regressor.coef_, psi)
+        regressor.covariance_ = sandwich(pieces, regressor.coef_, psi)
         regressor.sigma_ = np.sqrt(np.diag(regressor.covariance_))
     elif isinstance(regressor, JointFactorRegression) and regressor.corrected_ is not None:
         corrected = regressor.corrected_
-        _cluster(corrected, compressed, psi)
+        _cluster(corrected, pieces, psi)
         regressor.sigma_true_ = np.hypot(corrected.sigma_, regressor.coef_true_ - corrected.coef_)
 
 
@@ -150,7 +151,7 @@ def found_by(
     words = regressor.words
     if isinstance(regressor, CorrectedLeastSquares):
         assert psi is not None
-        notes = _worth(regressor, output_noise(posed.compressed, regressor.coef_, psi))
+        notes = _worth(regressor, output_noise(posed.pieces, regressor.coef_, psi))
         return RegressionResult(
             values=regressor.coef_, covariance=regressor.covariance_, words=words, notes=notes
         )
@@ -194,12 +195,41 @@ def _worth(regressor: CorrectedLeastSquares, noise: OutputNoise) -> tuple[str, .
     return tuple(notes)
 
 
+@dataclass(frozen=True, eq=False)
+class FewRows:
+    """Few rows for many, which every linear regression takes for them.
+
+    A triangular factor R of [X, y] has R'R = [X, y]'[X, y]: a regularised regression sees the same
+    path in it, and cross-validation between pieces the same errors.
+
+    Attributes
+    ----------
+    X, y : (k, p) and (k,), with mean zero: a constant finds nothing to do.
+    piece : (k,) number of the consecutive piece of data that each row stands for.
+    """
+
+    X: np.ndarray
+    y: np.ndarray
+    piece: np.ndarray
+
+
+def few_rows(pieces: TriangularFactors) -> FewRows:
+    """Return few rows for those behind the factors of equally long pieces of data."""
+    count, size, _ = pieces.R.shape
+    # Each row and its mirror image: the mean is zero, the squares are the same.
+    mirrored = np.concatenate([pieces.R, -pieces.R], axis=1).reshape(2 * count * size, -1)
+    # Penalties count per row: as many squares a row as the data have.
+    mirrored *= np.sqrt(count * size / pieces.rows)
+    piece = np.repeat(np.arange(count), 2 * size)
+    return FewRows(mirrored[:, :-1], mirrored[:, -1], piece)
+
+
 def found_by_validation(name: str, posed: PosedRegression) -> RegressionResult:
     """Fit one of scikit-learn's regressions, its penalty chosen between pieces of the data."""
-    compressed = posed.compressed
-    scale = np.sqrt(np.mean(compressed.X**2, axis=0))
-    folds = compressed.piece * _FOLDS // (compressed.piece.max() + 1)
-    chosen = _validated(name, replace(compressed, X=compressed.X / scale, piece=folds))
+    rows = few_rows(posed.pieces)
+    scale = np.sqrt(np.mean(rows.X**2, axis=0))
+    folds = rows.piece * _FOLDS // (rows.piece.max() + 1)
+    chosen = _validated(name, replace(rows, X=rows.X / scale, piece=folds))
     note = (
         f"{name}, {chosen.choice}, chosen between {_FOLDS} consecutive pieces of "
         "the data. No intervals: they would have to carry the bias of the penalty."
@@ -217,7 +247,7 @@ class _Validated:
     choice: str
 
 
-def _validated(name: str, rows: Compressed) -> _Validated:
+def _validated(name: str, rows: FewRows) -> _Validated:
     """Return the penalty with the least error between the pieces of standardised rows."""
     X, y, split = rows.X, rows.y, PredefinedSplit(rows.piece)
     found: Any

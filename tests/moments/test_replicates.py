@@ -1,13 +1,12 @@
-"""Moments from repetitions: what noise does to squares, it does not do to products."""
+"""Moments from replicates: what noise does to squares, it does not do to products."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from dynident.criteria import DEFAULTS
-from dynident.evidence.noise_model import differences, measure_noise, systematic_square
-from dynident.moments.replicated import moments, solve
+from dynident.moments.replicates import replicate_moments
+from dynident.moments.solution import regress
 
 RNG = np.random.default_rng(11)
 
@@ -24,7 +23,7 @@ def test_signal_moments_are_free_of_noise_in_the_mean(replicates: int) -> None:
     trials = 2000
     for _ in range(trials):
         noisy = repeated(signal, replicates, 0.5, RNG)
-        total += moments(noisy, noisy, edges, "repeated").signal.sum(axis=0)
+        total += replicate_moments(noisy, noisy, edges, "repeated").signal.sum(axis=0)
     expected = replicates * signal.T @ signal
     # One trial's standard deviation is about 0.5 * 2 * sqrt(60) * versions at most.
     tolerance = 5 * 8.0 * replicates / np.sqrt(trials)
@@ -38,14 +37,14 @@ def test_moments_of_noisy_copies_are_corrected_in_the_mean() -> None:
     for _ in range(trials):
         measured = signal + 0.5 * RNG.normal(size=signal.shape)
         copies = np.stack([measured, *(measured + 0.5 * RNG.normal(size=(3, 80, 2)))])
-        total += moments(copies, copies, np.array([0, 80]), "noise_augmented").signal[0]
+        total += replicate_moments(copies, copies, np.array([0, 80]), "noise_augmented").signal[0]
     assert np.allclose(total / trials, signal.T @ signal, atol=5 * 12.0 / np.sqrt(trials))
 
 
 def test_blocks_add_up_and_the_moments_are_symmetric() -> None:
     data = RNG.normal(size=(3, 40, 4))
-    whole = moments(data, data, np.array([0, 40]), "repeated")
-    parts = moments(data, data, np.array([0, 7, 29, 40]), "repeated")
+    whole = replicate_moments(data, data, np.array([0, 40]), "repeated")
+    parts = replicate_moments(data, data, np.array([0, 7, 29, 40]), "repeated")
     assert np.allclose(whole.signal[0], parts.signal.sum(axis=0))
     assert np.allclose(whole.signal, whole.signal.transpose(0, 2, 1))
     assert np.allclose(whole.total[0], data.reshape(-1, 4).T @ data.reshape(-1, 4))
@@ -60,10 +59,10 @@ def test_instruments_do_not_shrink_what_least_squares_shrinks() -> None:
         columns = repeated(clean, 2, 0.7, RNG)
         torque = np.repeat((clean @ truth)[None, :, None], 2, axis=0)
         data = np.concatenate([columns, torque], axis=2)
-        summed = moments(data, data, np.array([0, 200]), "repeated")
-        signal, total = summed.sums()
-        found.append(solve(signal[:2, :2], total[:2, :2], signal[:2, 2]).values)
-        plain.append(np.linalg.solve(total[:2, :2], total[:2, 2]))
+        summed = replicate_moments(data, data, np.array([0, 200]), "repeated")
+        pooled = summed.pooled()
+        found.append(regress(pooled).values)
+        plain.append(np.linalg.solve(pooled.gram, pooled.cross))
     assert np.allclose(np.mean(found, axis=0), truth, atol=0.05)
     assert np.allclose(np.mean(plain, axis=0), truth / 1.49, atol=0.05)
 
@@ -73,8 +72,7 @@ def test_directions_without_signal_are_left_out() -> None:
     columns = np.stack([np.hstack([clean, RNG.normal(size=(300, 1))]) for _ in range(2)])
     torque = np.repeat(3.0 * clean[None], 2, axis=0)
     data = np.concatenate([columns, torque], axis=2)
-    signal, total = moments(data, data, np.array([0, 300]), "repeated").sums()
-    solution = solve(signal[:2, :2], total[:2, :2], signal[:2, 2])
+    solution = regress(replicate_moments(data, data, np.array([0, 300]), "repeated").pooled())
     assert solution.rank == 1
     assert np.allclose(solution.values, [3.0, 0.0], atol=0.1)
 
@@ -82,40 +80,6 @@ def test_directions_without_signal_are_left_out() -> None:
 def test_dependent_columns_get_the_smallest_answer_and_no_explosion() -> None:
     clean = RNG.normal(size=(2, 300, 1))
     data = np.concatenate([clean, 2 * clean, 5 * clean], axis=2)
-    signal, total = moments(data, data, np.array([0, 300]), "single").sums()
-    solution = solve(signal[:2, :2], total[:2, :2], signal[:2, 2])
+    solution = regress(replicate_moments(data, data, np.array([0, 300]), "single").pooled())
     assert solution.rank == 1
     assert np.allclose(solution.values @ [1.0, 2.0], 5.0)
-
-
-@pytest.mark.parametrize("replicates", [2, 3])
-def test_differences_have_the_variance_of_the_noise(replicates: int) -> None:
-    residual = repeated(np.sin(np.arange(4000.0)), replicates, 0.3, RNG)
-    assert np.mean(differences(residual, "repeated") ** 2) == pytest.approx(0.09, rel=0.08)
-    assert systematic_square(residual, "repeated") == pytest.approx(0.5, rel=0.08)
-
-
-def test_whitened_noise_is_white_and_of_unit_variance() -> None:
-    """Noise that is coloured and grows at low speed."""
-    speed = [np.cos(np.arange(3000) / 50.0 + k) for k in range(4)]
-    shaped = []
-    for v in speed:
-        white = RNG.normal(size=3000)
-        coloured = np.convolve(white, [1.0, 0.8, 0.4])[:3000]
-        shaped.append(0.2 * coloured * (1.0 + 1.5 * np.exp(-((v / 0.2) ** 2))))
-    model = measure_noise(shaped, speed, DEFAULTS.noise)
-    for noise, v in zip(shaped, speed, strict=True):
-        e = model.whiten(noise[:, None], v)[20:, 0]
-        assert np.mean(e**2) == pytest.approx(1.0, rel=0.15)
-        assert abs(np.corrcoef(e[1:], e[:-1])[0, 1]) < 0.08
-        slow = np.abs(v[20:]) < 0.1
-        assert np.mean(e[slow] ** 2) == pytest.approx(1.0, rel=0.35)
-
-
-def test_what_is_missing_counts_as_white_noise_on_top() -> None:
-    noise = [RNG.normal(size=2000)]
-    speed = [np.ones(2000)]
-    plain, missing = (measure_noise(noise, speed, DEFAULTS.noise, misfit) for misfit in (0.0, 3.0))
-    probe = RNG.normal(size=(500, 1))
-    ratio = np.std(plain.whiten(probe, np.ones(500))) / np.std(missing.whiten(probe, np.ones(500)))
-    assert ratio == pytest.approx(np.sqrt(10.0), rel=0.05)

@@ -1,0 +1,221 @@
+"""What the shapes of a candidate leave of the moments, for the search for shape parameters.
+
+Each trial is reduced to its moments, of which a square root is a least-squares problem with few
+rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from dynident.diagnosis.search.scoring import (
+    Columns,
+    Score,
+    candidate_moments,
+    impossible,
+    moments_with_payload,
+    score,
+)
+from dynident.effects import Block, Effect, Needs, Parameter
+from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence_fit import EvidenceFit
+from dynident.fitting.shape_search import ShapeProblem
+
+_ROUNDING = 1e-12  # of the largest curvature, to which others are rounding errors
+
+
+@dataclass(frozen=True)
+class Tangent(Effect):
+    """An effect's columns, then their derivatives by the logarithm of each shape parameter.
+
+    Last comes the derivative by the value at which a column is taken, where there is one.
+    """
+
+    of: Effect | None = None
+    name: ClassVar[str] = "tangent"
+
+    @classmethod
+    def to(cls, effect: Effect) -> Tangent:
+        """Return the columns and derivatives of an effect."""
+        return cls(effect.joint, effect.source, effect.shape, effect.point, effect)
+
+    @property
+    def needs(self) -> Needs:  # type: ignore[override]
+        """As the effect."""
+        assert self.of is not None
+        return self.of.needs
+
+    def parameters(self, robot) -> tuple[Parameter, ...]:
+        """As the effect."""
+        assert self.of is not None
+        return self.of.parameters(robot)
+
+    def columns(self, block: Block) -> np.ndarray:
+        """Columns (T, n, k), then derivatives one after the other, (T, n, k + s k)."""
+        assert self.of is not None
+        plain, slopes = self.of.columns(block), self.of.sensitivities(block)
+        assert slopes is not None
+        turned = np.moveaxis(slopes, 3, 2).reshape(*slopes.shape[:2], -1)
+        at_point = self.of.point_slope(block) if self.of.point else None
+        parts = (plain, turned) if at_point is None else (plain, turned, at_point)
+        return np.concatenate(parts, axis=2)
+
+
+@dataclass(frozen=True, eq=False)
+class ScoreTrial:
+    """What an effect brings with some shapes.
+
+    Attributes
+    ----------
+    found : its score.
+    loss : what it leaves, less a constant: the drop, negative.
+    admissible : whether its values are possible.
+    residual, jacobian : (s + 1,) and (s + 1, s), by the logarithms; None where no derivatives are
+        known. Their products are those of the whitened residual and its derivatives, whose noise is
+        taken out of all but the sum.
+    """
+
+    found: Score
+    loss: float
+    admissible: bool = True
+    residual: np.ndarray | None = None
+    jacobian: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class MomentObjective:
+    """The search for the shapes of a candidate beside a model.
+
+    Attributes
+    ----------
+    evidence, fitted : the evidence, and the model without the effect as it fits it.
+    one : the score of the effect from which the search begins; payloads are carried as in it.
+    columns_of : where columns come from; `Evidence.columns` by default.
+    """
+
+    evidence: Evidence
+    fitted: EvidenceFit
+    one: Score
+    columns_of: Columns | None = None
+
+    @cached_property
+    def grid(self) -> int:
+        """Number of shapes that are tried of the effect."""
+        return sum(1 for _ in self.one.effect.variants(self.fitted.model.robot))
+
+    def score_at(self, effect: Effect) -> Score:
+        """Score the effect with another shape, or taken at another value."""
+        (parts,) = candidate_moments(self.evidence, self.fitted, [effect], self.columns_of)
+        carried = self.one.payload_recordings
+        if carried is not None:
+            parts = tuple(moments_with_payload(part, self.evidence, carried) for part in parts)
+        return score(self.fitted, effect, *parts, grid=self.grid, payload_recordings=carried)
+
+    def by_derivatives(self) -> ShapeProblem[ScoreTrial]:
+        """Return the search for shapes, and the value at which a column is taken, together."""
+        effect, robot = self.one.effect, self.fitted.model.robot
+        pointed = effect.parameters(robot) if effect.point else ()
+        sought = (*effect.shape_parameters(robot), *pointed)
+        limits = np.array([(s.lower, s.upper) for s in sought]).T
+        start = np.array([*effect.shape, *effect.point])
+        # Not further than to the next shapes of the grid: beyond, other peaks lead astray.
+        furthest = self.fitted.criteria.shapes.furthest
+        low, high = np.log(np.clip(np.outer((1.0 / furthest, furthest), start), *limits))
+
+        def trial(logarithms: np.ndarray) -> ScoreTrial:
+            x, shapes = np.clip(np.exp(logarithms), *limits), len(effect.shape)
+            return self._differentiated(effect.shaped(*x[:shapes]).at(x[shapes:].tolist()))
+
+        return ShapeProblem(low, high, np.log(start), _each(trial), differentiable=True)
+
+    def by_trial(self, lower: np.ndarray, upper: np.ndarray) -> ShapeProblem[ScoreTrial]:
+        """Return the search for shapes between bounds (s,) whose derivatives are not known."""
+
+        def trial(logarithms: np.ndarray) -> ScoreTrial:
+            found = self.score_at(self.one.effect.shaped(*np.exp(logarithms)))
+            return ScoreTrial(found, -found.drop)
+
+        return ShapeProblem(lower, upper, np.log(self.one.effect.shape), _each(trial))
+
+    def by_value(self, span: float) -> ShapeProblem[ScoreTrial]:
+        """Return the search for the value at which the column is taken; `span` to each side."""
+        start = np.log(self.one.effect.point)
+
+        def trial(logarithms: np.ndarray) -> ScoreTrial:
+            found = self.score_at(self.one.effect.at([float(np.exp(logarithms[0]))]))
+            return self._judged(found)
+
+        return ShapeProblem(start - span, start + span, start, _each(trial))
+
+    def _judged(self, found: Score) -> ScoreTrial:
+        possible = not impossible(found, self.fitted)
+        return ScoreTrial(found, -found.drop_at_point, possible)
+
+    def _differentiated(self, effect: Effect) -> ScoreTrial:
+        """The trial of an effect with its square root and derivatives."""
+        tangent = Tangent.to(effect)
+        ((with_model, with_self),) = candidate_moments(
+            self.evidence, self.fitted, [tangent], self.columns_of
+        )
+        plain = slice(0, len(self.one.values))
+        found = score(
+            self.fitted,
+            effect,
+            with_model.columns(plain),
+            with_self.among(plain),
+            grid=self.grid,
+        )
+        residual, jacobian = _square_root(
+            self.fitted, found, with_model.pooled().signal, with_self.pooled().signal
+        )
+        judged = self._judged(found)
+        return ScoreTrial(found, judged.loss, judged.admissible, residual, jacobian)
+
+
+def _each(
+    trial: Callable[[np.ndarray], ScoreTrial],
+) -> Callable[[Sequence[np.ndarray]], list[ScoreTrial]]:
+    return lambda points: [trial(x) for x in points]
+
+
+def _square_root(
+    fitted: EvidenceFit, found: Score, with_model: np.ndarray, with_self: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return residual and derivatives of a least-squares problem with the given signal moments.
+
+    Parameters
+    ----------
+    found : the score at these shapes.
+    with_model : (p + 1, k + s k) of the model's columns and the torque with the tangent's.
+    with_self : (k + s k, k + s k) of the tangent's columns with themselves.
+
+    Returns
+    -------
+    (s + 1,) and (s + 1, s)
+    """
+    p, k = len(fitted.values), len(found.effect.parameters(fitted.model.robot))
+    values = np.array(found.effect.point or found.values or (0.0,) * k)
+    count = with_self.shape[0] // k - 1
+    # What the torque changes by, along the logarithm of each shape.
+    along = block_diag(np.eye(k), *[values[:, None]] * count)
+    with_model, with_self = with_model @ along, along.T @ with_self @ along
+    back = fitted.solution.project(with_model[:p])
+    left = with_self - with_model[:p].T @ back
+    right = with_model[p] - back.T @ fitted.moments.pooled().signal[:p, p]
+    curvature, slope = left[k:, k:], right[k:] - left[k:, :k] @ values
+    if not found.effect.point:
+        # Linear parameters follow (Kaufman): what they can do is not the shapes' merit.
+        curvature = curvature - left[k:, :k] @ np.linalg.pinv(left[:k, :k]) @ left[:k, k:]
+    size, turn = np.linalg.eigh(curvature)
+    root = np.sqrt(np.clip(size, _ROUNDING * max(size[-1], 0.0), None))
+    down = np.divide(turn.T @ slope, root, out=np.zeros_like(root), where=root > 0)
+    # Noise and all, so that near the optimum the sum stays what it is a sum of.
+    rest = fitted.error_total - found.drop_at_point - down @ down
+    residual = np.append(-down, np.sqrt(max(rest, 0.0)))
+    return residual, np.vstack([root[:, None] * turn.T, np.zeros(count)])

@@ -1,0 +1,105 @@
+"""Second moments from which noise has been taken out by replicates of the same motion.
+
+Where a motion repeats, products of different repetitions are free of noise in the mean, and plain
+squares give the variance of the answers. Where it does not, copies with more of the stated noise
+say what the noise does to the squares.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from dynident.moments.second_moments import SecondMoments
+
+Kind = Literal["repeated", "noise_augmented", "single"]
+"""How the replicates of a signal come about: repetitions of a period; the measured record followed
+by copies to which the stated noise was added once more; or one record, of unknown noise."""
+
+
+def replicate_moments(
+    left: np.ndarray, right: np.ndarray, edges: np.ndarray, kind: Kind
+) -> SecondMoments:
+    """Second moments of columns of one recording, about zero.
+
+    Parameters
+    ----------
+    left, right : (P, S, a) and (P, S, b)
+        Columns at S instants in P replicates.
+    edges : (B + 1,)
+        First instant of each block, and S.
+    kind : Kind
+        What the replicates are.
+
+    Returns
+    -------
+    (B, a, b); noisy copies do not count as rows
+    """
+    free, total = [], []
+    for start, stop in pairwise(edges):
+        one, two = left[:, start:stop], right[:, start:stop]
+        if kind == "noise_augmented":
+            plain = one[0].T @ two[0]
+            noise = sum(
+                (a - one[0]).T @ (b - two[0]) for a, b in zip(one[1:], two[1:], strict=True)
+            ) / (len(one) - 1)
+            free.append(plain - noise)
+        else:
+            plain = one.reshape(-1, one.shape[2]).T @ two.reshape(-1, two.shape[2])
+            if kind == "repeated":
+                together = one.sum(axis=0).T @ two.sum(axis=0)
+                free.append((together - plain) / (len(one) - 1))
+        total.append(plain)
+    count = np.diff(edges) * (1 if kind == "noise_augmented" else len(left))
+    return SecondMoments(np.array(total), count, None, np.array(free) if free else None)
+
+
+@dataclass(frozen=True)
+class TimeVarying:
+    """Columns of a recording that repeats, with what the time of the session does to them.
+
+    Attributes
+    ----------
+    columns : (P, S, k)
+    time_factor : (P, S, k) factor of each that depends on the time; 1 where none does.
+    is_torque : (k,) mask.
+    """
+
+    columns: np.ndarray
+    time_factor: np.ndarray
+    is_torque: np.ndarray
+
+    @property
+    def instruments(self) -> np.ndarray:
+        """Columns of the next repetition's motion at this one's time, (P, S, k)."""
+        after = np.roll(self.time_factor, -1, axis=0)
+        sound = np.abs(after) > 1e-12 * np.abs(self.time_factor).max(axis=(0, 1))
+        ratio = np.where(sound, self.time_factor / np.where(sound, after, 1.0), 1.0)
+        return np.roll(self.columns, -1, axis=0) * ratio
+
+
+def time_varying_products(left: TimeVarying, right: TimeVarying, edges: np.ndarray) -> np.ndarray:
+    """Products, free of noise, of columns of which some depend on the time, (B, a, b).
+
+    Such a column is another one in each repetition, and products of repetitions are not its
+    square. Its instrument is the motion of the next repetition at the time of this one.
+
+    Parameters
+    ----------
+    left, right : columns of the same recording, (P, S, a) and (P, S, b).
+    edges : (B + 1,) first instant of each block, and S.
+    """
+    found = []
+    for start, stop in pairwise(edges):
+        one, two = left.columns[:, start:stop], right.columns[:, start:stop]
+        for_one, for_two = left.instruments[:, start:stop], right.instruments[:, start:stop]
+        there = np.einsum("psa,psb->ab", one, for_two, optimize=True)
+        back = np.einsum("psa,psb->ab", for_one, two, optimize=True)
+        # The torque has no instrument: what it holds of the time is its own.
+        weight = np.where(left.is_torque, 0.0, 0.5)[:, None]
+        weight = np.where(right.is_torque[None, :] & ~left.is_torque[:, None], 1.0, weight)
+        found.append((1.0 - weight) * there + weight * back)
+    return np.array(found)
