@@ -56,21 +56,23 @@ def decays(true: Sequence[float], start: Sequence[float]) -> ShapeProblem[Decays
     y = np.exp(-np.outer(T, true)) @ np.arange(2.0, 2.0 + len(true))
     span = np.log(np.tile([[0.05], [20.0]], len(start)))
     return ShapeProblem(
-        span[0],
-        span[1],
-        np.log(start),
-        lambda points: [Decays(np.exp(x), y) for x in points],
+        lower=span[0],
+        upper=span[1],
+        start=np.log(start),
+        evaluate=lambda points: [Decays(np.exp(x), y) for x in points],
         differentiable=True,
     )
 
 
 LOCAL: tuple[ShapeSolver, ...] = (
-    TrustRegion(1e-8, fall=1e-15, slope=1e-15, evaluations=60),
+    TrustRegion(precision=1e-8, fall=1e-15, slope=1e-15, evaluations=60),
     Simplex(1e-6, fall=1e-14, evaluations=2000),
 )
 
 
-@pytest.mark.parametrize("solver", [*LOCAL, Bracket(1e-8), Evolution(12, 40)], ids=repr)
+@pytest.mark.parametrize(
+    "solver", [*LOCAL, Bracket(1e-8), Evolution(population=12, generations=40)], ids=repr
+)
 def test_one_shape_is_found_by_every_solver(solver: ShapeSolver) -> None:
     found = search(decays([0.7], [2.0]), solver)
     assert np.exp(found.logarithms) == pytest.approx([0.7], rel=1e-2)
@@ -108,14 +110,18 @@ class Peak:
 
 
 def peak() -> ShapeProblem[Peak]:
-    bounds = np.array([-3.0]), np.array([3.0])
-    return ShapeProblem(*bounds, np.zeros(1), lambda points: [Peak(float(x[0])) for x in points])
+    return ShapeProblem(
+        lower=np.array([-3.0]),
+        upper=np.array([3.0]),
+        start=np.zeros(1),
+        evaluate=lambda points: [Peak(float(x[0])) for x in points],
+    )
 
 
 def test_the_global_search_finds_what_a_local_one_misses() -> None:
     local = search(peak(), Simplex())
     assert local.best == () or local.best[0].loss > -0.1
-    wide = search(peak(), Evolution(24, 40, finalists=5))
+    wide = search(peak(), Evolution(population=24, generations=40, finalists=5))
     assert len(wide.best) == 5
     assert wide.best[0].x == pytest.approx(1.0, abs=0.05)
     assert all(a.loss <= b.loss for a, b in zip(wide.best, wide.best[1:], strict=False))
@@ -123,9 +129,9 @@ def test_the_global_search_finds_what_a_local_one_misses() -> None:
 
 
 def test_the_global_search_ends_when_enough_is_found_or_nothing_is_to_be_hoped_for() -> None:
-    every = search(peak(), Evolution(24, 40)).evaluations
-    assert search(peak(), Evolution(24, 40, enough=-0.5)).evaluations < every
-    hopeless = search(peak(), Evolution(24, 40, hope=-1.5, patience=3))
+    every = search(peak(), Evolution(population=24, generations=40)).evaluations
+    assert search(peak(), Evolution(population=24, generations=40, enough=-0.5)).evaluations < every
+    hopeless = search(peak(), Evolution(population=24, generations=40, hope=-1.5, patience=3))
     assert hopeless.evaluations < every
 
 

@@ -139,6 +139,10 @@ def solve_columns(R: np.ndarray, kept: Sequence[int], rows: int) -> TriangularSo
     R : (m, m) as of `TriangularFactors.pooled`.
     kept : numbers of the columns.
     rows : behind the factor, which the variance is per degree of freedom of.
+
+    Returns
+    -------
+    Values of these columns, with what their covariance is made of
     """
     # The kept columns of a triangle are no triangle: factorise once more.
     Q, triangle = np.linalg.qr(R[:, kept])

@@ -87,7 +87,7 @@ def _best(rows: _RowObjective, effects: tuple[Effect, ...]) -> Shaped:
     """The model at the shapes that fit best; the search begins at those of some effects."""
     problem = rows.problem(effects)
     if problem.differentiable:
-        solver = TrustRegion(_PRECISION, fall=1e-12, slope=1e-14, evaluations=50)
+        solver = TrustRegion(precision=_PRECISION, fall=1e-12, slope=1e-14, evaluations=50)
     else:
         fall, most = 1e-9 * rows.loss(effects), 200 * len(problem.start)
         solver = Simplex(_PRECISION, fall=fall, evaluations=most)
@@ -141,11 +141,11 @@ class _RowObjective:
         lower, upper = np.log([(s.lower, s.upper) for s in self._parameters]).T
         start = np.log([s for effect in effects for s in effect.shape])
         return ShapeProblem(
-            lower,
-            upper,
-            np.clip(start, lower, upper),
-            lambda points: [_RowTrial(self, self.at(effects, x)) for x in points],
-            self._differentiable(effects),
+            lower=lower,
+            upper=upper,
+            start=np.clip(start, lower, upper),
+            evaluate=lambda points: [_RowTrial(self, self.at(effects, x)) for x in points],
+            differentiable=self._differentiable(effects),
         )
 
     def screened(self) -> tuple[Effect, ...]:

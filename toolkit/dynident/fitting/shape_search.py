@@ -53,7 +53,7 @@ T = TypeVar("T", bound=Trial)
 V = TypeVar("V")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ShapeProblem(Generic[T]):
     """Shapes that are sought by the natural logarithms of their values.
 
@@ -76,7 +76,7 @@ class ShapeProblem(Generic[T]):
         return self.evaluate([logarithms])[0]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ShapeSolution(Generic[T]):
     """Where a search ended.
 
@@ -114,7 +114,11 @@ def search(problem: ShapeProblem[T], solver: ShapeSolver) -> ShapeSolution[T]:
     log = _Log(problem, solver.finalists)
     found = solver.run(problem, log)
     return ShapeSolution(
-        np.atleast_1d(found.x), bool(found.success), str(found.message), log.best, log.evaluations
+        logarithms=np.atleast_1d(found.x),
+        converged=bool(found.success),
+        message=str(found.message),
+        best=log.best,
+        evaluations=log.evaluations,
     )
 
 
@@ -128,6 +132,10 @@ def screened(
     variants : groups, in each of which the first is what there is now.
     loss : of one choice from every group.
     most : combinations up to which all are tried; beyond, each group is gone through in turn.
+
+    Returns
+    -------
+    One variant of each group
     """
     if np.prod([len(group) for group in variants]) <= most:
         return min(product(*variants), key=loss)
@@ -137,7 +145,7 @@ def screened(
     return best
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class TrustRegion:
     """Least squares with exact derivatives, within the bounds.
 
@@ -225,7 +233,7 @@ class Bracket:
         return found
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Evolution:
     """Differential evolution (Storn and Price 1997) over all that the bounds admit.
 

@@ -91,6 +91,10 @@ def time_varying_products(left: TimeVarying, right: TimeVarying, edges: np.ndarr
     ----------
     left, right : columns of the same recording, (P, S, a) and (P, S, b).
     edges : (B + 1,) first instant of each block, and S.
+
+    Returns
+    -------
+    (B, a, b)
     """
     found = []
     for start, stop in pairwise(edges):

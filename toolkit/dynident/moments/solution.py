@@ -73,6 +73,10 @@ def solve_products(signal: np.ndarray, total: np.ndarray, moment: np.ndarray) ->
     moment : (p,)
         Signal moment of the columns with the torque.
 
+    Returns
+    -------
+    The solution, with the directions that it is in
+
     Raises
     ------
     FitError

@@ -59,7 +59,7 @@ def refined(
     if type(one.effect).sensitivities is not Effect.sensitivities:
         # A flat metric hides what matters in a sharp one: hence the small fall.
         solver = TrustRegion(
-            criteria.gradient_precision,
+            precision=criteria.gradient_precision,
             fall=criteria.gradient_fall,
             evaluations=criteria.evaluations,
         )

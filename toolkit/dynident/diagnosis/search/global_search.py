@@ -149,7 +149,10 @@ def _shapes_on(
     def evaluate(points: Sequence[np.ndarray]) -> list[ScoreTrial]:
         tried = [effect.shaped(*x[:shapes]).at(x[shapes:]) for x in np.exp(points)]
         scores = _scores(evidence, fitted, tried)
-        return [ScoreTrial(one, -one.fall, not impossible(one, fitted)) for one in scores]
+        return [
+            ScoreTrial(found=one, loss=-one.fall, admissible=not impossible(one, fitted))
+            for one in scores
+        ]
 
     systematic, criteria = fitted.error_signal, evidence.criteria.global_search
     solver = Evolution(
@@ -161,7 +164,8 @@ def _shapes_on(
         worst=systematic,
         finalists=criteria.finalists,
     )
-    return search(ShapeProblem(lower, upper, (lower + upper) / 2, evaluate), solver)
+    problem = ShapeProblem(lower=lower, upper=upper, start=(lower + upper) / 2, evaluate=evaluate)
+    return search(problem, solver)
 
 
 def _scores(evidence: Evidence, fitted: EvidenceFit, tried: list[Effect]) -> list[Score]:

@@ -7,7 +7,7 @@ rows.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
 
@@ -67,7 +67,7 @@ class Tangent(Effect):
         return np.concatenate(parts, axis=2)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ScoreTrial:
     """What an effect brings with some shapes.
 
@@ -132,16 +132,23 @@ class MomentObjective:
             x, shapes = np.clip(np.exp(logarithms), *limits), len(effect.shape)
             return self._differentiated(effect.shaped(*x[:shapes]).at(x[shapes:].tolist()))
 
-        return ShapeProblem(low, high, np.log(start), _each(trial), differentiable=True)
+        return ShapeProblem(
+            lower=low,
+            upper=high,
+            start=np.log(start),
+            evaluate=_each(trial),
+            differentiable=True,
+        )
 
     def by_trial(self, lower: np.ndarray, upper: np.ndarray) -> ShapeProblem[ScoreTrial]:
         """Return the search for shapes between bounds (s,) whose derivatives are not known."""
 
         def trial(logarithms: np.ndarray) -> ScoreTrial:
             found = self.score_at(self.one.effect.shaped(*np.exp(logarithms)))
-            return ScoreTrial(found, -found.drop)
+            return ScoreTrial(found=found, loss=-found.drop)
 
-        return ShapeProblem(lower, upper, np.log(self.one.effect.shape), _each(trial))
+        start = np.log(self.one.effect.shape)
+        return ShapeProblem(lower=lower, upper=upper, start=start, evaluate=_each(trial))
 
     def by_value(self, span: float) -> ShapeProblem[ScoreTrial]:
         """Return the search for the value at which the column is taken; `span` to each side."""
@@ -151,11 +158,13 @@ class MomentObjective:
             found = self.score_at(self.one.effect.at([float(np.exp(logarithms[0]))]))
             return self._judged(found)
 
-        return ShapeProblem(start - span, start + span, start, _each(trial))
+        return ShapeProblem(
+            lower=start - span, upper=start + span, start=start, evaluate=_each(trial)
+        )
 
     def _judged(self, found: Score) -> ScoreTrial:
         possible = not impossible(found, self.fitted)
-        return ScoreTrial(found, -found.drop_at_point, possible)
+        return ScoreTrial(found=found, loss=-found.drop_at_point, admissible=possible)
 
     def _differentiated(self, effect: Effect) -> ScoreTrial:
         """The trial of an effect with its square root and derivatives."""
@@ -174,8 +183,7 @@ class MomentObjective:
         residual, jacobian = _square_root(
             self.fitted, found, with_model.pooled().signal, with_self.pooled().signal
         )
-        judged = self._judged(found)
-        return ScoreTrial(found, judged.loss, judged.admissible, residual, jacobian)
+        return replace(self._judged(found), residual=residual, jacobian=jacobian)
 
 
 def _each(

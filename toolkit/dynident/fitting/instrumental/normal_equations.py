@@ -32,6 +32,10 @@ def factorise_instruments(
     measured : T samples in each recording.
     instruments : the same recordings with other positions, on the same time stamps.
     values : (p,) at which columns that depend on the predicted torque are taken.
+
+    Returns
+    -------
+    Factors of [V, W, y], joint by joint
     """
     return factorise(_rows(model, measured, instruments, values), model.size)
 
@@ -92,6 +96,10 @@ def solve_instruments(
     given : (p,) values of what the data do not tell.
     weighting : "joint": O holds the variance of each joint's residual in the ordinary solution;
         "none": O = E.
+
+    Returns
+    -------
+    The estimate, with what its covariance is made of
 
     Raises
     ------
