@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from dynident.moments.replicated import Moments, moments, solve
 
 from dynident.criteria import Criteria
 from dynident.diagnosis.search.scoring import (
@@ -26,7 +27,6 @@ from dynident.diagnosis.search.scoring import (
 from dynident.effects import Effect, effects_of
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.model import Model
-from dynident.moments.replicated import Moments, moments, solve
 from synthetic import arm
 
 MODEL = Model(arm()) + "viscous_friction"
