@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from dynident.moments.replicated import Moments, moments, solve
 
 from dynident.criteria import Criteria
 from dynident.diagnosis.search.scoring import (
@@ -27,6 +26,9 @@ from dynident.diagnosis.search.scoring import (
 from dynident.effects import Effect, effects_of
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.model import Model
+from dynident.moments.replicates import replicate_moments
+from dynident.moments.second_moments import SecondMoments
+from dynident.moments.solution import regress
 from synthetic import arm
 
 MODEL = Model(arm()) + "viscous_friction"
@@ -45,8 +47,8 @@ def replicated(signal: np.ndarray, std: float, rng: np.random.Generator) -> np.n
     return signal + std * rng.normal(size=(REPLICATES, *signal.shape))
 
 
-def products(left: np.ndarray, right: np.ndarray, edges: np.ndarray = EDGES) -> Moments:
-    return moments(left, right, edges, "repeated")
+def products(left: np.ndarray, right: np.ndarray, edges: np.ndarray = EDGES) -> SecondMoments:
+    return replicate_moments(left, right, edges, "repeated")
 
 
 class Rows:
@@ -82,10 +84,9 @@ class Rows:
         return self.z - self.x @ np.linalg.lstsq(self.x, self.z, rcond=None)[0]
 
 
-def fitted(known: Moments) -> EvidenceFit:
+def fitted(known: SecondMoments) -> EvidenceFit:
     """A fit as the scores know it: of the evidence only its moments count."""
-    signal, total = known.sums()
-    solution = solve(signal[:-1, :-1], total[:-1, :-1], signal[:-1, -1])
+    solution = regress(known.pooled())
     unused: Any = None
     return EvidenceFit(
         criteria=Criteria(),
@@ -97,7 +98,6 @@ def fitted(known: Moments) -> EvidenceFit:
         noise_known=True,
         white=(),
         moments=known,
-        rows=INSTANTS * REPLICATES,
         error_signal=unused,
         squares=unused,
         variances=unused,
@@ -161,9 +161,9 @@ def test_units_of_the_effect_change_its_value_alone(factor: float) -> None:
         assert getattr(other, name) == pytest.approx(getattr(plain, name), rel=1e-6)
 
 
-def replace_products(moments: Moments, left: float, right: float) -> Moments:
+def replace_products(moments: SecondMoments, left: float, right: float) -> SecondMoments:
     factor = left * right
-    return Moments(moments.signal * factor, moments.total * factor)
+    return SecondMoments(moments.total * factor, moments.counts, None, moments.signal * factor)
 
 
 def test_a_column_that_the_model_has_is_not_identifiable() -> None:
@@ -180,7 +180,7 @@ def test_of_two_equal_columns_one_direction_is_left() -> None:
     rows = Rows((0.3,), 3)
     twice = np.repeat(np.tile(rows.z, (REPLICATES, 1, 1)), 2, axis=2)
     known = rows.with_model
-    beside = Moments(np.repeat(known.signal, 2, axis=2), np.repeat(known.total, 2, axis=2))
+    beside = known.columns(np.repeat(np.arange(known.total.shape[2]), 2))
     ripple = effect("torque_ripple@elbow")
     found = score(rows.fitted, ripple, beside, products(twice, twice), 1)
     assert found.rank == 1
