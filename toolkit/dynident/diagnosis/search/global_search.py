@@ -49,7 +49,7 @@ def global_search(
     ----------
     evidence : recordings and their columns.
     start, last : the model before anything was added, and with all that was added.
-    tell : told what is being done, for a progress display.
+    progress : called with what is being done, for a progress display.
 
     Returns
     -------
