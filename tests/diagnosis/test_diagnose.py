@@ -241,3 +241,12 @@ def test_blunted_friction_is_a_nuisance_that_is_told_not_a_missing_effect(model:
     assert any("at elbow is blunter" in note for note in found.notes)
     assert not any("at shoulder is blunter" in note for note in found.notes)
     assert "blunted_friction" not in {c.effect.name for c in found.candidates}
+
+
+@pytest.mark.slow
+def test_an_estimate_is_fitted_anew_and_the_answer_says_with_what(model: Model) -> None:
+    train, _ = recordings(model, None, {}, **NOISE)
+    given = fit_model(model, Dataset(train))
+    found = find(given, Dataset(train), most=0)
+    assert found.fitted_by == found.before.method != given.method
+    assert any(found.fitted_by in note for note in found.joint_table().notes)

@@ -72,6 +72,11 @@ class Diagnosis:
         return self.steps[0] if self.steps else None
 
     @property
+    def fitted_by(self) -> str:
+        """How both models were fitted; an estimate that was given is not used, but fitted anew."""
+        return self.before.method
+
+    @property
     def sentence(self) -> str:
         """The verdict in plain words."""
         effects = ", ".join(self._named(step) for step in self.steps)
@@ -204,7 +209,10 @@ class Diagnosis:
             "Relative torque error on held-out data",
             ("joint", "before", "after", "noise floor", "systematic / noise", "and after"),
             (*rows, total),
-            (f"Noise floor: {self._noise_in_words()}.",),
+            (
+                f"Noise floor: {self._noise_in_words()}.",
+                f"Both fitted for the diagnosis, by {self.fitted_by}.",
+            ),
         )
 
     def map_table(self) -> Table:
