@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import takewhile
 
-from known_violations import excused
 from package_map import Module, modules
 
 FILES_IN_A_ROOM = 15
@@ -30,9 +29,6 @@ PLAIN_FACTS: dict[str, str] = {
     "named": "whether the answer adds an effect: of it the record of such answers is looked up",
 }
 """Boolean arguments that say how things are and choose no behaviour, with the reason."""
-
-BY_POSITION: dict[str, str] = {}
-"""Dataclasses of five fields and more that are built by position, with the reason."""
 
 
 @dataclass(frozen=True)
@@ -117,21 +113,21 @@ def test_every_file_has_a_docstring_and_most_are_short() -> None:
 def test_rooms_are_small() -> None:
     count = Counter(m.path.parent for m in modules().values() if not m.is_facade)
     crowded = {str(folder.name) for folder, files in count.items() if files > FILES_IN_A_ROOM}
-    assert crowded == excused("crowded rooms")
+    assert crowded == set()
 
 
 def test_names_of_classes_are_unique() -> None:
-    assert {name for name, places in classes().items() if len(places) > 1} == excused("classes")
+    assert {name for name, places in classes().items() if len(places) > 1} == set()
 
 
 def test_names_of_modules_are_unique() -> None:
     names = Counter(m.path.stem for m in modules().values() if not m.is_facade)
-    assert {name for name, n in names.items() if n > 1} - {"__main__"} == excused("modules")
+    assert {name for name, n in names.items() if n > 1} - {"__main__"} == set()
 
 
 def test_functions_are_short() -> None:
     found = {f.name for f in functions() if _lines(f.node) > LINES_OF_A_FUNCTION}
-    assert found == excused("long functions")
+    assert found == set()
 
 
 def test_no_boolean_switches_what_a_public_function_does() -> None:
@@ -143,7 +139,7 @@ def test_no_boolean_switches_what_a_public_function_does() -> None:
         for argument in function.arguments
         if _is_boolean(argument) and argument.arg not in PLAIN_FACTS
     }
-    assert found == excused("booleans")
+    assert found == set()
 
 
 def test_every_plain_fact_is_used() -> None:
@@ -160,8 +156,7 @@ def test_dataclasses_of_many_fields_take_keywords() -> None:
         and _takes_positions(node)
         and len(_fields(node)) > FIELDS_BY_POSITION
     }
-    assert found - set(BY_POSITION) == excused("dataclasses by position")
-    assert set(BY_POSITION) <= found
+    assert found == set()
 
 
 def test_public_functions_of_many_arguments_are_documented() -> None:
@@ -176,7 +171,7 @@ def test_public_functions_of_many_arguments_are_documented() -> None:
         and not _overrides(function)
         and (missing := _undocumented(function))
     }
-    assert found == excused("docstrings")
+    assert found == set()
 
 
 def _lines(node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:

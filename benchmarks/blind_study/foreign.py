@@ -58,9 +58,9 @@ class LuGre(JointEffect):
 
     def shape_parameters(self, robot):
         return (
-            ShapeParameter("distance", "rad", (0.01,), 1e-4, 1.0),
-            ShapeParameter("rise", "1", (0.5,), 0.0, 5.0),
-            ShapeParameter("vs", "rad/s", (0.1,), 1e-3, 2.0),
+            ShapeParameter("distance", "rad", (0.01,), lower=1e-4, upper=1.0),
+            ShapeParameter("rise", "1", (0.5,), lower=0.0, upper=5.0),
+            ShapeParameter("vs", "rad/s", (0.1,), lower=1e-3, upper=2.0),
         )
 
     def at_joint(self, block):

@@ -180,7 +180,7 @@ def test_the_lugre_state_settles_at_the_stribeck_curve() -> None:
     v = np.array([[0.05], [-0.2], [3.0]])
     level = (1 + 0.5 * np.exp(-((v / 0.1) ** 2))) * np.sign(v)
     still = np.zeros((3, 1))
-    block = Block(still[:, 0], still, v, still, ("j",), memory=level)
+    block = Block(still[:, 0], still, v, still, names=("j",), memory=level)
     np.testing.assert_allclose(effect.simulated_rate((2.0,), block), 0.0, atol=1e-12)
     np.testing.assert_allclose(effect.simulated_force((2.0,), block), 2.0 * level)
     assert SensorError("cubic_sensor_error", 0, 0.1).size == 0.1

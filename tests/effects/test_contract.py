@@ -69,7 +69,7 @@ def block_of(effect: Effect | type[Effect], seed: int, *, carries_payload: bool 
         q,
         v,
         a,
-        ROBOT.names,
+        names=ROBOT.names,
         carries_payload=carries_payload,
         rigid=ROBOT.regressor(q, v, a),
         torque=ROBOT.inverse_dynamics(q, v, a),

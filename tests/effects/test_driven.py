@@ -55,7 +55,9 @@ def explained(effect: Effect, value: float) -> np.ndarray:
     (found,) = ClosedLoop(accuracy=1e-4).simulate([task], PD, lead_in=0.5)
     a = np.gradient(found.v, found.t, axis=0)
     rest = found.torque - Mechanism.of(ROBOT, known()).command(found.t, found.q, found.v, a)
-    block = Block(found.t, found.q, found.v, a, ROBOT.names, body=ROBOT, rotor=np.array(ROTORS))
+    block = Block(
+        found.t, found.q, found.v, a, names=ROBOT.names, body=ROBOT, rotor=np.array(ROTORS)
+    )
     model = effect.at([value]).columns(block)[:, :, 0] * value
     b, a = cast(Any, butter(3, 30.0, fs=RATE))
     # The first motion rings from a start that is not known.
@@ -88,7 +90,7 @@ def test_presliding_is_what_the_loop_shows() -> None:
 
 def block(seed: int, rate: float = 500.0) -> Block:
     t, q, v, a = smooth_motion(2, seed, rate, 1.0, 2.0)
-    return Block(t, q, v, a, ROBOT.names, body=ROBOT, rotor=np.array(ROTORS))
+    return Block(t, q, v, a, names=ROBOT.names, body=ROBOT, rotor=np.array(ROTORS))
 
 
 @pytest.mark.parametrize("label", ["joint_elasticity@shoulder", "backlash@elbow"])
@@ -158,7 +160,7 @@ def test_a_motion_that_repeats_has_no_start_to_settle_from(
     (effect,) = effects_of(label, ROBOT)
     effect = effect.shaped(*shape)
     t, q, v, a = smooth_motion(2, 5, 500.0, 8.0, 2.0)
-    alone = Block(t, q, v, a, ROBOT.names, body=ROBOT, rotor=np.array(ROTORS))
+    alone = Block(t, q, v, a, names=ROBOT.names, body=ROBOT, rotor=np.array(ROTORS))
     first, third = slice(0, 1000), slice(2000, 3000)
     rings, steady = (effect.columns(one)[..., 0] for one in (alone, replace(alone, period=2.0)))
     assert unlike(rings[first], rings[third]) > 0.1
@@ -203,7 +205,7 @@ def test_dahls_state_is_the_sign_of_a_long_motion_and_a_spring_at_a_reversal() -
     q[:, 1] = np.where(t < 0.5, t, 1.0 - t)
     v = np.zeros((2001, 2))
     v[:, 1] = np.where(t < 0.5, 1.0, -1.0)
-    z = effect.columns(Block(t, q, v, 0 * q, ROBOT.names))[:, 1, 0] + np.sign(v[:, 1])
+    z = effect.columns(Block(t, q, v, 0 * q, names=ROBOT.names))[:, 1, 0] + np.sign(v[:, 1])
     assert np.abs(z[:1000] - 1.0).max() < 1e-12
     back = np.abs(q[:, 1] - 0.5)
     expected = -1.0 + 2.0 * np.exp(-back / 1e-2)

@@ -16,9 +16,11 @@ def test_the_tip_does_not_depend_on_the_order_of_the_joints() -> None:
     t, q, v, a = smooth_motion(2, 0, 50.0, 2.0, 2.0)
     payload = catalogue()["payload"]()
     one, two = Model(plain), Model(turned)
-    here = payload.columns(one.block(t, q, v, a, carries_payload=True))
+    block = one.block(t, q, v, a, carries_payload=True)
+    here = payload.columns(one.with_regressor(block))
     swapped = (x[:, ::-1] for x in (q, v, a))
-    there = payload.columns(two.block(t, *swapped, carries_payload=True))
+    block = two.block(t, *swapped, carries_payload=True)
+    there = payload.columns(two.with_regressor(block))
     assert np.allclose(here, there[:, ::-1])
     values = (1.0, 0.1, 0.0, 0.0, 0.0, 0.0, 0.02, 0.0, 0.0, 0.02)
     for robot in (plain, turned):

@@ -19,7 +19,7 @@ V = np.cos(3 * T)[:, None]
 
 
 def block(**changes) -> Block:
-    return Block(T, np.sin(3 * T)[:, None] / 3, V, 0 * V, ROBOT.names, **changes)
+    return Block(T, np.sin(3 * T)[:, None] / 3, V, 0 * V, names=ROBOT.names, **changes)
 
 
 def effect(label: str, *shape: float):

@@ -23,7 +23,7 @@ def test_columns_linear_in_the_torque_may_be_made_of_filtered_torque() -> None:
         for effect in kind.candidates(model.robot):
             quick = evidence.of(effect, 0, model, truth)[0]
             replicate = evidence.runs[0].replicates[0]
-            block = replicate.block(model, rigid=False)
+            block = replicate.block(model)
             slow = replicate.filtered(model.torque_without_loads(block, truth))
             joint = model.robot.names.index(str(effect.joint))
             assert np.allclose(quick[:, 0, 0], slow[:, joint], rtol=1e-9, atol=1e-9)

@@ -105,14 +105,36 @@ def residual_maps(robot, measured, before, after, moves, *, known: bool):
             band = 2 * NOISE / np.sqrt(count[keep]) if known else np.full(keep.sum(), np.nan)
             sentence = stribeck if against == "velocity" and j == robot.n - 1 else ""
             found.append(
-                ResidualMap(name, "N m", against, unit, centre, mean_old, mean_new, band, sentence)
+                ResidualMap(
+                    joint=name,
+                    torque_unit="N m",
+                    against=against,
+                    unit=unit,
+                    at=centre,
+                    before=mean_old,
+                    after=mean_new,
+                    band=band,
+                    sentence=sentence,
+                )
             )
         k = np.arange(1.0, 61.0)
         waves = np.exp(-1j * np.outer(k, q))
         amplitude, remains = (2 * np.abs(waves @ (e - e.mean())) / len(q) for e in (old, new))
         band = np.full(60, 3.5 * NOISE / np.sqrt(len(q)) if known else np.nan)
         what = "cycles per revolution"
-        found.append(ResidualMap(name, "N m", what, what, k, amplitude, remains, band, ""))
+        found.append(
+            ResidualMap(
+                joint=name,
+                torque_unit="N m",
+                against=what,
+                unit=what,
+                at=k,
+                before=amplitude,
+                after=remains,
+                band=band,
+                sentence="",
+            )
+        )
     return tuple(found)
 
 

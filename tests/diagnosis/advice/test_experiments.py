@@ -35,7 +35,8 @@ def fitted(robot: Robot, *more: str) -> tuple[Model, np.ndarray]:
 
 @pytest.fixture(scope="module")
 def adviser() -> Adviser:
-    return Adviser(CandidateExperiments(*fitted(arm()), RECORDED))
+    model, values = fitted(arm())
+    return Adviser(CandidateExperiments(model=model, values=values, recorded=RECORDED))
 
 
 def one(label: str):
@@ -102,7 +103,8 @@ def test_an_effect_already_in_the_model_is_told_from_others() -> None:
 
 
 def test_difference_is_that_of_the_torques() -> None:
-    trials = CandidateExperiments(*fitted(arm()), RECORDED)
+    model, values = fitted(arm())
+    trials = CandidateExperiments(model=model, values=values, recorded=RECORDED)
     offset, drift = one("torque_offset@elbow"), one("torque_drift@elbow")
     before, left = trials.difference(offset, [2.0], drift, CandidateExperiment("wide"))
     assert before == pytest.approx([0.0, 2.0], abs=1e-9)

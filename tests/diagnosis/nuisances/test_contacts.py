@@ -52,7 +52,9 @@ def data(seed: int, kind: str = "", repetitions: int = 4) -> list[Repeated]:
             speed = np.tile(motion(rng), (repetitions, 1))
             lacking = 3.0 * np.sign(speed) + 2.0 * np.sin(2 * np.pi * t / (STEP * INSTANTS))
             residual = lacking + noise(rng, kind, speed)
-            found.append(Repeated(run, run + 1, joint, t, residual, speed))
+            found.append(
+                Repeated(run=run, number=run + 1, joint=joint, t=t, residual=residual, speed=speed)
+            )
     return found
 
 
@@ -124,7 +126,12 @@ def test_instants_of_a_bump_are_left_out_of_all_repetitions() -> None:
     t = STEP * np.arange(1000)
     recording: Any = SimpleNamespace(start=100.0)
     replicate: Any = SimpleNamespace(t=t, recording=recording)
-    run = Run("repeated", (replicate,), np.arange(1000).reshape(4, 250), np.array([0, 125, 250]))
+    run = Run(
+        kind="repeated",
+        replicates=(replicate,),
+        index=np.arange(1000).reshape(4, 250),
+        edges=np.array([0, 125, 250]),
+    )
     pulse = DisturbancePulse(
         run=0,
         number=1,

@@ -205,9 +205,9 @@ class ActingEffects:
             q,
             v,
             np.zeros_like(q),
-            self.robot.names,
-            self.friction_width,
-            self.carries_payload,
+            names=self.robot.names,
+            friction_width=self.friction_width,
+            carries_payload=self.carries_payload,
             number=self.number,
         )
 

@@ -142,10 +142,10 @@ def _compare(
     task.progress("reading the motion")
     loop = motion_of_loop(given, task.train, controller, task.progress, criteria)
     runs = loop.runs or gather(task.train, criteria.noise)
-    evidence = Evidence(given, runs, criteria, _variants(given))
+    evidence = Evidence(given, runs, criteria=criteria, candidates=_variants(given))
     held = None
     if task.test is not None and len(task.test):
-        held = Evidence(given, gather(task.test, criteria.noise), criteria)
+        held = Evidence(given, gather(task.test, criteria.noise), criteria=criteria)
     task.progress("evaluating every effect")
     start = with_friction_width(evidence, shaped(evidence, given))
     task.progress("looking for contacts")

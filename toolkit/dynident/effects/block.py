@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 
 import numpy as np
@@ -48,6 +48,7 @@ class Block:
     q: np.ndarray
     v: np.ndarray
     a: np.ndarray
+    _: KW_ONLY
     names: tuple[str, ...]
     friction_width: float = FRICTION_WIDTH
     carries_payload: bool = False

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 
@@ -24,5 +24,6 @@ class ShapeParameter:
     name: str
     unit: str
     grid: tuple[float, ...]
+    _: KW_ONLY
     lower: float
     upper: float

@@ -6,7 +6,7 @@ Low-passed and decimated like the torque, for every replicate of every run.
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -44,6 +44,7 @@ class Evidence:
 
     model: Model
     runs: tuple[Run, ...]
+    _: KW_ONLY
     criteria: Criteria = DEFAULTS
     candidates: tuple[Effect, ...] = ()
     cache: ColumnCache = field(default_factory=ColumnCache, repr=False)
@@ -167,17 +168,17 @@ class Evidence:
             self._pass_through(sampled)
             return known[key]
         if effect.is_instantaneous:
-            (found,) = sampled.decimate(
-                self.model,
-                lambda block: [effect.acting_columns(replace(block, carries_payload=True))],
-                rigid=effect.needs_regressor,
-            )
+            (found,) = sampled.decimate(self.model, lambda block: [self._loaded(effect, block)])
         else:
-            block = replace(sampled.block(self.model, rigid=False), carries_payload=True)
-            found = sampled.filtered(effect.acting_columns(self.model.ready(effect, block, None)))
+            found = sampled.filtered(self._loaded(effect, sampled.block(self.model)))
         if effect in self._kept or effect in model.effects:
             known[key] = found
         return found
+
+    def _loaded(self, effect: Effect, block: Block) -> np.ndarray:
+        """Columns that follow from the motion alone, with the payload on board."""
+        block = replace(block, carries_payload=True)
+        return effect.acting_columns(self.model.ready(effect, block, None))
 
     def _rigid(self, sampled: Sampled) -> np.ndarray:
         known = self.cache.along(sampled.motion)
@@ -199,6 +200,7 @@ class Evidence:
         wanted = [effect for effect in every if (self._robot, effect) not in known]
 
         def evaluate(block: Block) -> list[np.ndarray]:
+            block = self.model.with_regressor(block)
             assert block.rigid is not None
             loaded = replace(block, carries_payload=True)
             return [block.rigid[:, :, base], *(effect.acting_columns(loaded) for effect in wanted)]
@@ -260,7 +262,7 @@ class Evidence:
             return kept[key]
         # One motion for all effects: what a robot does along it is then evaluated once.
         whole = kept.get(recorded)
-        whole = sampled.block(model, rigid=False) if whole is None else whole
+        whole = sampled.block(model) if whole is None else whole
         block = whole
         if effect in model and effect.needs_torque:
             block = replace(block, torque=self._own_torque(sampled, block, model, values))
@@ -309,7 +311,7 @@ class Evidence:
         return kept[key]
 
     def _rows(self, sampled: Sampled) -> Block:
-        return self.model.block(sampled.t, sampled.q, sampled.v, sampled.a, rigid=False)
+        return self.model.block(sampled.t, sampled.q, sampled.v, sampled.a)
 
 
 def _recorded(sampled: Sampled) -> Hashable:

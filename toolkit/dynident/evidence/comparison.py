@@ -134,6 +134,10 @@ def compare(
         recordings have their reference.
     criteria : of the noise, of loops and of what residual maps show.
 
+    Returns
+    -------
+    The error of each estimate, what exceeds the noise, and its simulation where there is one.
+
     Raises
     ------
     FitError
@@ -146,7 +150,7 @@ def compare(
     runs = gather(dataset, criteria.noise)
     results = []
     for estimate in named.values():
-        evidence = Evidence(estimate.model, runs, criteria)
+        evidence = Evidence(estimate.model, runs, criteria=criteria)
         results.append(on_recordings(evidence, estimate))
     return Comparison(
         names=tuple(named),
@@ -178,6 +182,10 @@ def compare_models(
     controller : as in `compare`; the loops are those of the test recordings, or of the training
         recordings where there are none.
     criteria : of the noise, the fit, of loops and of what residual maps show.
+
+    Returns
+    -------
+    As `compare`, of the fitted models.
     """
     runs = gather(train, criteria.noise)
     held = gather(test, criteria.noise) if len(test) else None
@@ -185,12 +193,12 @@ def compare_models(
     for model in models.values():
         if shaped_effects(model):
             model = refine_shapes(model, train).model
-        evidence = Evidence(model, runs, criteria)
+        evidence = Evidence(model, runs, criteria=criteria)
         fitted = fit_evidence(evidence, model)
         if held is None:
             results.append(on_blocks(evidence, fitted))
         else:
-            judge = Evidence(model, held, criteria)
+            judge = Evidence(model, held, criteria=criteria)
             results.append(on_recordings(judge, fitted))
         compared.append(model)
         judged, recorded = Judged(model, fitted.values), test if held else train

@@ -20,7 +20,7 @@ from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import MomentSolution, regress
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class EvidenceFit:
     """A model as it fits the training data.
 
@@ -131,18 +131,20 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
     values = solution.values
     left = [JointResidual.of(evidence, columns, values, j) for j in range(n)]
     return EvidenceFit(
-        evidence.criteria,
-        model.at(_held(model, values)),
-        values,
-        solution.covariance,
-        solution,
-        noise,
-        known,
-        white,
-        summed,
-        _signal(evidence, white, values),
-        np.array([one.square for one in left]),
-        np.array([one.variance or s**2 or 1.0 for one, s in zip(left, torque_std, strict=True)]),
+        criteria=evidence.criteria,
+        model=model.at(_held(model, values)),
+        values=values,
+        covariance=solution.covariance,
+        solution=solution,
+        noise=noise,
+        noise_known=known,
+        white=white,
+        moments=summed,
+        error_signal=_signal(evidence, white, values),
+        squares=np.array([one.square for one in left]),
+        variances=np.array(
+            [one.variance or s**2 or 1.0 for one, s in zip(left, torque_std, strict=True)]
+        ),
     )
 
 

@@ -16,7 +16,7 @@ from dynident.moments.replicates import Kind
 from dynident.moments.solution import regress
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class HeldOutRun:
     """One recording with its prediction, (T, n) each, SI units."""
 
@@ -34,7 +34,7 @@ class HeldOutRun:
         return self.measured - self.predicted
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class HeldOut:
     """What a model misses on held-out data.
 
@@ -95,8 +95,17 @@ def on_recordings(evidence: Evidence, fitted: EvidenceFit | Estimate) -> HeldOut
         joints = [model_columns(evidence, fitted.model, r, j, fitted.values) for j in range(n)]
         residual = np.stack([c[0] @ combination for c in joints], axis=-1)
         kept, predicted = run.kept, first.tau - residual
-        signals = (first.t, first.q, first.v, first.a, first.tau, predicted)
-        runs.append(HeldOutRun(run.recording.name, *(x[kept] for x in signals)))
+        runs.append(
+            HeldOutRun(
+                name=run.recording.name,
+                t=first.t[kept],
+                q=first.q[kept],
+                v=first.v[kept],
+                a=first.a[kept],
+                measured=first.tau[kept],
+                predicted=predicted[kept],
+            )
+        )
         folded.append(np.stack([run.fold([v @ combination for v in c]) for c in joints], axis=-1))
         doubt.append(np.array([_doubt(c[0], fitted) for c in joints]))
     return _judged(evidence, tuple(runs), folded, doubt)
@@ -122,13 +131,13 @@ def on_blocks(evidence: Evidence, fitted: EvidenceFit) -> HeldOut:
         tau = first.tau[rows]
         runs.append(
             HeldOutRun(
-                run.recording.name,
-                first.t[rows],
-                first.q[rows],
-                first.v[rows],
-                first.a[rows],
-                tau,
-                tau - misfit,
+                name=run.recording.name,
+                t=first.t[rows],
+                q=first.q[rows],
+                v=first.v[rows],
+                a=first.a[rows],
+                measured=tau,
+                predicted=tau - misfit,
             )
         )
         folded.append(residual)
@@ -141,6 +150,16 @@ def with_noise_of(judged: HeldOut, noise: HeldOut, criteria: NoiseCriteria) -> H
 
     What exceeds that noise is systematic. The mean square of noise alone varies by 2 s^4 over the
     number of rows, times what its colour costs.
+
+    Parameters
+    ----------
+    judged : recordings of which no motion repeats.
+    noise : others of the same robot, whose noise is known.
+    criteria : which confidence a lower limit has.
+
+    Returns
+    -------
+    `judged` with noise, ratio and its lower limit; as it is where it has them, or `noise` has none.
     """
     if judged.noise_std is not None or noise.noise_std is None:
         return judged
@@ -207,7 +226,9 @@ def _judged(
         (run.kind, e) for run, e in zip(evidence.runs, folded, strict=True) if run.kind != "single"
     ]
     if not pairs:
-        return HeldOut(runs, None, None, None, np.ones(n))
+        return HeldOut(
+            runs=runs, noise_std=None, ratio=None, least_ratio=None, inflation=np.ones(n)
+        )
     noise = [[differences(e[..., j], kind) for kind, e in pairs] for j in range(n)]
     power = np.array([np.mean(np.concatenate([d.ravel() for d in ds]) ** 2) for ds in noise])
     sizes = np.array([e.shape[1] for _, e in pairs])
@@ -224,4 +245,6 @@ def _judged(
     safe = np.where(power > 0, power, 1.0)
     ratio, at_least = (np.sqrt(np.clip(x, 0.0, None) / safe) for x in (excess, least))
     grown = np.array([inflation([row for d in ds for row in d], criteria) for ds in noise])
-    return HeldOut(runs, np.sqrt(power), ratio, at_least, grown)
+    return HeldOut(
+        runs=runs, noise_std=np.sqrt(power), ratio=ratio, least_ratio=at_least, inflation=grown
+    )

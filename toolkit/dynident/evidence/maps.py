@@ -18,7 +18,7 @@ Space = Literal["linear", "root"]
 """In what classes of a quantity are of equal width."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ResidualMap:
     """Mean residual of one joint in bins of a quantity, on the test recordings.
 
@@ -105,6 +105,10 @@ def residual_maps(
     model : as given: what its effects can fit is cleared away before a shape is named.
     before, after : of the model as given and of the final one, on the same recordings.
     criteria : when a map shows something.
+
+    Returns
+    -------
+    Maps joint by joint, each over what its sentence names.
     """
     joints = range(model.robot.n)
     return tuple(
@@ -139,15 +143,15 @@ def _of_joint(
         sigma = (noise if noise is not None else float(np.std(old))) * spread
         sentence = _sentence(against, at, (means[:, 0], sigma), fitted, criteria)
         yield ResidualMap(
-            robot.names[j],
-            robot.torque_units[j],
-            against,
-            unit,
-            at,
-            means[:, 0],
-            means[:, 1],
-            band,
-            sentence,
+            joint=robot.names[j],
+            torque_unit=robot.torque_units[j],
+            against=against,
+            unit=unit,
+            at=at,
+            before=means[:, 0],
+            after=means[:, 1],
+            band=band,
+            sentence=sentence,
         )
     yield _spectrum(robot, j, before, (old, new), noise, criteria)
 
@@ -248,13 +252,13 @@ def _spectrum(
             sentence = f"a line at {harmonics[peak]} cycles per revolution: ripple"
     unit = "cycles per revolution" if robot.kinds[j] == "revolute" else "cycles per 2 pi m"
     return ResidualMap(
-        robot.names[j],
-        robot.torque_units[j],
-        "cycles per revolution",
-        unit,
-        harmonics.astype(float),
-        amplitudes[0],
-        amplitudes[1],
-        level,
-        sentence,
+        joint=robot.names[j],
+        torque_unit=robot.torque_units[j],
+        against="cycles per revolution",
+        unit=unit,
+        at=harmonics.astype(float),
+        before=amplitudes[0],
+        after=amplitudes[1],
+        band=level,
+        sentence=sentence,
     )

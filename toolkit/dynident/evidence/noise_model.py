@@ -105,6 +105,10 @@ def measure_noise(
         Order, classes of speed, limits.
     misfit : N m or N
         Root mean square of the systematic residual.
+
+    Returns
+    -------
+    Standard deviation, colour, and scale by classes of speed.
     """
     everything, speeds = np.concatenate(noise), np.abs(np.concatenate(speed))
     std = float(np.sqrt(np.mean(everything**2)))
@@ -154,9 +158,20 @@ def _whitening_filter(
 
 
 def inflation(noise: list[np.ndarray], criteria: NoiseCriteria, power: int = 1) -> float:
-    """Variance of a mean of consecutive noise over that of independent noise, at least one.
+    """Variance of a mean of consecutive noise over that of independent noise.
 
-    With `power` 2, of a mean of products of two such noises.
+    Parameters
+    ----------
+    noise : list of (T,)
+        Stretches of noise of one joint, each in the order of time.
+    criteria : NoiseCriteria
+        Up to which lag correlations count.
+    power : int
+        2 for a mean of products of two such noises.
+
+    Returns
+    -------
+    A factor, at least one.
     """
     total = sum(float(x @ x) for x in noise)
     if not total > 0:

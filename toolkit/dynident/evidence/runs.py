@@ -34,7 +34,7 @@ Signals = list[np.ndarray]
 """One array per replicate of a recording, (T, J, k): rows, joints of the effect, columns."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Run:
     """One recording and its replicates.
 
@@ -80,7 +80,7 @@ class Run:
             at = [np.interp(first.t, recording.t, column) for column in columns]
             temperature = np.stack(at, axis=1)
         start, motion = recording.start, (first.q, first.v, first.a)
-        return model.block(first.t + start, *motion, rigid=False, temperature=temperature)
+        return model.block(first.t + start, *motion, temperature=temperature)
 
     def fold(self, signals: Sequence[np.ndarray]) -> np.ndarray:
         """Arrange measured signals, (T, ...) for each replicate, as (P, S, ...)."""
@@ -110,9 +110,18 @@ class Run:
         return [*signals[:-1], simulated]
 
     def whitened(self, signals: Sequence[np.ndarray], joint: int, noise: NoiseModel) -> np.ndarray:
-        """Whiten columns, (T, k) for each replicate, of a joint, and fold them into (P, S, k).
+        """Whiten columns of a joint, and fold them.
 
-        Of a simulated motion there is one replicate, without noise.
+        Parameters
+        ----------
+        signals : (T, k) for each replicate
+            Columns of one joint, of rows at a constant rate.
+        joint : whose they are.
+        noise : of that joint.
+
+        Returns
+        -------
+        (P, S, k); of a simulated motion P = 1: there is one replicate, without noise.
         """
         if self.columns_from == "simulation":
             speed = self.replicates[-1].v[:, joint]
@@ -141,6 +150,10 @@ def gather(
     criteria : copies, and blocks of time.
     simulated : the motion of each recording, simulated, on the same time stamps.
     seed : of the noise on the copies.
+
+    Returns
+    -------
+    A run for each recording, in their order.
 
     Raises
     ------
@@ -174,7 +187,7 @@ def gather(
         else:
             replicates, index, kind = (first,), usable[None, :], "single"
         edges = np.linspace(0, index.shape[1], per_run + 1).round().astype(int)
-        runs.append(Run(kind, replicates, index, edges))
+        runs.append(Run(kind=kind, replicates=replicates, index=index, edges=edges))
     if simulated is None:
         return tuple(runs)
     return tuple(
@@ -203,7 +216,14 @@ def resimulated(runs: Sequence[Run], simulated: Dataset) -> tuple[Run, ...]:
 
 
 def noisy(recording: Recording, noise: Noise, stream: np.random.Generator) -> Recording:
-    """Return a copy of a recording with one more draw of the stated noise on it."""
+    """Return a copy of a recording with one more draw of the stated noise on it.
+
+    Parameters
+    ----------
+    recording : on a uniform clock.
+    noise : standard deviations of position (rad or m) and torque (N m or N), (n,) each.
+    stream : of random numbers.
+    """
     q = recording.q + noise.position_std * stream.standard_normal(recording.q.shape)
     tau = recording.tau + noise.torque_std * stream.standard_normal(recording.tau.shape)
     return recording.replace(q=q, tau=tau)

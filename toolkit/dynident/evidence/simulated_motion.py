@@ -27,7 +27,7 @@ from dynident.model import Model
 from dynident.recording import Dataset
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class SimulatedMotion:
     """The recordings' references in the simulated loop of the fitted model.
 
@@ -130,7 +130,9 @@ def motion_of_loop(
     notes = found.source.notes
     if found.ending is Ending.DOUBTFUL_LOOP:
         notes = (*notes, found.message[0].upper() + found.message[1:])
-    return SimulatedMotion(runs, notes, controller, found.source.measured)
+    return SimulatedMotion(
+        runs=runs, notes=notes, controller=controller, measured=found.source.measured
+    )
 
 
 def _simulated(

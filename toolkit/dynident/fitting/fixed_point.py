@@ -21,7 +21,18 @@ class FixedPoint:
         self._share, self._change = 1.0, np.inf
 
     def following(self, model: Model, at: np.ndarray, found: np.ndarray) -> np.ndarray:
-        """Return the values (p,) after `at`, where the columns were taken, and `found`."""
+        """Return the values at which the columns are taken next.
+
+        Parameters
+        ----------
+        model : which says how far values may move at once.
+        at : (p,) where the columns were taken.
+        found : (p,) what was fitted with them.
+
+        Returns
+        -------
+        (p,)
+        """
         step = model.relaxed(at, found) - at
         change = float(np.linalg.norm(step))
         if change > _SHRUNK * self._change:

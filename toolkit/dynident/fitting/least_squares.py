@@ -89,6 +89,16 @@ def solve_factors(
 ) -> LinearSolution:
     """Solve for the parameters that the data identify; the rest stays as given.
 
+    Parameters
+    ----------
+    model : whose given values hold where the data say nothing.
+    factors : of each joint's rows.
+    weighting : "joint" divides the rows of each joint by its residual, "none" does not.
+
+    Returns
+    -------
+    With its covariance, and the residual of each joint, N m or N.
+
     Raises
     ------
     FitError
@@ -200,7 +210,21 @@ def estimate_of(
     factors: TriangularFactors,
     solution: LinearSolution,
 ) -> Estimate:
-    """Assemble an `Estimate` from a solution."""
+    """Assemble an `Estimate` from a solution.
+
+    Parameters
+    ----------
+    name : of the method, for the report.
+    weighting : "joint" or "none".
+    model : that was fitted.
+    dataset : whose recordings count.
+    factors : of all rows.
+    solution : of the same rows.
+
+    Returns
+    -------
+    With errors as shares of the measured torque.
+    """
     norms = factors.torque_norms
     residuals = factors.residual_norms(solution.values)
     words = "ordinary" if weighting == "none" else "weighted per joint"

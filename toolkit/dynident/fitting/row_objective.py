@@ -188,13 +188,13 @@ class _RowObjective:
         model, found = self.model, {}
         for effect in self.effects:
             if not effect.is_instantaneous:
-                whole = sampled.block(model, rigid=False)
+                whole = sampled.block(model)
                 found[effect.label] = model.ready(effect, whole, self._values)
         return found
 
     def _differentiable(self, effects: tuple[Effect, ...]) -> bool:
         sampled, blocks = self._samples[0], self._blocks[0]
-        few = sampled.block(self.model, slice(0, 50))
+        few = self.model.with_regressor(sampled.block(self.model, slice(0, 50)))
         return all(e.sensitivities(blocks.get(e.label, few)) is not None for e in effects)
 
     def columns(self, effects: tuple[Effect, ...]) -> np.ndarray:
@@ -217,8 +217,9 @@ class _RowObjective:
             if effect.label in blocks:
                 found.append(sampled.filtered(evaluate(blocks[effect.label])))
                 continue
-            rigid = effect.needs_regressor
-            found += sampled.decimate(self.model, lambda b: [evaluate(b)], rigid=rigid)
+            found += sampled.decimate(
+                self.model, lambda b: [evaluate(self.model.ready(effect, b, None))]
+            )
         return found
 
     def _rows(self, parts: Signals) -> np.ndarray:

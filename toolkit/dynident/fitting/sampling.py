@@ -37,7 +37,7 @@ Evaluate = Callable[[Block], list[np.ndarray]]
 """Columns of a block, each (T, ...)."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Sampled:
     """A recording ready for evaluation.
 
@@ -65,20 +65,10 @@ class Sampled:
         """Rate of the decimated rows."""
         return self.parallel.output_rate_hz
 
-    def blocks(
-        self, model: Model, evaluate: Evaluate, *, rigid: bool = True, size: int = BLOCK
-    ) -> Iterator[list[np.ndarray]]:
-        """Evaluate columns block by block; each as decimated rows.
-
-        Parameters
-        ----------
-        model : for the robot's regressor.
-        evaluate : columns of one block.
-        rigid : whether `evaluate` needs the rigid-body regressor.
-        size : samples at a time.
-        """
-        for plan in self._plans(size):
-            columns = evaluate(self.block(model, plan.raw, rigid=rigid))
+    def blocks(self, model: Model, evaluate: Evaluate) -> Iterator[list[np.ndarray]]:
+        """Evaluate columns block by block; each as decimated rows."""
+        for plan in self._plans():
+            columns = evaluate(self.block(model, plan.raw))
             yield [self.parallel.apply_block(one, plan) for one in columns]
 
     def columns(self, model: Model, values: np.ndarray | None = None) -> Iterator[np.ndarray]:
@@ -91,7 +81,7 @@ class Sampled:
         values : (p,) parameters at which columns that depend on the fitted model are taken.
         """
         known = self.whole_columns(model, values)
-        for plan in self._plans(BLOCK):
+        for plan in self._plans():
             here = {label: own[plan.raw] for label, own in known.items()}
             columns = model.columns(self.block(model, plan.raw), values, here)
             yield self.parallel.apply_block(columns, plan)
@@ -102,25 +92,24 @@ class Sampled:
         """Columns at the full rate of the effects that need the whole recording, by label."""
         if not any(effect.needs_recording for effect in model.effects):
             return {}
-        return model.whole_columns(self.block(model, rigid=False), values)
+        return model.whole_columns(self.block(model), values)
 
     def filtered(self, columns: np.ndarray) -> np.ndarray:
         """Decimated rows of columns at the full rate, (T, ...)."""
         return self.parallel.apply(columns)[self.kept]
 
-    def decimate(self, model: Model, evaluate: Evaluate, *, rigid: bool = True) -> list[np.ndarray]:
+    def decimate(self, model: Model, evaluate: Evaluate) -> list[np.ndarray]:
         """All decimated rows of some columns; see `blocks`."""
-        parts = list(self.blocks(model, evaluate, rigid=rigid))
+        parts = list(self.blocks(model, evaluate))
         return [np.concatenate(pieces) for pieces in zip(*parts, strict=True)]
 
-    def block(self, model: Model, raw: slice = slice(None), *, rigid: bool = True) -> Block:
+    def block(self, model: Model, raw: slice = slice(None)) -> Block:
         """Samples at the full rate as effects see them; all of them by default.
 
         Parameters
         ----------
         model : for the robot.
         raw : which samples.
-        rigid : whether the rigid-body regressor is evaluated.
         """
         motion, recording = self.motion, self.recording
         temperature = getattr(recording, "temperature", None)
@@ -132,15 +121,14 @@ class Sampled:
             motion.v[raw],
             motion.a[raw],
             carries_payload=bool(recording.payload),
-            rigid=rigid,
             number=getattr(recording, "number", 0),
             temperature=temperature,
         )
         return replace(block, period=recording.period) if raw == slice(None) else block
 
-    def _plans(self, size: int) -> Iterator[FilterBlock]:
+    def _plans(self) -> Iterator[FilterBlock]:
         """Blocks whose rows lie in the recording's window."""
-        for plan in self.parallel.blocks(self.motion.samples, size):
+        for plan in self.parallel.blocks(self.motion.samples, BLOCK):
             low, high = max(plan.kept.start, self.kept.start), min(plan.kept.stop, self.kept.stop)
             if high > low:
                 rows = slice(low - plan.kept.start, high - plan.kept.start)
@@ -175,7 +163,17 @@ def sample(recording: Recording, settings: Filter | None) -> Sampled:
         remedy = f"at least {LEAST_ROWS} are needed: record longer, or raise rate_hz in [filter]"
         raise RecordingError(what, recording.where, remedy)
     q, v, a, tau = (parallel.apply(x)[kept] for x in (motion.q, motion.v, motion.a, motion.tau))
-    return Sampled(recording, motion, parallel, kept, times[kept], q, v, a, tau)
+    return Sampled(
+        recording=recording,
+        motion=motion,
+        parallel=parallel,
+        kept=kept,
+        t=times[kept],
+        q=q,
+        v=v,
+        a=a,
+        tau=tau,
+    )
 
 
 def flagged(sampled: Sampled, payload: bool) -> Sampled:

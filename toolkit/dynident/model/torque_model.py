@@ -35,27 +35,41 @@ class Model(ParametrisedRobot):
         a,
         *,
         carries_payload: bool = False,
-        rigid: bool = True,
         number: int = 0,
         temperature: np.ndarray | None = None,
     ) -> Block:
-        """Samples as effects see them; see `Block` for shapes.
+        """Return samples as effects see them, without what depends on the model's bodies.
 
-        `rigid` says whether the rigid-body regressor, the costly part, is evaluated.
+        Parameters
+        ----------
+        t : (T,) s, from the start of the session.
+        q, v, a : (T, n) rad or m, and their derivatives.
+        carries_payload : whether the payload under study is on the robot.
+        number : of the recording in its study, from 1; 0 where that does not matter.
+        temperature : (T, n) degrees Celsius of the motors; or None.
+
+        Returns
+        -------
+        A block for `columns`, `with_regressor` or `ready`.
         """
         return Block(
             t,
             q,
             v,
             a,
-            self.robot.names,
-            self.friction_width,
-            carries_payload,
-            self.robot.tip,
-            rigid=self.robot.regressor(q, v, a) if rigid else None,
+            names=self.robot.names,
+            friction_width=self.friction_width,
+            carries_payload=carries_payload,
+            tip=self.robot.tip,
             number=number,
             temperature=temperature,
         )
+
+    def with_regressor(self, block: Block) -> Block:
+        """Return a block with the rigid-body regressor, which is costly; as it is if it has it."""
+        if block.rigid is not None:
+            return block
+        return replace(block, rigid=self.robot.regressor(block.q, block.v, block.a))
 
     def columns(
         self,
@@ -68,7 +82,7 @@ class Model(ParametrisedRobot):
         Parameters
         ----------
         block : Block
-            With its rigid-body regressor, as `Model.block` makes it.
+            Of any length; the regressor is evaluated here unless it has one.
         values : (p,), optional
             Parameter values at which columns that depend on the fitted model are taken; without
             them those that depend on its torque are zero, and its bodies are as described.
@@ -80,6 +94,7 @@ class Model(ParametrisedRobot):
         -------
         (T, n, p) in N m or N per unit of the parameters.
         """
+        block = self.with_regressor(block)
         assert block.rigid is not None
         full = np.zeros((len(block.t), self.robot.n, self.size))
         rigid = len(self.base.independent)
@@ -133,7 +148,13 @@ class Model(ParametrisedRobot):
 
         Parameters
         ----------
+        block : Block
+            Of any length.
         values, known : as for `columns`; without values the torque is zero.
+
+        Returns
+        -------
+        (T, n)
         """
         if values is None:
             return np.zeros(block.q.shape)
@@ -167,8 +188,8 @@ class Model(ParametrisedRobot):
         A block that effects of the same `shares_block` can use as well.
         """
         block = self.with_bodies(effect, block, values)
-        if effect.needs_regressor and block.rigid is None:
-            block = replace(block, rigid=self.robot.regressor(block.q, block.v, block.a))
+        if effect.needs_regressor:
+            block = self.with_regressor(block)
         if effect.needs_torque and block.torque is None:
             block = replace(block, torque=self.torque_without_loads(block, values))
         return block

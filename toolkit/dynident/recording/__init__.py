@@ -17,7 +17,7 @@ from dynident.recording.filters import (
     differentiate,
     lowpass,
 )
-from dynident.recording.formats.columns import Column
+from dynident.recording.formats.column_names import Column
 from dynident.recording.formats.read import SUFFIXES, read
 from dynident.recording.formats.write import write
 from dynident.recording.masks import away_from_edges, moving, within

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from dataclasses import replace as _replace
 from typing import Any, Literal
 
@@ -75,6 +75,7 @@ class Recording:
     q: np.ndarray
     tau: np.ndarray
     joints: tuple[str, ...]
+    _: KW_ONLY
     v: np.ndarray | None = None
     a: np.ndarray | None = None
     q_ref: np.ndarray | None = None

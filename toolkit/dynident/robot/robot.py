@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -44,6 +44,7 @@ class Robot:
     name: str
     joints: tuple[Joint, ...]
     links: tuple[Link, ...]
+    _: KW_ONLY
     gravity: Array = GRAVITY  # type: ignore[assignment]
     description: Description | None = None
     locked: tuple[str, ...] = ()
@@ -86,6 +87,10 @@ class Robot:
         gravity : (3,) array_like, optional
             m/s^2; default: what the description states (SDF, MJCF), else (0, 0, -9.81).
 
+        Returns
+        -------
+        The robot, with its description for writing it back.
+
         Raises
         ------
         FileError
@@ -119,6 +124,10 @@ class Robot:
             Names it in messages.
         joints, gravity
             As in `from_file`.
+
+        Returns
+        -------
+        The robot, with its description for writing it back.
 
         Raises
         ------

@@ -137,6 +137,10 @@ def write_verified(
     source : str or Path, optional
         The file that the robot was read from, whose bytes are copied if nothing changed.
 
+    Returns
+    -------
+    What was checked, with the largest difference of the torques.
+
     Raises
     ------
     RobotError

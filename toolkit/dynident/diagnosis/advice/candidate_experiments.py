@@ -19,7 +19,7 @@ _SAMPLES = 1000
 _DEPENDENT = 1e-7  # of the largest singular value of scaled columns
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Recorded:
     """What motion there is already, each (n,) in SI units.
 
@@ -48,12 +48,12 @@ class Recorded:
             return np.max([np.abs(getattr(run, name)).max(0) for run in runs], axis=0)
 
         return cls(
-            np.min([run.q.min(0) for run in runs], axis=0),
-            np.max([run.q.max(0) for run in runs], axis=0),
-            largest("v"),
-            largest("a"),
-            largest("tau"),
-            max(ends) - min(starts),
+            lower=np.min([run.q.min(0) for run in runs], axis=0),
+            upper=np.max([run.q.max(0) for run in runs], axis=0),
+            speed=largest("v"),
+            acceleration=largest("a"),
+            torque=largest("tau"),
+            span=max(ends) - min(starts),
         )
 
 
@@ -89,7 +89,7 @@ class CandidateExperiment:
 EVERYTHING = CandidateExperiment("everything")
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, kw_only=True)
 class CandidateExperiments:
     """Experiments evaluated with a fitted model; each motion is evaluated once.
 
@@ -246,7 +246,8 @@ class CandidateExperiments:
             q, v, a = path.at(t)
             late = self.longer * float(name == "late")
             loaded = name == "loaded"
-            self._blocks[motion] = self.model.block(t + late, q, v, a, carries_payload=loaded)
+            block = self.model.block(t + late, q, v, a, carries_payload=loaded)
+            self._blocks[motion] = self.model.with_regressor(block)
         return self._blocks[motion]
 
     def _model_columns(self, trial: CandidateExperiment) -> np.ndarray:

@@ -35,7 +35,12 @@ class Adviser:
         """Return the adviser for a model as it fits the recordings of the evidence."""
         recorded = Recorded.of(evidence)
         return cls(
-            CandidateExperiments(fitted.model, fitted.values, recorded, criteria=evidence.criteria)
+            CandidateExperiments(
+                model=fitted.model,
+                values=fitted.values,
+                recorded=recorded,
+                criteria=evidence.criteria,
+            )
         )
 
     def revealing(self, effect: Effect) -> str:
@@ -269,7 +274,9 @@ def revealing(effect: Effect, model: Model, values: np.ndarray, recorded: Record
     -------
     One sentence without a full stop.
     """
-    return Adviser(CandidateExperiments(model, values, recorded)).revealing(effect)
+    return Adviser(CandidateExperiments(model=model, values=values, recorded=recorded)).revealing(
+        effect
+    )
 
 
 def separating(
@@ -291,4 +298,6 @@ def separating(
     -------
     One sentence without a full stop.
     """
-    return Adviser(CandidateExperiments(model, values, recorded)).separating(effects, own)
+    return Adviser(CandidateExperiments(model=model, values=values, recorded=recorded)).separating(
+        effects, own
+    )

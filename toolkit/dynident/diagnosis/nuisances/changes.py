@@ -21,7 +21,7 @@ QUARTER = 0.6745
 """Median of the absolute value of a standard normal variable."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Repeated:
     """The residual of one joint in the repetitions of one recording.
 
@@ -46,7 +46,7 @@ class Repeated:
         return float(np.median(np.diff(self.t, axis=1)))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Changes:
     """Differences of one series, in the order of time, with their noise.
 
@@ -96,7 +96,16 @@ class Changes:
         return float(np.clip(alone, 0.0, 1.0) / np.sqrt(1.0 + unknown / power))
 
     def match(self, signal: np.ndarray, rows: np.ndarray, width: float) -> np.ndarray:
-        """Fit pulses of a width (in rows) at rows (M,), any real numbers, to a signal (P S,).
+        """Fit Gaussian pulses of one width to a signal.
+
+        Parameters
+        ----------
+        signal : (P S,) N m or N
+            Torque that is searched, as `change`.
+        rows : (M,)
+            Centres of the pulses, any real numbers.
+        width : rows
+            From the centre to where a pulse is 1/e of its height.
 
         Returns
         -------
@@ -179,7 +188,9 @@ def changes_of(
     noise = measure_noise(stretches, no_speed, criteria.noise, own_criteria.white_share * size)
     colour = noise.colour / (noise.std * noise.scales[0])
     return [
-        Changes(one, change, own, colour, ~out, own_criteria.reach)
+        Changes(
+            of=one, change=change, still=own, colour=colour, kept=~out, reach=own_criteria.reach
+        )
         for one, change, own, out in zip(series, changes, still, left_out, strict=True)
     ]
 

@@ -66,6 +66,10 @@ class Contacts:
         evidence, held : training and test recordings, nothing left out; `held` is None where there
             are none.
         fitted : the model as it fits the training recordings.
+
+        Returns
+        -------
+        The pulses, and the recordings with nothing left out.
         """
         pulses = _resolved(evidence, fitted, find_contacts(evidence, fitted))
         if held is None:
@@ -111,6 +115,11 @@ class Contacts:
         evidence, held : training and test recordings; errors are those of the latter, where there
             are any.
         fitted : the model that is judged.
+
+        Returns
+        -------
+        One for each joint where a pulse was found, the clearest first. All pulses are left out at
+        once: the first stands for what that changes, the others for no further change.
         """
         clearest: dict[str, DisturbancePulse] = {}
         for pulse in sorted((*self.pulses, *self.pulses_held), key=lambda one: one.p_value):
@@ -180,7 +189,14 @@ def _common(
 def contact_candidates(
     model: Model, evidence: Evidence, found: tuple[Disturbance, ...]
 ) -> tuple[Candidate, ...]:
-    """Return what is to be said of contacts at every joint."""
+    """Return what is to be said of contacts at every joint.
+
+    Parameters
+    ----------
+    model : the one that was given.
+    evidence : the recordings; contacts are sought where a motion repeats.
+    found : as `Contacts.disturbances` returns them.
+    """
     repeats = any(run.kind == "repeated" for run in evidence.runs)
     by_joint = {one.pulse.joint: one for one in found}
     candidates = []

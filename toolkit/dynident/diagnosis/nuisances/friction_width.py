@@ -41,7 +41,7 @@ class FrictionWidthColumn(JointEffect):
         return (Parameter("Fb", unit, 0.0),)
 
     def shape_parameters(self, robot):
-        return (ShapeParameter("k", "1", (0.5, 2.0, 4.0, 8.0), 0.2, 15.0),)
+        return (ShapeParameter("k", "1", (0.5, 2.0, 4.0, 8.0), lower=0.2, upper=15.0),)
 
     def at_joint(self, block: Block) -> np.ndarray:
         v = block.v[:, [block.index(self.joint)]]

@@ -75,12 +75,12 @@ def find_contacts(evidence: Evidence, fitted: EvidenceFit) -> tuple[DisturbanceP
         for j, joint in enumerate(recording.joints):
             found.append(
                 Repeated(
-                    r,
-                    recording.number,
-                    joint,
-                    first.t[run.index] + recording.start,
-                    residual[:, :, j],
-                    first.v[:, j][run.index],
+                    run=r,
+                    number=recording.number,
+                    joint=joint,
+                    t=first.t[run.index] + recording.start,
+                    residual=residual[:, :, j],
+                    speed=first.v[:, j][run.index],
                 )
             )
     return pulses_in(found, evidence.criteria)

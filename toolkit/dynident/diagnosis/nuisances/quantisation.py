@@ -103,7 +103,7 @@ def _predicted(
 ) -> list[np.ndarray]:
     """Torque that the model predicts along each recording, (T, n)."""
     runs = gather(Dataset(tuple(recordings), dataset.filter), fitted.criteria.noise)
-    evidence = Evidence(fitted.model, runs, fitted.criteria)
+    evidence = Evidence(fitted.model, runs, criteria=fitted.criteria)
     joints = range(fitted.model.robot.n)
     each = []
     for r in range(len(recordings)):

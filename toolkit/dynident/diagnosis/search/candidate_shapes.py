@@ -31,7 +31,17 @@ class Beside:
     def columns(
         self, variants: Sequence[Effect], model: Model, values: np.ndarray
     ) -> list[list[Signals]]:
-        """As `Evidence.columns`."""
+        """As `Evidence.columns`.
+
+        Parameters
+        ----------
+        variants : one effect at one place, with any number of shapes.
+        model, values : not used: the columns are those of `whole`.
+
+        Returns
+        -------
+        For each run, for each variant: (T, J, k) for each replicate.
+        """
         return self.evidence.columns(variants, self.whole.model, self.whole.values)
 
 
@@ -117,7 +127,7 @@ def reshaped(evidence: Evidence, others: EvidenceFit, whole: EvidenceFit, effect
     effect : as it is in the model.
     """
     beside = Beside(evidence, whole).columns
-    blank = Score(effect, None, not_identifiable=False)
+    blank = Score(effect=effect, payload_recordings=None, not_identifiable=False)
     now = MomentObjective(evidence, others, blank, beside).score_at(effect)
     return refined(evidence, others, now, beside)
 
@@ -125,7 +135,11 @@ def reshaped(evidence: Evidence, others: EvidenceFit, whole: EvidenceFit, effect
 def best_shape(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> Effect:
     """Return an effect at the shape at which it explains most; as it is where it explains nothing.
 
-    `fitted` is the model without it.
+    Parameters
+    ----------
+    evidence : the training recordings.
+    fitted : the model without the effect.
+    effect : with the shape that is tried first.
     """
     tried = [effect, *effect.variants(fitted.model.robot)]
     found = candidate_moments(evidence, fitted, tried)

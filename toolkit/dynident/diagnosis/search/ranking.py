@@ -91,7 +91,7 @@ def rank(
     for effect in only or candidates(fitted.model):
         driven = effect.is_dynamic_response
         if driven and (noisy or effect.joint in below_noise):
-            best.append(Score(effect, None, not_identifiable=False))
+            best.append(Score(effect=effect, payload_recordings=None, not_identifiable=False))
             continue
         progress(effect.label)
         tried = list(_score_variants(evidence, fitted, effect))
@@ -181,7 +181,7 @@ def _possible(one: Score, fitted: EvidenceFit) -> Score:
 def _seen(fitted: EvidenceFit, effect: Effect) -> Block:
     """One sample with the bodies that an effect needs of the fitted model."""
     still = np.zeros((1, fitted.model.robot.n))
-    block = fitted.model.block(np.zeros(1), still, still, still, rigid=False)
+    block = fitted.model.block(np.zeros(1), still, still, still)
     return fitted.model.with_bodies(effect, block, fitted.values)
 
 

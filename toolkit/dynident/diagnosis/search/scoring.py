@@ -23,7 +23,7 @@ Columns = Callable[[Sequence[Effect], Model, np.ndarray], list[list[Signals]]]
 """Columns of variants of an effect, for a model and its values, as `Evidence.columns`."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Score:
     """What one effect, with one shape, would bring if it were added.
 
@@ -132,7 +132,18 @@ def _time_factors(evidence: Evidence, variants: Sequence[Effect], run: int) -> n
 def moments_with_payload(
     part: SecondMoments, evidence: Evidence, payload_recordings: tuple[bool, ...]
 ) -> SecondMoments:
-    """Moments of columns that are zero in the runs which do not carry the payload."""
+    """Moments of columns that are zero in the runs which do not carry the payload.
+
+    Parameters
+    ----------
+    part : of columns that count the payload as carried in every run.
+    evidence : the runs, each with its blocks.
+    payload_recordings : for each run, whether it carries the payload.
+
+    Returns
+    -------
+    As `part`, zero in the blocks of the runs that do not.
+    """
     blocks = [
         np.full(len(run.edges) - 1, c)
         for run, c in zip(evidence.runs, payload_recordings, strict=True)
@@ -148,7 +159,21 @@ def score(
     grid: int,
     payload_recordings: tuple[bool, ...] | None = None,
 ) -> Score:
-    """Score an effect from its moments; `grid` is the number of shapes that were tried."""
+    """Score an effect from its moments.
+
+    Parameters
+    ----------
+    fitted : the model without the effect.
+    effect : at one shape.
+    with_model : of the effect's columns with the model's and the torque, (B, p + 1, k).
+    with_self : of the effect's columns with themselves, (B, k, k).
+    grid : number of shapes that were tried.
+    payload_recordings : for each run, whether it carries the payload; None for another effect.
+
+    Returns
+    -------
+    Not yet cross-validated; marked where the model already explains all that it could.
+    """
     p = len(fitted.values)
     solution = fitted.solution
     beside, own, known = with_model.pooled(), with_self.pooled(), fitted.moments.pooled()
@@ -160,21 +185,21 @@ def score(
     scale = np.sqrt(np.clip(np.diag(own.signal), 0.0, None))
     seen = _seen(effect, fitted, scale)
     if not np.any(seen):
-        return Score(effect, payload_recordings, not_identifiable=True)
+        return Score(effect=effect, payload_recordings=payload_recordings, not_identifiable=True)
     scale = np.where(seen, scale, 1.0)
     # Directions of the columns, by what is left of them beside the model.
     white = orthonormal_directions(own.signal * np.outer(seen, seen), scale)
     left, turn = np.linalg.eigh(white.T @ left_signal @ white)
     visible = left > fitted.criteria.gates.not_identifiable**2
     if not np.any(visible):
-        return Score(effect, payload_recordings, not_identifiable=True)
+        return Score(effect=effect, payload_recordings=payload_recordings, not_identifiable=True)
     directions = white @ turn[:, visible]
     moment = directions.T @ (signal[p] - back.T @ known.signal[:p, p])
     part = solve_products(
         directions.T @ left_signal @ directions, directions.T @ left_total @ directions, moment
     )
     if part.rank == 0:
-        return Score(effect, payload_recordings, not_identifiable=False)
+        return Score(effect=effect, payload_recordings=payload_recordings, not_identifiable=False)
     values = directions @ part.values
     drop = float(part.values @ moment)
     covariance = directions @ part.covariance @ directions.T
@@ -187,8 +212,8 @@ def score(
     penalised = drop - price
     blocks = _block_scores(fitted, with_model, with_self, back, values) @ directions @ part.basis
     return Score(
-        effect,
-        payload_recordings,
+        effect=effect,
+        payload_recordings=payload_recordings,
         not_identifiable=False,
         rank=part.rank,
         drop=drop,
@@ -228,7 +253,18 @@ def impossible(one: Score, fitted: EvidenceFit) -> str:
 def cross_validate(
     fitted: EvidenceFit, with_model: SecondMoments, with_self: SecondMoments
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Held-out squared residuals per block, without and with an effect, (B,) each."""
+    """Leave out every block in turn, and predict it by the model with and without an effect.
+
+    Parameters
+    ----------
+    fitted : the model without the effect.
+    with_model : of the effect's columns with the model's and the torque, (B, p + 1, k).
+    with_self : of the effect's columns with themselves, (B, k, k).
+
+    Returns
+    -------
+    Held-out squared residuals per block, whitened: (B,) without and (B,) with the effect.
+    """
     both = SecondMoments(
         _joined(fitted.moments.total, with_model.total, with_self.total),
         fitted.moments.counts,

@@ -24,6 +24,16 @@ def refitted(evidence: Evidence, model: Model, near: EvidenceFit | None = None) 
 
     Responses that depend on the bodies are refined again with the bodies that come out, which were
     others while the effect was missing, until nothing is gained.
+
+    Parameters
+    ----------
+    evidence : the training recordings.
+    model : with its shapes to begin with.
+    near : as for `fit_evidence`.
+
+    Returns
+    -------
+    The fit of the model with the shapes that explain most.
     """
     criteria = evidence.criteria.shapes
     fitted = fit_evidence(evidence, model, near)

@@ -27,9 +27,9 @@ class Contact(JointEffect):
     def shape_parameters(self, robot):
         # Places are not screened: what differs between repetitions says where it is.
         return (
-            ShapeParameter("number", "1", (1.0,), 1.0, 1e6),
-            ShapeParameter("time", "s", (0.0,), -1e6, 1e6),
-            ShapeParameter("width", "s", (0.2,), 1e-3, 10.0),
+            ShapeParameter("number", "1", (1.0,), lower=1.0, upper=1e6),
+            ShapeParameter("time", "s", (0.0,), lower=-1e6, upper=1e6),
+            ShapeParameter("width", "s", (0.2,), lower=1e-3, upper=10.0),
         )
 
     def variants(self, robot):

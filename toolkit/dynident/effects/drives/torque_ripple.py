@@ -34,9 +34,9 @@ class TorqueRipple(JointEffect):
     def shape_parameters(self, robot):
         if motion_unit(robot, self.joint) == "m":
             grid = tuple(float(k) for k in np.geomspace(30.0, 3000.0, 40).round())
-            return (ShapeParameter("k", "rad/m", grid, 10.0, 1e5),)
+            return (ShapeParameter("k", "rad/m", grid, lower=10.0, upper=1e5),)
         grid = tuple(float(k) for k in (*range(2, 33), *range(34, 62, 2)))
-        return (ShapeParameter("k", "1/rev", grid, 1.0, 500.0),)
+        return (ShapeParameter("k", "1/rev", grid, lower=1.0, upper=500.0),)
 
     def at_joint(self, block: Block) -> np.ndarray:
         phase = self.shape[0] * block.q[:, [block.index(self.joint)]]

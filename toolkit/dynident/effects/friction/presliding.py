@@ -40,7 +40,7 @@ class Presliding(JointEffect):
         unit = motion_unit(robot, self.joint)
         scale = 0.1 if unit == "m" else 1.0
         grid = tuple(scale * distance for distance in (1e-3, 3e-3, 1e-2, 3e-2))
-        return (ShapeParameter("distance", unit, grid, 1e-4 * scale, 0.3 * scale),)
+        return (ShapeParameter("distance", unit, grid, lower=1e-4 * scale, upper=0.3 * scale),)
 
     def at_joint(self, block: Block) -> np.ndarray:
         if block.memory is not None:  # one instant of a simulation

@@ -31,7 +31,7 @@ class StribeckFriction(JointEffect):
         unit = motion_unit(robot, self.joint)
         scale = 0.1 if unit == "m" else 1.0
         grid = tuple(scale * speed for speed in (0.02, 0.04, 0.08, 0.16, 0.32, 0.64))
-        return (ShapeParameter("vs", f"{unit}/s", grid, 0.005 * scale, 2.0 * scale),)
+        return (ShapeParameter("vs", f"{unit}/s", grid, lower=0.005 * scale, upper=2.0 * scale),)
 
     def at_joint(self, block: Block) -> np.ndarray:
         v = block.v[:, [block.index(self.joint)]]

@@ -48,7 +48,7 @@ class ThermalFriction(JointEffect):
 
     def shape_parameters(self, robot):
         grid = (10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0)
-        return (ShapeParameter("T", "s", grid, 1.0, 1e5),)
+        return (ShapeParameter("T", "s", grid, lower=1.0, upper=1e5),)
 
     def at_joint(self, block: Block) -> np.ndarray:
         v = block.v[:, [block.index(self.joint)]]

@@ -41,7 +41,9 @@ class Backlash(FlexibleJoint):
         return (Parameter("gap", motion_unit(robot, self.joint), 0.0),)
 
     def shape_parameters(self, robot):
-        sides = ShapeParameter("resonance", "Hz", (15.0, 30.0), RESONANCE.lower, RESONANCE.upper)
+        sides = ShapeParameter(
+            "resonance", "Hz", (15.0, 30.0), lower=RESONANCE.lower, upper=RESONANCE.upper
+        )
         return (sides, DAMPING, ROTOR_SHARE)
 
     def variants(self, robot) -> Iterator[Backlash]:

@@ -89,7 +89,7 @@ class DrivenLink:
         return np.arange(-wanted, 0) % self.period
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Fine:
     """A link's motion in the steps of a recursion, (S,) each, a run-up before it.
 
@@ -131,4 +131,15 @@ class Fine:
             # Without kinks, which a second derivative would show; but an inertia stays positive.
             samples = CubicSpline(np.arange(len(rows)), samples)(steps)
             whole = np.interp(steps, np.arange(len(rows)), whole)
-        return cls(rows, len(before), per, link.step / per, whole, *samples.T)
+        c, g, load, a = samples.T
+        return cls(
+            rows=rows,
+            first=len(before),
+            per=per,
+            step=link.step / per,
+            whole=whole,
+            c=c,
+            g=g,
+            load=load,
+            a=a,
+        )

@@ -16,10 +16,10 @@ from dynident.effects.transmissions.link_response import Response, responses, st
 from dynident.robot import Robot
 
 _SCREENED = (3.0, 4.0, 5.4, 7.3, 9.8, 13.2, 18.0, 25.0, 40.0, 80.0)  # Hz: a peak is narrow
-RESONANCE = ShapeParameter("resonance", "Hz", _SCREENED, 2.0, 200.0)
+RESONANCE = ShapeParameter("resonance", "Hz", _SCREENED, lower=2.0, upper=200.0)
 """Of the link against the locked motor, at the mean of its inertia."""
-DAMPING = ShapeParameter("damping", "1", (0.1,), 0.002, 2.0)
-ROTOR_SHARE = ShapeParameter("rotor_share", "1", (0.3,), 0.005, 0.95)
+DAMPING = ShapeParameter("damping", "1", (0.1,), lower=0.002, upper=2.0)
+ROTOR_SHARE = ShapeParameter("rotor_share", "1", (0.3,), lower=0.005, upper=0.95)
 """Share of the motor in the inertia that moves with the joint."""
 
 
@@ -73,8 +73,21 @@ class FlexibleJoint(Forceless):
         return gear, response
 
     def transmission(self, robot: Robot, stiffness: float, gap: float) -> Transmission:
-        """Return it as a simulator has it, for the motor and the damping of this shape."""
+        """Return it as a simulator has it, for the motor and the damping of this shape.
+
+        Parameters
+        ----------
+        robot : as described.
+        stiffness : N m/rad or N/m.
+        gap : rad or m, width of the dead zone; 0 for none.
+        """
         joint = robot.names.index(str(self.joint))
         resonance, damping, share = self.shape
         rotor = share / (1.0 - share) * mean_inertia(robot, joint)
-        return Transmission(joint, stiffness, damping * stiffness / (np.pi * resonance), gap, rotor)
+        return Transmission(
+            joint=joint,
+            stiffness=stiffness,
+            damping=damping * stiffness / (np.pi * resonance),
+            gap=gap,
+            rotor=rotor,
+        )

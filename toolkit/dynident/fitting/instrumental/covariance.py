@@ -102,7 +102,7 @@ def _carried(
         stop = min(start + _BLOCK, motion.samples)
         first, last = max(0, start - margin), min(motion.samples, stop + margin)
         raw, core = slice(first, last), slice(start - first, stop - first)
-        block = sampled.block(model, raw)
+        block = model.with_regressor(sampled.block(model, raw))
         here = {label: own[raw] for label, own in known.items()}
         V = model.columns(block, values, here)[:, :, kept]
         weighted = np.zeros_like(V)

@@ -62,7 +62,17 @@ def pose(model: Model, dataset: Dataset) -> PosedRegression:
 
 
 def pieces_of(model: Model, dataset: Dataset, values: np.ndarray | None) -> list[TriangularFactors]:
-    """Factors, joint by joint, of consecutive pieces of the data, equally long to a row."""
+    """Factors, joint by joint, of consecutive pieces of the data, equally long to a row.
+
+    Parameters
+    ----------
+    model, dataset : what is fitted to what.
+    values : (p,) at which columns that depend on the fit are taken; or None.
+
+    Returns
+    -------
+    At most `PIECES`, in the order of time; none without rows.
+    """
     total = sum(len(sample(one, dataset.filter).t) for one in dataset.recordings)
     borders = np.round(np.arange(1, PIECES + 1) * total / PIECES).astype(int)
     pieces: list[list[TriangularFactors]] = [[] for _ in borders]

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dynident.errors import DynidentError, RecordingError
-from dynident.recording.formats.columns import ColumnTable
+from dynident.recording.formats.column_names import ColumnTable
 
 COLUMNS = "columns"
 """Array of text, in the same file, that names the columns of every record."""

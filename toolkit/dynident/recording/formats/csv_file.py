@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dynident.errors import FileError, RecordingError
-from dynident.recording.formats.columns import ColumnTable
+from dynident.recording.formats.column_names import ColumnTable
 
 
 def open_csv(data: bytes, file: str) -> ColumnTable:

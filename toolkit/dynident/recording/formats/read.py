@@ -12,7 +12,7 @@ import numpy as np
 from dynident import files
 from dynident.errors import RecordingError
 from dynident.recording.formats.binary_files import open_mat, open_npz, open_parquet, pick
-from dynident.recording.formats.columns import (
+from dynident.recording.formats.column_names import (
     OPTIONAL,
     PARTIAL,
     REQUIRED,

@@ -284,6 +284,10 @@ def bounded(text: str | None, count: int, what: str) -> Array:
     text, count, what
         As in `finite`.
 
+    Returns
+    -------
+    (count,)
+
     Raises
     ------
     RobotError
@@ -302,6 +306,10 @@ def sizes(text: str | None, count: int, what: str) -> tuple[float, ...]:
     ----------
     text, count, what
         As in `bounded`.
+
+    Returns
+    -------
+    `count` of them.
 
     Raises
     ------
@@ -367,6 +375,10 @@ def rotors(element: Element, joint: str, kind: str | None, where: str) -> Iterat
         A joint or a transmission.
     joint, kind, where
         As in `stated_dynamics`.
+
+    Yields
+    ------
+    One for each that is stated.
     """
     for rotor in element.iter("drake:rotor_inertia"):
         # Both ways of stating a number: an attribute, and the element's text.

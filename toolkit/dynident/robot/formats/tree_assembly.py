@@ -124,6 +124,10 @@ def assemble(
     where : str
         The file, for messages.
 
+    Returns
+    -------
+    The links and the joints that move, those that are wanted in their order.
+
     Raises
     ------
     RobotError

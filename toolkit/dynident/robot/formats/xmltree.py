@@ -145,6 +145,10 @@ def reals(text: str | None, count: int, what: str, where: str) -> NDArray[np.flo
     where : str
         For messages.
 
+    Returns
+    -------
+    (count,)
+
     Raises
     ------
     RobotError
@@ -169,6 +173,10 @@ def finite(text: str | None, count: int, what: str, where: str) -> NDArray[np.fl
     ----------
     text, count, what, where
         As in `reals`.
+
+    Returns
+    -------
+    (count,)
 
     Raises
     ------

@@ -59,6 +59,10 @@ def heavy_geoms(model: MjcfModel, body: MjcfBody, where: str) -> Iterator[Elemen
     where : str
         The body, for messages.
 
+    Yields
+    ------
+    Copies of geoms, with the attributes of their defaults.
+
     Raises
     ------
     RobotError
