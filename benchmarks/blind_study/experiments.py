@@ -28,7 +28,7 @@ class SensorError:
     size: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Laboratory(Experiment):
     """An experiment whose torque noise has a colour and whose encoder may be wrong.
 
@@ -140,11 +140,13 @@ class Plan:
         case, made = self.case, self.made
         named = {one.effect for one in case.hidden}
         return Laboratory(
-            made.robot,
-            made.controller,
-            runs,
-            (*self.known, *hidden),
-            Sensors(position_std=case.position_std, position_resolution=case.position_resolution),
+            robot=made.robot,
+            controller=made.controller,
+            runs=runs,
+            effects=(*self.known, *hidden),
+            sensors=Sensors(
+                position_std=case.position_std, position_resolution=case.position_resolution
+            ),
             seed=case.seed * 10007 + case.number,
             friction_width=case.width,
             nominal=made.nominal,
