@@ -65,12 +65,6 @@ class Sampled:
         """Rate of the decimated rows."""
         return self.parallel.output_rate_hz
 
-    def blocks(self, model: Model, evaluate: Evaluate) -> Iterator[list[np.ndarray]]:
-        """Evaluate columns block by block; each as decimated rows."""
-        for plan in self._plans():
-            columns = evaluate(self.block(model, plan.raw))
-            yield [self.parallel.apply_block(one, plan) for one in columns]
-
     def columns(self, model: Model, values: np.ndarray | None = None) -> Iterator[np.ndarray]:
         """Columns of a model block by block, (T, n, p) as decimated rows.
 
@@ -99,8 +93,11 @@ class Sampled:
         return self.parallel.apply(columns)[self.kept]
 
     def decimate(self, model: Model, evaluate: Evaluate) -> list[np.ndarray]:
-        """All decimated rows of some columns; see `blocks`."""
-        parts = list(self.blocks(model, evaluate))
+        """Evaluate columns block by block; all of their decimated rows."""
+        parts = [
+            [self.parallel.apply_block(one, plan) for one in evaluate(self.block(model, plan.raw))]
+            for plan in self._plans()
+        ]
         return [np.concatenate(pieces) for pieces in zip(*parts, strict=True)]
 
     def block(self, model: Model, raw: slice = slice(None)) -> Block:
