@@ -32,6 +32,17 @@ def test_four_errors_and_nothing_written(run, tmp_path):
     assert listing(tmp_path) == before
 
 
+def test_the_loop_is_judged_by_the_criteria_of_the_study(run, tmp_path):
+    """With two periods in the record its noise is measured, unless nothing counts as repeated."""
+    said = []
+    for criteria in ("", "\n[criteria.loops]\nrepeats = 1e-9\n"):
+        text = STUDY.replace('"test.csv"\n', '"test.csv"\nperiod = 2.0\n') + criteria
+        done = run("simulate", write_loop_study(tmp_path, text))
+        assert done.status == 0
+        said.append("nothing repeats" in done.out)
+    assert said == [False, True]
+
+
 def test_report_and_picture(run, tmp_path):
     path = write_loop_study(tmp_path)
     done = run("simulate", path, "--report", "loop.html", "--plot", "loop.png")

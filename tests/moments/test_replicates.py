@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dynident.criteria import DEFAULTS
 from dynident.moments.replicates import replicate_moments
 from dynident.moments.solution import regress
 
+RELIABLE = DEFAULTS.noise.reliable
 RNG = np.random.default_rng(11)
 
 
@@ -61,7 +63,7 @@ def test_instruments_do_not_shrink_what_least_squares_shrinks() -> None:
         data = np.concatenate([columns, torque], axis=2)
         summed = replicate_moments(data, data, np.array([0, 200]), "repeated")
         pooled = summed.pooled()
-        found.append(regress(pooled).values)
+        found.append(regress(pooled, RELIABLE).values)
         plain.append(np.linalg.solve(pooled.gram, pooled.cross))
     assert np.allclose(np.mean(found, axis=0), truth, atol=0.05)
     assert np.allclose(np.mean(plain, axis=0), truth / 1.49, atol=0.05)
@@ -72,7 +74,9 @@ def test_directions_without_signal_are_left_out() -> None:
     columns = np.stack([np.hstack([clean, RNG.normal(size=(300, 1))]) for _ in range(2)])
     torque = np.repeat(3.0 * clean[None], 2, axis=0)
     data = np.concatenate([columns, torque], axis=2)
-    solution = regress(replicate_moments(data, data, np.array([0, 300]), "repeated").pooled())
+    solution = regress(
+        replicate_moments(data, data, np.array([0, 300]), "repeated").pooled(), RELIABLE
+    )
     assert solution.rank == 1
     assert np.allclose(solution.values, [3.0, 0.0], atol=0.1)
 
@@ -80,6 +84,8 @@ def test_directions_without_signal_are_left_out() -> None:
 def test_dependent_columns_get_the_smallest_answer_and_no_explosion() -> None:
     clean = RNG.normal(size=(2, 300, 1))
     data = np.concatenate([clean, 2 * clean, 5 * clean], axis=2)
-    solution = regress(replicate_moments(data, data, np.array([0, 300]), "single").pooled())
+    solution = regress(
+        replicate_moments(data, data, np.array([0, 300]), "single").pooled(), RELIABLE
+    )
     assert solution.rank == 1
     assert np.allclose(solution.values @ [1.0, 2.0], 5.0)

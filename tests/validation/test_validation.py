@@ -19,6 +19,7 @@ from dynident.closed_loop import (
     Sensors,
     TrueEffect,
 )
+from dynident.criteria import DEFAULTS
 from dynident.errors import SimulationError
 from dynident.evidence import compare
 from dynident.fitting import Estimate
@@ -185,7 +186,7 @@ def test_a_healthy_model_is_not_called_poor_within_the_noise(stated: bool) -> No
     )
     assert found.verdict == "follows"
     (run,) = found.runs
-    off = shifted(run.simulated, 0.5 * noise)
+    off = shifted(run.simulated, 0.5 * found.judgement.errors.position_noise)
     doubtful = replace(found, runs=(replace(run, simulated=off, reference=run.simulated),))
     assert np.all(doubtful.errors.joints[0] > doubtful.without_model.joints[0])
     assert doubtful.verdict == "follows" and "it cannot be told whether" in doubtful.sentence
@@ -235,12 +236,12 @@ def test_noise_of_rows_that_do_not_repeat_is_not_zero() -> None:
         period=2.4,
     )
     every = np.ones(len(sample(noisy, None).t), dtype=bool)
-    found = _noise(noisy, Dataset((noisy,)), every, lambda one: one.tau)
+    found = _noise(noisy, Dataset((noisy,)), every, lambda one: one.tau, DEFAULTS.loops)
     # The same with two whole periods and nothing besides.
     rows = t >= t[-1] - 4.8 + 1e-9
     whole = noisy.replace(**{x: getattr(noisy, x)[rows] for x in ("t", "q", "tau", "q_ref")})
     every = np.ones(len(sample(whole, None).t), dtype=bool)
-    other = _noise(whole, Dataset((whole,)), every, lambda one: one.tau)
+    other = _noise(whole, Dataset((whole,)), every, lambda one: one.tau, DEFAULTS.loops)
     assert found is not None and other is not None
     np.testing.assert_allclose(found[[0, 3]], other[[0, 3]], rtol=0.03)
 

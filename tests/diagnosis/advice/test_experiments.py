@@ -10,7 +10,7 @@ from dynident.diagnosis.advice.candidate_experiments import (
     CandidateExperiments,
     Recorded,
 )
-from dynident.diagnosis.advice.experiments import Adviser, revealing, separating
+from dynident.diagnosis.advice.experiments import Adviser
 from dynident.effects import catalogue, effects_of
 from dynident.model import Model
 from dynident.robot import Robot
@@ -35,7 +35,10 @@ def fitted(robot: Robot, *more: str) -> tuple[Model, np.ndarray]:
 
 @pytest.fixture(scope="module")
 def adviser() -> Adviser:
-    model, values = fitted(arm())
+    return advising(*fitted(arm()))
+
+
+def advising(model: Model, values: np.ndarray) -> Adviser:
     return Adviser(CandidateExperiments(model=model, values=values, recorded=RECORDED))
 
 
@@ -98,7 +101,7 @@ def test_effects_are_told_apart_where_they_differ_most(adviser: Adviser) -> None
 def test_an_effect_already_in_the_model_is_told_from_others() -> None:
     model, values = fitted(arm(), "quadratic_drag@elbow")
     pair = (one("quadratic_drag@elbow"), one("asymmetric_friction@elbow"))
-    said = separating(pair, [0.2], model, values, RECORDED)
+    said = advising(model, values).separating(pair, [0.2])
     assert "elbow" in said and "differ by" in said and "N m" in said
 
 
@@ -118,5 +121,5 @@ def test_an_arm_without_limits_is_advised_beyond_what_was_recorded() -> None:
         'lower="-2.5" upper="2.5" velocity="6" ', ""
     )
     model, values = fitted(Robot.from_text(text))
-    said = revealing(one("quadratic_drag@shoulder"), model, values, RECORDED)
+    said = advising(model, values).revealing(one("quadratic_drag@shoulder"))
     assert "up to 2.5 rad/s (recorded: up to 1.7)" in said

@@ -31,6 +31,7 @@ from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import regress
 from synthetic import arm
 
+RELIABLE = Criteria().noise.reliable
 MODEL = Model(arm()) + "viscous_friction"
 INSTANTS, REPLICATES, BLOCKS = 600, 3, 20
 EDGES = np.linspace(0, INSTANTS, BLOCKS + 1).astype(int)
@@ -86,7 +87,7 @@ class Rows:
 
 def fitted(known: SecondMoments) -> EvidenceFit:
     """A fit as the scores know it: of the evidence only its moments count."""
-    solution = regress(known.pooled())
+    solution = regress(known.pooled(), RELIABLE)
     unused: Any = None
     return EvidenceFit(
         criteria=Criteria(),
@@ -176,6 +177,22 @@ def test_a_column_that_the_model_has_is_not_identifiable() -> None:
     assert found.rank == 0 and found.drop == 0.0 and found.p_value == 1.0
 
 
+@pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")
+@pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
+def test_a_column_whose_squares_overflow_is_not_identifiable() -> None:
+    """A shape that is tried may be beyond all numbers: it must not end the search."""
+    rows = Rows((3.0,), seed=4)
+    rows.z = 1e200 * rows.z
+    columns = replicated(rows.z, 0.0, np.random.default_rng(0))
+    known = np.concatenate(
+        [np.tile(rows.x, (REPLICATES, 1, 1)), np.ones((REPLICATES, INSTANTS, 1))], axis=2
+    )
+    with_self = replicate_moments(columns, columns, EDGES, "single")
+    with_model = replicate_moments(known, columns, EDGES, "single")
+    said = score(rows.fitted, effect(), with_model, with_self, 1)
+    assert said.not_identifiable
+
+
 def test_of_two_equal_columns_one_direction_is_left() -> None:
     rows = Rows((0.3,), 3)
     twice = np.repeat(np.tile(rows.z, (REPLICATES, 1, 1)), 2, axis=2)
@@ -232,7 +249,7 @@ def test_held_out_gain_is_positive_for_what_is_there_and_not_for_what_is_not() -
 
 def test_losses_of_an_exact_model_vanish() -> None:
     rows = Rows((0.0,), 8, noise=0.0)
-    losses = held_out_losses(rows.fitted.moments)
+    losses = held_out_losses(rows.fitted.moments, RELIABLE)
     assert losses == pytest.approx(np.zeros(BLOCKS), abs=1e-8 * INSTANTS)
 
 

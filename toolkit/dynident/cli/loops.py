@@ -78,7 +78,7 @@ def simulate(
     study = load_study(file)
     recordings, used = _recordings(study, recording)
     controller = _controller(study, recordings)
-    found = _validation(_estimate(study, estimate, chosen), recordings, controller)
+    found = _validation(study, _estimate(study, estimate, chosen), recordings, controller)
     _write(found, report, plot)
     words = {"train": ("No recording is for testing: these are the training recordings.",)}
     failed = any(one.status != "no_reference" for one in found.skipped)
@@ -167,7 +167,9 @@ def _estimate(study: Study, saved: Path | None, chosen: Chosen) -> Estimate:
     return found
 
 
-def _validation(estimate: Estimate, recordings: Dataset, controller: Controller) -> Validation:
+def _validation(
+    study: Study, estimate: Estimate, recordings: Dataset, controller: Controller
+) -> Validation:
     from dynident.validation import validate
 
     with progress("simulating") as show_progress:
@@ -175,6 +177,7 @@ def _validation(estimate: Estimate, recordings: Dataset, controller: Controller)
             estimate,
             recordings,
             controller,
+            criteria=study.criteria,
             progress=lambda done, total: show_progress(f"{done:.1f} of {total:.1f} s", done, total),
         )
 

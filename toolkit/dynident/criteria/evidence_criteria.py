@@ -56,6 +56,13 @@ class NoiseCriteria(CriteriaGroup):
     copies_beside_simulation: int = criterion(
         2, "copies", "such copies where the columns come from a simulated motion", least=2
     )
+    reliable: float = criterion(
+        0.05,
+        "1",
+        "share of signal in a direction of the columns, below which it is noise and left out",
+        over=0,
+        most=1,
+    )
     blocks: int = criterion(
         20, "blocks", "blocks of time for cross-validation, over all recordings", least=3
     )

@@ -106,6 +106,7 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
     ]
     noise = tuple(flat_noise(std or 1.0) for std in torque_std) if near is None else near.noise
     known = any(run.kind != "single" for run in evidence.runs)
+    reliable = evidence.criteria.noise.reliable
     columns, values, fixed_point = [], at, FixedPoint()
     for round in range(criteria.value_rounds if model.needs_values else criteria.noise_rounds):
         if not columns or model.needs_values:
@@ -115,7 +116,7 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
                 for r in range(len(evidence.runs))
             ]
         white = _whiten(evidence, columns, noise, values)
-        values = regress(_moments(evidence, model, white).pooled()).values
+        values = regress(_moments(evidence, model, white).pooled(), reliable).values
         if round == 0 and near is None:
             # Along a robot without bodies their columns are rounding errors, and any value fits.
             values = _keeping_dependent(model, at, values)
@@ -127,7 +128,7 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
         at = _held(model, fixed_point.following(model, at, values))
     white = _whiten(evidence, columns, noise, values)
     summed = _moments(evidence, model, white)
-    solution = regress(summed.pooled())
+    solution = regress(summed.pooled(), reliable)
     values = solution.values
     left = [JointResidual.of(evidence, columns, values, j) for j in range(n)]
     return EvidenceFit(

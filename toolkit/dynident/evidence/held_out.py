@@ -120,7 +120,8 @@ def on_blocks(evidence: Evidence, fitted: EvidenceFit) -> HeldOut:
         columns = np.stack([run.fold(c) for c in joints], axis=2)  # (P, S, n, p + 1)
         residual = np.empty(columns.shape[:3])
         for start, stop in zip(run.edges[:-1], run.edges[1:], strict=True):
-            values = regress(fitted.moments.without(block)).values
+            reliable = evidence.criteria.noise.reliable
+            values = regress(fitted.moments.without(block), reliable).values
             residual[:, start:stop] = columns[:, start:stop] @ np.append(-values, 1.0)
             block += 1
         measured = 1 if run.kind == "noise_augmented" else len(residual)

@@ -99,12 +99,6 @@ class Estimate:
         sigma = np.sqrt(np.clip(np.diag(self.covariance), 0.0, None))
         return np.where(self.identified & np.any(self.covariance), sigma, np.nan)
 
-    @property
-    def relative_sigma(self) -> np.ndarray:
-        """Standard deviations over absolute values, (p,)."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return self.sigma / np.abs(self.values)
-
     @cached_property
     def robot(self) -> Robot:
         """The robot with the identified base parameters.

@@ -13,9 +13,6 @@ EXACT = 1e-9
 """Directions below this share of the largest (of columns scaled to norm 1) are dependent; in terms
 of squares, in which half of the digits are gone."""
 
-RELIABLE = 0.05
-"""Directions in which less than this share of the square is signal are noise, and left out."""
-
 
 @dataclass(frozen=True)
 class MomentSolution:
@@ -48,22 +45,27 @@ class MomentSolution:
         return scaled @ scaled.T
 
 
-def regress(moments: SecondMoments) -> MomentSolution:
+def regress(moments: SecondMoments, least_reliability: float) -> MomentSolution:
     """Regress the last column on the others.
 
     Parameters
     ----------
     moments : (p + 1, p + 1) of all rows.
+    least_reliability : share of signal in the square of a direction, below which it is noise and
+        left out.
 
     Raises
     ------
     FitError
         If a moment is not finite.
     """
-    return solve_products(moments.signal[:-1, :-1], moments.gram, moments.signal[:-1, -1])
+    signal = moments.signal
+    return solve_products(signal[:-1, :-1], moments.gram, signal[:-1, -1], least_reliability)
 
 
-def solve_products(signal: np.ndarray, total: np.ndarray, moment: np.ndarray) -> MomentSolution:
+def solve_products(
+    signal: np.ndarray, total: np.ndarray, moment: np.ndarray, least_reliability: float
+) -> MomentSolution:
     """Solve signal @ values = moment where the columns carry signal.
 
     Parameters
@@ -72,10 +74,11 @@ def solve_products(signal: np.ndarray, total: np.ndarray, moment: np.ndarray) ->
         Signal and total moments of the columns.
     moment : (p,)
         Signal moment of the columns with the torque.
+    least_reliability : see `regress`.
 
     Returns
     -------
-    The solution, with the directions that it is in
+    The solution, with the directions that it is in.
 
     Raises
     ------
@@ -85,7 +88,7 @@ def solve_products(signal: np.ndarray, total: np.ndarray, moment: np.ndarray) ->
     scale = np.sqrt(np.diag(total))
     white = orthonormal_directions(total, np.where(scale > 0, scale, 1.0))
     reliability, turn = np.linalg.eigh(white.T @ signal @ white)
-    good = reliability > RELIABLE
+    good = reliability > least_reliability
     basis = white @ turn[:, good]
     reliability = reliability[good]
     values = basis @ ((basis.T @ moment) / reliability)

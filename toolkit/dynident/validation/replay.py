@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dynident.closed_loop import Controller, Mechanism
-from dynident.criteria import DEFAULTS, LoopCriteria
+from dynident.criteria import DEFAULTS, Criteria, LoopCriteria
 from dynident.errors import DynidentError, DynidentWarning, RecordingError, SimulationError
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import sources_of
@@ -40,7 +40,7 @@ def validate(
     dataset: Dataset,
     controller: Controller,
     *,
-    criteria: LoopCriteria = DEFAULTS.loops,
+    criteria: Criteria = DEFAULTS,
     progress: Progress | None = None,
 ) -> Validation:
     """Simulate the identified robot in the loop that was recorded, and compare the motion.
@@ -55,7 +55,7 @@ def validate(
     estimate : of the robot and its effects.
     dataset : recordings; those without a reference are left out by name.
     controller : of the loop in which they were made.
-    criteria : what the errors mean.
+    criteria : its `loops` say what the errors mean.
     progress : called now and then with the seconds simulated, and the seconds to simulate.
 
     Returns
@@ -68,7 +68,7 @@ def validate(
         If no recording has a reference, or the controller cannot be simulated or is another
         robot's. A loop that cannot be simulated is no error: see `Validation.skipped`.
     """
-    return simulate_again(Judged.of(estimate), dataset, controller, criteria, progress)
+    return simulate_again(Judged.of(estimate), dataset, controller, criteria.loops, progress)
 
 
 @dataclass(frozen=True, eq=False)

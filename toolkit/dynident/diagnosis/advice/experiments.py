@@ -16,7 +16,6 @@ from dynident.effects import Effect
 from dynident.errors import DynidentError
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
-from dynident.model import Model
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,45 +258,3 @@ class _Separation:
     size: float
     joint: int
     rms: float
-
-
-def revealing(effect: Effect, model: Model, values: np.ndarray, recorded: Recorded) -> str:
-    """Say which experiment would show an effect; see `Adviser.revealing`.
-
-    Parameters
-    ----------
-    effect : that the recordings do not show.
-    model, values : the fitted model and its parameters, (p,).
-    recorded : what motion there is already.
-
-    Returns
-    -------
-    One sentence without a full stop.
-    """
-    return Adviser(CandidateExperiments(model=model, values=values, recorded=recorded)).revealing(
-        effect
-    )
-
-
-def separating(
-    effects: Sequence[Effect],
-    own: Sequence[float],
-    model: Model,
-    values: np.ndarray,
-    recorded: Recorded,
-) -> str:
-    """Say which experiment would distinguish effects; see `Adviser.separating`.
-
-    Parameters
-    ----------
-    effects, own : the one that was added with those that explain the same; its values.
-    model, values : the fitted model and its parameters, (p,).
-    recorded : what motion there is already.
-
-    Returns
-    -------
-    One sentence without a full stop.
-    """
-    return Adviser(CandidateExperiments(model=model, values=values, recorded=recorded)).separating(
-        effects, own
-    )

@@ -184,7 +184,7 @@ def score(
     left_total = own.total - cross - cross.T + back.T @ known.gram @ back
     scale = np.sqrt(np.clip(np.diag(own.signal), 0.0, None))
     seen = _seen(effect, fitted, scale)
-    if not np.any(seen):
+    if not np.any(seen) or not np.all(np.isfinite(own.signal)):
         return Score(effect=effect, payload_recordings=payload_recordings, not_identifiable=True)
     scale = np.where(seen, scale, 1.0)
     # Directions of the columns, by what is left of them beside the model.
@@ -196,7 +196,10 @@ def score(
     directions = white @ turn[:, visible]
     moment = directions.T @ (signal[p] - back.T @ known.signal[:p, p])
     part = solve_products(
-        directions.T @ left_signal @ directions, directions.T @ left_total @ directions, moment
+        directions.T @ left_signal @ directions,
+        directions.T @ left_total @ directions,
+        moment,
+        fitted.criteria.noise.reliable,
     )
     if part.rank == 0:
         return Score(effect=effect, payload_recordings=payload_recordings, not_identifiable=False)
@@ -272,14 +275,15 @@ def cross_validate(
         _joined(fitted.moments.signal, with_model.signal, with_self.signal),
     )
     without = np.r_[0 : len(fitted.values), both.inputs]
-    return held_out_losses(both.among(without)), held_out_losses(both)
+    reliable = fitted.criteria.noise.reliable
+    return held_out_losses(both.among(without), reliable), held_out_losses(both, reliable)
 
 
-def held_out_losses(summed: SecondMoments) -> np.ndarray:
+def held_out_losses(summed: SecondMoments, least_reliability: float) -> np.ndarray:
     """Squared residual of each block under the fit to all others, free of noise in the mean."""
     found = []
     for block in range(len(summed.signal)):
-        values = regress(summed.without(block)).values
+        values = regress(summed.without(block), least_reliability).values
         combination = np.append(-values, 1.0)
         found.append(combination @ summed.signal[block] @ combination)
     return np.array(found)
