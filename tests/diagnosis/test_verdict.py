@@ -30,7 +30,7 @@ def recordings(model: Model, **values: float) -> tuple[Recording, ...]:
 
 
 def with_contact(recording: Recording, size: float) -> Recording:
-    """A bump of 0.4 s that returns in every period, at the elbow."""
+    """A pulse of 0.4 s that returns in every period, at the elbow."""
     pulse = size * np.exp(-(((np.mod(recording.t, 8.0) - 3.0) / 0.15) ** 2))
     tau = np.array(recording.tau)
     tau[:, 1] += pulse

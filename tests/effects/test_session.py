@@ -52,7 +52,7 @@ def test_a_contact_is_in_one_recording_only() -> None:
     one = effect("contact@hinge", 3, 100.0, 0.5)
     pulse = one.columns(block(number=3))[:, 0, 0]
     assert T[np.argmax(pulse)] == pytest.approx(100.0, abs=0.05)
-    # The area of a Gaussian bump of height one.
+    # The area of a Gaussian pulse of height one.
     assert np.trapezoid(pulse, T) == pytest.approx(0.5 * np.sqrt(2 * np.pi), rel=1e-3)
     assert not np.any(one.columns(block(number=2)))
     assert list(one.variants(ROBOT)) == [one]

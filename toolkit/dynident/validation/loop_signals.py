@@ -39,6 +39,7 @@ def filtered_run(
     controller, model : of the simulated loop.
     dataset : for its filter and the stated noise.
     settling : s to drop at the start.
+    criteria : of when periods repeat, for the noise.
 
     Returns
     -------

@@ -162,7 +162,7 @@ def _masked(
 def _resolved(
     evidence: Evidence, fitted: EvidenceFit, pulses: Sequence[DisturbancePulse]
 ) -> tuple[DisturbancePulse, ...]:
-    """Bumps at joints whose residual is more than what differentiation and filters leave."""
+    """Pulses at joints whose residual is more than what differentiation and filters leave."""
     if not pulses:
         return ()
     judged = on_recordings(evidence, fitted)
@@ -174,7 +174,7 @@ def _resolved(
 def _common(
     pulses: Sequence[DisturbancePulse], others: Sequence[DisturbancePulse], reach: float
 ) -> tuple[DisturbancePulse, ...]:
-    """Bumps that are among others too, at about the same time."""
+    """Pulses that are among others too, at about the same time."""
     return tuple(
         one
         for one in pulses

@@ -206,7 +206,7 @@ def _about(peak: _PulsePlace, k: int, one: Repeated, criteria: ContactCriteria) 
 
 @dataclass(frozen=True, eq=False)
 class _Tried:
-    """Bumps of one width at M places.
+    """Pulses of one width at M places.
 
     Attributes
     ----------

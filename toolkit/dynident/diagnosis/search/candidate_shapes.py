@@ -54,7 +54,7 @@ def refined(
     ----------
     evidence, fitted : the evidence, and the model without the effect as it fits it.
     one : the score that is refined.
-    columns_of : where columns come from; `Evidence.of` by default.
+    columns_of : where columns come from; `Evidence.columns` by default.
     """
     if not one.drop > 0:
         return one

@@ -30,8 +30,9 @@ class Score:
     Attributes
     ----------
     effect : with its shape.
-    carriers : which runs carry the payload; None for effects to which that does not matter.
-    absorbed : whether nothing of its columns is left beside the model's.
+    payload_recordings : which runs carry the payload; None for effects to which that does not
+        matter.
+    not_identifiable : whether nothing of its columns is left beside the model's.
     rank : number of its parameters that the data can tell.
     drop : of the squared, whitened, noise-free residual.
     share : drop over the squared residual with its noise.
