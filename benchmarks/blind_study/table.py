@@ -158,7 +158,7 @@ def figures(judged: list[Judged]) -> list[Rate]:
         Rate("elasticity, backlash: held-out error within 1.2", _within(soft_right, 1.2), 0.95),
         Rate("both of two effects found", [j.both for j in both], 0.80),
         Rate(
-            "absorbed effects reported as absorbed",
+            "effects that are not identifiable reported as such",
             [j.absorbed for j in of.get("absorbed", [])],
             1.0,
         ),

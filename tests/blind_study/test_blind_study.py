@@ -163,7 +163,7 @@ def test_foreign_laws_are_to_be_refused_and_absorbed_ones_listed() -> None:
     one = judge(hidden, _said("nothing_missing", candidates=(listed,)))
     assert one.absorbed and not one.alarm
     rates = {rate.what: rate for rate in figures([strange, one])}
-    assert rates["absorbed effects reported as absorbed"].held == [True]
+    assert rates["effects that are not identifiable reported as such"].held == [True]
 
 
 def test_rates_come_with_their_interval_and_what_is_demanded() -> None:

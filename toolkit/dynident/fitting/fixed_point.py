@@ -42,8 +42,8 @@ class FixedPoint:
 
 
 def not_converged(change: float) -> str:
-    """Say that values did not settle; `change` is the last one, relative."""
+    """Say that values did not converge; `change` is the last one, relative."""
     return (
-        "The columns that depend on the parameters themselves have not settled: in the last round "
-        f"the values still changed by {100 * change:.2g} %."
+        "The columns that depend on the parameters themselves have not converged: in the last "
+        f"round the values still changed by {100 * change:.2g} %."
     )
