@@ -81,6 +81,10 @@ def of_links(
     robot : Robot or None
         The tree that carries the links, if it is known.
     rotors : joints with a rotor inertia of their own, which can do without mass.
+
+    Returns
+    -------
+    The bodies, and what is typical of the robot's links.
     """
     geometry: dict[str, LinkGeometry] = {}
     broken: dict[str, tuple[str, ...]] = {}

@@ -81,6 +81,10 @@ def kind_of(verdict: str, *, named: bool, over_floor: float) -> tuple[Said, Size
     verdict : of the diagnosis.
     named : whether it adds an effect.
     over_floor : held-out error of the model as given, over the noise floor.
+
+    Returns
+    -------
+    What the answer says, and whether what the given model lacks is large or small.
     """
     size: Size = "large" if over_floor >= LARGE else "small"
     if verdict == "unexplained":

@@ -81,7 +81,7 @@ class Attempt:
 def solve_scaled(
     program: ScaledProgram, starts: Sequence[np.ndarray], tolerance: float, max_iterations: int
 ) -> tuple[Attempt, ...]:
-    """Solve a program from each start; return where each ended. One that fails raises nothing.
+    """Solve a program from each start. One that fails raises nothing.
 
     Parameters
     ----------
@@ -89,6 +89,10 @@ def solve_scaled(
     starts : of all variables, (k,) in their units and within their bounds.
     tolerance : Ipopt's, on the scaled program.
     max_iterations : of each start.
+
+    Returns
+    -------
+    Where each start ended, in the order of the starts.
     """
     points = [program.at(start / program.scale) for start in starts]
     undefined = [program.undefined(point) for point in points]

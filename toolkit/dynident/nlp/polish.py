@@ -72,6 +72,10 @@ def polished(
     problem : that was solved.
     x : (s,) what a conic solver found.
     multipliers : its own.
+
+    Returns
+    -------
+    (s,) the optimum, and its multipliers.
     """
     pattern = _pattern(problem, x, multipliers)
     best = current = x, multipliers

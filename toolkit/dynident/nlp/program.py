@@ -214,7 +214,7 @@ class Program(_Printed):
         tolerance: float = 1e-10,
         max_iterations: int = 500,
     ) -> ProgramSolution:
-        """Solve the program by Ipopt with exact Hessian, and return the best of the starts.
+        """Solve the program by Ipopt with exact Hessian.
 
         A start that fails raises nothing: ask `status`, or call `ProgramSolution.require`.
 
@@ -224,6 +224,10 @@ class Program(_Printed):
             the variable says. The best solution wins. Default: one start.
         tolerance : Ipopt's, on the scaled program.
         max_iterations : of each start.
+
+        Returns
+        -------
+        The best of the starts' solutions, and where every start ended.
 
         Raises
         ------

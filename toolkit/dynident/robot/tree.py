@@ -152,7 +152,7 @@ class Description:
 
 
 def random_motion(joints: Sequence[Joint], seed: int, samples: int) -> tuple[Array, Array, Array]:
-    """Return q, v, a (samples, n), uniform within the limits.
+    """Draw a motion, uniform within the limits.
 
     Parameters
     ----------
@@ -160,6 +160,10 @@ def random_motion(joints: Sequence[Joint], seed: int, samples: int) -> tuple[Arr
         Where a limit is missing (or leaves no room) q is within pi rad or 1 m, the speed within
         3 rad/s or 1 m/s; accelerations are within 10 rad/s^2 or m/s^2.
     seed, samples : int
+
+    Returns
+    -------
+    q, v, a : (samples, n), in rad or m, and per s and s^2.
     """
     rng = np.random.default_rng(seed)
     spans = np.array([_span(joint) for joint in joints])

@@ -186,13 +186,17 @@ def _seen(fitted: EvidenceFit, effect: Effect) -> Block:
 
 
 def judged(evidence: Evidence, fitted: EvidenceFit, one: Score, tests: int) -> tuple[Score, str]:
-    """Return a score refined and cross-validated, and the gate that it does not pass, if any.
+    """Refine and cross-validate a score, and judge it.
 
     Parameters
     ----------
     evidence, fitted : the data, and the model as it fits them.
     one : the score.
     tests : number of effects and shapes tried.
+
+    Returns
+    -------
+    The score, and the gate that it does not pass, in words; "" where it passes all.
     """
     one = _confirm(evidence, fitted, one)
     return one, _refusal(one, evidence, fitted, tests, evidence.criteria.gates.first_share)

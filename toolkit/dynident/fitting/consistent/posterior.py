@@ -22,7 +22,7 @@ def posterior(
     metric: Metric | None,
     within: Within,
 ) -> tuple[Problem, tuple[str, ...]]:
-    """Return the problem of a projection, and what has to be noted about it.
+    """State a projection as a problem.
 
     Parameters
     ----------
@@ -30,6 +30,10 @@ def posterior(
     x_hat : (s,) what is projected.
     names : the model's parameters.
     prior, metric, within : as of `project`.
+
+    Returns
+    -------
+    The problem, and what has to be noted about it.
 
     Raises
     ------

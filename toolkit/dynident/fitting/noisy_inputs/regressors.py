@@ -141,11 +141,15 @@ def _cluster(regressor: StatisticsRegressor, pieces: TriangularFactors, psi: np.
 def found_by(
     regressor: StatisticsRegressor, posed: PosedRegression, psi: np.ndarray | None
 ) -> RegressionResult:
-    """Fit an estimator as `fitted` does, and return what an estimate holds of it.
+    """Fit an estimator as `fitted` does.
 
     Parameters
     ----------
     regressor, posed, psi : as of `fitted`.
+
+    Returns
+    -------
+    What an estimate holds of it; without a covariance where `psi` is not known.
     """
     regressor = fitted(regressor, posed, psi)
     words = regressor.words

@@ -23,7 +23,7 @@ from dynident.validation.validation_result import Validation
 def simulated_loop(
     validation: Validation, recording: str | None = None, joints: tuple[str, ...] | None = None
 ) -> Figure:
-    """The simulated loop of a recording: two rows a joint, a column a quantity.
+    """Return a figure of a recording's simulated loop: two rows a joint, a column a quantity.
 
     Above, what was measured, simulated, and the reference (of the torque: what the control law
     gives for the recorded positions); below, what each leaves of the measurement, with the band of

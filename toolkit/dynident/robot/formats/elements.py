@@ -163,6 +163,10 @@ def required(inertial: Element, where: str, example: str) -> tuple[Element, Elem
     example : str
         How the format states a mass.
 
+    Returns
+    -------
+    The <mass>, and the <inertia>.
+
     Raises
     ------
     RobotError

@@ -71,6 +71,10 @@ def read_tree(text: str, where: str, joints: tuple[str, ...] | None) -> tuple[Op
     joints : tuple of str, optional
         Joints to keep, in order; default: all moving ones.
 
+    Returns
+    -------
+    The parsed description, and the tree of the joints that are kept.
+
     Raises
     ------
     RobotError
