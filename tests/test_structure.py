@@ -178,6 +178,17 @@ def test_public_functions_of_many_arguments_are_documented() -> None:
     assert found == set()
 
 
+def test_documented_attributes_exist() -> None:
+    """Every name in a section "Attributes" is a field, a property or set by a method."""
+    found = {
+        f"{name}: {attribute}"
+        for name, places in classes().items()
+        for _, node in places
+        for attribute in set(_documented_attributes(node)) - set(_members(node))
+    }
+    assert found == set()
+
+
 def _lines(node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
     return (node.end_lineno or 0) - node.lineno + 1
 
@@ -205,6 +216,34 @@ def _fields(node: ast.ClassDef) -> list[str]:
         if "ClassVar" not in ast.unparse(n.annotation)
         and not (n.value and re.search(r"(init=False|kw_only=True)", ast.unparse(n.value)))
     ]
+
+
+def _documented_attributes(node: ast.ClassDef) -> list[str]:
+    """Return the names in the section "Attributes" of a class."""
+    section = re.search(
+        r"^Attributes\n-+\n(.*?)(?=^\w[^\n]*\n-+$|\Z)",
+        ast.get_docstring(node) or "",
+        re.MULTILINE | re.DOTALL,
+    )
+    heads = re.findall(r"^(\S[^:\n]*?)(?: ?:.*)?$", section[1], re.MULTILINE) if section else []
+    return [name.strip() for head in heads for name in head.split(",")]
+
+
+def _members(node: ast.ClassDef) -> Iterator[str]:
+    """Yield the attributes of a class, those from its base classes in the package with them."""
+    for inner in ast.walk(node):
+        if isinstance(inner, ast.Attribute) and isinstance(inner.ctx, ast.Store):
+            yield from [inner.attr] if ast.unparse(inner.value) == "self" else []
+    for inner in node.body:
+        if isinstance(inner, ast.AnnAssign):
+            yield ast.unparse(inner.target)
+        elif isinstance(inner, ast.Assign):
+            yield from map(ast.unparse, inner.targets)
+        elif isinstance(inner, ast.FunctionDef):
+            yield inner.name
+    for base in node.bases:
+        for _, parent in classes().get(ast.unparse(base).split("[")[0], ()):
+            yield from _members(parent)
 
 
 def _overrides(function: Function) -> bool:

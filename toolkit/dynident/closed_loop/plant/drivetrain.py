@@ -83,8 +83,8 @@ class DrivetrainSystem(LeafSystem):
 
     Attributes
     ----------
-    gears, loss, widths : parameters: of the c transmissions; dry friction per torque (N,); speeds
-        (N,) over which it changes its sign. To be set before each simulation.
+    gears : parameters of the c transmissions, to be set before each simulation; `set_loss` sets
+        those of the losses.
     """
 
     def __init__(self, layout: Layout, compliant: np.ndarray, has_forces: bool) -> None:
