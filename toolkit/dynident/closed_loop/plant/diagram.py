@@ -139,7 +139,7 @@ class Plant:
         """
         self._mechanisms = tuple(mechanisms)
         bodies = self._bodies(mechanisms, starts)
-        inertia = block_diag(*(one.inertia for one in mechanisms))
+        inertia: np.ndarray = np.asarray(block_diag(*(one.inertia for one in mechanisms)))
         self._set_train(mechanisms, inertia)
         self._inertia, motors = inertia, np.diag(inertia)
         self.gain = np.concatenate([one.gain for one in mechanisms])
