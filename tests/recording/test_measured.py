@@ -23,7 +23,11 @@ EMPS = {
     "q_ref.slider": "qg",
 }
 AUTHORS = Filter(
-    position_cutoff_hz=100.0, rate_hz=100.0, decimation="chebyshev", edge_s=(0.049, 0.0)
+    position_cutoff_hz=100.0,
+    rate_hz=100.0,
+    decimation="chebyshev",
+    edge_s=(0.049, 0.0),
+    ends="keep",
 )
 
 

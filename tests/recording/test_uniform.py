@@ -65,7 +65,7 @@ def test_a_held_command_keeps_its_impulse():
     kept = np.cumsum(even.tau[:-1] * np.diff(even.t)[:, None], axis=0)[-1]
     np.testing.assert_allclose(kept, given, atol=1e-9)
     # What acts at the new stamps is what acted there: half a sample after the logged command.
-    acts = differentiate(even, Filter()).tau
+    acts = differentiate(even, Filter(ends="keep")).tau
     expected = 3 * motion(even.t - 0.5e-3)
     np.testing.assert_allclose(acts[5:-5], expected[5:-5], atol=0.02)
 

@@ -55,6 +55,7 @@ class _FilterEntry(SettingsTable):
     rate_hz: float | None = Positive
     decimation: Literal["pick", "chebyshev"] = "pick"
     edge_s: tuple[float, float] = (0.0, 0.0)
+    ends: Literal["drop", "keep"] = "drop"
 
 
 class _NoiseEntry(SettingsTable):

@@ -15,7 +15,7 @@ from dynident.fitting.fixed_point import FixedPoint, not_converged
 from dynident.fitting.sampling import rows
 from dynident.model import Model
 from dynident.moments.factors import RANK_TOLERANCE, TriangularFactors, factorise
-from dynident.recording import Dataset, default_filter
+from dynident.recording import Dataset, default_filter, rows_in_words, uniform
 from dynident.robot import BaseParameters, base_parameters
 from dynident.threads import single_threaded
 
@@ -249,7 +249,9 @@ def sources_of(dataset: Dataset) -> tuple[DataSource, ...]:
     """The files behind a dataset."""
     found = []
     for recording in dataset.recordings:
+        recording = uniform(recording)
         settings = dataset.filter or default_filter(recording.rate_hz)
         file, digest = recording.provenance.file, recording.provenance.sha256
-        found.append(DataSource(recording.name or file, digest, settings.description))
+        words = f"{settings.description}; {rows_in_words(recording, settings)}"
+        found.append(DataSource(recording.name or file, digest, words))
     return tuple(found)

@@ -24,7 +24,7 @@ from dynident.recording import (
     default_filter,
     differentiate,
     uniform,
-    within,
+    usable_rows,
 )
 
 BLOCK = 16384
@@ -46,7 +46,7 @@ class Sampled:
     recording : on a uniform clock.
     motion : at the full rate.
     parallel : the low-pass and decimation of columns and torque.
-    kept : decimated rows that lie in the recording's window.
+    kept : decimated rows that are used, see `usable_rows`.
     t, q, v, a, tau : decimated rows, (T,) and (T, n).
     """
 
@@ -150,15 +150,15 @@ def sample(recording: Recording, settings: Filter | None) -> Sampled:
     motion = differentiate(recording, settings)
     parallel = ParallelFilter(settings, motion.rate_hz, recording.period, recording.where)
     times = parallel.times(motion.t)
-    kept = slice(0, len(times))
-    if recording.window is not None:
-        inside = np.flatnonzero(within(times, *recording.window, recording.where))
-        kept = slice(int(inside[0]), int(inside[-1]) + 1)
+    kept = usable_rows(recording, parallel, motion.t, times)
     count = kept.stop - kept.start
     if count < LEAST_ROWS:
         what = f"only {count} rows are left after filtering and decimation"
-        remedy = f"at least {LEAST_ROWS} are needed: record longer, or raise rate_hz in [filter]"
-        raise RecordingError(what, recording.where, remedy)
+        if settings.ends == "drop":
+            edge = max(settings.margins(motion.rate_hz)) / motion.rate_hz + parallel.transient
+            what += f", which take {edge:.2g} s at each end"
+        remedy = f"at least {LEAST_ROWS} are needed: record longer, or raise rate_hz or the "
+        raise RecordingError(what, recording.where, remedy + "cut-offs in [filter]")
     q, v, a, tau = (parallel.apply(x)[kept] for x in (motion.q, motion.v, motion.a, motion.tau))
     return Sampled(
         recording=recording,

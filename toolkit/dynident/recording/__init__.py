@@ -4,11 +4,12 @@
 through `Column`), `Recording` checks them. `uniform` puts jittered time stamps on a uniform clock.
 `differentiate` turns positions into a `Motion`; `ParallelFilter` passes regressor columns and
 torque through one low-pass and decimation, in blocks if asked; both follow a `Filter`.
-`within`, `away_from_edges` and `moving` pick rows; `periods` lays repetitions side by side;
-`require_motion` and `require_torque` refuse recordings that show nothing.
+`usable` and `usable_rows` decide which rows count, `within` and `moving` pick some of them;
+`periods` lays repetitions side by side; `require_motion` and `require_torque` refuse recordings
+that show nothing.
 """
 
-from dynident.recording.dataset import Dataset, Noise, numbered
+from dynident.recording.dataset import Dataset, Noise, numbered, without_ends
 from dynident.recording.filters import (
     Filter,
     Motion,
@@ -20,7 +21,7 @@ from dynident.recording.filters import (
 from dynident.recording.formats.column_names import Column
 from dynident.recording.formats.read import SUFFIXES, read
 from dynident.recording.formats.write import write
-from dynident.recording.masks import away_from_edges, moving, within
+from dynident.recording.masks import moving, within
 from dynident.recording.parallel import FilterBlock, ParallelFilter, choose_factor
 from dynident.recording.periods import Periods, mismatch, periods, require_repetition
 from dynident.recording.plausibility import (
@@ -29,8 +30,9 @@ from dynident.recording.plausibility import (
     resolution,
     warn_of_missing_torque,
 )
-from dynident.recording.recording import SIGNALS, Provenance, Recording
+from dynident.recording.recording import SIGNALS, LeftOut, Provenance, Recording
 from dynident.recording.uniform import uniform
+from dynident.recording.usable_rows import rows_in_words, usable, usable_rows
 
 __all__ = [
     "SIGNALS",
@@ -39,13 +41,13 @@ __all__ = [
     "Dataset",
     "Filter",
     "FilterBlock",
+    "LeftOut",
     "Motion",
     "Noise",
     "ParallelFilter",
     "Periods",
     "Provenance",
     "Recording",
-    "away_from_edges",
     "central_difference",
     "choose_factor",
     "default_filter",
@@ -60,8 +62,12 @@ __all__ = [
     "require_repetition",
     "require_torque",
     "resolution",
+    "rows_in_words",
     "uniform",
+    "usable",
+    "usable_rows",
     "warn_of_missing_torque",
     "within",
+    "without_ends",
     "write",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from dynident.errors import RecordingError
 from dynident.recording.filters import Filter
 from dynident.recording.recording import Recording
+from dynident.recording.usable_rows import usable
 
 NoiseSource = Literal["replicates", "given", "unknown"]
 """Where the noise of recordings is known from: repetition, the study, or nowhere."""
@@ -35,7 +36,8 @@ class Dataset:
 
     Attributes
     ----------
-    recordings : in any number.
+    recordings : in any number; unless the filter keeps the ends, their windows leave out where the
+        robot stands still there, and a loop's transient before it repeats, see `usable`.
     filter : None for `default_filter` at each recording's rate.
     noise : needed for a noise floor where nothing repeats; None where it is unknown.
 
@@ -50,7 +52,10 @@ class Dataset:
     noise: Noise | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "recordings", tuple(self.recordings))
+        recordings = tuple(self.recordings)
+        if self.filter is None or self.filter.ends == "drop":
+            recordings = tuple(usable(one) for one in recordings)
+        object.__setattr__(self, "recordings", recordings)
         for recording in self.recordings[1:]:
             if recording.joints != self.recordings[0].joints:
                 ours = ", ".join(self.recordings[0].joints)
@@ -63,6 +68,13 @@ class Dataset:
     def __add__(self, other: Dataset) -> Dataset:
         """Recordings of both, with this one's filter and noise."""
         return Dataset(self.recordings + other.recordings, self.filter, self.noise)
+
+
+def without_ends(dataset: Dataset) -> Dataset:
+    """Return the dataset with a filter that drops the ends, where its own keeps them."""
+    if dataset.filter is None or dataset.filter.ends == "drop":
+        return dataset
+    return replace(dataset, filter=replace(dataset.filter, ends="drop"))
 
 
 def numbered(*datasets: Dataset) -> tuple[Dataset, ...]:

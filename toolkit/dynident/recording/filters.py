@@ -29,6 +29,8 @@ class Filter:
     decimation : "pick" keeps every k-th filtered row; "chebyshev" filters as MATLAB's `decimate`
         does before it picks.
     edge_s : s dropped at the start and at the end after differentiation.
+    ends : "drop" leaves out, beyond `edge_s`, what the filters and differences make up where they
+        see past the record; "keep" uses all of the record, as some published recipes do.
 
     Raises
     ------
@@ -42,6 +44,7 @@ class Filter:
     rate_hz: float | None = None
     decimation: Literal["pick", "chebyshev"] = "pick"
     edge_s: tuple[float, float] = (0.0, 0.0)
+    ends: Literal["drop", "keep"] = "drop"
 
     def __post_init__(self) -> None:
         for name in ("position_cutoff_hz", "cutoff_hz", "rate_hz"):
@@ -52,6 +55,8 @@ class Filter:
             raise RecordingError(
                 f"decimation = {self.decimation!r}", "filter", 'write "pick" or "chebyshev"'
             )
+        if self.ends not in ("drop", "keep"):
+            raise RecordingError(f"ends = {self.ends!r}", "filter", 'write "drop" or "keep"')
         if len(self.edge_s) != 2 or not all(math.isfinite(e) and e >= 0 for e in self.edge_s):
             remedy = "give two times in s, not negative"
             raise RecordingError(f"edge_s = {self.edge_s!r}", "filter", remedy)
@@ -69,8 +74,23 @@ class Filter:
             f"position low-pass {self.position_cutoff_hz:g} Hz" if self.position_cutoff_hz else "",
             f"parallel low-pass {self.cutoff_hz:g} Hz" if self.cutoff_hz else "",
             f"decimated to {self.rate_hz:g} Hz ({self.decimation})" if self.rate_hz else "",
+            "ends kept" if self.ends == "keep" else "",
         ]
         return ", ".join(part for part in parts if part) or "none"
+
+    def margins(self, rate_hz: float) -> tuple[int, int]:
+        """Samples at either end whose derivatives are not used, at a sampling rate in Hz.
+
+        Besides `edge_s`: 3 periods of the position's cut-off, after which the transient of its
+        filter is below 1 % of the acceleration, and at least the 2 samples at which differences
+        are one-sided.
+        """
+        least = 0
+        if self.ends == "drop":
+            cutoff = self.position_cutoff_hz
+            least = max(2, math.ceil(3.0 / cutoff * rate_hz) if cutoff else 0)
+        first, last = (max(round(edge * rate_hz), least) for edge in self.edge_s)
+        return first, last
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -104,17 +124,14 @@ def default_filter(rate_hz: float) -> Filter:
     """Filter that suits most arms: 40 Hz on positions, 18 Hz on columns and torque, 50 Hz out.
 
     Below 200 Hz all frequencies shrink with the sampling rate, so that the position's low-pass
-    stays at a fifth of it. At each end 3 periods of the position's cut-off are dropped, after
-    which the filter's transient is below 1 % of the acceleration.
+    stays at a fifth of it.
     """
     share = min(1.0, rate_hz / 200.0)
-    edge = 3.0 / (40.0 * share)
     return Filter(
         position_cutoff_hz=40.0 * share,
         cutoff_hz=18.0 * share,
         rate_hz=50.0 * share,
         decimation="pick",
-        edge_s=(edge, edge),
     )
 
 
@@ -250,7 +267,7 @@ def differentiate(recording: Recording, filter: Filter) -> Motion:
     Parameters
     ----------
     recording : T samples of n joints.
-    filter : its `position_cutoff_hz` and `edge_s` are used here.
+    filter : its `position_cutoff_hz`, `edge_s` and `ends` are used here.
 
     Returns
     -------
@@ -271,14 +288,14 @@ def differentiate(recording: Recording, filter: Filter) -> Motion:
     tau = recording.tau
     if recording.torque == "held_command":
         tau = np.concatenate([tau[:1], (tau[:-1] + tau[1:]) / 2])
-    first, last = (round(edge * rate) for edge in filter.edge_s)
+    first, last = filter.margins(rate)
     kept = slice(first, recording.samples - last)
     if recording.samples - last - first < 2:
         raise RecordingError(
-            f"nothing is left of {recording.duration:g} s when {filter.edge_s[0]:g} and "
-            f"{filter.edge_s[1]:g} s are dropped at the ends",
+            f"nothing is left of {recording.duration:.4g} s when {first / rate:.3g} and "
+            f"{last / rate:.3g} s are dropped at the ends",
             where,
-            "record longer, or choose a smaller edge_s",
+            "record longer, raise position_cutoff_hz, or choose a smaller edge_s",
         )
     return Motion(
         t=recording.t[kept],

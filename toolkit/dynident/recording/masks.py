@@ -1,4 +1,4 @@
-"""Which rows to use: away from the edges, within a window, moving.
+"""Rows within a window, and rows in which a joint moves.
 
 Each mask is a boolean array, True for what is kept.
 """
@@ -44,24 +44,6 @@ def within(
         span = f"time runs from {t[0]:g} to {t[-1]:g} s" if len(t) else "nothing is recorded"
         raise RecordingError(f"{window} holds no samples", where, span)
     return kept
-
-
-def away_from_edges(t: np.ndarray, before: float, after: float | None = None) -> np.ndarray:
-    """Rows at least `before` s after the first and `after` s before the last.
-
-    For the transients of a filter: `ParallelFilter.transient` says how long they are.
-
-    Parameters
-    ----------
-    t : (T,) s, increasing.
-    before, after : s; without `after`, both ends lose `before`.
-
-    Returns
-    -------
-    (T,) bool.
-    """
-    after = before if after is None else after
-    return (t >= t[0] + before) & (t <= t[-1] - after)
 
 
 def moving(v: np.ndarray, threshold: float | np.ndarray) -> np.ndarray:

@@ -108,7 +108,7 @@ class ParallelFilter:
         """Samples after which a block's end no longer shows (below 1e-9 of the largest value)."""
         return sum(_memory(sections, _FORGOTTEN) for sections, _ in self.stages)
 
-    @property
+    @cached_property
     def transient(self) -> float:
         """Time in s from a record's end over which the filter sees beyond it (to 1 %)."""
         return sum(_memory(sections, 1e-2) for sections, _ in self.stages) / self.rate_hz

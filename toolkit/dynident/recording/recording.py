@@ -39,6 +39,15 @@ class Provenance:
     record: str = ""
 
 
+@dataclass(frozen=True, kw_only=True)
+class LeftOut:
+    """A stretch of a recording that is not used, from `start` to `stop` in s, and why."""
+
+    reason: str
+    start: float
+    stop: float
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Recording:
     """Samples of a robot's motion and torques, checked and read-only.
@@ -62,6 +71,8 @@ class Recording:
     number : its place among the recordings of a study, from 1; 0 where that does not matter.
     name : for tables; the file's name without its suffix by default.
     provenance : file, hash, filter.
+    left_out : stretches that `usable_rows.usable` has found to be of no use, which its window then
+        excludes; None where nobody has looked.
 
     Raises
     ------
@@ -89,6 +100,7 @@ class Recording:
     number: int = 0
     name: str = ""
     provenance: Provenance = field(default_factory=Provenance)
+    left_out: tuple[LeftOut, ...] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "joints", _joint_names(self.joints, self.where))

@@ -12,9 +12,9 @@ from dynident.closed_loop import Controller
 from dynident.criteria import LoopCriteria
 from dynident.errors import RecordingError
 from dynident.fitting.instrumental.noise_level import white_variance
-from dynident.fitting.sampling import LEAST_ROWS, Sampled, sample
+from dynident.fitting.sampling import Sampled, sample
 from dynident.model import Model
-from dynident.recording import Dataset, Noise, Recording, away_from_edges, mismatch, periods, within
+from dynident.recording import Dataset, Noise, Recording, mismatch, periods, within, without_ends
 from dynident.validation.control_law import law_torque
 from dynident.validation.loop_errors import QUANTITIES, LoopRun, Signals
 
@@ -51,6 +51,8 @@ def filtered_run(
         If nothing is left after the settling time, or of the filters' transients.
     """
     assert recording.q_ref is not None
+    # Measured and simulated motion end differently: ends that a recipe keeps are of no use here.
+    dataset = without_ends(dataset)
     first = recording.t[0] + settling
     window = (first, np.inf)
     if recording.window is not None:
@@ -62,20 +64,19 @@ def filtered_run(
     simulated = sample(again.recording.replace(window=window), dataset.filter)
     law = law_torque(recording, controller, model.robot)
     reference = sample(recording.replace(q=recording.q_ref, tau=law), dataset.filter)
-    kept = _inside(measured)
     noise = _noise(
-        recording, dataset, kept, lambda one: law_torque(one, controller, model.robot), criteria
+        recording, dataset, lambda one: law_torque(one, controller, model.robot), criteria
     )
     return LoopRun(
         name=recording.name,
-        t=measured.t[kept],
-        measured=_signals(measured, kept),
-        simulated=_signals(simulated, kept),
-        reference=_signals(reference, kept),
+        t=measured.t,
+        measured=_signals(measured),
+        simulated=_signals(simulated),
+        reference=_signals(reference),
         noise=noise,
         saturated=np.asarray(again.saturated, dtype=float),
-        law_terms=_law_terms(recording, law, controller, model, dataset, kept),
-        encoder_noise=_encoder_noise(recording, again.recording, dataset, kept),
+        law_terms=_law_terms(recording, law, controller, model, dataset),
+        encoder_noise=_encoder_noise(recording, again.recording, dataset),
     )
 
 
@@ -85,7 +86,6 @@ def _law_terms(
     controller: Controller,
     model: Model,
     dataset: Dataset,
-    kept: np.ndarray,
 ) -> np.ndarray:
     """What each gain makes of the errors, as one more of it would add to the torque, rms (n,)."""
     square = np.zeros(controller.n)
@@ -95,14 +95,12 @@ def _law_terms(
     for name in controller.law.gains:
         doubled = replace(free, **{name: tuple(2.0 * x for x in getattr(free, name))})
         term = law_torque(recording, doubled, model.robot) - law
-        tau = sample(recording.replace(tau=term), dataset.filter).tau[kept]
+        tau = sample(recording.replace(tau=term), dataset.filter).tau
         square += np.mean(tau**2, axis=0)
     return np.sqrt(square)
 
 
-def _encoder_noise(
-    recording: Recording, simulated: Recording, dataset: Dataset, kept: np.ndarray
-) -> np.ndarray:
+def _encoder_noise(recording: Recording, simulated: Recording, dataset: Dataset) -> np.ndarray:
     """Noise of the filtered positions, rms (n,), if that of the raw ones is white.
 
     From third differences of what the simulation leaves of them: the motion that an imperfect
@@ -113,29 +111,16 @@ def _encoder_noise(
     noise = Noise(white, np.zeros(recording.n))
     alone = _stated(recording, noise, lambda one: one.tau)
     assert alone is not None
-    return np.sqrt(np.mean(sample(alone, dataset.filter).q[kept] ** 2, axis=0))
+    return np.sqrt(np.mean(sample(alone, dataset.filter).q ** 2, axis=0))
 
 
-def _inside(sampled: Sampled) -> np.ndarray:
-    """Rows for which the filter saw nothing beyond the record's ends, (T,) bool.
-
-    There it makes up what it does not know from the last sample, noise and all. A record too short
-    for that keeps every row.
-    """
-    inside = away_from_edges(sampled.motion.t, sampled.parallel.transient)
-    first, last = sampled.motion.t[inside][[0, -1]] if inside.any() else (np.inf, -np.inf)
-    kept = (sampled.t >= first) & (sampled.t <= last)
-    return kept if kept.sum() >= LEAST_ROWS else np.ones(len(kept), dtype=bool)
-
-
-def _signals(sampled: Sampled, kept: np.ndarray) -> Signals:
+def _signals(sampled: Sampled, kept: slice | np.ndarray = slice(None)) -> Signals:
     return Signals(sampled.q[kept], sampled.v[kept], sampled.a[kept], sampled.tau[kept])
 
 
 def _noise(
     recording: Recording,
     dataset: Dataset,
-    kept: np.ndarray,
     law: Callable[[Recording], np.ndarray],
     criteria: LoopCriteria,
 ) -> np.ndarray | None:
@@ -149,8 +134,9 @@ def _noise(
         return None
     sampled = sample(alone, dataset.filter)
     there = alone.t[np.any(alone.q != 0, axis=1) | np.any(alone.tau != 0, axis=1)]
+    kept = np.ones(len(sampled.t), dtype=bool)
     if len(there):
-        folded = kept & (sampled.t >= there[0]) & (sampled.t <= there[-1])
+        folded = (sampled.t >= there[0]) & (sampled.t <= there[-1])
         kept = folded if folded.any() else kept
     noise = _signals(sampled, kept)
     return np.array([np.sqrt(np.mean(noise.of(one) ** 2, axis=0)) for one in QUANTITIES])

@@ -8,16 +8,11 @@ from typing import Protocol
 
 import numpy as np
 
-from dynident.errors import RecordingError
-from dynident.fitting.sampling import LEAST_ROWS
 from dynident.model import Model
-from dynident.recording import Dataset, Filter, ParallelFilter, Recording, default_filter, uniform
+from dynident.recording import Dataset, uniform, without_ends
 
 ProgressCallback = Callable[[str, float, float], None]
 """(what is being done, how much is done, how much there is to do)."""
-
-_PERIODS = 3.0
-"""Of the position's cut-off, after which its filter no longer shows an end (to 1 %)."""
 
 
 def silent(what: str, done: float, total: float) -> None:
@@ -109,33 +104,10 @@ class Instruments(Protocol):
 
 
 def prepared(dataset: Dataset) -> Dataset:
-    """Return the recordings on uniform clocks, their windows away from the ends.
+    """Return the recordings on uniform clocks, without the ends of the filters.
 
-    Instruments then have the same time stamps. At the very ends differences are one-sided and pass
-    several times the noise of central ones, and filters make up what they do not see; measured and
-    simulated motion end differently.
+    Instruments then have the same time stamps. Measured and simulated motion end differently: ends
+    that a published recipe keeps are of no use here.
     """
-    recordings = (uniform(recording) for recording in dataset.recordings)
-    return replace(
-        dataset, recordings=tuple(_away_from_ends(one, dataset.filter) for one in recordings)
-    )
-
-
-def _away_from_ends(recording: Recording, settings: Filter | None) -> Recording:
-    rate = recording.rate_hz
-    settings = settings or default_filter(rate)
-    parallel = ParallelFilter(settings, rate, recording.period, recording.where)
-    cutoff = settings.position_cutoff_hz
-    margin = parallel.transient + (_PERIODS / cutoff if cutoff else 0.0)
-    # Half a sample more: a window's end is no matter of rounding.
-    margin = max(margin, 1.5 / rate)
-    first, last = recording.window or (-np.inf, np.inf)
-    first = max(first, float(recording.t[0]) + margin)
-    last = min(last, float(recording.t[-1]) - margin)
-    if last - first < LEAST_ROWS / rate:
-        what = f"{recording.duration:.4g} s are next to nothing between the filter's ends"
-        remedy = (
-            f"it needs {margin:.3g} s at each: record longer, raise the cut-offs, or leave it out"
-        )
-        raise RecordingError(what, recording.where, remedy)
-    return recording.replace(window=(first, last))
+    recordings = tuple(uniform(recording) for recording in dataset.recordings)
+    return replace(without_ends(dataset), recordings=recordings)

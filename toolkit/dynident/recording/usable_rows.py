@@ -1,0 +1,159 @@
+"""Which rows of a recording may be used: one place for fits, instruments, diagnosis, validation.
+
+Left out are: rows near either end, where the parallel filter makes up what it does not see (with
+unfiltered noise); a robot that stands still at the start or at the end, whose dry friction may be
+anything; the transient of a loop before a motion repeats; and what the study's window excludes. A
+pose that is held in the middle of a recording was chosen, and stays.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from dynident.recording.filters import Filter
+from dynident.recording.masks import within
+from dynident.recording.parallel import ParallelFilter
+from dynident.recording.recording import LeftOut, Recording
+
+_IDLE = 0.25  # s of standing still at an end that are worth leaving out
+_MOVES = 1e-3  # of a joint's travel by which it must leave its place at an end
+_NOISE = 6.0  # standard deviations of the position's noise likewise
+_SETTLED = 5.0  # times the later differences of repetitions, above which a loop has not settled
+_FINE = 1e-4  # of a joint's travel by which repetitions may differ in any case
+_QUIET = 0.1  # s that repetitions must agree for a transient to be over
+
+STANDS_STILL = "standing still"
+TRANSIENT = "transient before the motion repeats"
+FILTER_ENDS = "the filter sees past the ends"
+
+
+def usable(recording: Recording) -> Recording:
+    """Return the recording with a window that leaves out what is of no use.
+
+    Copies of it (with other positions, say) keep that window, so that their rows belong together.
+
+    Parameters
+    ----------
+    recording : as it was recorded; one that has been looked at comes back as it is.
+
+    Returns
+    -------
+    Recording
+        With `left_out`, and the window that follows from it and from its own.
+    """
+    if recording.left_out is not None:
+        return recording
+    start, stop = float(recording.t[0]), float(recording.t[-1])
+    begins, ends = _moves(recording)
+    found = []
+    if begins - start >= _IDLE:
+        found.append(LeftOut(reason=STANDS_STILL, start=start, stop=begins))
+    settled = _settled(recording)
+    if settled > start:
+        found.append(LeftOut(reason=TRANSIENT, start=start, stop=settled))
+    if stop - ends >= _IDLE:
+        found.append(LeftOut(reason=STANDS_STILL, start=ends, stop=stop))
+    low, high = recording.window or (-np.inf, np.inf)
+    for one in found:
+        if one.start == start:
+            low = max(low, one.stop)
+        else:
+            high = min(high, one.start)
+    if not found or not low < high:
+        # A window that asks for just these stretches means them.
+        return recording.replace(left_out=())
+    return recording.replace(window=(low, high), left_out=tuple(found))
+
+
+def usable_rows(
+    recording: Recording, parallel: ParallelFilter, t: np.ndarray, times: np.ndarray
+) -> slice:
+    """Decimated rows that may be used; the slice may be empty.
+
+    Parameters
+    ----------
+    recording : whose window holds.
+    parallel : the filter of columns and torque.
+    t : (T,) s, samples that pass the filter.
+    times : (R,) s, of the decimated rows.
+    """
+    kept = np.ones(len(times), dtype=bool)
+    if recording.window is not None:
+        kept = within(times, *recording.window, recording.where)
+    if parallel.filter.ends == "drop":
+        slack = 1e-6 / parallel.rate_hz
+        margin = parallel.transient - slack
+        kept &= (times >= t[0] + margin) & (times <= t[-1] - margin)
+    inside = np.flatnonzero(kept)
+    return slice(int(inside[0]), int(inside[-1]) + 1) if len(inside) else slice(0, 0)
+
+
+def rows_in_words(recording: Recording, settings: Filter) -> str:
+    """How many decimated rows of a recording are used, and why the others are not.
+
+    Parameters
+    ----------
+    recording : on a uniform clock.
+    settings : its filter.
+    """
+    parallel = ParallelFilter(settings, recording.rate_hz, recording.period, recording.where)
+    first, last = settings.margins(recording.rate_hz)
+    t = recording.t[first : recording.samples - last]
+    every = parallel.rows(recording.samples)
+    kept = usable_rows(recording, parallel, t, parallel.times(t))
+    words = [f"{kept.stop - kept.start} of {len(every)} rows used"]
+    if settings.ends == "drop":
+        ends = [n / recording.rate_hz + parallel.transient for n in (first, last)]
+        words.append(f"{FILTER_ENDS} ({ends[0]:.3g} and {ends[1]:.3g} s)")
+    else:
+        words.append("ends kept")
+    words += [
+        f"{one.reason} from {one.start:.4g} to {one.stop:.4g} s" for one in recording.left_out or ()
+    ]
+    if recording.window is not None and not recording.left_out:
+        words.append(f"window {recording.window[0]:.4g} to {recording.window[1]:.4g} s")
+    return "; ".join(words)
+
+
+def _moves(recording: Recording) -> tuple[float, float]:
+    """When a joint first leaves its place, and when the last one comes to rest, s."""
+    q, t = recording.q, recording.t
+    # White noise has six times its variance in second differences; motion has next to none.
+    second = np.diff(q, n=2, axis=0)
+    noise = 1.4826 * np.median(np.abs(second), axis=0) / np.sqrt(6.0) if len(second) else 0.0
+    least = np.maximum(_MOVES * np.ptp(q, axis=0), _NOISE * noise)
+    from_start = np.flatnonzero(np.any(np.abs(q - q[0]) > least, axis=1))
+    from_end = np.flatnonzero(np.any(np.abs(q - q[-1]) > least, axis=1))
+    if not len(from_start) or not len(from_end):
+        return float(t[0]), float(t[-1])  # nothing moves at all
+    return float(t[from_start[0]]), float(t[from_end[-1]])
+
+
+def _settled(recording: Recording) -> float:
+    """Time from which the motion repeats, s; the start where it does at once or never."""
+    start = float(recording.t[0])
+    period = recording.period
+    if period is None or recording.duration < 1.5 * period:
+        return start
+    t = recording.t[recording.t <= recording.t[-1] - period]
+    first = recording.q[: len(t)]
+    again = np.stack([np.interp(t + period, recording.t, column) for column in recording.q.T], 1)
+    apart = np.abs(again - first)
+    # The first period against the second; what differs later is noise, or a drift.
+    head = t < start + period
+    later = apart[~head] if np.count_nonzero(~head) > len(t) // 4 else apart[len(apart) // 2 :]
+    usual = np.sqrt(np.mean(later**2, axis=0))
+    least = np.maximum(_SETTLED * usual, _FINE * np.ptp(recording.q, axis=0))
+    far = np.flatnonzero(np.any(apart[head] > least, axis=1))
+    if not len(far) or t[far[0]] - start > _QUIET:
+        return start
+    over = far[-1]
+    for one, two in pairwise(far):
+        if t[two] - t[one] > _QUIET:
+            over = one
+            break
+    settled = float(t[over])
+    # Half a period and more is no transient: it does not repeat, which others say.
+    return settled if settled - start < period / 2 else start
