@@ -16,7 +16,7 @@ ROBOT = chain(3, 1)
 PLAIN = Model(ROBOT) + "viscous_friction" + "coulomb_friction"
 VISCOUS, DRY = 0.3, 0.2
 RATE = 200.0
-BARE = Filter(position_cutoff_hz=None, cutoff_hz=None, rate_hz=None)
+BARE = Filter(position_cutoff_hz=None, cutoff_hz=None, rate_hz=None, ends="keep")
 
 
 def exact(label: str, values: tuple[float, ...], t, q, v, a) -> np.ndarray:

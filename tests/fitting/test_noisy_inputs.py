@@ -94,7 +94,7 @@ def test_corrected_least_squares_is_right_where_least_squares_is_wrong(noise) ->
 
 def test_bayes_says_that_its_inputs_are_correlated() -> None:
     found = di.fit(model(), noisy(), di.Regression("bayes", "encoders"))
-    assert "not independent. Prefer it" in found.summary()
+    assert "not independent. Prefer it" in " ".join(found.summary().split())
     corrected = di.fit(model(), noisy(), di.Regression("corrected", "encoders"))
     off = np.hypot(found.values - corrected.values, corrected.sigma)
     np.testing.assert_allclose(found.sigma, off, rtol=1e-6)

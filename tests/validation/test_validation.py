@@ -235,13 +235,11 @@ def test_noise_of_rows_that_do_not_repeat_is_not_zero() -> None:
         q_ref=motion,
         period=2.4,
     )
-    every = np.ones(len(sample(noisy, None).t), dtype=bool)
-    found = _noise(noisy, Dataset((noisy,)), every, lambda one: one.tau, DEFAULTS.loops)
+    found = _noise(noisy, Dataset((noisy,)), lambda one: one.tau, DEFAULTS.loops)
     # The same with two whole periods and nothing besides.
     rows = t >= t[-1] - 4.8 + 1e-9
     whole = noisy.replace(**{x: getattr(noisy, x)[rows] for x in ("t", "q", "tau", "q_ref")})
-    every = np.ones(len(sample(whole, None).t), dtype=bool)
-    other = _noise(whole, Dataset((whole,)), every, lambda one: one.tau, DEFAULTS.loops)
+    other = _noise(whole, Dataset((whole,)), lambda one: one.tau, DEFAULTS.loops)
     assert found is not None and other is not None
     np.testing.assert_allclose(found[[0, 3]], other[[0, 3]], rtol=0.03)
 
