@@ -24,7 +24,6 @@ from dynident.errors import SimulationError
 from dynident.evidence import compare
 from dynident.fitting import Estimate
 from dynident.fitting.given import given_estimate
-from dynident.fitting.sampling import sample
 from dynident.model import Model
 from dynident.recording import Dataset, Noise, Recording
 from dynident.robot import Robot

@@ -70,7 +70,7 @@ def usable(recording: Recording) -> Recording:
 def usable_rows(
     recording: Recording, parallel: ParallelFilter, t: np.ndarray, times: np.ndarray
 ) -> slice:
-    """Decimated rows that may be used; the slice may be empty.
+    """Decide which decimated rows may be used.
 
     Parameters
     ----------
@@ -78,6 +78,16 @@ def usable_rows(
     parallel : the filter of columns and torque.
     t : (T,) s, samples that pass the filter.
     times : (R,) s, of the decimated rows.
+
+    Returns
+    -------
+    slice
+        Of the decimated rows; it may be empty.
+
+    Raises
+    ------
+    RecordingError
+        If the window holds no row at all.
     """
     kept = np.ones(len(times), dtype=bool)
     if recording.window is not None:
@@ -91,7 +101,7 @@ def usable_rows(
 
 
 def rows_in_words(recording: Recording, settings: Filter) -> str:
-    """How many decimated rows of a recording are used, and why the others are not.
+    """Return how many decimated rows of a recording are used, and why the others are not.
 
     Parameters
     ----------
