@@ -170,7 +170,11 @@ def recorded(robot: Robot, seed: int = 1, noise: float = 0.1, friction: float = 
 
 
 def estimated(robot: Robot, recording: Recording) -> Estimate:
-    return fit(Model(robot) + "viscous_friction", Dataset((recording,), QUIET), LeastSquares())
+    return fit(
+        Model(robot) + "viscous_friction",
+        Dataset((recording,), QUIET),
+        LeastSquares(errors="independent"),
+    )
 
 
 def links(robot: Robot) -> dict[str, np.ndarray]:

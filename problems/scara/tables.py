@@ -123,10 +123,10 @@ def estimate(table: str) -> di.Estimate:
     unfiltered = replace(study.train, filter=di.Filter())
     half = SimulatedLoop(study.controller, natural_frequency_hz=tuple(FULL_HZ / 2))
     how: dict[str, tuple[di.Dataset, Any]] = {
-        "1": (study.train, di.LeastSquares()),
+        "1": (study.train, di.LeastSquares(errors="independent")),
         "2": (study.train, di.IV(study.controller, start="least_squares")),
         "3": (study.train, di.IV(study.controller, start="regular")),
-        "5": (unfiltered, di.LeastSquares()),
+        "5": (unfiltered, di.LeastSquares(errors="independent")),
         "6": (unfiltered, di.IV(study.controller, start="regular")),
         "7": (study.train, di.IV(half, start="regular")),
     }

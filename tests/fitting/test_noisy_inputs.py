@@ -155,7 +155,7 @@ def test_one_sigma_is_printed_with_what_it_holds(tmp_path: Path) -> None:
     np.testing.assert_allclose(regressor.sigma_true_, found.sigma, rtol=1e-9)
     again = load_estimate(found.save(tmp_path / "estimate.json"))
     assert again.words_of_sigma == found.words_of_sigma
-    plain = di.fit(model(), noisy())
+    plain = di.fit(model(), noisy(), di.LeastSquares(errors="independent"))
     assert "as independent" in plain.words_of_sigma
 
 

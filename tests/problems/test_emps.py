@@ -30,7 +30,7 @@ def reproduced(part: str) -> Estimate:
     model = study.model
     for effect in PUBLISHED[part]["effects"]:
         model = model + effect
-    return fit_model(model, study.train, LeastSquares("none"))
+    return fit_model(model, study.train, LeastSquares("none", "independent"))
 
 
 @needs_data

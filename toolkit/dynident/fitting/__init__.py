@@ -19,7 +19,8 @@ from dynident.fitting.fit_model import Method, fit
 from dynident.fitting.given import given_estimate
 from dynident.fitting.history import Convergence
 from dynident.fitting.instrumental import IV, Filtered, SimulatedLoop, SwappedPeriods
-from dynident.fitting.least_squares import LeastSquares, LinearSolution, solve_factors
+from dynident.fitting.least_squares import LeastSquares
+from dynident.fitting.linear_solution import LinearSolution, solve_factors
 from dynident.fitting.noisy_inputs import Regression
 from dynident.fitting.noisy_inputs.encoder_noise import encoder_noise
 from dynident.fitting.noisy_inputs.measured import InputNoise, input_noise

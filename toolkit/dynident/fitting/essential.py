@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynident.fitting.least_squares import solve_columns, solve_factors
+from dynident.fitting.linear_solution import solve_columns, solve_factors
 from dynident.model import Model
 from dynident.moments.factors import TriangularFactors
 from dynident.tables import Table, number, percent

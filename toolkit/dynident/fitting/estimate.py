@@ -204,8 +204,8 @@ class Estimate:
                 "sigma carries the noise of encoders and torque; what the model lacks is not in it."
             )
         return (
-            "sigma takes the errors of the equations as independent: what the model lacks is not "
-            "in it."
+            "sigma takes the errors of the equations as independent, which those of rows behind a "
+            "low-pass are not; what the model lacks is not in it."
         )
 
     # --- files ---------------------------------------------------------------------------------

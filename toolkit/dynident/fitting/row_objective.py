@@ -15,7 +15,8 @@ import numpy as np
 from scipy.linalg import qr
 
 from dynident.effects import Block, Effect
-from dynident.fitting.least_squares import LeastSquares, solve_factors
+from dynident.fitting.least_squares import LeastSquares
+from dynident.fitting.linear_solution import solve_factors
 from dynident.fitting.sampling import Sampled, sample
 from dynident.fitting.shape_search import (
     ShapeProblem,
@@ -75,7 +76,7 @@ def refine_shapes(model: Model, dataset: Dataset) -> Shaped:
     shaped = _best(rows, rows.screened())
     for _ in range(_PASSES):
         before = shaped.model
-        relaxed = LeastSquares().fit(before, dataset)
+        relaxed = LeastSquares(errors="independent").fit(before, dataset)
         rows = _RowObjective(relaxed.model, samples, relaxed.values)
         shaped = _best(rows, rows.effects)
         if np.allclose(_logarithms(before), _logarithms(shaped.model), atol=10 * _PRECISION):
@@ -100,7 +101,7 @@ def _without_nonlinear(model: Model, dataset: Dataset) -> np.ndarray:
     rest = model
     for effect in shaped_effects(model):
         rest = rest - effect if effect.nonlinear else rest
-    found = LeastSquares().fit(rest, dataset).values
+    found = LeastSquares(errors="independent").fit(rest, dataset).values
     values = model.linearisation_point()
     values[: model.base.rank] = found[: model.base.rank]
     for effect in rest.effects:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -17,8 +17,10 @@ from dynident.fitting.consistent.programs import Solver, require_solver, solve
 from dynident.fitting.consistent.projection import project
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.given import prior_model
-from dynident.fitting.least_squares import LeastSquares, estimate_of, solve_factors
+from dynident.fitting.least_squares import LeastSquares, estimate_of
+from dynident.fitting.linear_solution import solve_factors, solve_weighted
 from dynident.fitting.sampling import rows
+from dynident.fitting.uncertainty.row_errors import row_errors
 from dynident.model import Model
 from dynident.moments.factors import TriangularFactors, factorise
 from dynident.nlp import Problem
@@ -41,13 +43,15 @@ class Constrained:
     within : default: fully consistent links.
     prior : default: the model's robot description.
     solver : "conic" (Clarabel, the optimum) or "nlp" (Ipopt, certified by the conic bound).
-    weighting : as of `LeastSquares`, from the residual of unconstrained least squares.
+    weighting, errors : as of `LeastSquares`, from the residual of unconstrained least squares.
     """
 
     within: Within = field(default_factory=Within)
     prior: Robot | Prior | None = None
     solver: Solver = "conic"
+    _: KW_ONLY
     weighting: Literal["joint", "none"] = "joint"
+    errors: Literal["correlated", "independent"] = "correlated"
     name: ClassVar[str] = "constrained least squares"
 
     def __post_init__(self) -> None:
@@ -67,7 +71,7 @@ class Constrained:
         """
         prior = self.prior if isinstance(self.prior, Prior) else Prior(self.prior or model.robot)
         model = prior_model(model, prior.robot)
-        free = LeastSquares(self.weighting).fit(model, dataset)
+        free = LeastSquares(self.weighting, "independent").fit(model, dataset)
         # Columns that depend on the fit are taken where least squares converged.
         model = free.model
         factors = factorise(rows(model, dataset, free.values))
@@ -94,10 +98,17 @@ class Constrained:
         active = active_set(problem, answer.x)
         C = space.combination
         values = C @ answer.x
+        covariance = active.covariance
+        if self.errors == "correlated":
+            weighted = solve_weighted(model, factors, 1.0 / std)
+            found = row_errors(model, dataset, free.values, weighted)
+            # Rows that share noise say less than as many independent ones; the prior says the same.
+            more = C.T @ found.meat @ C - data.T @ data
+            covariance = covariance + covariance @ more @ covariance
         solution = replace(
             solve_factors(model, factors, self.weighting),
             values=values,
-            covariance=C @ active.covariance @ C.T,
+            covariance=C @ covariance @ C.T,
         )
         estimate = estimate_of(self.name, self.weighting, model, dataset, factors, solution)
         links = {b: answer.x[10 * k : 10 * k + 10] for k, b in enumerate(space.bodies)}

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from dynident.errors import FitError
 from dynident.fitting.estimate import Estimate
-from dynident.fitting.least_squares import solve_factors
+from dynident.fitting.linear_solution import solve_factors
 from dynident.fitting.sampling import rows
 from dynident.model import Model
 from dynident.moments.factors import factorise

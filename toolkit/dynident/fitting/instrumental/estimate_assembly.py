@@ -14,7 +14,8 @@ from dynident.fitting.instrumental.iv_iterations import Iterations
 from dynident.fitting.instrumental.noise_level import NoiseLevel, position_noise, torque_noise
 from dynident.fitting.instrumental.normal_equations import InstrumentalSolution
 from dynident.fitting.instrumental.source import InstrumentSource
-from dynident.fitting.least_squares import residual_std, sources_of
+from dynident.fitting.least_squares import sources_of
+from dynident.fitting.linear_solution import residual_std
 from dynident.model import Model
 from dynident.tables import number
 

@@ -109,7 +109,7 @@ class IV:
         """
         if not dataset.recordings:
             raise FitError("no recording to fit", remedy='mark some recordings use = "train"')
-        first = LeastSquares(self.weighting).fit(model, dataset)
+        first = LeastSquares(self.weighting, "independent").fit(model, dataset)
         start = start_values(self.start, model, first)
         guess = Guess(start, (model.given_values(), first.values), self.progress)
         source = self.chosen.prepare(model, dataset, guess)

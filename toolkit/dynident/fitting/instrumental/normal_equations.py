@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from dynident.errors import FitError
-from dynident.fitting.least_squares import require_rows, residual_std
+from dynident.fitting.linear_solution import require_rows, residual_std
 from dynident.fitting.sampling import sample
 from dynident.model import Model
 from dynident.moments.factors import RANK_TOLERANCE, TriangularFactors, factorise

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from dynident.errors import FitError
-from dynident.fitting.least_squares import solve_factors
+from dynident.fitting.linear_solution import solve_factors
 from dynident.fitting.noisy_inputs.measured import InputNoise
 from dynident.fitting.sampling import rows, sample
 from dynident.model import Model

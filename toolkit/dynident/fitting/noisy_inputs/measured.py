@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynident.errors import FitError
-from dynident.fitting.least_squares import solve_factors
+from dynident.fitting.linear_solution import solve_factors
 from dynident.fitting.sampling import rows, sample
 from dynident.model import Model
 from dynident.moments.factors import factorise

@@ -9,7 +9,8 @@ import numpy as np
 
 from dynident.errors import FitError
 from dynident.fitting.estimate import Estimate
-from dynident.fitting.least_squares import estimate_of, residual_std
+from dynident.fitting.least_squares import estimate_of
+from dynident.fitting.linear_solution import residual_std
 from dynident.fitting.noisy_inputs.encoder_noise import encoder_noise
 from dynident.fitting.noisy_inputs.measured import InputNoise, input_noise
 from dynident.fitting.noisy_inputs.posed import PIECES, PosedRegression, pose

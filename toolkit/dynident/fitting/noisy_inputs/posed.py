@@ -7,7 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from dynident.fitting.least_squares import LeastSquares, LinearSolution, solve_factors
+from dynident.fitting.least_squares import LeastSquares
+from dynident.fitting.linear_solution import LinearSolution, solve_factors
 from dynident.fitting.sampling import rows, sample
 from dynident.model import Model
 from dynident.moments.factors import TriangularFactors, combine, factorise, in_pieces
@@ -44,7 +45,7 @@ class PosedRegression:
 
 def pose(model: Model, dataset: Dataset) -> PosedRegression:
     """Return the regression of a model and data; raises as least squares does."""
-    relaxed = LeastSquares().fit(model, dataset)
+    relaxed = LeastSquares(errors="independent").fit(model, dataset)
     model, kept = relaxed.model, list(relaxed.basis.independent)
     values = relaxed.values if model.needs_values else None
     parts = pieces_of(model, dataset, values)

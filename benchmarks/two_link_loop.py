@@ -1,0 +1,153 @@
+"""A two-link arm in a vertical plane under PD control, many recordings at a time.
+
+Shares no code with the package: own equations of motion, own integrator. Each recording has a
+motion and noise of its own; the encoders' noise is fed back. Records begin and stop in mid-motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynident.model import Model
+from dynident.recording import Recording
+from dynident.robot import Robot
+
+ARM = """<robot name="two_link">
+  <link name="base"/>
+  <link name="upper"><inertial><origin xyz="0.2 0.01 0"/><mass value="4"/>
+    <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.06" iyz="0" izz="0.06"/></inertial></link>
+  <link name="fore"><inertial><origin xyz="0.15 -0.01 0"/><mass value="2"/>
+    <inertia ixx="0.004" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial></link>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/>
+    <origin rpy="1.5707963267948966 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="-2.5" upper="2.5" velocity="6" effort="200"/></joint>
+  <joint name="elbow" type="revolute"><parent link="upper"/><child link="fore"/>
+    <origin xyz="0.4 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="-2.5" upper="2.5" velocity="6" effort="100"/></joint>
+</robot>"""
+RATE = 1000.0
+PERIOD = 6.0
+KP, KD = np.array([900.0, 250.0]), np.array([60.0, 14.0])
+VISCOUS, COULOMB = np.array([1.5, 0.6]), np.array([2.5, 0.9])
+WIDTH = 0.05
+"""Of tanh(v / width) in the dry friction, rad/s."""
+
+_SETTLING = 0.5  # s
+_LENGTH, _G = 0.4, 9.81
+_M1, _X1, _Y1, _J1 = 4.0, 4 * 0.2, 4 * 0.01, 0.06 + 4 * (0.2**2 + 0.01**2)
+_M2, _X2, _Y2, _J2 = 2.0, 2 * 0.15, -2 * 0.01, 0.02 + 2 * (0.15**2 + 0.01**2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lab:
+    """What the recordings of a case are like.
+
+    Attributes
+    ----------
+    position_std : of the encoders' white noise, rad; it is fed back.
+    torque_std : (2,) of the white noise on the recorded torque, N m.
+    stribeck : share of the Coulomb level that friction rises by at rest.
+    seconds : of each recording.
+    period : whether the motion repeats with `PERIOD` and the recording says so.
+    """
+
+    position_std: float = 0.0
+    torque_std: tuple[float, float] = (0.0, 0.0)
+    stribeck: float = 0.0
+    seconds: float = 12.0
+    period: bool = False
+
+    def recordings(self, seeds: range) -> list[Recording]:
+        """One recording for each seed."""
+        # The loop settles before the record begins.
+        count = round((self.seconds + _SETTLING) * RATE) + 1
+        rngs = [np.random.default_rng([seed, 15]) for seed in seeds]
+        waves = np.stack([rng.normal(size=(2, 2, 5)) for rng in rngs])
+        noise = np.stack([rng.normal(size=(count, 2)) for rng in rngs]) * self.position_std
+        t = np.arange(count) / RATE
+        q_ref, v_ref = _references(waves, t, self.seconds if not self.period else PERIOD)
+        begin = round(_SETTLING * RATE)
+        q, tau = (x[:, begin:] for x in self._moved(q_ref, v_ref, noise))
+        t, q_ref = t[begin:] - t[begin], q_ref[:, begin:]
+        std = np.array(self.torque_std)
+        return [
+            Recording(
+                t,
+                q[i],
+                tau[i] + std * rng.normal(size=tau[i].shape),
+                ("shoulder", "elbow"),
+                q_ref=q_ref[i],
+                torque="held_command",
+                period=PERIOD if self.period else None,
+                name=f"seed {seed}",
+            )
+            for i, (seed, rng) in enumerate(zip(seeds, rngs, strict=True))
+        ]
+
+    def _moved(
+        self, q_ref: np.ndarray, v_ref: np.ndarray, noise: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Measured positions and commanded torques, (S, T, 2) each."""
+        S, T, _ = q_ref.shape
+        x = np.concatenate([q_ref[:, 0], v_ref[:, 0]], axis=1)
+        measured, commands = np.empty((S, T, 2)), np.empty((S, T, 2))
+        before = q_ref[:, 0] - v_ref[:, 0] / RATE
+        h = 1.0 / RATE
+        for k in range(T):
+            y = x[:, :2] + noise[:, k]
+            tau = KP * (q_ref[:, k] - y) + KD * (v_ref[:, k] - (y - before) * RATE)
+            before = y
+            measured[:, k], commands[:, k] = y, tau
+            k1 = self._rate(x, tau)
+            k2 = self._rate(x + h / 2 * k1, tau)
+            k3 = self._rate(x + h / 2 * k2, tau)
+            k4 = self._rate(x + h * k3, tau)
+            x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        return measured, commands
+
+    def _rate(self, x: np.ndarray, tau: np.ndarray) -> np.ndarray:
+        """Derivative of positions and velocities, (S, 4)."""
+        q1, q2, v1, v2 = x.T
+        s2, c2 = np.sin(q2), np.cos(q2)
+        across = _LENGTH * (_X2 * c2 - _Y2 * s2)
+        slope = -_LENGTH * (_X2 * s2 + _Y2 * c2)
+        m11 = _J1 + _M2 * _LENGTH**2 + _J2 + 2 * across
+        m12, m22 = _J2 + across, _J2
+        fore = _G * (_X2 * np.cos(q1 + q2) - _Y2 * np.sin(q1 + q2))
+        upper = _G * ((_X1 + _M2 * _LENGTH) * np.cos(q1) - _Y1 * np.sin(q1))
+        dry = np.tanh(x[:, 2:] / WIDTH) * (
+            1.0 + self.stribeck * np.exp(-((x[:, 2:] / (4 * WIDTH)) ** 2))
+        )
+        left = tau - VISCOUS * x[:, 2:] - COULOMB * dry
+        b1 = left[:, 0] - slope * (2 * v1 * v2 + v2**2) - upper - fore
+        b2 = left[:, 1] + slope * v1**2 - fore
+        det = m11 * m22 - m12**2
+        return np.stack([v1, v2, (m22 * b1 - m12 * b2) / det, (m11 * b2 - m12 * b1) / det], axis=1)
+
+
+def model() -> Model:
+    """The arm with viscous and dry friction."""
+    bodies = Model(Robot.from_text(ARM), friction_width=WIDTH)
+    return bodies + "viscous_friction" + "coulomb_friction"
+
+
+def truth(model: Model) -> np.ndarray:
+    """Its true parameters, (p,)."""
+    values = model.given_values()
+    for j, joint in enumerate(model.robot.names):
+        values[model.names.index(f"Fv@{joint}")] = VISCOUS[j]
+        values[model.names.index(f"Fc@{joint}")] = COULOMB[j]
+    return values
+
+
+def _references(waves: np.ndarray, t: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
+    """Reference positions and velocities, (S, T, 2) each."""
+    order = np.arange(1, 6)
+    w = 2 * np.pi / min(period, 8.0) * order
+    waves = waves * 0.5 / order
+    sin, cos = np.sin(t[:, None] * w), np.cos(t[:, None] * w)
+    q = np.einsum("tk,sjk->stj", sin, waves[:, 0]) + np.einsum("tk,sjk->stj", cos, waves[:, 1])
+    v = np.einsum("tk,sjk->stj", cos * w, waves[:, 0])
+    return q, v - np.einsum("tk,sjk->stj", sin * w, waves[:, 1])

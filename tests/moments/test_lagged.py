@@ -1,0 +1,26 @@
+"""Products of rows with later ones, whatever the blocks that they come in."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from dynident.moments.lagged import lagged_products
+
+
+def test_blocks_do_not_matter_and_stretches_do() -> None:
+    rng = np.random.default_rng(0)
+    X, e = rng.normal(size=(50, 2, 3)), rng.normal(size=(50, 2))
+    cuts = [0, 1, 3, 20, 21, 22, 50]
+    begins = {0, 20}
+    blocks = [(a in begins, X[a:b], e[a:b]) for a, b in itertools.pairwise(cuts)]
+    found = lagged_products(blocks, 4)
+    for k in range(5):
+        pairs = [t for t in range(50 - k) if (t < 20) == (t + k < 20)]
+        assert found.pairs[k] == len(pairs)
+        columns = sum(np.einsum("ja,jb->jab", X[t], X[t + k]) for t in pairs)
+        np.testing.assert_allclose(found.columns[:, k], columns, atol=1e-12)
+        np.testing.assert_allclose(
+            found.residual[:, k], sum(e[t] * e[t + k] for t in pairs), atol=1e-12
+        )

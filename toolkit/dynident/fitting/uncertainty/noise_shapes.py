@@ -1,0 +1,54 @@
+"""What noise of a raw sample looks like in the rows of a regression: autocorrelations.
+
+Rows behind a low-pass are not independent. Whatever the noise of the raw samples is, the filters
+that it has passed are known: of its spectrum only the shape before them has to be measured.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import signal
+
+from dynident.fitting.sampling import Sampled
+from dynident.recording.filters import butterworth
+
+_BANDS = 4
+"""Of constant density before the filters. Taste: fewer average over more of the spectrum, more
+have less data each; coverage on trials is the same with 2 to 5."""
+_OPEN = 1e-3
+"""Share of the power below which a filter counts as closed, and bands end."""
+_GRID = 2048
+
+
+def noise_shapes(sampled: Sampled, lags: int) -> np.ndarray:
+    """Return autocorrelations that noise in rows may be made of, (S, lags + 1), each 1 at lag 0.
+
+    White noise in bands of frequency, and the first and second difference of white noise of the
+    encoders, all behind the recording's filters and decimation (folding included). Their sums with
+    coefficients above zero are the autocorrelations considered.
+
+    Parameters
+    ----------
+    sampled : a recording with its filters.
+    lags : longest lag, in decimated rows.
+    """
+    parallel, rate = sampled.parallel, sampled.motion.rate_hz
+    f = (np.arange(_GRID) + 0.5) / _GRID * rate / 2
+    power = np.ones(_GRID)
+    for sections, _ in parallel.stages:
+        power *= _response(sections, f, rate) ** 4  # forward and backward
+    top = f[np.flatnonzero(power > _OPEN * power.max())[-1]]
+    band = np.minimum((f / top * _BANDS).astype(int), _BANDS - 1)
+    spectra = [power * (band == b) for b in range(_BANDS)]
+    encoder = power.copy()
+    if cutoff := parallel.filter.position_cutoff_hz:
+        encoder *= _response(butterworth(rate, cutoff), f, rate) ** 4
+    slope = np.sin(2 * np.pi * f / rate) ** 2  # central differences
+    spectra += [encoder * slope, encoder * slope**2]
+    cosines = np.cos(2 * np.pi * np.outer(f / parallel.output_rate_hz, np.arange(lags + 1)))
+    found = np.array(spectra) @ cosines
+    return found / found[:, :1]
+
+
+def _response(sections: np.ndarray, f: np.ndarray, rate: float) -> np.ndarray:
+    return np.abs(signal.sosfreqz(sections, f, fs=rate)[1])
