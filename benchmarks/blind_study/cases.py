@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -55,6 +56,7 @@ class Case:
     stated_width : what the study says of it.
     payload : a known payload in every other recording, or none.
     says_payload : whether the study says which recordings carry one, where it is hidden.
+    variant : "healthy" where what was drawn to be hidden was left out.
     """
 
     seed: int
@@ -71,28 +73,36 @@ class Case:
     stated_width: float
     payload: bool
     says_payload: bool
+    variant: Literal["", "healthy"] = ""
 
     @property
     def name(self) -> str:
         """The folder of its data."""
-        return f"case_{self.seed}_{self.number:04d}"
+        return f"case_{self.seed}_{self.number:04d}" + (f"_{self.variant}" if self.variant else "")
+
+    def healthy(self) -> Case:
+        """Return the case with nothing hidden in it, under a name of its own."""
+        return replace(self, kind="healthy", hidden=(), variant="healthy")
 
     def to_dict(self) -> dict[str, Any]:
         return asdict(self)
 
 
-def draw(seed: int, count: int, first: int = 0) -> list[Case]:
-    """Draw cases `first` to `first + count - 1` of a seed."""
+def draw(seed: int, count: int, first: int = 0, joints: Mapping[int, int] = JOINTS) -> list[Case]:
+    """Draw cases `first` to `first + count - 1` of a seed.
+
+    `joints` says how many cases of a block have robots of how many joints.
+    """
     found: list[Case] = []
     for block in range(first // BLOCK, -(-(first + count) // BLOCK)):
-        found += _block(seed, block)
+        found += _block(seed, block, joints)
     return [case for case in found if first <= case.number < first + count]
 
 
-def _block(seed: int, block: int) -> list[Case]:
+def _block(seed: int, block: int, shares: Mapping[int, int]) -> list[Case]:
     rng = np.random.default_rng([seed, block, 1])
     kinds = rng.permutation([kind for kind, share in SHARES.items() for _ in range(share)])
-    joints = rng.permutation([n for n, share in JOINTS.items() for _ in range(share)])
+    joints = rng.permutation([n for n, share in shares.items() for _ in range(share)])
     # Every effect comes up equally often, whatever the number of cases.
     known = iter(_cycle(KNOWN, SHARES["known"], seed, block))
     twos = iter(_cycle(KNOWN, 2 * SHARES["two"], seed + 1, block))

@@ -2,12 +2,17 @@
 
     python benchmarks/blind_study run --count 400 --seed 30000 --jobs 2
     python benchmarks/blind_study table
+    python benchmarks/blind_study run --plant mujoco --seed 51000 --count 200 --filter all
+    python benchmarks/blind_study report
 
 `run` draws the cases of a seed, makes them, asks `dynident explain` about each, and appends what it
 says to answers.jsonl; cases that are in there are not asked again. `table` compares the answers
-with the truth. With `--backend dask` joblib spreads the cases over the cluster whose scheduler
-`--scheduler` names (its workers need this package and `benchmarks` on their PYTHONPATH, and the
-folder in common).
+with the truth; `report` prints what is right and what is claimed without reason. `--plant mujoco`
+lets MuJoCo move robots of two to seven joints; `--filter` writes a setting of [filter] into the
+studies, or each of six in turn; `--healthy-only` hides nothing.
+
+With `--backend dask` joblib spreads the cases over the cluster whose scheduler `--scheduler` names
+(its workers need this package and `benchmarks` on their PYTHONPATH, and the folder in common).
 """
 
 from __future__ import annotations
@@ -15,7 +20,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -23,11 +28,16 @@ from typing import Any
 from joblib import Parallel, delayed, parallel_config
 
 from blind_study.cases import SHARES, Case, draw
+from blind_study.circumstances import draw_mujoco
+from blind_study.filters import FILTERS
 from blind_study.make import Size
+from blind_study.report import print_report
 from blind_study.table import show
-from blind_study.worker import Place, answer
+from blind_study.worker import Place, answer, label
 
 USUAL = Path("blind_study_results")
+PLANTS: dict[str, Callable[[int, int, int], Sequence[Case]]] = {"own": draw, "mujoco": draw_mujoco}
+"""Who moves the robots, and how their cases are drawn."""
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -39,10 +49,13 @@ def main(arguments: list[str] | None = None) -> None:
     )
     commands = parser.add_subparsers(dest="command", required=True)
     run = commands.add_parser("run", help="make cases and ask about them")
+    run.add_argument("--plant", choices=tuple(PLANTS), default="own", help="simulator")
+    run.add_argument("--filter", choices=("all", *FILTERS), default="none", help="as users write")
+    run.add_argument("--healthy-only", action="store_true", help="hide nothing in any robot")
     run.add_argument("--seed", type=int, default=0, help="development: 0 to 999")
     run.add_argument("--count", type=int, default=400, help="cases to draw")
     run.add_argument("--first", type=int, default=0, help="number of the first one")
-    run.add_argument("--joints", type=int, nargs="*", choices=(2, 6, 7), help="only these robots")
+    run.add_argument("--joints", type=int, nargs="*", choices=range(2, 8), help="only these robots")
     run.add_argument("--kinds", nargs="*", choices=tuple(SHARES), help="only these kinds")
     run.add_argument("--effects", nargs="*", help="only cases that hide one of these")
     run.add_argument("--numbers", type=int, nargs="*", help="only these cases")
@@ -55,18 +68,29 @@ def main(arguments: list[str] | None = None) -> None:
     )
     run.add_argument("--runs", type=int, nargs=2, default=(4, 2), metavar=("TRAIN", "TEST"))
     table = commands.add_parser("table", help="compare the answers with the truth")
-    for one in (run, table):
+    report = commands.add_parser("report", help="what is right, and what is claimed without reason")
+    for one in (run, table, report):
         one.add_argument("--out", type=Path, default=USUAL, help="folder of the study")
     options = parser.parse_args(arguments)
     if options.command == "run":
         place = Place(options.out.resolve(), options.data)
         size = Size(*options.rates, *options.runs)
         run_study(_chosen(options), place, size, options)
-    show(options.out)
+    if options.command == "report" or (options.command == "run" and _is_wider(options)):
+        print_report(options.out)
+    else:
+        show(options.out)
+
+
+def _is_wider(options: argparse.Namespace) -> bool:
+    """Whether a run goes beyond what the table is about."""
+    return options.plant != "own" or options.filter != "none" or options.healthy_only
 
 
 def _chosen(options: argparse.Namespace) -> list[Case]:
-    found = draw(options.seed, options.count, options.first)
+    found = list(PLANTS[options.plant](options.seed, options.count, options.first))
+    if options.healthy_only:
+        found = [case.healthy() for case in found]
     for name in ("joints", "kinds", "effects", "numbers"):
         wanted = getattr(options, name)
         if wanted is not None:
@@ -92,17 +116,23 @@ def run_study(cases: list[Case], place: Place, size: Size, options: argparse.Nam
     """Answer every case that has no answer yet; only this process writes them down."""
     place.folder.mkdir(parents=True, exist_ok=True)
     done = answered(place)
-    todo = [case for case in cases if case.name not in done]
+    filters = tuple(FILTERS) if options.filter == "all" else (options.filter,)
+    wanted = [(case, [f for f in filters if label(case, f) not in done]) for case in cases]
+    todo = [(case, left) for case, left in wanted if left]
     with _spread(options.backend, options.scheduler, options.jobs):
         stream = Parallel(return_as="generator_unordered")(
-            delayed(answer)(case, place, size) for case in todo
+            delayed(answer)(case, place, size, left) for case, left in todo
         )
-        with place.answers.open("a") as handle, _progress(len(todo)) as progress:
-            for said in stream:
-                assert said is not None
-                handle.write(json.dumps(said) + "\n")
+        with (
+            place.answers.open("a") as handle,
+            _progress(sum(len(left) for _, left in todo)) as progress,
+        ):
+            for answers in stream:
+                assert answers is not None
+                for said in answers:
+                    handle.write(json.dumps(said) + "\n")
+                    progress(said)
                 handle.flush()
-                progress(said)
 
 
 def _spread(backend: str, scheduler: str | None, jobs: int) -> Any:

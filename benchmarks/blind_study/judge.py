@@ -50,6 +50,10 @@ class Judged:
     both : of two, whether each is in the set of some step.
     absorbed : whether the truth is listed as absorbed.
     cpu_s : of `explain`.
+    before, after : N m, held-out error without and with what was added.
+    filter : name of the setting of [filter] that the study has.
+    friction : "constraint" where dry friction is MuJoCo's own, else "tanh".
+    plant : "mujoco" or "own".
     """
 
     name: str
@@ -72,11 +76,21 @@ class Judged:
     both: bool
     absorbed: bool
     cpu_s: float
+    before: float | None = None
+    after: float | None = None
+    filter: str = "none"
+    friction: str = "tanh"
+    plant: str = "own"
 
     @property
     def alarm(self) -> bool:
         """Whether something is said to be missing."""
         return bool(self.added) or self.verdict != "nothing_missing"
+
+    @property
+    def worse(self) -> bool:
+        """Whether the held-out error is larger with what was added than without."""
+        return self.before is not None and self.after is not None and self.after > self.before
 
     @property
     def rejected(self) -> bool:
@@ -91,6 +105,9 @@ def judge(truth: dict[str, Any], said: dict[str, Any]) -> Judged:
     """Compare an answer with the truth."""
     case, planar = truth["case"], bool(truth["planar"])
     hidden = tuple(_place(one) for one in truth["hidden"])
+    also = tuple(_place(one) for one in truth.get("also", ()))
+    true = (*hidden, *also)
+    circumstances = case.get("circumstances")
     answer = said.get("answer") or {
         "steps": [],
         "candidates": [],
@@ -119,19 +136,33 @@ def judge(truth: dict[str, Any], said: dict[str, Any]) -> Judged:
         case["width"] != case["stated_width"],
         said.get("error", ""),
         first[0] if first else None,
-        exact=bool(first) and first[0] in hidden,
-        right=any(found(one, first) for one in hidden),
-        in_three=any(found(one, leading) for one in hidden),
-        in_set=any(one in first for one in hidden),
+        exact=bool(first) and first[0] in true,
+        right=any(found(one, first) for one in true),
+        in_three=any(found(one, leading) for one in true),
+        in_set=any(one in first for one in true),
         size=len(first),
         added=tuple(one[0] for one in sets),
         verdict=answer["verdict"],
         before_over_floor=before / floor if floor and before is not None else None,
         over_floor=after / floor if floor and after is not None else None,
-        both=bool(hidden) and all(any(found(one, each) for each in sets) for one in hidden),
+        both=bool(hidden)
+        and all(
+            any(found(one, each) for each in sets for one in (asked, *_other_way(asked, also)))
+            for asked in hidden
+        ),
         absorbed=any(one in absorbed for one in hidden),
         cpu_s=said["cpu_s"],
+        before=before,
+        after=after,
+        filter=said.get("filter", "none"),
+        friction=circumstances["friction"] if circumstances else "tanh",
+        plant="mujoco" if circumstances else "own",
     )
+
+
+def _other_way(one: Place, also: tuple[Place, ...]) -> list[Place]:
+    """Return the same coupling from its other end, where that is true too."""
+    return [other for other in also if other == (one[0], one[2], one[1])]
 
 
 def same(truth: Place, other: Place, joints: list[str], *, planar: bool) -> bool:

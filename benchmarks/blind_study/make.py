@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-import json
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomlkit
 
 from blind_study import strengths
 from blind_study.cases import Case, Hidden
+from blind_study.circumstances import MujocoCase
 from blind_study.experiments import PAUSE, PERIOD, Laboratory, Plan, SensorError
 from blind_study.foreign import EFFECTS, SENSOR_ERRORS
 from blind_study.robots import TWO, specimen
+from blind_study.writing import state_study
 from dynident.closed_loop import TrueEffect, write_experiment
-from dynident.effects import FRICTION_WIDTH, Effect, catalogue
+from dynident.effects import Effect, catalogue
+from dynident.errors import DynidentWarning
 from dynident.fitting import fit, rows
 from dynident.model import Model
 from dynident.recording import Dataset
@@ -81,15 +83,21 @@ def make(case: Case, folder: Path, size: Size) -> dict[str, Any]:
     SimulationError
         If the robot cannot be simulated.
     """
+    with warnings.catch_warnings():
+        # A clock that jitters is said to be resampled, each time it is.
+        warnings.simplefilter("ignore", DynidentWarning)
+        return _made(case, folder, size)
+
+
+def _made(case: Case, folder: Path, size: Size) -> dict[str, Any]:
     rng = np.random.default_rng([case.seed, case.number, 4])
-    rate = size.rate_of_two if case.joints == TWO else size.rate_of_many
-    made = specimen(case.joints, rate, rng)
-    plan = Plan(case, made, (), rate, size.runs, size.tests, size.repetitions)
+    plan = _plan(case, size, rng)
+    made = plan.made
     plan = replace(plan, known=_known(plan, rng))
     secrets = [_secret(plan, one, rng) for one in case.hidden]
     noise = _residual(plan, plan.short((), (), noisy=True))
     floor = 0.0
-    if not secrets or case.width != case.stated_width:
+    if not secrets or case.width != case.stated_width or isinstance(case, MujocoCase):
         floor = _ratio(plan, None, noise)
     ratios, found = [], []
     for secret in secrets:
@@ -99,19 +107,45 @@ def make(case: Case, folder: Path, size: Size) -> dict[str, Any]:
     effects = tuple(one for secret in found for one in secret.effects)
     errors = tuple(one for secret in found for one in secret.errors)
     write_experiment(plan.whole(effects, errors), folder)
-    _state_width(folder / "study.toml", case.stated_width)
+    state_study(folder / "study.toml", case)
     return {
         "case": case.to_dict(),
+        "rate_hz": plan.rate_hz,
         "joints": list(made.robot.names),
         "planar": made.planar,
         "hidden": [
             {**_place(plan, secret.label), "ratio": ratio, **_numbers(secret)}
             for secret, ratio in zip(found, ratios, strict=True)
         ],
+        "also": [_place(plan, one) for one in _also(case)],
         "ratio": max([floor, *ratios]),
         "ratio_without": floor,
         "noise_rms": [float(x) for x in noise],
     }
+
+
+def _plan(case: Case, size: Size, rng: np.random.Generator) -> Plan:
+    """Return what all experiments of a case have in common; MuJoCo is loaded for its cases only."""
+    if isinstance(case, MujocoCase):
+        from blind_study.mujoco_lab import MujocoPlan
+
+        rate = case.circumstances.rate_hz
+        made = specimen(case.joints, rate, rng)
+        return MujocoPlan(case, made, (), rate, size.runs, size.tests, size.repetitions)
+    rate = size.rate_of_two if case.joints == TWO else size.rate_of_many
+    made = specimen(case.joints, rate, rng)
+    return Plan(case, made, (), rate, size.runs, size.tests, size.repetitions)
+
+
+def _also(case: Case) -> tuple[Hidden, ...]:
+    """Return what is true as well: MuJoCo's tendons couple both ways."""
+    if not isinstance(case, MujocoCase):
+        return ()
+    return tuple(
+        replace(one, joint=one.source, source=one.joint)
+        for one in case.hidden
+        if one.effect == "joint_coupling"
+    )
 
 
 def _known(plan: Plan, rng: np.random.Generator) -> tuple[TrueEffect, ...]:
@@ -244,19 +278,3 @@ def _moved(plan: Plan, secret: _Secret, rng: np.random.Generator) -> _Secret:
         return replace(one, effect=one.effect.shaped(float(number), time + later, width))
 
     return replace(secret, effects=tuple(moved(one) for one in secret.effects))
-
-
-def _state_width(study: Path, width: float) -> None:
-    """Let a study say this width of dry friction, whatever it truly is."""
-    document = tomlkit.parse(study.read_text())
-    document.pop("friction_width", None)
-    text = tomlkit.dumps(document)
-    if width != FRICTION_WIDTH:
-        text = text.replace("\ntorque =", f"\nfriction_width = {width!r}\ntorque =", 1)
-    study.write_text(text)
-
-
-def write_truth(truth: dict[str, Any], path: Path) -> None:
-    """Write what was hidden, apart from the data."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(truth, indent=1) + "\n")

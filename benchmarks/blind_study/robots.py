@@ -1,4 +1,4 @@
-"""Robots of two, six and seven joints with lengths, masses and friction drawn at random."""
+"""Robots of two to seven joints with lengths, masses and friction drawn at random."""
 
 from __future__ import annotations
 
@@ -56,9 +56,10 @@ class _Part:
 
 
 def specimen(joints: int, rate_hz: float, rng: np.random.Generator) -> Specimen:
-    """Draw a robot of two, six or seven joints."""
+    """Draw a robot of two to seven joints; of three to five, it is the shoulder of one of six."""
     planar = joints == TWO and rng.random() < 0.6
-    parts = _two(rng, planar) if joints == TWO else _many(rng, joints)
+    whole = joints if joints in MANY else MANY[0]
+    parts = _two(rng, planar) if joints == TWO else _many(rng, whole)[:joints]
     robot = Robot.from_text(_urdf(f"arm{joints}", parts, rng))
     friction = np.array([part.friction for part in parts])
     friction = friction * np.exp(rng.normal(0.0, 0.25, friction.shape))

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,39 +15,12 @@ from scipy import stats
 
 from blind_study import record
 from blind_study.judge import Judged, judge
+from blind_study.rate import Rate
 from blind_study.robots import MANY, TWO
 from dynident.diagnosis.track_record import LARGE, track_record
 
 LEAST = 0.7
 """Ratio below which an effect need not be found."""
-
-
-@dataclass(frozen=True)
-class Rate:
-    """A figure of the study: how often something held, and how often it should."""
-
-    what: str
-    held: Sequence[bool]
-    demanded: float
-    at_most: bool = False
-
-    def row(self) -> tuple[str, str, str, str, str]:
-        if not self.held:
-            return self.what, "no cases", "", self._demand(), ""
-        count, total = sum(map(bool, self.held)), len(self.held)
-        interval = stats.binomtest(count, total).proportion_ci(method="wilson")
-        value = count / total
-        met = value <= self.demanded if self.at_most else value >= self.demanded
-        return (
-            self.what,
-            f"{count}/{total} = {value:.3f}",
-            f"{interval.low:.3f} .. {interval.high:.3f}",
-            self._demand(),
-            "yes" if met else "NO",
-        )
-
-    def _demand(self) -> str:
-        return f"{'at most' if self.at_most else 'at least'} {self.demanded:g}"
 
 
 def show(folder: Path) -> None:
@@ -65,7 +37,7 @@ def show(folder: Path) -> None:
     console.print(_effects(judged))
     console.print(_times(judged))
     console.print(_records(judged))
-    console.print(_failures(judged))
+    console.print(wrong_answers(judged))
 
 
 def load(folder: Path) -> tuple[list[Judged], list[str]]:
@@ -80,7 +52,7 @@ def load(folder: Path) -> tuple[list[Judged], list[str]]:
             skipped[name] = said["skipped"]
             continue
         skipped.pop(name, None)
-        truth = json.loads((folder / "truth" / f"{name}.json").read_text())
+        truth = json.loads((folder / "truth" / f"{said.get('case', name)}.json").read_text())
         judged[name] = judge(truth, said)
     return [judged[name] for name in sorted(judged)], list(skipped.values())
 
@@ -261,17 +233,24 @@ def _records(judged: list[Judged]) -> Table:
     return table
 
 
-def _failures(judged: list[Judged]) -> Table:
+def wrong_answers(
+    judged: list[Judged], besides: Callable[[Judged], bool] = lambda one: False
+) -> Table:
+    """List the answers that are wrong, and those of which `besides` holds."""
     table = _table("What went wrong", "case", "kind", "joints", "hidden", "ratio", "answer")
     for one in judged:
-        if not _wrong(one):
+        if not _wrong(one) and not besides(one):
             continue
         hidden = ", ".join(map(_label, one.truth)) or "nothing"
         added = ", ".join(map(_label, one.added)) or "nothing"
         said = one.broken or f"{one.verdict.replace('_', ' ')}: {added}"
-        hidden += " (width misstated)" if one.misstated else ""
+        hidden += f" ({_friction(one)})" if one.misstated else ""
         table.add_row(one.name, one.kind, str(one.joints), hidden, f"{one.ratio:.2f}", said)
     return table
+
+
+def _friction(one: Judged) -> str:
+    return "constraint friction" if one.friction == "constraint" else "width misstated"
 
 
 def _wrong(one: Judged) -> bool:

@@ -6,13 +6,16 @@ import io
 import json
 import shutil
 import time
+from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from blind_study.cases import Case
-from blind_study.make import Size, make, unavailable, write_truth
+from blind_study.filters import state
+from blind_study.make import Size, make, unavailable
+from blind_study.writing import write_truth
 from dynident.errors import DynidentError
 from dynident.threads import single_threaded
 
@@ -41,25 +44,43 @@ class Place:
         return self.folder / "answers.jsonl"
 
 
+def label(case: Case, filter: str) -> str:
+    """Name of an answer: that of its case, and of its setting of [filter] where it has one."""
+    return case.name if filter == "none" else f"{case.name}:{filter}"
+
+
 @single_threaded
-def answer(case: Case, place: Place, size: Size) -> dict[str, Any]:
-    """Make a case, ask for an explanation as a user would, and return what was said."""
-    said: dict[str, Any] = {"name": case.name, "seed": case.seed, "number": case.number}
+def answer(
+    case: Case, place: Place, size: Size, filters: Sequence[str] = ("none",)
+) -> list[dict[str, Any]]:
+    """Make a case, ask for an explanation as a user would, and return what was said.
+
+    One answer a setting of [filter], all of the same recordings.
+    """
+    each = [_about(case, filter) for filter in filters]
     missing = unavailable(case)
     if missing:
-        return {**said, "skipped": f"no effect {missing} in the catalogue"}
+        return [{**said, "skipped": f"no effect {missing} in the catalogue"} for said in each]
     folder = place.data_of(case)
     started = time.process_time()
     try:
         truth = make(case, folder, size)
     except DynidentError as error:
-        return {**said, "skipped": f"not simulated: {error}"}
+        return [{**said, "skipped": f"not simulated: {error}"} for said in each]
     write_truth(truth, place.truth_of(case))
-    said["made_s"] = time.process_time() - started
-    said |= explain(folder / "study.toml")
+    made = time.process_time() - started
+    for said, filter in zip(each, filters, strict=True):
+        if filter != "none":
+            state(folder / "study.toml", filter, truth["rate_hz"])
+        said |= {"made_s": made, **explain(folder / "study.toml")}
     if place.data == "drop":
         shutil.rmtree(folder)
-    return said
+    return each
+
+
+def _about(case: Case, filter: str) -> dict[str, Any]:
+    said = {"name": label(case, filter), "seed": case.seed, "number": case.number}
+    return said if filter == "none" else {**said, "case": case.name, "filter": filter}
 
 
 def explain(study: Path) -> dict[str, Any]:

@@ -15,9 +15,10 @@ from blind_study.experiments import SensorError
 from blind_study.foreign import EFFECTS, FOREIGN
 from blind_study.judge import judge, same
 from blind_study.make import Size, make, unavailable
+from blind_study.rate import Rate
 from blind_study.robots import specimen
 from blind_study.strengths import KNOWN, start
-from blind_study.table import Rate, figures, load
+from blind_study.table import figures, load
 from dynident.effects import catalogue
 from dynident.fitting import fit
 from dynident.study import load as load_study
