@@ -30,6 +30,7 @@ FLOORS = (
     ("closed_loop",),
     ("fitting",),
     ("consistency", "validation"),
+    ("wiring",),
     ("evidence",),
     ("diagnosis",),
     ("study",),

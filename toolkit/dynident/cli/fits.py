@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -142,6 +142,7 @@ def fit(study: Path, chosen: Chosen, kind: _Kind, more: _More, to: _Files) -> Co
     Example: dynident fit study.toml --out estimate.json --robot identified.urdf
     """
     from dynident.fitting import fit as fit_model
+    from dynident.wiring import check_wiring
 
     kind.require(chosen)
     if to.plot is not None and chosen.method != "iv":
@@ -153,9 +154,14 @@ def fit(study: Path, chosen: Chosen, kind: _Kind, more: _More, to: _Files) -> Co
     with progress("fitting") as show_progress:
         method = kind.method(chosen, loaded, show_progress)
         estimate = fit_model(loaded.model, loaded.train, method)
+        wiring = check_wiring(loaded.model, loaded.train, loaded.test, loaded.criteria.wiring)
+        said = (f"Wiring: {fault.sentence}" for fault in wiring)
+        estimate = replace(estimate, notes=(*said, *estimate.notes))
         tables, content = more.of(estimate, chosen, loaded)
     to.write(estimate)
     return CommandAnswer(
-        content=lambda: estimate.to_dict() | content,
+        content=lambda: estimate.to_dict()
+        | {"wiring": [fault.to_dict() for fault in wiring]}
+        | content,
         parts=lambda: (*estimate.tables(), *tables),
     )

@@ -42,6 +42,7 @@ from dynident.criteria.search_criteria import (
     SearchCriteria,
     ShapeCriteria,
 )
+from dynident.criteria.wiring_criteria import WiringCriteria
 
 __all__ = [
     "DEFAULTS",
@@ -59,4 +60,5 @@ __all__ = [
     "SearchCriteria",
     "ShapeCriteria",
     "VerdictCriteria",
+    "WiringCriteria",
 ]

@@ -21,6 +21,7 @@ from dynident.criteria.search_criteria import (
     SearchCriteria,
     ShapeCriteria,
 )
+from dynident.criteria.wiring_criteria import WiringCriteria
 from dynident.errors import CriteriaError
 from dynident.settings import nearest
 from dynident.tables import Table
@@ -42,6 +43,7 @@ class Criteria:
     maps : when a picture of the residual shows something.
     advice : which experiments are advised.
     loops : what the errors of a simulated closed loop mean.
+    wiring : when recordings contradict what is said of their columns.
     """
 
     noise: NoiseCriteria = field(default_factory=NoiseCriteria)
@@ -56,6 +58,7 @@ class Criteria:
     maps: MapCriteria = field(default_factory=MapCriteria)
     advice: AdviceCriteria = field(default_factory=AdviceCriteria)
     loops: LoopCriteria = field(default_factory=LoopCriteria)
+    wiring: WiringCriteria = field(default_factory=WiringCriteria)
 
     @classmethod
     def with_values(cls, values: Mapping[str, Any]) -> Criteria:

@@ -1,5 +1,8 @@
 """The way of data through a diagnosis: compare -> rank -> add -> refit -> judge.
 
+Before it, recordings are checked against the robot (`dynident.wiring`): where a column is not what
+it is called, that is the answer, and nothing is added.
+
 - *compare*: the model as given is fitted to the recordings, where they repeat with one repetition
   as the instrument of another, so that noise in the columns does no harm. What is no missing
   physics is allowed for: contacts are left out, dry friction may reverse over another width.
@@ -38,6 +41,7 @@ from dynident.diagnosis.search.selection import (
     without_superfluous,
 )
 from dynident.diagnosis.search.shaped_fit import refitted, shaped
+from dynident.diagnosis.wiring_answer import Wiring
 from dynident.effects import Effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
@@ -89,10 +93,14 @@ def diagnose(
         per_joint = criteria.search.most_effects_per_joint * given.robot.n
         most = max(criteria.search.most_effects, per_joint)
     train, *others = numbered(train, *([] if test is None else [test]))
-    task = _Task(train=train, test=others[0] if others else None, most=most, progress=progress)
+    progress("checking the wiring")
+    held_out = others[0] if others else None
+    wiring = Wiring.of(given, train, held_out, criteria.wiring)
+    most = 0 if wiring.faults else most
+    task = _Task(train=train, test=held_out, most=most, progress=progress)
     start = _compare(given, controller, criteria, task)
     extended = _extend(_rank(start, task), task)
-    return _judge(_search_globally(start, extended, task), task)
+    return wiring.heeded(_judge(_search_globally(start, extended, task), task))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,6 +12,7 @@ from dynident.evidence.maps import ResidualMap
 from dynident.fitting.estimate import DataSource, Estimate
 from dynident.recording.dataset import NoiseSource
 from dynident.tables import Table, finite, number, percent, print_tables
+from dynident.wiring import Fault
 
 Verdict = Literal["nothing_missing", "explained", "unexplained"]
 
@@ -49,6 +50,9 @@ class Diagnosis:
     notes : caveats that belong to the verdict, in plain words.
     test_sources : the test recordings; empty where blocks of time were held out.
     criteria : the numbers by which all this was decided.
+    wiring : columns and data that are not what the study says: where there are any, they are the
+        answer, nothing is added, and the verdict is "unexplained".
+    impossible : inertias and frictions of the final model that no robot has; likewise.
     """
 
     verdict: Verdict
@@ -65,6 +69,8 @@ class Diagnosis:
     notes: tuple[str, ...] = ()
     test_sources: tuple[DataSource, ...] = ()
     criteria: Criteria = DEFAULTS
+    wiring: tuple[Fault, ...] = ()
+    impossible: tuple[str, ...] = ()
 
     @property
     def best(self) -> Step | None:
@@ -79,7 +85,17 @@ class Diagnosis:
     @property
     def sentence(self) -> str:
         """The verdict in plain words."""
+        if self.wiring:
+            faults = " ".join(fault.sentence for fault in self.wiring)
+            return f"The recordings are not what the study says, and nothing was sought. {faults}"
         effects = ", ".join(self._named(step) for step in self.steps)
+        if self.impossible:
+            added = f" {effects} added, but" if effects else ""
+            return (
+                f"None of these explains it:{added} no robot can have what the fit says, "
+                f"{', '.join(self.impossible)}. Is the sign, the unit or the order of a column "
+                "wrong, or is the description another robot's?"
+            )
         if self.noise_source == "unknown":
             return _VERDICTS_WITHOUT_NOISE[self.verdict].format(effects=effects)
         left = max((j.ratio_after or 0.0 for j in self.joints), default=0.0)
@@ -104,6 +120,8 @@ class Diagnosis:
         It holds for noise that was measured and for the default criteria.
         """
         floor = self.test_error.noise_floor
+        if self.wiring or self.impossible:
+            return None
         if self.noise_source != "replicates" or not floor or self.criteria.changed:
             return None
         over = self.test_error.before / floor
@@ -167,6 +185,8 @@ class Diagnosis:
                 "after": self.test_error.after,
                 "noise_floor": self.test_error.noise_floor,
             },
+            "wiring": [fault.to_dict() for fault in self.wiring],
+            **({"impossible": list(self.impossible)} if self.impossible else {}),
             "notes": list(self.caveats),
             **({"criteria": self._changed_criteria()} if self.criteria.changed else {}),
         }
@@ -176,6 +196,8 @@ class Diagnosis:
 
     def tables(self) -> tuple[Table | str, ...]:
         """Everything that `show` prints, in its order."""
+        if self.wiring:
+            return (self.sentence, self.joint_table(), self.map_table(), *self.caveats)
         return (
             self.joint_table(),
             self.map_table(),

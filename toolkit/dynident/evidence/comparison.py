@@ -22,6 +22,7 @@ from dynident.tables import Table, finite, percent, print_tables
 from dynident.threads import single_threaded
 from dynident.validation.replay import Judged, loop_of
 from dynident.validation.validation_result import Loop, loop_table
+from dynident.wiring import Fault, check_wiring
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +37,7 @@ class Comparison:
     loops : each in the closed loop of the recordings, see `dynident.validate`; None where the
         controller or the reference is not known.
     criteria : by which noise was measured, and maps are read.
+    wiring : columns and data that are not what the study says, where that was checked.
     """
 
     names: tuple[str, ...]
@@ -43,12 +45,14 @@ class Comparison:
     results: tuple[HeldOut, ...]
     loops: tuple[Loop, ...] = ()
     criteria: Criteria = DEFAULTS
+    wiring: tuple[Fault, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON of `compare --json`."""
         robot, last = self.models[0].robot, self.results[-1]
         return {
             "noise": {"floor": last.floor},
+            "wiring": [fault.to_dict() for fault in self.wiring],
             "models": [
                 {
                     "name": name,
@@ -91,6 +95,7 @@ class Comparison:
             rows.append((joint, *errors, percent(noise)))
         rows.append(("all", *(percent(r.error) for r in self.results), percent(last.floor)))
         notes = () if last.floor is not None else ("The noise floor is unknown.",)
+        notes = (*notes, *(f"Wiring: {fault.sentence}" for fault in self.wiring))
         columns = ("joint", *self.names, "noise floor")
         errors = Table("Relative torque error on held-out recordings", columns, tuple(rows), notes)
         loops = loop_table(self.names, self._loops, robot.names)
@@ -209,4 +214,5 @@ def compare_models(
         results=tuple(results),
         loops=tuple(loops),
         criteria=criteria,
+        wiring=check_wiring(next(iter(models.values())), train, test, criteria.wiring),
     )

@@ -31,12 +31,14 @@ class Provenance:
     sha256 : hexadecimal digits of the file's content; empty likewise.
     filter : what was done to the numbers since, in words; empty if nothing.
     record : which recording of a file that holds several; empty if it holds one.
+    columns : (ours, the file's name of it, scale) of each column that was read; empty likewise.
     """
 
     file: str = ""
     sha256: str = ""
     filter: str = ""
     record: str = ""
+    columns: tuple[tuple[str, str, float], ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

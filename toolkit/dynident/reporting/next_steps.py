@@ -10,6 +10,7 @@ from dynident.diagnosis.result import Diagnosis
 from dynident.effects import Effect
 from dynident.reporting.joint_states import states
 from dynident.tables import percent
+from dynident.wiring import Fault
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,8 @@ def summary(diagnosis: Diagnosis) -> str:
 
 def next_steps(diagnosis: Diagnosis) -> tuple[Advice, ...]:
     """What to do, the most useful first."""
+    if diagnosis.wiring:
+        return tuple(_to_mend(fault) for fault in diagnosis.wiring)
     found = [*_to_add(diagnosis), *_to_separate(diagnosis)]
     if diagnosis.verdict == "unexplained":
         found.append(_unexplained(diagnosis))
@@ -59,6 +62,11 @@ def next_steps(diagnosis: Diagnosis) -> tuple[Advice, ...]:
             )
         )
     return tuple(found)
+
+
+def _to_mend(fault: Fault) -> Advice:
+    what = f"Mend the study: {fault.what}. {fault.where}."
+    return Advice(what, f"{fault.evidence[0].upper()}{fault.evidence[1:]}.", fault.mend)
 
 
 def _to_add(diagnosis: Diagnosis) -> list[Advice]:

@@ -83,7 +83,8 @@ def read(
     names = joints_in(table) if joints is None else _joint_names(joints, where)
     if kinds is not None and len(kinds) != len(names):
         raise RecordingError(f"{len(kinds)} kinds for {len(names)} joints", where)
-    found = load(table, resolve(table, names, columns))
+    located = resolve(table, names, columns)
+    found = load(table, located)
     signals: dict[str, Any] = {
         signal: np.column_stack([found[f"{signal}.{joint}"] for joint in names])
         for signal in (*REQUIRED, *OPTIONAL)
@@ -98,7 +99,12 @@ def read(
         t=found["t"],
         joints=names,
         name=record or path.stem,
-        provenance=Provenance(where, hashlib.sha256(data).hexdigest(), record=record or ""),
+        provenance=Provenance(
+            where,
+            hashlib.sha256(data).hexdigest(),
+            record=record or "",
+            columns=tuple((ours, one.name, one.scale) for ours, one in located.items()),
+        ),
         **signals,
     )
     warn_of_units(recording, kinds)

@@ -1,0 +1,175 @@
+"""The search for the assignment of columns to joints that the robot's equations of motion want.
+
+Every hypothesis is a single fault. The one whose fit is the most likely by far, with inertias and
+frictions that are possible, is accepted; then further faults are looked for beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynident.criteria import WiringCriteria
+from dynident.model import Model
+from dynident.wiring.assignment import (
+    Assignment,
+    Hypothesis,
+    position_hypotheses,
+    torque_hypotheses,
+)
+from dynident.wiring.described_torque import DescribedScale, far_from_described
+from dynident.wiring.gear_ratios import (
+    motor_side_hypotheses,
+    torque_scale_hypotheses,
+    turns_too_far,
+)
+from dynident.wiring.wiring_regression import TorqueFit, WiringRegression
+from dynident.wiring.wiring_rows import WiringRows
+
+_ALIKE = 0.8
+"""Share of the best gain with which scales of other joints stay in question."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Accepted:
+    """A hypothesis that wins by far, with the fits before and after it."""
+
+    hypothesis: Hypothesis
+    before: TorqueFit
+    after: TorqueFit
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SearchResult:
+    """Faults that were accepted, and the fit without them.
+
+    Attributes
+    ----------
+    accepted : in the order in which they were found.
+    assignment : without these faults.
+    fit : of it.
+    """
+
+    accepted: tuple[Accepted, ...]
+    assignment: Assignment
+    fit: TorqueFit
+
+
+def search(model: Model, rows: WiringRows, criteria: WiringCriteria) -> SearchResult:
+    """Accept faults one after the other, until none wins by far.
+
+    Parameters
+    ----------
+    model : of which the robot and the width of friction count.
+    rows : a few hundred, of all recordings.
+    criteria : by how much a hypothesis must win, and how many faults are looked for.
+
+    Returns
+    -------
+    The faults, with the assignment and the fit that are left.
+    """
+    now = Assignment.as_recorded(model.robot.n)
+    accepted: list[Accepted] = []
+    while True:
+        here = _Fits(model, rows, now)
+        if len(accepted) == criteria.most_faults:
+            break
+        tried = here.all_plain()
+        best = _best(tried, here.start, criteria.tie)
+        if not _settled(best, here, criteria):
+            tried += motor_side_hypotheses(model, rows, now, here.start, criteria)
+            best = _best(tried, here.start, criteria.tie)
+        if best is None or not _wins(best, here.start, rows, criteria):
+            break
+        best = _nearest_described(best, tried, here)
+        accepted.append(Accepted(hypothesis=best[0], before=here.start, after=best[1]))
+        now = best[0].mended
+    if not any(one.hypothesis.kind == "torque_scale" for one in accepted):
+        unit = DescribedScale.of(model, rows, now, criteria).hypothesis(now, criteria)
+        if unit is not None:
+            accepted.append(Accepted(hypothesis=unit, before=here.start, after=here.start))
+            now = unit.mended
+    return SearchResult(accepted=tuple(accepted), assignment=now, fit=here.start)
+
+
+class _Fits:
+    """Fits of every plain hypothesis beside an assignment."""
+
+    def __init__(self, model: Model, rows: WiringRows, now: Assignment) -> None:
+        self.model, self.rows, self.now = model, rows, now
+        self.regression = WiringRegression.of(model, rows.moved(now.change))
+        self.start = self.regression.fit(now.torque_of, now.torque_scale)
+
+    def all_plain(self) -> list[tuple[Hypothesis, TorqueFit]]:
+        """Hypotheses with their fits, the plainest first."""
+        own = torque_hypotheses(self.now)
+        found = [(one, _fit(self.regression, one)) for one in own]
+        kinds = self.model.robot.kinds
+        revolute = tuple(i for i, kind in enumerate(kinds) if kind == "revolute")
+        for group in position_hypotheses(self.now, revolute):
+            motion = self.rows.moved(group[0].mended.change)
+            regression = WiringRegression.of(self.model, motion)
+            found += [(one, _fit(regression, one)) for one in group]
+        return [*found, *torque_scale_hypotheses(self.regression, self.now, self.start)]
+
+
+def _settled(
+    best: tuple[Hypothesis, TorqueFit] | None, here: _Fits, criteria: WiringCriteria
+) -> bool:
+    """Whether a plain hypothesis leaves nothing that gears would explain.
+
+    Degrees look like a gear of 57 at one joint, but not at all.
+    """
+    if best is None or not _wins(best, here.start, here.rows, criteria):
+        return False
+    one, _ = best
+    if one.kind == "degrees" and len(one.joints) == 1:
+        return False
+    joints = range(here.model.robot.n)
+    if any(turns_too_far(here.model, here.rows, one.mended, j, criteria) for j in joints):
+        return False
+    if one.kind != "degrees":
+        return True
+    described = DescribedScale.of(here.model, here.rows, one.mended, criteria)
+    return described.hypothesis(one.mended, criteria) is None
+
+
+def _nearest_described(
+    best: tuple[Hypothesis, TorqueFit], tried: list[tuple[Hypothesis, TorqueFit]], here: _Fits
+) -> tuple[Hypothesis, TorqueFit]:
+    """Of scales that fit alike, the one with inertias as described: all others, or this one?"""
+    if best[0].kind != "torque_scale":
+        return best
+    alike = [
+        one
+        for one in tried
+        if one[0].kind == "torque_scale"
+        and one[1].score - here.start.score > _ALIKE * (best[1].score - here.start.score)
+    ]
+    return min(alike, key=lambda x: far_from_described(here.model, here.regression, x[1].inertia))
+
+
+def _fit(regression: WiringRegression, one: Hypothesis) -> TorqueFit:
+    return regression.fit(one.mended.torque_of, one.mended.torque_scale)
+
+
+def _best(
+    tried: Sequence[tuple[Hypothesis, TorqueFit]], start: TorqueFit, tie: float
+) -> tuple[Hypothesis, TorqueFit] | None:
+    """The most likely hypothesis; among those that are as likely as it, the plainest."""
+    if not tried:
+        return None
+    gains = np.array([fit.score - start.score for _, fit in tried])
+    return tried[int(np.argmax(gains >= gains.max() - tie * max(float(gains.max()), 0.0)))]
+
+
+def _wins(
+    best: tuple[Hypothesis, TorqueFit],
+    start: TorqueFit,
+    rows: WiringRows,
+    criteria: WiringCriteria,
+) -> bool:
+    gain = best[1].score - start.score
+    return gain >= criteria.gain and gain * rows.independent >= criteria.evidence

@@ -1,0 +1,85 @@
+"""The verb `check_wiring`: recordings against the robot that they are said to be of."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.criteria import DEFAULTS, WiringCriteria
+from dynident.model import Model
+from dynident.recording import Dataset
+from dynident.threads import single_threaded
+from dynident.wiring.fault import Fault
+from dynident.wiring.fault_words import IN_COLUMNS, column_lines, faults_of
+from dynident.wiring.gear_ratios import turns_too_far
+from dynident.wiring.hypothesis_search import SearchResult, search
+from dynident.wiring.same_data import shared_recordings, twice_recorded
+from dynident.wiring.stated_period import wrong_periods
+from dynident.wiring.wiring_rows import WiringRows, rows_of
+
+
+@single_threaded
+def check_wiring(
+    model: Model,
+    train: Dataset,
+    test: Dataset | None = None,
+    criteria: WiringCriteria = DEFAULTS.wiring,
+) -> tuple[Fault, ...]:
+    """Look for columns and data that are not what the study says they are.
+
+    Parameters
+    ----------
+    model : of which the robot counts; which effects it names does not.
+    train : recordings to fit.
+    test : recordings to judge by, which must be others.
+    criteria : by how much another assignment must win.
+
+    Returns
+    -------
+    Faults, the surest first; empty where nothing contradicts what is said.
+
+    Raises
+    ------
+    RecordingError
+        If a recording does not suit its filter.
+    """
+    test = test or Dataset(())
+    every = Dataset((*train.recordings, *test.recordings), train.filter)
+    found = [
+        *twice_recorded(train, criteria),
+        *shared_recordings(train, test, criteria),
+        *wrong_periods(every, criteria),
+    ]
+    if any(fault.kind == "one_source" for fault in found):
+        return tuple(found)  # every assignment of a column that is not there fits badly
+    rows = rows_of(train, criteria.rows, criteria.independent_hz)
+    result = search(model, rows, criteria)
+    named = faults_of(model, result, train.recordings[0])
+    far = _out_of_range(model, rows, result, train, criteria)
+    return (*found, *named, *far)
+
+
+def _out_of_range(
+    model: Model, rows: WiringRows, result: SearchResult, train: Dataset, criteria: WiringCriteria
+) -> tuple[Fault, ...]:
+    """Joints that still turn farther than they can, of which the torques tell nothing."""
+    now, robot = result.assignment, model.robot
+    found = []
+    for j, name in enumerate(robot.names):
+        if robot.kinds[j] != "revolute" or not turns_too_far(model, rows, now, j, criteria):
+            continue
+        travel = float(np.ptp(rows.q[:, now.position_of[j]])) * abs(float(now.position_scale[j]))
+        limits = robot.joints[j]
+        room = limits.upper - limits.lower
+        limit = f", and its limits leave {room:.3g} rad" if np.isfinite(room) else ""
+        mended = now.positions_scaled(float(np.pi / 180), j)
+        found.append(
+            Fault(
+                kind="degrees",
+                joints=(name,),
+                what=f"q.{name}: in degrees, not rad, or on the motor side of a gear",
+                evidence=f"it travels {travel:.4g} rad{limit}, which the torques do not tell apart",
+                mend=column_lines(mended, train.recordings[0]),
+                where=f"If in degrees, {IN_COLUMNS[0].lower()}{IN_COLUMNS[1:]}",
+            )
+        )
+    return tuple(found)

@@ -1,0 +1,171 @@
+"""One assignment of positions to joints, and quick fits of torques assigned to them.
+
+The regressor of a motion is evaluated once; of it only the second moments of each joint's rows
+are kept. A fit to torques in another order, of another sign or scale is then one small system of
+equations. Beside the rigid body every joint has viscous and dry friction, a rotor, a spring and an
+offset, so that what a model lacks is not taken for a fault of the wiring.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from dynident.model import Model
+from dynident.wiring.wiring_rows import WiringRows
+
+OF_A_JOINT = 5
+"""Columns of a joint's own: Fv, Fc, rotor inertia, spring, offset."""
+_ROUNDS = 3  # of weighting joints by what is left at them
+_RIDGE = 1e-11
+_LEAST = 1e-5
+"""Share of the torque's power below which a residual is as good as none."""
+_STATES = 12  # positions at which the inertia is looked at
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TorqueFit:
+    """A fit to torques that are assigned to joints in some way.
+
+    Attributes
+    ----------
+    values : (p,) of the columns.
+    unexplained : (n,) residual power of each joint over the torque's.
+    inertia, friction : (n,) mean joint-space inertia (kg m^2 or kg) and power lost to friction (W).
+    inertia_z, friction_z : (n,) the same over their standard deviations, per root of a row.
+    """
+
+    values: np.ndarray
+    unexplained: np.ndarray
+    inertia: np.ndarray
+    friction: np.ndarray
+    inertia_z: np.ndarray
+    friction_z: np.ndarray
+
+    @property
+    def score(self) -> float:
+        """Logarithmic likelihood per row, of fits whose inertias and frictions are possible.
+
+        An impossible value costs what it would cost to hold it at zero.
+        """
+        z = np.minimum(np.concatenate([self.inertia_z, self.friction_z]), 0.0)
+        lost = 0.5 * float(np.sum(np.log1p(z**2)))
+        return self.fit_score - lost
+
+    @property
+    def fit_score(self) -> float:
+        """The part of the score that the residual makes."""
+        return -0.5 * float(np.sum(np.log(np.maximum(self.unexplained, _LEAST))))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class WiringRegression:
+    """Second moments of a motion's columns with themselves and with every torque.
+
+    Attributes
+    ----------
+    gram : (n, p, p) of each joint's rows.
+    cross : (n, n, p) of joint i's rows with torque column k.
+    power : (n,) sum of squares of each torque column.
+    inertia_of, friction_of : (n, p) mean inertia and friction power, linear in the values.
+    """
+
+    gram: np.ndarray
+    cross: np.ndarray
+    power: np.ndarray
+    inertia_of: np.ndarray
+    friction_of: np.ndarray
+
+    @classmethod
+    def of(cls, model: Model, rows: WiringRows) -> WiringRegression:
+        """Evaluate the columns along a motion.
+
+        Parameters
+        ----------
+        model : of which the robot and the width of friction count.
+        rows : the motion and the torques.
+        """
+        columns = _columns(model, rows)
+        n = columns.shape[1]
+        by_joint = columns.transpose(1, 0, 2)
+        own = columns.shape[2] - OF_A_JOINT * n
+        friction_of = np.zeros((n, columns.shape[2]))
+        dry = np.tanh(rows.v / model.friction_width)
+        for j in range(n):
+            at = own + OF_A_JOINT * j
+            friction_of[j, at] = np.mean(rows.v[:, j] ** 2)
+            friction_of[j, at + 1] = np.mean(rows.v[:, j] * dry[:, j])
+        return cls(
+            gram=by_joint.transpose(0, 2, 1) @ by_joint,
+            cross=np.swapaxes(by_joint.transpose(0, 2, 1) @ rows.tau, 1, 2),
+            power=np.sum(rows.tau**2, axis=0),
+            inertia_of=_inertia_of(model, rows, columns.shape[2]),
+            friction_of=friction_of,
+        )
+
+    def fit(self, order: np.ndarray, scale: np.ndarray) -> TorqueFit:
+        """Fit torques that are `scale[i]` times the column `order[i]` at joint i.
+
+        Parameters
+        ----------
+        order : (n,) numbers of torque columns.
+        scale : (n,) by which each is multiplied.
+        """
+        n = len(order)
+        cross = self.cross[np.arange(n), order] * scale[:, None]
+        power = np.maximum(self.power[order] * scale**2, 1e-300)
+        left = power
+        for _ in range(_ROUNDS):
+            weight = 1.0 / np.maximum(left, _LEAST * power)
+            A = (weight @ self.gram.reshape(n, -1)).reshape(len(self.gram[0]), -1)
+            size = np.sqrt(np.maximum(np.diag(A), 1e-300))
+            factor = cho_factor(A / np.outer(size, size) + _RIDGE * np.eye(len(A)))
+            values = cho_solve(factor, (weight @ cross) / size) / size
+            quadratic = (self.gram @ values) @ values
+            left = np.maximum(power - 2 * cross @ values + quadratic, 0.0)
+        wanted = np.concatenate([self.inertia_of, self.friction_of])
+        spread = np.sqrt(np.sum((wanted / size) * cho_solve(factor, (wanted / size).T).T, axis=1))
+        found = wanted @ values
+        z = np.divide(found, spread, out=np.zeros_like(found), where=spread > 0)
+        return TorqueFit(
+            values=values,
+            unexplained=left / power,
+            inertia=found[:n],
+            friction=found[n:],
+            inertia_z=z[:n],
+            friction_z=z[n:],
+        )
+
+
+def _columns(model: Model, rows: WiringRows) -> np.ndarray:
+    """Columns of base parameters, then five of each joint's own, (T, n, p)."""
+    robot, kept = model.robot, list(model.base.independent)
+    samples, n = rows.q.shape
+    columns = np.zeros((samples, n, len(kept) + OF_A_JOINT * n))
+    columns[:, :, : len(kept)] = robot.regressor(rows.q, rows.v, rows.a)[:, :, kept]
+    dry = np.tanh(rows.v / model.friction_width)
+    for j in range(n):
+        own = [rows.v[:, j], dry[:, j], rows.a[:, j], rows.q[:, j], np.ones(samples)]
+        at = len(kept) + OF_A_JOINT * j
+        columns[:, j, at : at + OF_A_JOINT] = np.stack(own, axis=1)
+    return columns
+
+
+def _inertia_of(model: Model, rows: WiringRows, size: int) -> np.ndarray:
+    """Mean inertia at each joint, (n, p): the torque of a unit of acceleration, gravity off."""
+    robot, kept = model.robot, list(model.base.independent)
+    n = robot.n
+    at = np.linspace(0, len(rows.q) - 1, min(_STATES, len(rows.q))).round().astype(int)
+    q = rows.q[at]
+    rest = np.zeros_like(q)
+    still = robot.regressor(q, rest, rest)
+    found = np.zeros((n, size))
+    for j in range(n):
+        pushed = np.array(rest)
+        pushed[:, j] = 1.0
+        column = (robot.regressor(q, rest, pushed) - still)[:, j, kept]
+        found[j, : len(kept)] = column.mean(axis=0)
+        found[j, len(kept) + OF_A_JOINT * j + 2] = 1.0
+    return found

@@ -1,0 +1,70 @@
+"""A few hundred rows of all recordings: motion and torque as the regression sees them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dynident.fitting.sampling import sample
+from dynident.recording import Dataset
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class WiringRows:
+    """Rows on which assignments of columns to joints are compared.
+
+    Attributes
+    ----------
+    q, v, a : (T, n) rad or m, and their derivatives.
+    tau : (T, n) N m or N.
+    independent : about how many of the rows are worth counting: neighbours err alike.
+    """
+
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    tau: np.ndarray
+    independent: float
+
+    def moved(self, change: np.ndarray) -> WiringRows:
+        """Return the rows with positions `change @ q`, (n, n): joints exchanged, or rescaled."""
+        q, v, a = (x @ change.T for x in (self.q, self.v, self.a))
+        return replace(self, q=q, v=v, a=a)
+
+    def thinned(self, most: int) -> WiringRows:
+        """Return at most so many of the rows, evenly."""
+        at = np.unique(np.linspace(0, len(self.q) - 1, min(most, len(self.q))).round().astype(int))
+        return replace(self, q=self.q[at], v=self.v[at], a=self.a[at], tau=self.tau[at])
+
+
+def rows_of(dataset: Dataset, most: int, independent_hz: float) -> WiringRows:
+    """Pick rows from all recordings, evenly in time.
+
+    Parameters
+    ----------
+    dataset : the recordings, filtered as their study says.
+    most : rows that are picked, about.
+    independent_hz : 1/s, rows that count as independent.
+
+    Returns
+    -------
+    Rows of all recordings, one after the other.
+
+    Raises
+    ------
+    RecordingError
+        If a recording does not suit its filter.
+    """
+    parts = []
+    duration = 0.0
+    each = max(20, -(-most // len(dataset.recordings)))
+    for recording in dataset.recordings:
+        one = sample(recording, dataset.filter)
+        duration += len(one.t) / one.rate_hz
+        at = np.unique(np.linspace(0, len(one.t) - 1, min(each, len(one.t))).round().astype(int))
+        parts.append([x[at] for x in (one.q, one.v, one.a, one.tau)])
+    q, v, a, tau = (np.concatenate(pieces) for pieces in zip(*parts, strict=True))
+    return WiringRows(
+        q=q, v=v, a=a, tau=tau, independent=min(float(len(q)), duration * independent_hz)
+    )
