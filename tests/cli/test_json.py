@@ -40,7 +40,9 @@ def is_place(said: dict[str, Any]) -> bool:
 def check_diagnosis(said: dict[str, Any], source: str) -> None:
     assert set(said) == {
         *("verdict", "noise", "joints", "steps", "candidates", "test_error", "notes"),
+        "wiring",
     }
+    assert said["wiring"] == []
     assert said["verdict"] in VERDICTS
     assert said["noise"] == {"source": source}
     assert [joint["name"] for joint in said["joints"]] == ["shoulder", "elbow"]
@@ -148,7 +150,7 @@ def test_compare(run, study, tmp_path):
     done = run("compare", path, "--json", "--with", addition, "--with", "joint_spring")
     assert done.status == 0 and done.err == ""
     said = done.json
-    assert set(said) == {"noise", "models", "joints"}
+    assert set(said) == {"noise", "models", "joints", "wiring"}
     assert number(said["noise"]["floor"], 0)
     assert [m["name"] for m in said["models"]] == ["study", f"+ {addition}", "+ joint_spring"]
     viscous = ["viscous_friction@shoulder", "viscous_friction@elbow"]

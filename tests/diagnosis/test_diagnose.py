@@ -183,7 +183,9 @@ def test_units_of_torque_do_not_change_the_answer(model: Model) -> None:
     train, test = recordings(model, "quadratic_drag@shoulder", {"Fq__shoulder": 0.3}, **NOISE)
     plain = diagnosed(model, "quadratic_drag@shoulder", {"Fq__shoulder": 0.3})
     scaled = [Dataset(tuple(r.replace(tau=1e3 * r.tau) for r in part)) for part in (train, test)]
-    found = find(model, *scaled)
+    # The description is in the same unit: else the torques would be said to be in N mm.
+    robot = model.robot.with_theta(1e3 * model.robot.theta)
+    found = find(Model(robot, model.effects), *scaled)
     assert [s.effect.label for s in found.steps] == [s.effect.label for s in plain.steps]
     assert found.test_error.after == pytest.approx(plain.test_error.after, rel=1e-6)
     assert found.steps[0].values[0] == pytest.approx(1e3 * plain.steps[0].values[0], rel=1e-5)

@@ -160,8 +160,8 @@ def fit(study: Path, chosen: Chosen, kind: _Kind, more: _More, to: _Files) -> Co
         tables, content = more.of(estimate, chosen, loaded)
     to.write(estimate)
     return CommandAnswer(
-        content=lambda: estimate.to_dict()
-        | {"wiring": [fault.to_dict() for fault in wiring]}
-        | content,
+        content=lambda: (
+            estimate.to_dict() | {"wiring": [fault.to_dict() for fault in wiring]} | content
+        ),
         parts=lambda: (*estimate.tables(), *tables),
     )

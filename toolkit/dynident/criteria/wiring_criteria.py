@@ -28,9 +28,7 @@ class WiringCriteria(CriteriaGroup):
         _INJECTED + "; without one at most 0.07, with one as a rule above 0.8",
         over=0,
     )
-    evidence: float = criterion(
-        15.0, "1", "the same over all independent rows", "taste", over=0
-    )
+    evidence: float = criterion(15.0, "1", "the same over all independent rows", "taste", over=0)
     tie: float = criterion(
         0.1,
         "1",
@@ -58,7 +56,10 @@ class WiringCriteria(CriteriaGroup):
         "measured: 0.68 to 1.7 in eight studies with descriptions of every kind",
     )
     least_gear: float = criterion(
-        15.0, "1", "described over measured torque of every joint above which a gear is likely", over=1
+        15.0,
+        "1",
+        "described over measured torque of every joint above which a gear is likely",
+        over=1,
     )
     odd_one: float = criterion(
         20.0, "1", "factor by which one joint's torque is off, the others being right", over=1
@@ -67,7 +68,9 @@ class WiringCriteria(CriteriaGroup):
         3.0, "1", "rms of a torque over the limit in the description that no drive has", over=1
     )
     shared: float = criterion(
-        0.2, "1", "share of a test recording's samples that are fitted above which it judges nothing"
+        0.2,
+        "1",
+        "share of a test recording's samples that are fitted above which it judges nothing",
     )
     one_source: float = criterion(
         1e-5, "1", "difference of two columns, each of unit size, below which they are one", over=0

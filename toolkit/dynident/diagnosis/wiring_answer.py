@@ -36,6 +36,10 @@ class Wiring:
         Parameters
         ----------
         model, train, test, criteria : as there.
+
+        Returns
+        -------
+        The faults, and the rows that they were sought on.
         """
         return cls(
             faults=check_wiring(model, train, test, criteria),

@@ -38,6 +38,7 @@ class Provenance:
     sha256: str = ""
     filter: str = ""
     record: str = ""
+    _: KW_ONLY
     columns: tuple[tuple[str, str, float], ...] = ()
 
 

@@ -39,6 +39,10 @@ class DescribedScale:
         model : whose bodies are the described ones.
         rows, now : the rows, and what belongs to which joint.
         criteria : when a torque is said to show.
+
+        Returns
+        -------
+        Factor and limit of each joint.
         """
         robot = model.robot
         motion = rows.moved(now.change)
@@ -80,21 +84,21 @@ class DescribedScale:
                 mended = now.torques_scaled(1e-3, *every)
                 return Hypothesis(kind="torque_unit", joints=every, mended=mended, ratios=(1e-3,))
             if np.all(self.factor[known] < 1 / criteria.least_gear):
-                factors = np.where(self.known, 1 / np.where(self.known, self.factor, 1), 1 / typical)
+                factors = np.where(
+                    self.known, 1 / np.where(self.known, self.factor, 1), 1 / typical
+                )
                 mended = now
                 for j, factor in enumerate(factors):
                     mended = mended.torques_scaled(float(factor), j)
                 given = tuple(float(x) for x in factors)
-                return Hypothesis(
-                    kind="torque_scale", joints=every, mended=mended, ratios=given
-                )
+                return Hypothesis(kind="torque_scale", joints=every, mended=mended, ratios=given)
             for j in known[np.abs(np.log(self.factor[known] / typical)) > np.log(criteria.odd_one)]:
                 factor = typical / float(self.factor[j])
                 mended = now.torques_scaled(factor, int(j))
                 return Hypothesis(
                     kind="torque_scale", joints=(int(j),), mended=mended, ratios=(factor,)
                 )
-        for j in np.flatnonzero(self.over_effort > criteria.beyond_effort):
+        for j in np.flatnonzero(~self.known & (self.over_effort > criteria.beyond_effort)):
             mended = now.torques_scaled(1e-3, int(j))
             return Hypothesis(kind="torque_unit", joints=(int(j),), mended=mended, ratios=(1e-3,))
         return None
@@ -115,6 +119,10 @@ def far_from_described(model: Model, regression: WiringRegression, inertia: np.n
     model : whose bodies are the described ones.
     regression : along a motion.
     inertia : (n,) kg m^2 or kg, that were fitted.
+
+    Returns
+    -------
+    Zero where they are as described.
     """
     kept = len(model.base.independent)
     described = regression.inertia_of[:, :kept] @ model.given_values()[:kept]

@@ -33,6 +33,10 @@ def torque_scale_hypotheses(
     ----------
     regression : along the motion.
     now, start : the assignment, and its fit.
+
+    Returns
+    -------
+    The best factor of each joint.
     """
     found: list[Tried] = []
     for joint in range(len(now.torque_of)):
@@ -164,6 +168,10 @@ def turns_too_far(
     rows, now : the positions, as they are assigned.
     joint : its number.
     criteria : how far is too far.
+
+    Returns
+    -------
+    True if it does.
     """
     column = rows.q[:, now.position_of[joint]] * now.position_scale[joint]
     travel = float(np.ptp(column))

@@ -43,9 +43,9 @@ def shared_recordings(train: Dataset, test: Dataset, criteria: WiringCriteria) -
             kind="same_data",
             joints=(),
             what=f"test recordings are training data: {', '.join(shares)}",
-            evidence=f"{percent(min(shares.values()))} or more of their samples are fitted, so that "
-            "their errors judge nothing",
-            where='Name other files there, give windows that do not overlap, or leave these '
+            evidence=f"{percent(min(shares.values()))} or more of their samples are fitted, so "
+            "that their errors judge nothing",
+            where="Name other files there, give windows that do not overlap, or leave these "
             '[[recordings]] entries with use = "test" out: then blocks of time are held out',
         ),
     )

@@ -33,9 +33,7 @@ def wrong_periods(dataset: Dataset, criteria: WiringCriteria) -> tuple[Fault, ..
             off, left, likely = better
             name = f"{one.name} (number {one.number})" if one.number else one.name
             alike.setdefault((one.period, float(f"{likely:.6g}")), []).append((name, off, left))
-    return tuple(
-        _fault(period, likely, cases) for (period, likely), cases in alike.items()
-    )
+    return tuple(_fault(period, likely, cases) for (period, likely), cases in alike.items())
 
 
 def _fault(period: float, likely: float, cases: list[tuple[str, float, float]]) -> Fault:

@@ -1,0 +1,190 @@
+"""Columns that are not what they are called: named where they are, silence where they are not."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomlkit
+
+import dynident as di
+from dynident.cli import main
+from dynident.recording import Dataset, Recording, write
+from dynident.wiring import check_wiring
+from study_files import edited, recording, true_model, write_study
+from synthetic import smooth_motion
+from wiring_faults import Injected, broken, column_faults, data_faults
+
+FAULTS = [*column_faults(2), *data_faults(2)]
+NAMES = [f"{one.kind[0]} {one.joints}" for one in FAULTS]
+
+
+@cache
+def data() -> Dataset:
+    return Dataset((recording(0), recording(1)))
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=NAMES)
+def test_every_single_fault_is_named(fault: Injected) -> None:
+    found = check_wiring(true_model(), broken(data(), fault.change))
+    assert fault.is_named(found, true_model().robot.names), found
+
+
+def test_nothing_is_said_where_nothing_is_wrong() -> None:
+    assert check_wiring(true_model(), data(), Dataset((recording(2),))) == ()
+
+
+def test_missing_physics_is_no_fault() -> None:
+    """Large effects that the model lacks: springs, drag, a delay, another gain."""
+    for change in (
+        lambda r: r.replace(tau=r.tau + 20.0 * r.q),
+        lambda r: r.replace(tau=r.tau * np.array([1.0, 0.7])),
+        lambda r: r.replace(tau=np.roll(r.tau, 1, axis=0)),
+        lambda r: r.replace(tau=r.tau + 2.0 * np.sin(7 * r.q)),
+        lambda r: r.replace(q=r.q + np.array([0.0, 0.3])),
+    ):
+        assert check_wiring(true_model(), broken(data(), change)) == ()
+
+
+def test_joints_in_another_order_have_the_same_fault() -> None:
+    swapped = Dataset(tuple(one.select(("elbow", "shoulder")) for one in data().recordings))
+    robot = di.Robot.from_text(true_model().robot.description.text, joints=["elbow", "shoulder"])  # type: ignore[union-attr]
+    for fault in column_faults(2):
+        there = check_wiring(di.Model(robot), broken(swapped, fault.change))
+        assert fault.is_named(there, robot.names), fault.kind
+
+
+def test_two_faults_are_both_named() -> None:
+    def change(one: Recording) -> Recording:
+        tau = one.tau * np.array([-1.0, 1.0])
+        return one.replace(q=np.rad2deg(one.q), tau=tau)
+
+    found = check_wiring(true_model(), broken(data(), change))
+    assert {fault.kind for fault in found} == {"torque_sign", "degrees"}
+    assert found[0].mend == found[1].mend and len(found[0].mend) == 3
+
+
+def test_random_numbers_are_no_wiring() -> None:
+    rng = np.random.default_rng(3)
+    t, q, _, _ = smooth_motion(2, 5, 100.0, 16.0, 8.0)
+    noise = Recording(t, q, rng.normal(size=q.shape), ("shoulder", "elbow"))
+    assert check_wiring(true_model(), Dataset((noise,))) == ()
+
+
+def test_what_was_fitted_does_not_judge() -> None:
+    train, other = data().recordings
+    (fault,) = check_wiring(true_model(), Dataset((train,)), Dataset((train, other)))
+    assert fault.kind == "same_data" and train.name in fault.what and other.name not in fault.what
+    first, second = train.replace(window=(0.0, 8.0)), train.replace(window=(8.0, 16.0))
+    assert check_wiring(true_model(), Dataset((first,)), Dataset((second,))) == ()
+
+
+# --- the line that mends it -----------------------------------------------------------------------
+
+
+def _study_with(fault: Injected, folder: Path, mapped: str) -> Path:
+    """A study whose files have the fault, in names and a scale of their own where asked."""
+    path = write_study(folder)
+    for k, file in enumerate(("train.csv", "test.csv")):
+        write(fault.change(recording(k).replace(q_ref=recording(k).q)), folder / file)
+    if mapped:
+        for file in ("train.csv", "test.csv"):
+            text = (folder / file).read_text()
+            (folder / file).write_text(text.replace("tau.elbow", "current", 1))
+        path.write_text(path.read_text() + mapped)
+    return path
+
+
+def _mended(path: Path, fault: di.wiring.Fault) -> None:
+    """Type the lines where the fault says they go."""
+    document = tomlkit.parse(path.read_text())
+    lines = tomlkit.parse("\n".join(fault.mend))
+    if fault.kind == "period":
+        for entry in document["recordings"]:  # type: ignore[union-attr]
+            entry["period"] = lines["period"]
+    else:
+        columns = document.setdefault("columns", tomlkit.table())
+        for key, value in lines.items():
+            columns[key] = value
+    path.write_text(tomlkit.dumps(document))
+
+
+@pytest.mark.filterwarnings("ignore::dynident.errors.DynidentWarning")
+@pytest.mark.parametrize("mapped", ["", '\n[columns]\n"tau.elbow" = "current"\n'])
+@pytest.mark.parametrize("fault", list(column_faults(2)), ids=NAMES[: -len([*data_faults(2)])])
+def test_the_line_mends_it_when_typed(fault: Injected, mapped: str, tmp_path: Path) -> None:
+    path = _study_with(fault, tmp_path, mapped)
+    study = di.load(path)
+    found = check_wiring(study.model, study.train, study.test)
+    assert fault.is_named(found, study.robot.names), found
+    _mended(path, found[0])
+    study = di.load(path)
+    assert check_wiring(study.model, study.train, study.test) == ()
+    if fault.ratio is None:
+        for made, own in zip(
+            (*study.train.recordings, *study.test.recordings), (0, 1), strict=True
+        ):
+            assert made.tau == pytest.approx(recording(own).tau, rel=1e-6, abs=1e-9)
+            assert made.q == pytest.approx(recording(own).q, rel=1e-6, abs=1e-9)
+
+
+def test_a_period_is_mended_too(tmp_path: Path) -> None:
+    path = write_study(tmp_path)
+    path.write_text(edited(("period = 8.0", "period = 8.03")))
+    study = di.load(path)
+    (fault,) = check_wiring(study.model, study.train, study.test)
+    assert fault.kind == "period" and fault.mend == ("period = 8.0",)
+    _mended(path, fault)
+    study = di.load(path)
+    assert check_wiring(study.model, study.train, study.test) == ()
+
+
+# --- in the commands ------------------------------------------------------------------------------
+
+NEGATED = """
+[columns]
+"tau.shoulder" = { name = "tau.shoulder", scale = -1.0 }
+"tau.elbow" = { name = "tau.elbow", scale = -1.0 }
+"""
+
+
+@cache
+def negated() -> di.diagnosis.Diagnosis:
+    change = next(one.change for one in FAULTS if one.kind == ("torque_signs",))
+    train, test = (broken(Dataset((recording(k),)), change) for k in (0, 1))
+    return di.diagnose(true_model(), train, test)
+
+
+def test_the_fault_is_the_answer_of_a_diagnosis() -> None:
+    """All torques negated fit as well as before: only what the values mean shows it."""
+    found = negated()
+    assert found.verdict == "unexplained" and found.steps == () and found.confidence == ""
+    assert "signs of all torques are wrong" in str(found.tables()[0])
+    (said,) = found.to_dict()["wiring"]
+    assert said["what"] == "the signs of all torques are wrong" and said["evidence"]
+
+
+def test_the_report_says_it_first(tmp_path: Path) -> None:
+    page = di.report(negated(), tmp_path / "report.html").read_text()
+    assert page.index("signs of all torques") < page.index("Relative torque error")
+    assert "scale = -1.0" in page and "dynident add" not in page
+
+
+@pytest.mark.parametrize("command", ["fit", "compare"])
+def test_other_commands_say_it_too(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write_study(tmp_path)
+    path.write_text(path.read_text() + NEGATED)
+    with pytest.raises(SystemExit) as end:
+        main([command, str(path)])
+    assert not end.value.code
+    out = " ".join(capsys.readouterr().out.split())
+    assert "Wiring: the signs of all torques are wrong" in out
+
+
+def test_health_has_an_empty_list() -> None:
+    found = di.diagnose(true_model(), Dataset((recording(0),)), Dataset((recording(1),)))
+    assert found.to_dict()["wiring"] == [] and found.verdict == "nothing_missing"
