@@ -168,6 +168,18 @@ def test_a_motion_that_repeats_has_no_start_to_settle_from(
     assert unlike(rings[third], steady[third]) < 0.05
 
 
+@pytest.mark.parametrize("label", ["joint_elasticity@elbow", "backlash@elbow", "presliding@elbow"])
+def test_a_record_shorter_than_its_period_starts_at_rest(label: str) -> None:
+    (effect,) = effects_of(label, ROBOT)
+    t, q, v, a = smooth_motion(2, 5, 500.0, 1.9, 2.0)
+    alone = Block(t, q, v, a, names=ROBOT.names, body=ROBOT, rotor=np.array(ROTORS))
+    short = effect.columns(replace(alone, period=2.0))
+    if label.startswith("presliding"):
+        assert np.isfinite(short).all()
+    else:
+        np.testing.assert_array_equal(short, effect.columns(alone))
+
+
 def unlike(x: np.ndarray, y: np.ndarray) -> float:
     """Difference of two signals, relative to the latter (root mean squares)."""
     return float(np.linalg.norm(x - y) / np.linalg.norm(y))

@@ -37,7 +37,8 @@ class DrivenLink:
     ----------
     inertia : kg m^2 or kg, of all that moves with the joint, in the mean over its poses.
     a, whole, load : (T,) acceleration of the motor, and inertia and torque of all that moves.
-    step, period : s between samples; samples after which the motion repeats, 0 where it does not.
+    step, period : s between samples; samples after which the motion repeats, 0 where it does not
+        within the recording.
     M, C, G : (T, n) derivatives of torques by the joint's acceleration, speed and position.
     """
 
@@ -53,7 +54,9 @@ class DrivenLink:
         if len(block.t) < 3:
             raise EffectError("its response needs more than two samples")
         self.step = float(np.mean(np.diff(block.t)))
-        self.period = 0 if block.period is None else round(block.period / self.step)
+        # A record that is shorter than its period does not hold what came before it.
+        whole = 0 if block.period is None else round(block.period / self.step)
+        self.period = whole if whole <= len(block.t) else 0
 
     def behind(self, gear: Transmitting) -> np.ndarray:
         """Return the inertia behind a transmission, (T,): no less than a part of the mean."""
