@@ -9,10 +9,12 @@ import pytest
 from scipy import special
 
 from blind_study.circumstances import Circumstances
+from blind_study.foreign import EFFECTS
 from blind_study.mujoco_lab import MujocoLaboratory, MujocoRun
 from blind_study.mujoco_machine import bare, build
 from blind_study.mujoco_plant import Loop, Plant, needed
 from blind_study.robots import specimen
+from blind_study.strengths import KNOWN, start
 from dynident.closed_loop import Fourier, TrueEffect
 from dynident.effects import catalogue
 from dynident.fitting import fit
@@ -185,3 +187,51 @@ def test_what_is_put_into_mujoco_comes_out_of_a_fit(name: str) -> None:
     model = Model(made.nominal, (*(one.effect for one in effects), effect.at(LAWS[name])), WIDTH)
     found = fit(model, data).values[model.slices[effect.label]]
     np.testing.assert_allclose(found, LAWS[name], rtol=0.03)
+
+
+SIDE_OF_THE_RECORD = ("torque_delay",)
+"""Effects that change what is recorded, not how the robot moves."""
+
+
+@pytest.mark.parametrize("circumstances", [SMOOTH, TIGHT], ids=["tanh", "constraint"])
+@pytest.mark.parametrize("name", sorted((*KNOWN, *EFFECTS)))
+def test_every_effect_is_felt(name: str, circumstances: Circumstances) -> None:
+    made = specimen(4, 500.0, np.random.default_rng(6))
+    robot = made.robot
+    kind = {**catalogue(), **EFFECTS}[name]
+    begin = start(name, made, 1, 2, np.random.default_rng(1), WIDTH)
+    shape = (1.0, 0.1, 0.05) if name == "contact" else begin.shape
+    joint = None if kind.place == "robot" else robot.names[1]
+    effect = kind(joint, robot.names[2] if kind.place == "pair" else None, shape).on(robot)
+    sizes = {"coulomb_friction": made.dry, "rotor_inertia": made.rotor}
+    known = [
+        TrueEffect(catalogue()[one](other).on(robot), (float(sizes[one][k]),))
+        for one in sizes
+        for k, other in enumerate(robot.names)
+        if (one, other) != (name, robot.names[1])
+    ]
+    trajectory = Fourier.random(robot, 8.0, [3], amplitude=made.amplitude, speed=made.speed)
+    t = np.arange(150) / 500.0
+    q_ref, v_ref, _ = trajectory.at(t + 1.0)
+    loop = replace(
+        still(150, 4, np.zeros(4)),
+        q_ref=q_ref,
+        v_ref=v_ref,
+        ahead=np.zeros_like(q_ref),
+        noise=np.zeros_like(q_ref),
+        kp=np.array(made.controller.kp),
+        kd=np.array(made.controller.kd),
+    )
+
+    def commands(effects: list[TrueEffect]) -> tuple[np.ndarray, np.ndarray]:
+        built = build(robot, effects, circumstances, 1, carries_payload=True)
+        width = WIDTH if circumstances is SMOOTH else 0.0
+        return Plant(built, width).run(loop, name)[1], built.delay
+
+    without, _ = commands(known)
+    with_it, delay = commands([*known, TrueEffect(effect, begin.values, hidden=True)])
+    assert np.isfinite(with_it).all()
+    if name in SIDE_OF_THE_RECORD:
+        assert delay[1] > 0
+    else:
+        assert np.abs(with_it - without).max() > 1e-4
