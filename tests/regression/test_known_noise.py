@@ -92,7 +92,9 @@ def test_intervals_cover(coupling: float) -> None:
         one = JointFactorRegression(NOISE, queries="noiseless", tol=0.1).fit(X, y)
         low, high = one.interval().T
         covered["true"] += int(np.sum((low < weak) & (high > weak)))
-        low, high = JointFactorRegression(queries="noisy", tol=0.1).fit(X, y).interval().T
+        # That of noisy inputs is of least squares: rounds do not change it.
+        plain = JointFactorRegression(queries="noisy", max_iter=1).fit(X, y)
+        low, high = plain.interval().T
         covered["noisy"] += int(np.sum((low < noisy) & (high > noisy)))
         assert one.corrected_ is not None
         off = np.abs(one.corrected_.coef_ - weak)

@@ -152,7 +152,7 @@ class SecondMoments:
     @property
     def count(self) -> int:
         """Rows of all blocks, N."""
-        return int(np.sum(self.counts))
+        return int(self.counts if np.ndim(self.counts) == 0 else np.sum(self.counts))
 
     # --- blocks of rows -------------------------------------------------------------------------
 
@@ -251,5 +251,6 @@ class SecondMoments:
 
     def residual(self, coefficients: np.ndarray) -> float:
         """Sum of squares that coefficients (d,) leave of the output about its mean, or zero."""
-        signed = np.append(-coefficients, 1.0)
+        signed = np.ones(len(coefficients) + 1)
+        np.negative(coefficients, out=signed[:-1])
         return max(float(signed @ self.total @ signed), 0.0)

@@ -136,23 +136,24 @@ class Posterior:
     <t_i> = ct x_i + e <z_i>.
     """
 
+    # Rounds come by the thousand on tens of numbers: what costs is the number of calls.
     def __init__(self, factors: Loadings, statistics: SecondMoments) -> None:
         self.factors, self.statistics = factors, statistics
-        f = factors
-        mz, mx, pz, px, py = f.wz, f.wx, f.pz, f.px, f.py
-        self.Ez, self.Ex = mz**2 + f.wz_var, mx**2 + f.wx_var
+        f, total = factors, statistics.total
+        mz, mx, pz, px = f.wz, f.wx, f.pz, f.px
+        mx2 = mx**2
         # Sums of what is positive throughout: with little noise, differences would lose all digits.
         self.A = 1 + f.wz_var / pz + f.wx_var / px
-        self.a = self.A + mz**2 / pz + mx**2 / px
-        self.seen = px * self.A + mx**2
+        self.a = self.A + mz**2 / pz + mx2 / px
+        self.seen = px * self.A + mx2
         self.g = pz * px * self.a / self.seen
         self.s = float(self.g.sum())
         self.b = mz * mx / self.seen
-        self.kappa = self.g / (py + self.s)
+        self.kappa = self.g / (f.py + self.s)
         self.ct, self.e = mx / (px * self.a), mz / (pz * self.a)
-        self.v = statistics.cross - statistics.gram @ self.b
+        self.v = total[:-1, -1] - total[:-1, :-1] @ self.b
         self.R = statistics.residual(self.b)
-        self.Gd = np.diag(statistics.gram)
+        self.Gd = total.diagonal()[:-1]
 
     @property
     def rounding(self) -> float:
@@ -174,7 +175,8 @@ class Posterior:
         f, a0, b0 = self.factors, prior.shape, prior.rate
         shape, rate = a0 + 1, (a0 + 1) / f.relevance
         log_relevance = digamma(shape) - np.log(rate)
-        weights = log_relevance - np.log(2 * np.pi) - f.relevance * (self.Ez + self.Ex) / 2
+        squares = f.wz**2 + f.wz_var + (f.wx**2 + f.wx_var)
+        weights = log_relevance - np.log(2 * np.pi) - f.relevance * squares / 2
         weights += (np.log(2 * np.pi * np.e * f.wz_var) + np.log(2 * np.pi * np.e * f.wx_var)) / 2
         own = a0 * np.log(b0) - gammaln(a0) + (a0 - 1) * log_relevance - b0 * f.relevance
         entropy = shape - np.log(rate) + gammaln(shape) + (1 - shape) * digamma(shape)
@@ -197,11 +199,11 @@ class Posterior:
 
         wz_var, wx_var = 1 / (tt / f.pz + f.relevance), 1 / (tt / f.px + f.relevance)
         wz, wx = wz_var * zt / f.pz, wx_var * xt / f.px
-        relevance = f.relevance
         if prior is None:
-            wz_var, wx_var = np.zeros_like(wz), np.zeros_like(wx)
-        Ez, Ex = wz**2 + wz_var, wx**2 + wx_var
-        if prior is not None:
+            wz_var, wx_var, relevance = f.wz_var, f.wx_var, f.relevance
+            Ez, Ex = wz**2, wx**2
+        else:
+            Ez, Ex = wz**2 + wz_var, wx**2 + wx_var
             relevance = (prior.shape + 1) / (prior.rate + (Ez + Ex) / 2)
         shrink = f.py / (f.py + self.s)
         py = max(shrink**2 * self.R / N + self.s * shrink, LEAST_VARIANCE)

@@ -13,7 +13,7 @@ another order or unit, whose rounding differs, would get another answer.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
@@ -180,9 +180,7 @@ def _leap(here: Posterior, prior: Gamma | None, known: np.ndarray, degree: int) 
     positive = _VARIANCES if prior is None else _POSITIVE
 
     def place(coordinates: np.ndarray) -> Posterior:
-        found = _factors(coordinates, positive, here.factors)
-        found = replace(found, px=np.where(known, here.factors.px, found.px))
-        return Posterior(found, here.statistics)
+        return Posterior(_factors(coordinates, positive, here.factors, known), here.statistics)
 
     last = _coordinates(here.factors, positive)
     now = 2 * _coordinates(here.updated(prior, known), positive) - last
@@ -193,21 +191,31 @@ def _leap(here: Posterior, prior: Gamma | None, known: np.ndarray, degree: int) 
 
 
 _VARIANCES = ("pz", "px")
-_POSITIVE = ("wz_var", "wx_var", "relevance", *_VARIANCES)
+_WEIGHTS = ("wz_var", "wx_var", "relevance")  # of the Bayesian form alone
+_POSITIVE = (*_WEIGHTS, *_VARIANCES)
 
 
 def _coordinates(factors: Loadings, positive: tuple[str, ...]) -> np.ndarray:
     """Return weights, and logarithms of what is positive."""
-    logs = [np.log(getattr(factors, name)) for name in positive]
-    return np.concatenate([factors.wz, factors.wx, *logs, [np.log(factors.py)]])
+    sizes = [getattr(factors, name) for name in positive]
+    d = len(factors.wz)
+    coordinates = np.concatenate([factors.wz, factors.wx, *sizes, [factors.py]])
+    np.log(coordinates[2 * d :], out=coordinates[2 * d :])
+    return coordinates
 
 
-def _factors(coordinates: np.ndarray, positive: tuple[str, ...], like: Loadings) -> Loadings:
-    wz, wx, *logs = coordinates[:-1].reshape(2 + len(positive), -1)
-    sizes = {
-        name: np.exp(np.clip(log, -_LOGARITHM, _LOGARITHM))
-        for name, log in zip(positive, logs, strict=True)
-    }
-    pz, px = (np.maximum(sizes.pop(name), LEAST_VARIANCE) for name in _VARIANCES)
-    py = max(float(np.exp(np.clip(coordinates[-1], None, _LOGARITHM))), LEAST_VARIANCE)
-    return replace(like, wz=wz, wx=wx, pz=pz, px=px, py=py, **sizes)
+def _factors(
+    coordinates: np.ndarray, positive: tuple[str, ...], like: Loadings, known: np.ndarray
+) -> Loadings:
+    """Return the factors at coordinates, with known noise and what those do not hold as `like`."""
+    d = len(like.wz)
+    wz, wx = coordinates[:d], coordinates[d : 2 * d]
+    # Not np.clip: for few numbers its checks cost more than the rest of this.
+    logs = np.minimum(np.maximum(coordinates[2 * d :], -_LOGARITHM), _LOGARITHM)
+    sizes = np.exp(logs)
+    parts = {name: sizes[k * d : (k + 1) * d] for k, name in enumerate(positive)}
+    pz = np.maximum(parts.pop("pz"), LEAST_VARIANCE)
+    px = np.where(known, like.px, np.maximum(parts.pop("px"), LEAST_VARIANCE))
+    py = max(float(sizes[-1]), LEAST_VARIANCE)
+    kept = {name: parts.get(name, getattr(like, name)) for name in _WEIGHTS}
+    return Loadings(wz=wz, wx=wx, pz=pz, px=px, py=py, **kept)

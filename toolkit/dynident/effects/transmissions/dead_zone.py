@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -77,97 +77,94 @@ def through_dead_zones(links: Sequence[DeadZoneLink]) -> list[DeadZoneMotion]:
     if len(links) > most:
         parts = [links[k : k + most] for k in range(0, len(links), most)]
         return [one for part in parts for one in through_dead_zones(part)]
+    recursion = _Recursion.of(links)
     if len(links) == 1:
-        return [_walk(_Recursion.of(links[0], len(links[0].m)))]
-    each = [_Recursion.of(link, longest) for link in links]
-    together = _Recursion(*(np.stack(x, axis=-1) for x in zip(*map(_fields, each), strict=True)))
+        return [_walk(recursion)]
     # A link that its load outgrows falls beyond all numbers: the caller sees that it is not finite.
     with np.errstate(over="ignore", invalid="ignore"):
-        d = _walk_together(together)
-        beyond = d[1:-1] - np.clip(d[1:-1], -together.half, together.half)
-        side = np.zeros_like(d)
-        side[1:-1] = np.sign(beyond)
-    side = np.nan_to_num(side)
+        d, beyond = _walk_together(recursion)
+        side = np.nan_to_num(np.sign(beyond))
     lengths = [len(link.m) for link in links]
     return [DeadZoneMotion(d[:s, v], side[:s, v]) for v, s in enumerate(lengths)]
 
 
 @dataclass(frozen=True, eq=False)
 class _Recursion:
-    """What the recursion multiplies by in each step, (S,) or (S, V); K and half are () or (V,)."""
+    """What the recursion of V links multiplies by in each step, as long as the longest of them.
+
+    Attributes
+    ----------
+    start, load : (2, V) first deflections, and (S, V).
+    drive : (S, 2, V) of a deflection, and of what of it is beyond the gap.
+    free, touching : (S, 2, V) of what drives a link, and of its deflection a step back.
+    half : (V,) of the gap.
+    """
 
     start: np.ndarray
     load: np.ndarray
-    inertia: np.ndarray
+    drive: np.ndarray
     free: np.ndarray
-    free_back: np.ndarray
     touching: np.ndarray
-    touching_back: np.ndarray
-    K: np.ndarray
     half: np.ndarray
 
     @classmethod
-    def of(cls, link: DeadZoneLink, steps: int) -> _Recursion:
-        """Return it for as many steps, the last one repeated."""
-        rows = np.minimum(np.arange(steps), len(link.m) - 1)
-        m, load, c, g = (x[rows] for x in (link.m, link.load, link.c, link.g))
-        h, gear = link.step, link.gear
+    def of(cls, links: Sequence[DeadZoneLink]) -> _Recursion:
+        """Return it of all links; shorter ones repeat their last step."""
+        steps = max(len(link.m) for link in links)
+        m, load, c, g = np.empty((4, steps, len(links)))
+        for v, link in enumerate(links):
+            for whole, own in ((m, link.m), (load, link.load), (c, link.c), (g, link.g)):
+                whole[: len(own), v], whole[len(own) :, v] = own, own[-1]
+        h = np.array([link.step for link in links])
+        gears = [link.gear for link in links]
+        K, D, half = np.array([(one.stiffness, one.damping, one.half_gap) for one in gears]).T
         mass, damping = m / h**2, c / (2.0 * h)
-        more = damping + gear.damping / (2.0 * h)
-        free, touching = 1.0 / (mass + damping), 1.0 / (mass + more)
         lean = np.where(load[:2] >= 0.0, 1.0, -1.0)
-        start = (load[:2] + lean * gear.stiffness * gear.half_gap) / (g[:2] + gear.stiffness)
-        return cls(
-            start,
-            load,
-            2.0 * mass - g,
-            free,
-            (mass - damping) * free,
-            touching,
-            (mass - more) * touching,
-            np.array(gear.stiffness),
-            np.array(gear.half_gap),
-        )
+        start = (load[:2] + lean * K * half) / (g[:2] + K)
+        drive, free, touching = np.empty((3, steps, 2, len(links)))
+        drive[:, 0], drive[:, 1] = 2.0 * mass - g, K
+        for factors, damped in ((free, damping), (touching, damping + D / (2.0 * h))):
+            factors[:, 0] = 1.0 / (mass + damped)
+            factors[:, 1] = (mass - damped) * factors[:, 0]
+        return cls(start, load, drive, free, touching, half)
 
 
-def _fields(one: _Recursion) -> list[np.ndarray]:
-    return [getattr(one, field.name) for field in fields(one)]
+def _walk_together(r: _Recursion) -> tuple[np.ndarray, np.ndarray]:
+    """Return deflections (S, V) of V links, and what of them is beyond the gap.
 
-
-def _walk_together(r: _Recursion) -> np.ndarray:
-    """Return deflections (S, V) of V links; nothing is allocated in a step."""
-    d = np.zeros_like(r.load)
+    The call is what costs in a step, not its dozens of numbers: as few as can be.
+    """
+    both = np.zeros_like(r.drive)
+    d = both[:, 0]
     d[:2] = r.start
-    half, low, K = r.half, -r.half, r.K
-    beyond, pushed, part = (np.empty_like(half) for _ in range(3))
-    ahead, back, touches = np.empty_like(half), np.empty_like(half), np.empty(len(half), dtype=bool)
-    for k in range(1, len(d) - 1):
-        now = d[k]
+    half, low, zero = r.half, -r.half, np.zeros_like(r.half)
+    driven, factors = np.empty_like(both[0]), np.empty_like(both[0])
+    (pushed, held), (ahead, back), touches = driven, factors, np.empty(len(half), dtype=bool)
+    now_on = (x[1:-1] for x in (both, d, both[:, 1], r.drive, r.load, r.free, r.touching))
+    steps = zip(*now_on, d[:-2], d[2:], strict=True)
+    for state, now, beyond, drive, load, free, touching, before, after in steps:
         np.maximum(now, low, out=beyond)
         np.minimum(beyond, half, out=beyond)
         np.subtract(now, beyond, out=beyond)
-        np.not_equal(beyond, 0.0, out=touches)
-        np.copyto(ahead, r.free[k])
-        np.copyto(ahead, r.touching[k], where=touches)
-        np.copyto(back, r.free_back[k])
-        np.copyto(back, r.touching_back[k], where=touches)
-        np.multiply(r.inertia[k], now, out=pushed)
-        np.add(pushed, r.load[k], out=pushed)
-        np.multiply(K, beyond, out=part)
-        np.subtract(pushed, part, out=pushed)
+        np.not_equal(beyond, zero, out=touches)
+        np.copyto(factors, free)
+        np.copyto(factors, touching, where=touches)
+        np.multiply(drive, state, out=driven)
+        np.add(pushed, load, out=pushed)
+        np.subtract(pushed, held, out=pushed)
         np.multiply(pushed, ahead, out=pushed)
-        np.multiply(back, d[k - 1], out=part)
-        np.subtract(pushed, part, out=d[k + 1])
-    return d
+        np.multiply(back, before, out=held)
+        np.subtract(pushed, held, out=after)
+    return d, both[:, 1]
 
 
 def _walk(r: _Recursion) -> DeadZoneMotion:
     """As `_walk_together`, of one link: in plain numbers, which are faster than arrays of one."""
-    load, inertia = r.load.tolist(), r.inertia.tolist()
-    free, free_back = r.free.tolist(), r.free_back.tolist()
-    touching, touching_back = r.touching.tolist(), r.touching_back.tolist()
-    K, half = float(r.K), float(r.half)
-    before, now = r.start.tolist()
+    load, inertia, K = r.load[:, 0].tolist(), r.drive[:, 0, 0].tolist(), float(r.drive[0, 1, 0])
+    free, free_back = r.free[:, :, 0].T.tolist()
+    touching, touching_back = r.touching[:, :, 0].T.tolist()
+    half = float(r.half[0])
+    before, now = r.start[:, 0].tolist()
     d, side = [before, now, *[0.0] * (len(load) - 2)], [0.0] * len(load)
     for k in range(1, len(load) - 1):
         pushed = load[k] + inertia[k] * now
