@@ -82,6 +82,7 @@ def _hides(case, effect: str) -> bool:
     return case.kind == "known" and case.hidden[0].effect == effect and not unavailable(case)
 
 
+@pytest.mark.slow
 def test_a_study_is_run_judged_and_goes_on_where_it_stopped(tmp_path: Path, capfd) -> None:
     cases = [c for c in draw(0, 100) if c.joints == 2 and c.kind == "healthy"]
     numbers = [str(c.number) for c in cases[:2]]

@@ -66,6 +66,7 @@ def test_errors_reach_the_shell(tmp_path):
     assert listing(tmp_path) == before
 
 
+@pytest.mark.slow
 def test_a_pipe_gets_json_alone_and_no_progress(tmp_path):
     done = shell("compare", write_study(tmp_path), "--json")
     assert done.returncode == 0 and done.stderr == ""

@@ -317,6 +317,7 @@ def test_unstable_loops_say_so() -> None:
     assert caught.value.reason == "unstable"
 
 
+@pytest.mark.slow
 def test_nothing_that_is_tried_ends_the_process() -> None:
     """Random links, effects and gains, of any size: a motion, or one clear line."""
     done = subprocess.run(

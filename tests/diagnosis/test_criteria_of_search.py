@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
 from dynident.criteria import Criteria
 from dynident.diagnosis import Diagnosis, diagnose
 from dynident.model import Model
@@ -25,6 +27,7 @@ def found(criteria: Criteria) -> Diagnosis:
     return diagnose(PLAIN, Dataset(made), criteria=criteria)
 
 
+@pytest.mark.slow
 def test_a_gate_that_nothing_passes_adds_nothing_and_is_reported() -> None:
     usual = found(Criteria())
     assert [step.effect.label for step in usual.steps] == ["quadratic_drag@shoulder"]

@@ -25,6 +25,11 @@ KNOWN: dict[object, Diagnosis] = {}
 STATED = Noise(np.array([2e-5, 2e-5]), np.array([0.3, 0.3]))
 
 
+def in_full(*case: object):
+    """A case that `make test-fast` leaves out: three of their kind remain."""
+    return pytest.param(*case, marks=pytest.mark.slow)
+
+
 @pytest.fixture(scope="module")
 def model() -> Model:
     return Model(arm()) + "viscous_friction" + "coulomb_friction"
@@ -58,15 +63,15 @@ def diagnosed(model: Model, hidden: str | None, values: dict[str, float]) -> Dia
     ("hidden", "values"),
     [
         ("torque_offset@elbow", {"offset__elbow": 0.3}),
-        ("asymmetric_friction@elbow", {"dFv__elbow": 0.3, "dFc__elbow": 0.2}),
+        in_full("asymmetric_friction@elbow", {"dFv__elbow": 0.3, "dFc__elbow": 0.2}),
         ("stribeck_friction@elbow", {"Fs__elbow": 0.6}),
-        ("quadratic_drag@shoulder", {"Fq__shoulder": 0.3}),
-        ("joint_spring@shoulder", {"k__shoulder": 0.8, "c__shoulder": -0.2}),
-        ("torque_ripple@elbow", {"As__elbow": 0.2, "Ac__elbow": 0.1}),
-        ("rotor_inertia@elbow", {"Ia__elbow": 0.1}),
+        in_full("quadratic_drag@shoulder", {"Fq__shoulder": 0.3}),
+        in_full("joint_spring@shoulder", {"k__shoulder": 0.8, "c__shoulder": -0.2}),
+        in_full("torque_ripple@elbow", {"As__elbow": 0.2, "Ac__elbow": 0.1}),
+        in_full("rotor_inertia@elbow", {"Ia__elbow": 0.1}),
         ("payload", {"payload.mass": 0.3, "payload.mx": 0.06, "payload.Izz": 0.02}),
-        ("drive_gain@shoulder", {"e__shoulder": 0.1}),
-        ("joint_coupling@elbow:shoulder", {"cv__elbow:shoulder": 0.3}),
+        in_full("drive_gain@shoulder", {"e__shoulder": 0.1}),
+        in_full("joint_coupling@elbow:shoulder", {"cv__elbow:shoulder": 0.3}),
     ],
 )
 def test_a_hidden_effect_is_found_and_the_error_falls_to_the_floor(
@@ -86,6 +91,7 @@ def test_a_hidden_effect_is_found_and_the_error_falls_to_the_floor(
 
 
 @pytest.mark.parametrize("name", ["viscous_friction", "coulomb_friction"])
+@pytest.mark.slow
 def test_plain_friction_is_found_where_the_model_has_none(model: Model, name: str) -> None:
     train, test = recordings(model, None, {}, **NOISE)
     found = find(model - f"{name}@elbow", Dataset(train), Dataset(test))
@@ -147,6 +153,7 @@ def test_without_repetition_or_stated_noise_the_verdict_says_so(model: Model) ->
     assert found.best.effect.name == "stribeck_friction"
 
 
+@pytest.mark.slow
 def test_stated_noise_gives_a_floor_and_a_mark(model: Model) -> None:
     train, test = recordings(model, None, {}, **NOISE)
     told = [
@@ -162,6 +169,7 @@ def test_stated_noise_gives_a_floor_and_a_mark(model: Model) -> None:
     assert found.test_error.noise_floor == pytest.approx(measured.test_error.noise_floor, rel=0.1)
 
 
+@pytest.mark.slow
 def test_test_recordings_that_do_not_repeat_take_the_floor_of_the_others(model: Model) -> None:
     train, test = recordings(model, "torque_offset@elbow", {"offset__elbow": 0.3}, **NOISE)
     found = find(model, Dataset(train), Dataset(tuple(r.replace(period=None) for r in test)))
@@ -179,6 +187,7 @@ def test_without_test_recordings_blocks_are_held_out(model: Model) -> None:
     assert found.test_error.after < 1.15 * (found.test_error.noise_floor or 0)
 
 
+@pytest.mark.slow
 def test_units_of_torque_do_not_change_the_answer(model: Model) -> None:
     train, test = recordings(model, "quadratic_drag@shoulder", {"Fq__shoulder": 0.3}, **NOISE)
     plain = diagnosed(model, "quadratic_drag@shoulder", {"Fq__shoulder": 0.3})
@@ -191,6 +200,7 @@ def test_units_of_torque_do_not_change_the_answer(model: Model) -> None:
     assert found.steps[0].values[0] == pytest.approx(1e3 * plain.steps[0].values[0], rel=1e-5)
 
 
+@pytest.mark.slow
 def test_the_answer_is_the_same_every_time_and_fits_json(model: Model) -> None:
     hidden = ("torque_offset@elbow", {"offset__elbow": 0.3})
     train, test = recordings(model, *hidden, **NOISE)

@@ -81,6 +81,7 @@ def test_what_the_data_do_not_tell_keeps_its_given_value_and_has_no_sigma(model:
     )
 
 
+@pytest.mark.slow
 def test_the_estimate_names_the_method_that_was_used(model: Model) -> None:
     runs = recordings(model)[:2]
     noise = Noise(np.full(2, 2e-5), np.full(2, 0.3))

@@ -65,6 +65,7 @@ def healthy() -> Dataset:
     return recordings(2, 2)
 
 
+@pytest.mark.slow
 def test_a_healthy_robot_is_accused_by_least_squares_and_not_by_simulated_instruments(
     healthy: Dataset,
 ) -> None:

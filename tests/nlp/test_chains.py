@@ -17,6 +17,7 @@ NOTIONS = [("full", 0.3, 1e-5), ("semi", 3.0, 1e-5)]
 
 @pytest.mark.parametrize("distance", ["quadratic", "entropic"])
 @pytest.mark.parametrize(("consistency", "spread", "flat"), NOTIONS)
+@pytest.mark.slow
 def test_twenty_impossible_estimates_of_seven_links(consistency, spread, flat, distance) -> None:
     active = 0
     for seed in range(20):

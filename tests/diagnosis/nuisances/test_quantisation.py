@@ -60,6 +60,7 @@ def test_a_healthy_robot_with_a_coarse_encoder_lacks_nothing(model: Model) -> No
     assert any("steps of the encoder at shoulder" in note for note in found.notes)
 
 
+@pytest.mark.slow
 def test_the_same_residual_without_steps_is_unexplained(model: Model) -> None:
     moved = tuple(off_the_lattice(one) for one in recordings(model, STEP, 0.1, 4))
     judged = find(model, Dataset(moved[:3]), Dataset(moved[3:]), most=0)
