@@ -18,6 +18,7 @@ from dynident.errors import FitError, RecordingError
 from dynident.fitting import (
     IV,
     Constrained,
+    Estimate,
     Filtered,
     LeastSquares,
     Method,
@@ -67,18 +68,22 @@ def dataset() -> Dataset:
     return replace(made, noise=noise)
 
 
+@cache
+def fitted(name: str) -> Estimate:
+    """The estimate that most of these tests are about."""
+    return fit(model(), dataset(), METHODS[name])
+
+
 @every_method
 def test_the_truth_is_recovered(name: str) -> None:
     truth = loops.truth(model())
     most = 0.01 if name in PRIOR_DECIDES else 0.002
-    np.testing.assert_allclose(
-        fit(model(), dataset(), METHODS[name]).values, truth, atol=most * np.abs(truth).max()
-    )
+    np.testing.assert_allclose(fitted(name).values, truth, atol=most * np.abs(truth).max())
 
 
 @every_method
 def test_an_estimate_says_how_it_came_about(name: str) -> None:
-    found = fit(model(), dataset(), METHODS[name])
+    found = fitted(name)
     assert found.method and found.status and found.rows > model().size
     assert found.error < 0.2 and found.joint_errors.shape == found.torque_std.shape == (2,)
     assert [source.file for source in found.sources] == ["run0.npz"]
@@ -91,7 +96,7 @@ def test_an_estimate_says_how_it_came_about(name: str) -> None:
 
 @every_method
 def test_units_of_torque_do_not_matter(name: str) -> None:
-    plain = fit(model(), dataset(), METHODS[name])
+    plain = fitted(name)
     noise = dataset().noise
     assert noise is not None
     scaled = replace(
@@ -119,7 +124,7 @@ def in_units(text: str) -> str:
 
 @every_method
 def test_order_of_joints_does_not_matter(name: str) -> None:
-    plain = fit(model(), dataset(), METHODS[name])
+    plain = fitted(name)
     turned, method = ["elbow", "shoulder"], METHODS[name]
     description = loops.robot().description
     assert description is not None
@@ -139,7 +144,7 @@ def test_order_of_joints_does_not_matter(name: str) -> None:
 
 @every_method
 def test_an_estimate_survives_its_file(name: str, tmp_path: Path) -> None:
-    found = fit(model(), dataset(), METHODS[name])
+    found = fitted(name)
     again = load_estimate(found.save(tmp_path / "estimate.json"))
     assert np.array_equal(again.values, found.values)
     assert np.array_equal(again.covariance, found.covariance)

@@ -106,22 +106,18 @@ def test_bayes_says_that_its_inputs_are_correlated() -> None:
 @pytest.mark.slow
 def test_intervals_of_corrected_least_squares_cover_though_noise_is_filtered() -> None:
     """25 draws of the noise, 8 parameters: filtered rows are not independent, the pieces are."""
+    clean = synthetic(model(), truth(), 3, duration=32.0, position_std=0.0, torque_std=0.0)
     off = []
     for seed in range(25):
-        one = replace(
-            noisy(),
-            recordings=(
-                synthetic(model(), truth(), 3, duration=32.0, position_std=0.0, torque_std=0.0),
-            ),
-        )
         rng = np.random.default_rng(seed)
-        clean = one.recordings[0]
         recording = clean.replace(
             q=clean.q + STD * rng.standard_normal(clean.q.shape),
             tau=clean.tau + 0.1 * rng.standard_normal(clean.q.shape),
         )
         found = di.fit(
-            model(), replace(one, recordings=(recording,)), di.Regression("corrected", "encoders")
+            model(),
+            replace(noisy(), recordings=(recording,)),
+            di.Regression("corrected", "encoders"),
         )
         off.append((found.values - truth()) / found.sigma)
     covered = np.mean(np.abs(off) < 1.96)
