@@ -58,6 +58,7 @@ def test_least_squares_loses_the_inertias_as_the_filter_is_opened() -> None:
     assert least_squares()["J2"] == pytest.approx(expected, abs=CUTOFFS["tolerance"])
 
 
+@pytest.mark.slow
 def test_instruments_give_the_same_inertias_at_every_cutoff() -> None:
     for name in cutoffs.INERTIAL:
         narrow, wide = instruments()[name]

@@ -84,6 +84,7 @@ def test_a_controller_that_cannot_be_is_no_failure_of_an_estimate(head: Any) -> 
         tracking.tracked(wrong, head.experiment.mechanism(), 1, SHORT)
 
 
+@pytest.mark.slow
 def test_adding_the_missing_friction_is_worth_more_than_any_regression() -> None:
     """Every method, projected, in the loop; one of them in the arm, too."""
     found = tracking.trial(PROBLEMS / "vision_head", 420 * 20, 1, 1)

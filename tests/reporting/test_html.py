@@ -76,6 +76,7 @@ def test_plotly_is_inlined_once_and_the_file_is_small(found, tmp_path):
     assert path.read_text(encoding="utf-8").count("* plotly.js v") == 1
 
 
+@pytest.mark.slow
 def test_seven_joints_and_long_traces_stay_small():
     many = diagnosis(tuple(f"joint{i}" for i in range(7)), samples=1500)
     again = [replace(t, recording=f"{k}-{t.recording}") for k in range(3) for t in many.traces]
