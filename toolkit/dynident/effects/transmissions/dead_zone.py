@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 _TOGETHER = 20_000_000
-"""Steps, over all links, that are walked through at once: ten numbers each are in memory."""
+"""Steps, over all links, that are walked through at once: a dozen numbers each are in memory."""
 
 
 @dataclass(frozen=True)
