@@ -191,8 +191,7 @@ def _leap(here: Posterior, prior: Gamma | None, known: np.ndarray, degree: int) 
 
 
 _VARIANCES = ("pz", "px")
-_WEIGHTS = ("wz_var", "wx_var", "relevance")  # of the Bayesian form alone
-_POSITIVE = (*_WEIGHTS, *_VARIANCES)
+_POSITIVE = ("wz_var", "wx_var", "relevance", *_VARIANCES)
 
 
 def _coordinates(factors: Loadings, positive: tuple[str, ...]) -> np.ndarray:
@@ -217,5 +216,13 @@ def _factors(
     pz = np.maximum(parts.pop("pz"), LEAST_VARIANCE)
     px = np.where(known, like.px, np.maximum(parts.pop("px"), LEAST_VARIANCE))
     py = max(float(sizes[-1]), LEAST_VARIANCE)
-    kept = {name: parts.get(name, getattr(like, name)) for name in _WEIGHTS}
-    return Loadings(wz=wz, wx=wx, pz=pz, px=px, py=py, **kept)
+    return Loadings(
+        wz=wz,
+        wx=wx,
+        wz_var=parts.get("wz_var", like.wz_var),
+        wx_var=parts.get("wx_var", like.wx_var),
+        relevance=parts.get("relevance", like.relevance),
+        pz=pz,
+        px=px,
+        py=py,
+    )
