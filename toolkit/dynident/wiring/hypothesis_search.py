@@ -132,6 +132,9 @@ def _settled(
         return False
     if one.kind != "degrees":
         return True
+    far = [turns_too_far(here.model, here.rows, here.now, j, criteria) for j in joints]
+    if any(far) and not all(far):
+        return False  # where all are called degrees for the sake of one
     described = DescribedScale.of(here.model, here.rows, one.mended, criteria)
     return described.hypothesis(one.mended, criteria) is None
 
