@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dynident.closed_loop import Controller
 from dynident.model import Model
 from dynident.recording import Recording
 from dynident.robot import Robot
@@ -125,6 +126,11 @@ class Lab:
         b2 = left[:, 1] + slope * v1**2 - fore
         det = m11 * m22 - m12**2
         return np.stack([v1, v2, (m22 * b1 - m12 * b2) / det, (m11 * b2 - m12 * b1) / det], axis=1)
+
+
+def controller() -> Controller:
+    """The loop's control law, as the package states it."""
+    return Controller(kind="pd", rate_hz=RATE, kp=tuple(KP), kd=tuple(KD))
 
 
 def model() -> Model:

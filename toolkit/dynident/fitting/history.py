@@ -155,7 +155,7 @@ class Convergence:
         stds = ", ".join(number(float(x), 3) for x in self.position_std)
         what = "torque noise"
         if self.noise_source == "measured":
-            what = "the rest of the residual, taken as white torque noise"
+            what = "white torque noise, both from the spectrum of the residual"
         torque = ", ".join(number(float(x), 3) for x in self.torque_std)
         notes = (
             f"sigma: encoder noise ({stds}) and {what} ({torque}), {self.noise_source}, "

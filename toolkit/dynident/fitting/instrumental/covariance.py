@@ -8,24 +8,18 @@ noise is carried to the estimate by the adjoint of what was done to it.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dynident.effects import Block
 from dynident.fitting.instrumental.noise_level import NoiseLevel
 from dynident.fitting.instrumental.normal_equations import InstrumentalSolution
-from dynident.fitting.instrumental.standard_parameters import minimum_norm
+from dynident.fitting.instrumental.torque_jacobians import torque_jacobians
 from dynident.fitting.sampling import Sampled, sample
+from dynident.fitting.uncertainty.cluster_sandwich import BlockScores, time_blocks
 from dynident.model import Model
 from dynident.recording import Dataset, central_difference, lowpass
 
-if TYPE_CHECKING:
-    from dynident.robot.dynamics import TorqueDerivatives
-
 _BLOCK = 8192
-_STEP = 1e-6  # rad or m, and per s: derivatives of a torque that is smooth on this scale
 
 
 def carried_covariance(
@@ -109,7 +103,7 @@ def _carried(
         inside = kept_rows[(kept_rows >= first) & (kept_rows < last)] - first
         weighted[inside] = parallel.low_pass(V)[inside] * (weights**2)[:, None]
         back = parallel.low_pass(weighted)
-        jacobians = _jacobians(model, values, block, noise.position_std * rate)
+        jacobians = torque_jacobians(model, values, block, noise.position_std * rate)
         acceleration, speed, position = (
             jacobian.transpose(0, 2, 1) @ back
             for jacobian in (jacobians.by_a, jacobians.by_v, jacobians.by_q)
@@ -133,37 +127,32 @@ def _differences(x: np.ndarray, rate: float) -> np.ndarray:
     return central_difference(padded, rate)[2:-2]
 
 
-def _jacobians(
-    model: Model, values: np.ndarray, block: Block, speed_noise: np.ndarray
-) -> TorqueDerivatives:
-    """Derivatives of the predicted torque, but for effects of it or of the whole recording."""
-    q, v, a, n = block.q, block.v, block.a, model.robot.n
-    found = model.robot.torque_derivatives(q, v, a, minimum_norm(model, values))
-    here = _effects(model, values, block, q, v, a)
-    for j in range(n):
-        unit = np.zeros(n)
-        unit[j] = 1.0
-        found.by_a[:, :, j] += _effects(model, values, block, q, v, a + unit) - here
-        # Dry friction is a step on the scale of the noise: a secant across the noise counts.
-        h = max(_STEP, float(speed_noise[j])) * unit
-        rise = _effects(model, values, block, q, v + h, a)
-        rise -= _effects(model, values, block, q, v - h, a)
-        found.by_v[:, :, j] += rise / (2 * h[j])
-        h = _STEP * unit
-        rise = _effects(model, values, block, q + h, v, a)
-        rise -= _effects(model, values, block, q - h, v, a)
-        found.by_q[:, :, j] += rise / (2 * h[j])
-    return found
-
-
-def _effects(
-    model: Model, values: np.ndarray, block: Block, q: np.ndarray, v: np.ndarray, a: np.ndarray
+def block_covariance(
+    model: Model,
+    values: np.ndarray,
+    measured: Dataset,
+    instruments: Dataset,
+    solution: InstrumentalSolution,
 ) -> np.ndarray:
-    """Torque of the effects alone, (T, n)."""
-    total = np.zeros(q.shape)
-    for effect in model.effects:
-        if effect.needs_torque or effect.needs_recording:
-            continue
-        moved = model.ready(effect, replace(block, q=q, v=v, a=a, rigid=None), values)
-        total += effect.columns(moved) @ values[model.slices[effect.label]]
-    return total
+    """Return the covariance (p, p) from the scatter of V' O^-1 e between blocks of time.
+
+    Parameters
+    ----------
+    model, values : (p,) the estimate.
+    measured, instruments : recordings behind W and V.
+    solution : the estimate's weights and inverse.
+    """
+    kept, weights = list(solution.basis.independent), solution.weights**2
+    scores, recordings = BlockScores(len(kept)), len(measured.recordings)
+    for one, other in zip(measured.recordings, instruments.recordings, strict=True):
+        own, instrument = sample(one, measured.filter), sample(other, instruments.filter)
+        blocks, first, start = time_blocks(own, recordings), scores.count, 0
+        columns = zip(instrument.columns(model, values), own.columns(model, values), strict=True)
+        for V, W in columns:
+            rows = slice(start, start + len(W))
+            residual = (own.tau[rows] - W @ values) * weights
+            scores.add(blocks[rows], np.einsum("tjr,tj->tr", V[:, :, kept], residual), first)
+            start = rows.stop
+    covariance = np.zeros((model.size, model.size))
+    covariance[np.ix_(kept, kept)] = solution.gain @ scores.meat @ solution.gain.T
+    return covariance

@@ -9,10 +9,15 @@ import numpy as np
 from dynident.fitting.estimate import Estimate, unidentified
 from dynident.fitting.history import Convergence
 from dynident.fitting.instrumental.bias import ExpectedBias, expected_bias
-from dynident.fitting.instrumental.covariance import carried_covariance, textbook_covariance
+from dynident.fitting.instrumental.covariance import (
+    block_covariance,
+    carried_covariance,
+    textbook_covariance,
+)
 from dynident.fitting.instrumental.iv_iterations import Iterations
-from dynident.fitting.instrumental.noise_level import NoiseLevel, position_noise, torque_noise
+from dynident.fitting.instrumental.noise_level import NoiseLevel, noise_level, position_noise
 from dynident.fitting.instrumental.normal_equations import InstrumentalSolution
+from dynident.fitting.instrumental.residual_spectrum import residual_noise
 from dynident.fitting.instrumental.source import InstrumentSource
 from dynident.fitting.least_squares import sources_of
 from dynident.fitting.linear_solution import residual_std
@@ -34,6 +39,13 @@ def assemble(method: str, iterations: Iterations) -> Estimate:
     found, solution, values = iterations.found, iterations.solution, iterations.values
     noise, bias = _noise(model, source, iterations)
     covariance = carried_covariance(model, values, iterations.instruments, solution, noise)
+    words = ""
+    if noise.doubt:
+        # No size of the noise explains the residual: the scatter of the data has to say it.
+        covariance = block_covariance(
+            model, values, source.measured, iterations.instruments, solution
+        )
+        words = "sigma is the scatter between blocks of time: the noise could not be measured."
     norms = found.residual_norms(values)
     freedom = found.rows - solution.rank
     variance = float(np.sum((norms * solution.weights) ** 2)) / freedom
@@ -67,9 +79,10 @@ def assemble(method: str, iterations: Iterations) -> Estimate:
         rows=found.rows,
         method=method,
         status=history.sentence,
-        notes=(*_notes(model, solution, history, bias), *source.notes),
+        notes=(*_doubted(noise), *_notes(model, solution, history, bias), *source.notes),
         sources=sources_of(source.measured),
         history=history,
+        sigma_words=words,
     )
 
 
@@ -90,10 +103,25 @@ def _noise(
     if given:
         torque = np.asarray(given.torque_std, dtype=float)
         return NoiseLevel(position, torque, "given"), bias
-    counts = iterations.found.counts
-    variance = iterations.found.residual_norms(iterations.values) ** 2 / counts
-    torque = torque_noise(measured, variance, bias.residual_variance, counts)
-    return NoiseLevel(position, torque, "measured"), bias
+    found = residual_noise(
+        model,
+        iterations.values,
+        measured,
+        iterations.instruments,
+        position,
+        iterations.solution.rank,
+    )
+    return noise_level(model.robot.names, found), bias
+
+
+def _doubted(noise: NoiseLevel) -> tuple[str, ...]:
+    """The complaint that the residual is no noise; empty where it may be."""
+    if not noise.doubt:
+        return ()
+    return (
+        f"The noise could not be measured: {noise.doubt}. State it in [noise], or look for what "
+        "the model lacks.",
+    )
 
 
 def _notes(

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dynident.fitting.instrumental.residual_spectrum import NoiseVariances
 from dynident.fitting.instrumental.source import InstrumentSource
-from dynident.fitting.sampling import Sampled, sample
 from dynident.recording import Dataset, within
 
 _DIFFERENCES = 3
 _GAIN = 20.0
 """Variance of the third difference of white noise of variance 1."""
-_EXCESS = 4.0
-"""Standard deviations by which a residual's variance must exceed the encoders' share."""
+_NEGATIVE = 3.0
+"""Standard errors below zero at which a variance is none: what is there is no such noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,11 +26,13 @@ class NoiseLevel:
     position_std : (n,) rad or m.
     torque_std : (n,) N m or N.
     source : "given" or "measured".
+    doubt : why the residual is not noise of these two kinds; empty where it may be.
     """
 
     position_std: np.ndarray
     torque_std: np.ndarray
     source: str
+    doubt: str = ""
 
 
 def white_variance(x: np.ndarray) -> np.ndarray:
@@ -40,10 +42,11 @@ def white_variance(x: np.ndarray) -> np.ndarray:
 
 
 def position_noise(source: InstrumentSource, instruments: Dataset) -> np.ndarray:
-    """Measure the encoder's white noise, (n,) rad or m.
+    """Measure the encoder's white noise roughly, (n,) rad or m.
 
     In what the instruments leave of the measured positions: the motion that an imperfect model
-    misses is smooth, and leaves next to nothing in its third differences.
+    misses is smooth, and leaves next to nothing in its third differences. In a closed loop the
+    robot follows its encoders, and this comes out a few percent too large.
     """
     squares, count = np.zeros(instruments.recordings[0].n), 0
     for one, other in zip(source.measured.recordings, instruments.recordings, strict=True):
@@ -54,33 +57,25 @@ def position_noise(source: InstrumentSource, instruments: Dataset) -> np.ndarray
     return np.sqrt(squares / max(count, 1) / source.noise_share)
 
 
-def torque_noise(
-    measured: Dataset, variance: np.ndarray, expected: np.ndarray, counts: np.ndarray
-) -> np.ndarray:
-    """Return the white torque noise that accounts for what the encoders do not, (n,) N m or N.
+def noise_level(joints: tuple[str, ...], found: NoiseVariances) -> NoiseLevel:
+    """Return standard deviations for measured variances.
+
+    A variance that is zero or less within its standard error is taken as large as that error: so
+    much of it may be there. One that is negative beyond it is no variance, and is said.
 
     Parameters
     ----------
-    measured : the recordings, whose filters pass the noise.
-    variance : (n,) of the residual of each joint's rows.
-    expected : (n,) that the encoders' noise accounts for.
-    counts : (n,) rows.
+    joints : n names.
+    found : in the spectrum of the residual.
     """
-    excess = variance - expected
-    sure = excess > _EXCESS * np.sqrt(2.0 / np.maximum(counts, 1)) * expected
-    return np.sqrt(np.where(sure, np.maximum(excess, 0.0), 0.0) / _torque_gain(measured))
-
-
-def _torque_gain(measured: Dataset) -> float:
-    """Variance in a row of the regression per variance of white noise in the raw torque."""
-    return float(np.mean([_gain(sample(one, measured.filter)) for one in measured.recordings]))
-
-
-def _gain(sampled: Sampled) -> float:
-    impulse = np.zeros((sampled.motion.samples, 1))
-    middle = sampled.motion.samples // 2
-    if sampled.recording.torque == "held_command":
-        impulse[middle - 1 : middle + 1] = 0.5
-    else:
-        impulse[middle] = 1.0
-    return float(np.sum(sampled.parallel.low_pass(impulse) ** 2))
+    n = len(joints)
+    std = np.sqrt(np.maximum(found.values, found.std))
+    bad = np.flatnonzero(found.values < -_NEGATIVE * found.std)
+    names = [f"{('torque', 'encoder')[int(k < n)]} of {joints[k % n]}" for k in bad]
+    doubt = ""
+    if names:
+        doubt = (
+            "the spectrum of the residual is not that of white noise of encoders and torque: the "
+            f"variance comes out negative at the {', the '.join(names)}"
+        )
+    return NoiseLevel(std[:n], std[n:], "measured", doubt)

@@ -34,20 +34,36 @@ def noise_shapes(sampled: Sampled, lags: int) -> np.ndarray:
     """
     parallel, rate = sampled.parallel, sampled.motion.rate_hz
     f = (np.arange(_GRID) + 0.5) / _GRID * rate / 2
-    power = np.ones(_GRID)
-    for sections, _ in parallel.stages:
-        power *= _response(sections, f, rate) ** 4  # forward and backward
+    power, encoder = filter_power(sampled, f)
     top = f[np.flatnonzero(power > _OPEN * power.max())[-1]]
     band = np.minimum((f / top * _BANDS).astype(int), _BANDS - 1)
     spectra = [power * (band == b) for b in range(_BANDS)]
-    encoder = power.copy()
-    if cutoff := parallel.filter.position_cutoff_hz:
-        encoder *= _response(butterworth(rate, cutoff), f, rate) ** 4
     slope = np.sin(2 * np.pi * f / rate) ** 2  # central differences
     spectra += [encoder * slope, encoder * slope**2]
     cosines = np.cos(2 * np.pi * np.outer(f / parallel.output_rate_hz, np.arange(lags + 1)))
     found = np.array(spectra) @ cosines
     return found / found[:, :1]
+
+
+def filter_power(sampled: Sampled, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the power that a recording's filters let through, of torques and of positions.
+
+    Parameters
+    ----------
+    sampled : a recording with its filters.
+    f : (F,) Hz, at the full rate.
+
+    Returns
+    -------
+    (F,) each; that of positions has the low-pass before differentiation in it
+    """
+    rate, power = sampled.motion.rate_hz, np.ones(len(f))
+    for sections, _ in sampled.parallel.stages:
+        power *= _response(sections, f, rate) ** 4  # forward and backward
+    cutoff = sampled.parallel.filter.position_cutoff_hz
+    if cutoff is None:
+        return power, power
+    return power, power * _response(butterworth(rate, cutoff), f, rate) ** 4
 
 
 def _response(sections: np.ndarray, f: np.ndarray, rate: float) -> np.ndarray:
