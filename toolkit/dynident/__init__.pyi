@@ -16,6 +16,7 @@ from . import reporting as reporting
 from . import robot as robot
 from . import study as study
 from . import validation as validation
+from . import wiring as wiring
 from .consistency.checking import check as check
 from .diagnosis.procedure import diagnose as diagnose
 from .effects.effect import Effect as Effect

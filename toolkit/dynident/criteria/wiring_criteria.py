@@ -61,6 +61,12 @@ class WiringCriteria(CriteriaGroup):
         "described over measured torque of every joint above which a gear is likely",
         over=1,
     )
+    as_described: float = criterion(
+        5.0,
+        "1",
+        "factor by which torques may differ from those described, units being right",
+        over=1,
+    )
     odd_one: float = criterion(
         20.0, "1", "factor by which one joint's torque is off, the others being right", over=1
     )

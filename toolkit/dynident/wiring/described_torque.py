@@ -66,6 +66,13 @@ class DescribedScale:
         rms = np.sqrt(np.mean(tau**2, axis=0))
         return cls(factor=factor, known=known, over_effort=rms / efforts)
 
+    def confirmed(self, criteria: WiringCriteria) -> bool:
+        """Whether the described torques show at most joints, in about their size."""
+        known = np.flatnonzero(self.known)
+        if len(known) < max(1, len(self.known) / 2):
+            return False
+        return bool(np.abs(np.log(self._typical(known))) < np.log(criteria.as_described))
+
     def hypothesis(self, now: Assignment, criteria: WiringCriteria) -> Hypothesis | None:
         """Another unit, or the motor side of gears, where the torques are far from described.
 

@@ -7,6 +7,7 @@ import numpy as np
 from dynident.criteria import WiringCriteria
 from dynident.model import Model
 from dynident.wiring.assignment import Assignment, Hypothesis
+from dynident.wiring.fault import FaultKind
 from dynident.wiring.wiring_regression import TorqueFit, WiringRegression
 from dynident.wiring.wiring_rows import WiringRows
 
@@ -105,7 +106,11 @@ class _Gears:
         both = position.torques_scaled(ratio, joint)
         regression = WiringRegression.of(self.model, self.rows.moved(position.change))
         tried: list[Tried] = []
-        for kind, mended in (("motor_side", both), ("motor_side_position", position)):
+        sides: tuple[tuple[FaultKind, Assignment], ...] = (
+            ("motor_side", both),
+            ("motor_side_position", position),
+        )
+        for kind, mended in sides:
             one = Hypothesis(kind=kind, joints=(joint,), mended=mended, ratios=(ratio,))
             tried.append((one, regression.fit(mended.torque_of, mended.torque_scale)))
         return max(tried, key=_score)

@@ -28,6 +28,8 @@ from dynident.wiring.gear_ratios import (
 from dynident.wiring.wiring_regression import TorqueFit, WiringRegression
 from dynident.wiring.wiring_rows import WiringRows
 
+_OF_SIZE = ("torque_scale", "motor_side")
+"""Faults that say of which size a torque is already."""
 _ALIKE = 0.8
 """Share of the best gain with which scales of other joints stay in question."""
 
@@ -79,14 +81,15 @@ def search(model: Model, rows: WiringRows, criteria: WiringCriteria) -> SearchRe
         tried = here.all_plain()
         best = _best(tried, here.start, criteria.tie)
         if not _settled(best, here, criteria):
-            tried += motor_side_hypotheses(model, rows, now, here.start, criteria)
+            gears = motor_side_hypotheses(model, rows, now, here.start, criteria)
+            tried = [*_but_degrees_of_all(tried, gears), *gears]
             best = _best(tried, here.start, criteria.tie)
         if best is None or not _wins(best, here.start, rows, criteria):
             break
         best = _nearest_described(best, tried, here)
         accepted.append(Accepted(hypothesis=best[0], before=here.start, after=best[1]))
         now = best[0].mended
-    if not any(one.hypothesis.kind == "torque_scale" for one in accepted):
+    if not any(one.hypothesis.kind in _OF_SIZE for one in accepted):
         unit = DescribedScale.of(model, rows, now, criteria).hypothesis(now, criteria)
         if unit is not None:
             accepted.append(Accepted(hypothesis=unit, before=here.start, after=here.start))
@@ -136,7 +139,23 @@ def _settled(
     if any(far) and not all(far):
         return False  # where all are called degrees for the sake of one
     described = DescribedScale.of(here.model, here.rows, one.mended, criteria)
-    return described.hypothesis(one.mended, criteria) is None
+    return described.confirmed(criteria)
+
+
+def _but_degrees_of_all(
+    tried: list[tuple[Hypothesis, TorqueFit]], gears: list[tuple[Hypothesis, TorqueFit]]
+) -> list[tuple[Hypothesis, TorqueFit]]:
+    """Leave degrees of all joints out where gears of all fit better: 57 is no unusual ratio."""
+    several = [fit.score for one, fit in gears if len(one.joints) > 1]
+    return [
+        (one, fit)
+        for one, fit in tried
+        if not (
+            one.kind == "degrees"
+            and len(one.joints) > 1
+            and max(several, default=-np.inf) > fit.score
+        )
+    ]
 
 
 def _nearest_described(

@@ -39,7 +39,7 @@ def wrong_periods(dataset: Dataset, criteria: WiringCriteria) -> tuple[Fault, ..
 def _fault(period: float, likely: float, cases: list[tuple[str, float, float]]) -> Fault:
     """One fault of all recordings that have it alike."""
     names = ", ".join(name for name, _, _ in cases)
-    off, left = (max(case[k] for case in cases) for k in (1, 2))
+    off, left = max(case[1] for case in cases), max(case[2] for case in cases)
     return Fault(
         kind="period",
         joints=(),
