@@ -41,6 +41,7 @@ def check_diagnosis(said: dict[str, Any], source: str) -> None:
     assert set(said) == {
         *("verdict", "noise", "joints", "steps", "candidates", "test_error", "notes"),
         "wiring",
+        "withdrawn",
     }
     assert said["wiring"] == []
     assert said["verdict"] in VERDICTS

@@ -46,7 +46,7 @@ class _RecordingEntry(SettingsTable):
     period: float | None = Positive
     start: float = 0.0
     window: tuple[float, float] | None = None
-    payload: bool | None = None
+    payload: bool | Literal["unknown"] | None = None
 
 
 class _FilterEntry(SettingsTable):
@@ -263,6 +263,10 @@ def _recordings(said: _StudyFile, path: Path, robot: Robot) -> list[Recording]:
             ours: Column(theirs, 1.0) if isinstance(theirs, str) else Column(**theirs.model_dump())
             for ours, theirs in said.columns.items()
         }
+    payloads = {entry.payload for entry in said.recordings}
+    if "unknown" in payloads and payloads & {True, False}:
+        remedy = 'state true or false for every recording, or "unknown" for all of them'
+        raise StudyError("a payload is known and unknown", f"{path}: recordings", remedy)
     known: dict[tuple[Path, str | None], Recording] = {}
     found = []
     for number, entry in enumerate(said.recordings, start=1):
@@ -277,7 +281,7 @@ def _recordings(said: _StudyFile, path: Path, robot: Robot) -> list[Recording]:
                 period=entry.period,
                 start=entry.start,
                 window=entry.window,
-                payload=entry.payload,
+                payload=None if entry.payload == "unknown" else entry.payload,
                 torque=said.torque,
                 number=number,
             )

@@ -15,10 +15,9 @@ import numpy as np
 import pytest
 
 from dynident.criteria import Criteria
+from dynident.diagnosis.search.cross_validation import cross_validate, held_out_losses
 from dynident.diagnosis.search.scoring import (
     Score,
-    cross_validate,
-    held_out_losses,
     impossible,
     moments_with_payload,
     score,

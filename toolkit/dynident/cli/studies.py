@@ -8,6 +8,7 @@ import click
 
 from dynident.cli.group import CommandAnswer, answered, commands
 from dynident.cli.work import (
+    MOST,
     STUDY,
     comparison_of,
     diagnosis_of,
@@ -23,15 +24,16 @@ _PATH = click.Path(path_type=Path)
 @commands.command()
 @STUDY
 @answered
+@MOST
 @click.option("--report", type=_PATH, help="Also write this HTML report.")
-def explain(study: Path, report: Path | None) -> CommandAnswer:
+def explain(study: Path, most: int | None, report: Path | None) -> CommandAnswer:
     """Run the whole loop: compare, diagnose, add, refit, compare. The study stays as it is.
 
     Example: dynident explain study.toml --report report.html
     """
     require_places(study, report)
     loaded = load_study(study)
-    diagnosis = diagnosis_of(loaded)
+    diagnosis = diagnosis_of(loaded, most)
     write_report(loaded, diagnosis, report)
     return CommandAnswer(
         content=diagnosis.to_dict,
@@ -42,12 +44,13 @@ def explain(study: Path, report: Path | None) -> CommandAnswer:
 @commands.command()
 @STUDY
 @answered
-def diagnose(study: Path) -> CommandAnswer:
+@MOST
+def diagnose(study: Path, most: int | None) -> CommandAnswer:
     """Say where the model fails and which effects it lacks.
 
     Example: dynident diagnose study.toml --json
     """
-    diagnosis = diagnosis_of(load_study(study))
+    diagnosis = diagnosis_of(load_study(study), most)
     return CommandAnswer(content=diagnosis.to_dict, parts=diagnosis.tables)
 
 
@@ -104,15 +107,16 @@ def add(study: Path, effect: str) -> CommandAnswer:
 @commands.command()
 @STUDY
 @answered
+@MOST
 @click.option("--to", type=_PATH, default=Path("report.html"), show_default=True)
-def report(study: Path, to: Path) -> CommandAnswer:
+def report(study: Path, most: int | None, to: Path) -> CommandAnswer:
     """Diagnose, and write the HTML report.
 
     Example: dynident report study.toml --to report.html
     """
     require_places(study, to)
     loaded = load_study(study)
-    diagnosis = diagnosis_of(loaded)
+    diagnosis = diagnosis_of(loaded, most)
     write_report(loaded, diagnosis, to)
     return CommandAnswer(
         content=lambda: {"report": str(to), **diagnosis.to_dict()}, lines=(diagnosis.sentence,)

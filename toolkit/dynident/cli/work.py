@@ -46,8 +46,15 @@ def load_study(path: Path) -> Study:
         return load(path)
 
 
-def diagnosis_of(study: Study) -> Diagnosis:
-    """Run the search for what the model lacks."""
+MOST = click.option(
+    "--most",
+    type=click.IntRange(min=0),
+    help="Effects that are added at most, one at several joints counting once.",
+)
+
+
+def diagnosis_of(study: Study, most: int | None = None) -> Diagnosis:
+    """Run the search for what the model lacks; `most` effects are added, None for the usual."""
     from dynident.diagnosis import diagnose as search
 
     with progress("diagnosing") as show_progress:
@@ -56,6 +63,7 @@ def diagnosis_of(study: Study) -> Diagnosis:
             study.train,
             study.test,
             controller=study.controller,
+            most=most,
             criteria=study.criteria,
             progress=show_progress,
         )

@@ -11,7 +11,9 @@ from dynident.criteria.criterion import TWO_LINK_CASES, CriteriaGroup, criterion
 class SearchCriteria(CriteriaGroup):
     """How much is searched, which of several effects is named, and which is dropped again."""
 
-    most_effects: int = criterion(8, "effects", "effects that are added at most", least=0)
+    most_effects: int = criterion(
+        8, "effects", "effects that are added at most, one at several joints counting once", least=0
+    )
     most_effects_per_joint: int = criterion(
         2, "effects", "the same for each joint, where that is more", least=0
     )
@@ -123,6 +125,13 @@ class GateCriteria(CriteriaGroup):
         least=0,
         most=1,
     )
+    least_gain: float = criterion(
+        0.003,
+        "1",
+        "least share of the squared residual on held-out blocks that an effect must take off",
+        least=0,
+        most=1,
+    )
     standard_errors: float = criterion(
         1.5, "1", "held-out gain over its standard error, from which it counts", TWO_LINK_CASES
     )
@@ -148,6 +157,20 @@ class GateCriteria(CriteriaGroup):
         "1",
         "part of the noise below which a column is not seen at any possible value",
         over=0,
+    )
+    filter_share: float = criterion(
+        0.5,
+        "1",
+        "share of the cut-offs at which an effect must have the same value, where nothing tells "
+        "the noise of the columns",
+        over=0,
+        most=1,
+    )
+    same_value: float = criterion(
+        1 / 3,
+        "1",
+        "relative change of an effect's value with the filter up to which it is the same",
+        least=0,
     )
     beyond_bounds: float = criterion(
         3.0, "1", "standard deviations by which one of several values may leave its bounds"

@@ -7,6 +7,7 @@ effect with the experiment that would show it or distinguish it, residual maps, 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -16,11 +17,11 @@ from dynident.diagnosis.nuisances.contacts import Disturbance, contact_candidate
 from dynident.diagnosis.nuisances.quantisation import rounding_notes, with_rounding
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.ranking import Ranking
-from dynident.diagnosis.search.selection import AddedEffect
+from dynident.diagnosis.search.withdrawal import Path
 from dynident.diagnosis.verdict import noise_source, notes_on, verdict_of
 from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
-from dynident.evidence.held_out import HeldOut, on_blocks, on_recordings, with_noise_of
+from dynident.evidence.evidence_fit import EvidenceFit
+from dynident.evidence.held_out import HeldOut, on_recordings
 from dynident.evidence.maps import residual_maps
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import sources_of
@@ -40,21 +41,21 @@ _METHODS: dict[NoiseSource, str] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Search:
-    """What a search did: the evidence, the fits, the effects added, the ranking of each round.
+    """What a search did: the evidence, the effects added, their fits, the ranking of each round.
 
     Attributes
     ----------
     disturbances : contacts, left out of the evidence.
     notes : on its instruments, where they come from a simulation or could not.
+    limit : effects that were allowed, where more of them pass every gate; None elsewhere.
     """
 
     evidence: Evidence
-    start: EvidenceFit
-    final: EvidenceFit
-    found: tuple[AddedEffect, ...]
+    path: Path
     rounds: tuple[Ranking, ...]
     disturbances: tuple[Disturbance, ...] = ()
     notes: tuple[str, ...] = ()
+    limit: int | None = None
 
 
 def assemble(
@@ -72,25 +73,12 @@ def assemble(
     -------
     What is known of the model, effect by effect and joint by joint, and the verdict.
     """
-    evidence, start, fitted = search.evidence, search.start, search.final
-    found, rounds, given = search.found, search.rounds, search.start.model
-    by_label = {e.label: e for e in fitted.model.effects}
-    stages = [start]
-    for one in found[:-1]:
-        wider = stages[-1].model + by_label[one.score.effect.label]
-        stages.append(fit_evidence(evidence, wider.with_shapes(fitted.model.effects), stages[-1]))
-    if found:
-        # With another friction width where that was called for later.
-        stages.append(fitted)
-    judged = [
-        with_noise_of(on_recordings(held, s), on_recordings(evidence, s), evidence.criteria.noise)
-        if held
-        else on_blocks(evidence, s)
-        for s in stages
-    ]
+    evidence, rounds, path = search.evidence, search.rounds, search.path
+    stages, judged, start = path.stages, path.judged, path.stages[0]
+    given, by_label = start.model, {e.label: e for e in path.final.model.effects}
     rounded = test if test is not None and held is not None else train
     before = with_rounding(judged[0], start, rounded)
-    after = with_rounding(judged[-1], stages[-1], rounded) if found else before
+    after = with_rounding(judged[-1], stages[-1], rounded) if path.found else before
     steps = tuple(
         Step(
             effect=by_label[one.score.effect.label],
@@ -100,9 +88,10 @@ def assemble(
             indistinguishable=one.indistinguishable,
             p_value=one.p_value,
         )
-        for one, stage, old, new in zip(found, stages[1:], judged[:-1], judged[1:], strict=True)
+        for one, stage, (old, new) in zip(path.found, stages[1:], pairwise(judged), strict=True)
     )
-    contacts = tuple(one.step(given) for one in search.disturbances)
+    helping = [one for one in search.disturbances if one.error_after <= one.error_before]
+    contacts = tuple(one.step(given) for one in helping)
     first_error = contacts[0].test_error_before if contacts else before.error
     steps = (*contacts, *_advised(steps, Adviser.of(evidence, stages[-1])))
     source = noise_source(evidence, held)
@@ -128,6 +117,8 @@ def assemble(
         ),
         test_sources=sources_of(test) if test is not None else (),
         criteria=evidence.criteria,
+        withdrawn=path.withdrawn,
+        limit=search.limit,
     )
 
 

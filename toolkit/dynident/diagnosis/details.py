@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -70,6 +71,14 @@ class Step:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Withdrawn:
+    """An effect that passed every gate on the training recordings, and why it was taken back."""
+
+    effect: Effect
+    why: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class JointResult:
     """Errors at one joint, on the test recordings.
 
@@ -119,6 +128,27 @@ class Trace:
     measured: np.ndarray
     before: np.ndarray
     after: np.ndarray
+
+
+def named_together(steps: Sequence[Step]) -> list[str]:
+    """Name each step with everything that is indistinguishable from it: never one alone.
+
+    What every joint has is named once, with its joints.
+    """
+    added = {one.effect.label for one in steps}
+    groups: dict[str, list[Step]] = {}
+    for step in steps:
+        together = step.effect.at_every_joint
+        groups.setdefault(step.effect.name if together else step.effect.label, []).append(step)
+    found = []
+    for group in groups.values():
+        first, joints = group[0].effect, [str(one.effect.joint) for one in group]
+        title = first.title
+        if len(group) > 1:
+            title = f"{first.name.replace('_', ' ')} at {', '.join(joints[:-1])} and {joints[-1]}"
+        others = [e.title for s in group for e in s.indistinguishable if e.label not in added]
+        found.append(title + (f" (or {' or '.join(dict.fromkeys(others))})" if others else ""))
+    return found
 
 
 def place(effect: Effect) -> dict[str, str | None]:

@@ -9,23 +9,27 @@ it is called, that is the answer, and nothing is added.
 - *rank*: every effect that the model lacks is scored by what it would take off the residual; the
   best are refined in their shapes and cross-validated; gates say which are significant and
   relevant.
-- *add*: the best of these, or a simpler one that explains nearly as much.
-- *refit*: all parameters anew, shapes too; then rank again, until no effect passes the gates. Where
-  a residual remains, a search through all shapes of effects that ring or have backlash follows.
-- *judge*: what the others have made superfluous is dropped; errors before and after, and the
-  verdict, are those on recordings (or blocks of time) that were not fitted.
+- *add*: the best of these, or a simpler one that explains nearly as much; what every joint has, at
+  all joints that call for it.
+- *refit*: all parameters anew, shapes too; values that no robot can have refuse the effect. Then
+  rank again, until no effect passes the gates. Where a residual remains, a search through all
+  shapes of effects that ring or have backlash follows.
+- *judge*: what the others have made superfluous is dropped, and what raises the error on recordings
+  (or blocks of time) that were not fitted is withdrawn; errors before and after, and the verdict,
+  are those on the same.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from dynident.closed_loop import Controller
 from dynident.criteria import DEFAULTS, Criteria
 from dynident.diagnosis.assembly import Search, assemble
+from dynident.diagnosis.details import Withdrawn
 from dynident.diagnosis.nuisances.contacts import Contacts
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.nuisances.quantisation import nothing_but_rounding
@@ -33,14 +37,17 @@ from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.global_search import RankedModel, global_search
 from dynident.diagnosis.search.payload_recordings import with_payload, with_payload_decided
 from dynident.diagnosis.search.ranking import Ranking, candidates, rank
+from dynident.diagnosis.search.refusal import follows_the_filter, narrower, newly_impossible
 from dynident.diagnosis.search.selection import (
     AddedEffect,
     alternatives_only,
+    at_other_joints,
     breaks_its_promise,
     choose,
     without_superfluous,
 )
 from dynident.diagnosis.search.shaped_fit import refitted, shaped
+from dynident.diagnosis.search.withdrawal import Path, path_of
 from dynident.diagnosis.wiring_answer import Wiring
 from dynident.effects import Effect
 from dynident.evidence.columns import Evidence
@@ -75,7 +82,8 @@ def diagnose(
     test : recordings to judge by; without any, blocks of the training recordings are held out.
     controller : of the closed loop behind the recordings; where nothing repeats, the simulated
         loop gives the instruments.
-    most : effects that are added at most; None for `SearchCriteria.most_effects`.
+    most : effects that are added at most, one at several joints counting once; None for
+        `SearchCriteria.most_effects`.
     criteria : the numbers that decide the answer, see `dynident.criteria`.
     progress : is called with what is being done, for a display.
 
@@ -100,7 +108,8 @@ def diagnose(
     task = _Task(train=train, test=held_out, most=most, progress=progress)
     start = _compare(given, controller, criteria, task)
     extended = _extend(_rank(start, task), task)
-    return wiring.heeded(_judge(_search_globally(start, extended, task), task))
+    settled, path = _settle(_search_globally(start, extended, task), task)
+    return wiring.heeded(_judge(settled, path, task))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,21 +130,36 @@ class _Stage:
     ----------
     evidence, held : of the training and of the test recordings, contacts left out; `held` is None
         where blocks of time are held out.
+    narrow : the training recordings behind lower cut-offs, where noise in the columns is unknown.
     loop : behind the simulated motion in the evidence, where there is one.
     contacts : those that were left out.
     start, fitted : fits of the model as given, and of the one with all effects added.
     found : these effects.
     rounds : the ranking after each of them, the first one before any.
+    refused : labels of effects that were withdrawn, with the reason: they are not tried again.
     """
 
     evidence: Evidence
     held: Evidence | None
+    narrow: Evidence | None
     loop: SimulatedMotion
     contacts: Contacts
     start: EvidenceFit
     fitted: EvidenceFit
     found: tuple[AddedEffect, ...] = ()
     rounds: tuple[Ranking, ...] = ()
+    refused: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def proposals(self) -> int:
+        """Effects added, one at several joints counting once."""
+        return sum(not one.with_it for one in self.found)
+
+    @property
+    def latest(self) -> tuple[AddedEffect, ...]:
+        """What was added last, at all of its joints."""
+        chosen = [k for k, one in enumerate(self.found) if not one.with_it]
+        return self.found[chosen[-1] :] if chosen else ()
 
     @property
     def ranked(self) -> RankedModel:
@@ -162,7 +186,13 @@ def _compare(
     if contacts.pulses:
         start = with_friction_width(evidence, shaped(evidence, given))
     return _Stage(
-        evidence=evidence, held=held, loop=loop, contacts=contacts, start=start, fitted=start
+        evidence=evidence,
+        held=held,
+        narrow=narrower(evidence, task.train),
+        loop=loop,
+        contacts=contacts,
+        start=start,
+        fitted=start,
     )
 
 
@@ -174,20 +204,27 @@ def _variants(given: Model) -> tuple[Effect, ...]:
 def _rank(stage: _Stage, task: _Task) -> _Stage:
     """Rank every effect that the model lacks; drop alternatives that are significant beside it."""
     ranking = rank(stage.evidence, stage.fitted, len(stage.found), task.progress)
-    found = stage.found
-    if found:
-        found = (*found[:-1], alternatives_only(found[-1], ranking))
+    ranking = ranking.refusing(stage.refused)
+    found = tuple(
+        alternatives_only(one, ranking) if one in stage.latest else one for one in stage.found
+    )
     return replace(stage, found=found, rounds=(*stage.rounds, ranking))
 
 
 def _extend(stage: _Stage, task: _Task) -> _Stage:
     """Add the best effect, refit, and rank again, until none passes every gate."""
-    while len(stage.found) < task.most and not _resolved(stage, task):
+    while stage.proposals < task.most and not _resolved(stage, task):
         best = choose(stage.evidence, stage.fitted, stage.rounds[-1])
         wider = None if best is None else _add_and_refit(stage, best, task)
-        if wider is None:
+        if best is None or wider is None:
             break
-        stage = _rank(wider, task)
+        why = newly_impossible(wider.evidence, stage.fitted, wider.fitted)
+        why = why or follows_the_filter(stage.narrow, wider.fitted, best.score)
+        if why:
+            ranking = stage.rounds[-1].refusing({best.score.effect.label: why})
+            stage = replace(stage, rounds=(*stage.rounds[:-1], ranking))
+        else:
+            stage = _rank(wider, task)
     return stage
 
 
@@ -198,7 +235,9 @@ def _add_and_refit(stage: _Stage, best: AddedEffect, task: _Task) -> _Stage | No
     """
     task.progress(f"adding {best.score.effect.label}")
     evidence, loop, before = with_payload(stage.evidence, best.score), stage.loop, stage.fitted
-    wider = refitted(evidence, before.model + best.score.effect, before)
+    added = (best, *at_other_joints(evidence, before, best, len(stage.found)))
+    model = before.model + tuple(one.score.effect for one in added)
+    wider = refitted(evidence, model, before)
     fitted = with_friction_width(evidence, wider)
     if breaks_its_promise(before, fitted, best.score):
         return None
@@ -208,7 +247,7 @@ def _add_and_refit(stage: _Stage, best: AddedEffect, task: _Task) -> _Stage | No
     if moved is not evidence:
         evidence = moved
         fitted = with_friction_width(evidence, refitted(evidence, fitted.model, fitted))
-    found = (*stage.found, best)
+    found = (*stage.found, *added)
     return replace(stage, evidence=evidence, loop=loop, fitted=fitted, found=found)
 
 
@@ -229,29 +268,58 @@ def _search_globally(start: _Stage, extended: _Stage, task: _Task) -> _Stage:
     return other if better else extended
 
 
-def _judge(stage: _Stage, task: _Task) -> Diagnosis:
-    """Drop what is superfluous, confirm contacts, and say what held-out data say."""
-    evidence, start, rounds = stage.evidence, stage.start, stage.rounds
+def _settle(stage: _Stage, task: _Task) -> tuple[_Stage, Path]:
+    """Drop what is superfluous and withdraw what does harm; then go on with what is left."""
+    withdrawn: tuple[Withdrawn, ...] = ()
+    while True:
+        many = len(stage.found)
+        stage, path = _pruned(stage, task)
+        withdrawn = (*withdrawn, *path.withdrawn)
+        if len(path.found) < many:
+            refused = {**stage.refused, **{o.effect.label: o.why for o in path.withdrawn}}
+            stage = _rank(replace(stage, refused=refused), task)
+        wider = _extend(stage, task) if path.withdrawn else stage
+        if wider.found == stage.found:
+            return stage, replace(path, withdrawn=withdrawn)
+        stage = wider
+
+
+def _pruned(stage: _Stage, task: _Task) -> tuple[_Stage, Path]:
+    """Drop what is superfluous, confirm contacts, and withdraw what raises the held-out error."""
+    evidence, start = stage.evidence, stage.start
     held = None if stage.held is None else with_payload_decided(stage.held, stage.fitted)
     kept = without_superfluous(evidence, held, stage.fitted, list(stage.found), task.progress)
     final = kept.final
-    if len(kept.found) < len(stage.found):
-        rounds = (*rounds, rank(evidence, final, len(kept.found), task.progress))
     contacts = stage.contacts.confirmed(evidence, held, final)
     evidence, held = contacts.left_out(evidence), contacts.left_out_of_test(held)
     if contacts.pulses != stage.contacts.pulses:
         start = fit_evidence(evidence, start.model, start)
         final = fit_evidence(evidence, final.model, final)
-    search = Search(
+    path = path_of(evidence, held, start, final, tuple(kept.found), task.progress)
+    pruned = replace(
+        stage,
         evidence=evidence,
+        held=held,
+        contacts=contacts,
         start=start,
-        final=final,
-        found=tuple(kept.found),
-        rounds=rounds,
-        disturbances=contacts.disturbances(evidence, held, start),
-        notes=stage.loop.notes,
+        fitted=path.final,
+        found=path.found,
     )
-    return assemble(search, task.train, task.test, held)
+    return pruned, path
+
+
+def _judge(stage: _Stage, path: Path, task: _Task) -> Diagnosis:
+    """Say what held-out data say of the path that the model has gone."""
+    reached = stage.proposals >= task.most > 0
+    search = Search(
+        evidence=stage.evidence,
+        path=path,
+        rounds=stage.rounds,
+        disturbances=stage.contacts.disturbances(stage.evidence, stage.held, stage.start),
+        notes=stage.loop.notes,
+        limit=task.most if reached and stage.rounds[-1].passing else None,
+    )
+    return assemble(search, task.train, task.test, stage.held)
 
 
 def _has_changed(evidence: Evidence, start: EvidenceFit, fitted: EvidenceFit) -> bool:

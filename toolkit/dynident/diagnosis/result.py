@@ -6,7 +6,16 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from dynident.criteria import DEFAULTS, Criteria
-from dynident.diagnosis.details import Candidate, JointResult, Step, TestError, Trace, place
+from dynident.diagnosis.details import (
+    Candidate,
+    JointResult,
+    Step,
+    TestError,
+    Trace,
+    Withdrawn,
+    named_together,
+    place,
+)
 from dynident.diagnosis.track_record import TrackRecord, track_record
 from dynident.evidence.maps import ResidualMap
 from dynident.fitting.estimate import DataSource, Estimate
@@ -53,6 +62,8 @@ class Diagnosis:
     wiring : columns and data that are not what the study says: where there are any, they are the
         answer, nothing is added, and the verdict is "unexplained".
     impossible : inertias and frictions of the final model that no robot has; likewise.
+    withdrawn : effects that passed every gate and were taken back, with the reason.
+    limit : effects that were allowed, where the search ended there; None where it ended by itself.
     """
 
     verdict: Verdict
@@ -71,6 +82,8 @@ class Diagnosis:
     criteria: Criteria = DEFAULTS
     wiring: tuple[Fault, ...] = ()
     impossible: tuple[str, ...] = ()
+    withdrawn: tuple[Withdrawn, ...] = ()
+    limit: int | None = None
 
     @property
     def best(self) -> Step | None:
@@ -88,7 +101,16 @@ class Diagnosis:
         if self.wiring:
             faults = " ".join(fault.sentence for fault in self.wiring)
             return f"The recordings are not what the study says, and nothing was sought. {faults}"
-        effects = ", ".join(self._named(step) for step in self.steps)
+        if self.limit is None:
+            return self._verdict_in_words
+        return (
+            f"{self._verdict_in_words} The search ended at its limit of {self.limit} additions, "
+            "and more effects are significant and relevant: allow more (--most)."
+        )
+
+    @property
+    def _verdict_in_words(self) -> str:
+        effects = ", ".join(named_together(self.steps))
         if self.impossible:
             added = f" {effects} added, but" if effects else ""
             return (
@@ -139,14 +161,9 @@ class Diagnosis:
         return (
             *((self.confidence,) if self.confidence else ()),
             *((f"Criteria of the study, not the defaults: {changed}.",) if changed else ()),
+            *(f"Withdrawn: {one.effect.title}, which {one.why}." for one in self.withdrawn),
             *self.notes,
         )
-
-    def _named(self, step: Step) -> str:
-        """A step with everything that is indistinguishable from it: never one alone."""
-        added = {one.effect.label for one in self.steps}
-        others = [e.title for e in step.indistinguishable if e.label not in added]
-        return step.effect.title + (f" (or {' or '.join(others)})" if others else "")
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON of `diagnose --json` and `explain --json`."""
@@ -187,6 +204,7 @@ class Diagnosis:
             },
             "wiring": [fault.to_dict() for fault in self.wiring],
             **({"impossible": list(self.impossible)} if self.impossible else {}),
+            "withdrawn": [{**place(one.effect), "why": one.why} for one in self.withdrawn],
             "notes": list(self.caveats),
             **({"criteria": self._changed_criteria()} if self.criteria.changed else {}),
         }

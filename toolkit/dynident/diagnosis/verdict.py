@@ -92,5 +92,9 @@ def notes_on(evidence, held, fitted: EvidenceFit, source: NoiseSource) -> tuple[
         payload_recordings += [
             r.recording.name for r in (held.runs if held else ()) if r.recording.payload
         ]
-        notes.append(f"Payload carried in: {', '.join(payload_recordings)}.")
+        notes.append(
+            f"Payload carried in: {', '.join(payload_recordings)}. Before `dynident add` can write "
+            "it into the study, set payload = true in the [[recordings]] of these, and false in "
+            "the others."
+        )
     return (*notes, *friction_width_notes(fitted))

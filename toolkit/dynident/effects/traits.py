@@ -39,12 +39,16 @@ class EffectTraits:
         a linearisation point.
     time_varying : whether the columns depend on the time in the session: they do not repeat with
         the motion.
+    opposes_motion : whether it is a part of the joint's friction, which together takes power.
+    at_every_joint : whether a robot that has it at one joint, as a rule, has it at all.
     """
 
     needs: ClassVar[Needs] = Needs.NOTHING
     linear_in_torque: ClassVar[bool] = False
     nonlinear: ClassVar[bool] = False
     time_varying: ClassVar[bool] = False
+    opposes_motion: ClassVar[bool] = False
+    at_every_joint: ClassVar[bool] = False
 
     @property
     def needs_regressor(self) -> bool:

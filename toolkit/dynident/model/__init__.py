@@ -4,9 +4,11 @@ In: a robot and effects. Out: the parameters in which the torque is linear (`par
 the robot that their values describe, and the columns of the regression (`torque_model`). This is
 the one place that knows in which order columns can be evaluated: those of effects that make the
 torque, along the bodies that the values describe, then those of effects that depend on the
-torque; and of a whole recording once.
+torque; and of a whole recording once. Whether values are possible together says
+`possible_values`.
 """
 
+from dynident.model.possible_values import Impossible, impossible_at
 from dynident.model.torque_model import Model
 
-__all__ = ["Model"]
+__all__ = ["Impossible", "Model", "impossible_at"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
 
@@ -77,6 +77,19 @@ class Filter:
             "ends kept" if self.ends == "keep" else "",
         ]
         return ", ".join(part for part in parts if part) or "none"
+
+    def narrowed(self, share: float, rate_hz: float) -> Filter:
+        """Return the filter with its cut-offs at a share of what they are, for samples at a rate.
+
+        Where positions pass no low-pass, they then pass that of columns and torque, or the default.
+        """
+        default = default_filter(rate_hz)
+        position = self.position_cutoff_hz or self.cutoff_hz or default.position_cutoff_hz
+        return replace(
+            self,
+            position_cutoff_hz=share * position if position else None,
+            cutoff_hz=share * self.cutoff_hz if self.cutoff_hz else None,
+        )
 
     def margins(self, rate_hz: float) -> tuple[int, int]:
         """Samples at either end whose derivatives are not used, at a sampling rate in Hz.

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 
 from dynident.diagnosis.search.candidate_shapes import refined
+from dynident.diagnosis.search.cross_validation import cross_validate
+from dynident.diagnosis.search.payload_recordings import payload_scores, unconfirmed
 from dynident.diagnosis.search.scoring import (
     Score,
     candidate_moments,
-    cross_validate,
     impossible,
     moments_with_payload,
     score,
@@ -21,7 +21,6 @@ from dynident.effects import Block, Effect, catalogue
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, residuals
 from dynident.evidence.noise_model import differences, systematic_square
-from dynident.evidence.runs import Run
 from dynident.model import Model
 from dynident.moments.replicates import Kind
 
@@ -48,6 +47,14 @@ class Ranking:
         """Scores that pass every gate, best first."""
         pairs = zip(self.scores, self.refusals, strict=True)
         return tuple(s for s, refusal in pairs if not refusal and not s.not_identifiable)
+
+    def refusing(self, reasons: Mapping[str, str]) -> Ranking:
+        """Return the ranking with further effects refused, a reason for each label."""
+        refusals = tuple(
+            refusal or reasons.get(s.effect.label, "")
+            for s, refusal in zip(self.scores, self.refusals, strict=True)
+        )
+        return replace(self, refusals=refusals)
 
     def corrected(self, one: Score) -> float:
         """The p value of a score, corrected for all tests of this round."""
@@ -138,29 +145,9 @@ def joints_below_noise(evidence: Evidence, fitted: EvidenceFit) -> frozenset[str
     return frozenset(found)
 
 
-def payload_choices(runs: tuple[Run, ...], most: int) -> list[tuple[bool, ...]]:
-    """Which runs may carry the payload: as the study says, or every choice where it is silent.
-
-    Of more than `most` runs only those choices in which one carries it, or all but one.
-    """
-    stated = [run.recording.payload for run in runs]
-    if any(flag is not None for flag in stated):
-        return [tuple(bool(flag) for flag in stated)]
-    if len(runs) > most:
-        singles = np.eye(len(runs), dtype=bool)
-        return [tuple(bool(c) for c in row) for row in (*singles, *~singles)]
-    every = product((False, True), repeat=len(runs))
-    return [c for c in every if any(c) and not all(c)] or [(True,) * len(runs)]
-
-
 def _score_variants(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> Iterator[Score]:
     if effect.is_payload:
-        choices = payload_choices(evidence.runs, evidence.criteria.search.payload_recordings)
-        (whole,) = candidate_moments(evidence, fitted, [effect])
-        for choice in choices:
-            parts = (moments_with_payload(part, evidence, choice) for part in whole)
-            one = score(fitted, effect, *parts, grid=len(choices), payload_recordings=choice)
-            # A load has mass: of two complementary choices only one can be meant.
+        for one in payload_scores(evidence, fitted, effect):
             yield _possible(one, fitted)
         return
     seen = _seen(fitted, effect)
@@ -235,11 +222,15 @@ def _refusal(one: Score, evidence: Evidence, fitted: EvidenceFit, tests: int, le
         return unresolved
     if one.gains is None:
         return "other effects explain more"
+    assert one.losses is not None
+    gain = one.gains.sum() / max(float(np.sum(one.losses + one.gains)), 1e-300)
+    if 0 < gain < gates.least_gain:
+        return f"takes only {100 * gain:.2g} % off the held-out squared residual"
     spread = one.gains.std(ddof=1) * np.sqrt(len(one.gains))
     confident = one.gains.sum() > gates.standard_errors * spread
     if not (one.gains.sum() > 0 and (confident or np.mean(one.gains > 0) >= gates.blocks_gaining)):
         return "does not help on held-out blocks"
-    return ""
+    return unconfirmed(evidence, fitted, one)
 
 
 def _step(evidence: Evidence) -> float:

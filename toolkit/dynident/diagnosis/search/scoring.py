@@ -1,4 +1,4 @@
-"""What an effect would bring: tests, penalties and cross-validation on the moments."""
+"""What an effect would bring: tests and penalties on the moments."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from operator import add
 import numpy as np
 from scipy import stats
 
+from dynident.diagnosis.search.cleared_columns import cleared
 from dynident.effects import Effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, time_varying_columns, time_varying_mask
@@ -17,7 +18,6 @@ from dynident.evidence.runs import Signals
 from dynident.model import Model
 from dynident.moments.replicates import TimeVarying, time_varying_products
 from dynident.moments.second_moments import SecondMoments
-from dynident.moments.solution import orthonormal_directions, regress, solve_products
 
 Columns = Callable[[Sequence[Effect], Model, np.ndarray], list[list[Signals]]]
 """Columns of variants of an effect, for a model and its values, as `Evidence.columns`."""
@@ -105,7 +105,9 @@ def candidate_moments(
             two.append(run.moments(white, white))
             if run.kind == "repeated" and mixed:
                 new = TimeVarying(
-                    white, _time_factors(evidence, variants, r), np.zeros(white.shape[2], bool)
+                    white,
+                    _time_factors(evidence, variants, r, width),
+                    np.zeros(white.shape[2], bool),
                 )
                 old = time_varying_columns(evidence, fitted.model, r, known)
                 chosen = time_varying[:, None] | np.full(white.shape[2], variants[0].time_varying)
@@ -121,12 +123,13 @@ def candidate_moments(
     return [(beside.columns(part), own.among(part)) for part in parts]
 
 
-def _time_factors(evidence: Evidence, variants: Sequence[Effect], run: int) -> np.ndarray:
-    """What the time of the session does to the columns of effects, (P, S, k) over all of them."""
+def _time_factors(
+    evidence: Evidence, variants: Sequence[Effect], run: int, width: int
+) -> np.ndarray:
+    """What the time of the session does to `width` columns of each effect, (P, S, k) in all."""
     factors = []
     for effect in variants:
-        count = len(effect.parameters(evidence.model.robot))
-        factors += [evidence.time_factor(effect, run)] * count
+        factors += [evidence.time_factor(effect, run)] * width
     return np.stack(factors, axis=2)
 
 
@@ -175,41 +178,24 @@ def score(
     -------
     Not yet cross-validated; marked where the model already explains all that it could.
     """
-    p = len(fitted.values)
-    solution = fitted.solution
-    beside, own, known = with_model.pooled(), with_self.pooled(), fitted.moments.pooled()
-    signal, total = beside.signal, beside.total
-    back = solution.project(signal[:p])  # the model's share of the columns
-    left_signal = own.signal - signal[:p].T @ back
-    cross = back.T @ total[:p]
-    left_total = own.total - cross - cross.T + back.T @ known.gram @ back
+    own = with_self.pooled()
     scale = np.sqrt(np.clip(np.diag(own.signal), 0.0, None))
     seen = _seen(effect, fitted, scale)
     if not np.any(seen) or not np.all(np.isfinite(own.signal)):
         return Score(effect=effect, payload_recordings=payload_recordings, not_identifiable=True)
-    scale = np.where(seen, scale, 1.0)
-    # Directions of the columns, by what is left of them beside the model.
-    white = orthonormal_directions(own.signal * np.outer(seen, seen), scale)
-    left, turn = np.linalg.eigh(white.T @ left_signal @ white)
-    visible = left > fitted.criteria.gates.not_identifiable**2
-    if not np.any(visible):
+    found = cleared(fitted, with_model.pooled(), own, seen)
+    if found is None:
         return Score(effect=effect, payload_recordings=payload_recordings, not_identifiable=True)
-    directions = white @ turn[:, visible]
-    moment = directions.T @ (signal[p] - back.T @ known.signal[:p, p])
-    part = solve_products(
-        directions.T @ left_signal @ directions,
-        directions.T @ left_total @ directions,
-        moment,
-        fitted.criteria.noise.reliable,
-    )
+    part, directions, back = found.part, found.directions, found.back
     if part.rank == 0:
         return Score(effect=effect, payload_recordings=payload_recordings, not_identifiable=False)
+    p, total, left_total = len(fitted.values), with_model.pooled().total, found.left_total
     values = directions @ part.values
-    drop = float(part.values @ moment)
+    drop = found.drop
     covariance = directions @ part.covariance @ directions.T
     at = np.array(effect.point) if len(effect.point) == len(values) else values
     combination = np.append(-fitted.values, 1.0)
-    with_model_columns = (combination @ known.total)[:p]
+    with_model_columns = (combination @ fitted.moments.pooled().total)[:p]
     with_noise = combination @ total - with_model_columns @ back
     shapes = len(effect.shape_parameters(fitted.model.robot))
     price = (part.rank + shapes) * np.log(fitted.rows) + 2.0 * np.log(grid)
@@ -222,7 +208,7 @@ def score(
         rank=part.rank,
         drop=drop,
         share=drop / fitted.error_total,
-        p_value=_block_p_value(part.basis.T @ moment, blocks),
+        p_value=_block_p_value(part.basis.T @ found.moment, blocks),
         penalised=float(penalised),
         values=tuple(float(v) for v in values),
         sigma=tuple(float(s) for s in np.sqrt(np.clip(np.diag(covariance), 0.0, None))),
@@ -252,52 +238,6 @@ def impossible(one: Score, fitted: EvidenceFit) -> str:
         if value < parameter.lower - slack or value > parameter.upper + slack:
             return f"would need {parameter.name} = {value:.3g} {parameter.unit}"
     return ""
-
-
-def cross_validate(
-    fitted: EvidenceFit, with_model: SecondMoments, with_self: SecondMoments
-) -> tuple[np.ndarray, np.ndarray]:
-    """Leave out every block in turn, and predict it by the model with and without an effect.
-
-    Parameters
-    ----------
-    fitted : the model without the effect.
-    with_model : of the effect's columns with the model's and the torque, (B, p + 1, k).
-    with_self : of the effect's columns with themselves, (B, k, k).
-
-    Returns
-    -------
-    Held-out squared residuals per block, whitened: (B,) without and (B,) with the effect.
-    """
-    both = SecondMoments(
-        _joined(fitted.moments.total, with_model.total, with_self.total),
-        fitted.moments.counts,
-        None,
-        _joined(fitted.moments.signal, with_model.signal, with_self.signal),
-    )
-    without = np.r_[0 : len(fitted.values), both.inputs]
-    reliable = fitted.criteria.noise.reliable
-    return held_out_losses(both.among(without), reliable), held_out_losses(both, reliable)
-
-
-def held_out_losses(summed: SecondMoments, least_reliability: float) -> np.ndarray:
-    """Squared residual of each block under the fit to all others, free of noise in the mean."""
-    found = []
-    for block in range(len(summed.signal)):
-        values = regress(summed.without(block), least_reliability).values
-        combination = np.append(-values, 1.0)
-        found.append(combination @ summed.signal[block] @ combination)
-    return np.array(found)
-
-
-def _joined(model: np.ndarray, cross: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """Moments of [model columns, effect columns, torque], from their parts."""
-    p = model.shape[1] - 1
-    top = np.concatenate([model[:, :p, :p], cross[:, :p], model[:, :p, p:]], axis=2)
-    turned = cross.transpose(0, 2, 1)
-    middle = np.concatenate([turned[:, :, :p], own, turned[:, :, p:]], axis=2)
-    bottom = np.concatenate([model[:, p:, :p], cross[:, p:], model[:, p:, p:]], axis=2)
-    return np.concatenate([top, middle, bottom], axis=1)
 
 
 def _block_scores(

@@ -32,11 +32,14 @@ class AddedEffect:
     score : what it would bring, with its shape.
     p_value : corrected for the number of tests.
     indistinguishable : effects that explain the same.
+    with_it : the label of the effect that it was added together with, at another joint; empty for
+        the one that was chosen.
     """
 
     score: Score
     p_value: float
     indistinguishable: tuple[Effect, ...]
+    with_it: str = ""
 
 
 def choose(evidence: Evidence, fitted: EvidenceFit, ranking: Ranking) -> AddedEffect | None:
@@ -74,6 +77,40 @@ def choose(evidence: Evidence, fitted: EvidenceFit, ranking: Ranking) -> AddedEf
     chosen = min(as_good, key=_size)  # the first of the simplest: they stand in order
     others = tuple(s.effect for s in among if s is not chosen)
     return AddedEffect(chosen, ranking.corrected(chosen), others)
+
+
+def at_other_joints(
+    evidence: Evidence, fitted: EvidenceFit, best: AddedEffect, added: int
+) -> tuple[AddedEffect, ...]:
+    """Return the same effect at the other joints that call for it, where every joint has it.
+
+    One proposal for all of them is simpler than one after the other.
+
+    Parameters
+    ----------
+    evidence, fitted : the data, and the model as it fits them.
+    best : the effect that was chosen.
+    added : number of effects added so far.
+
+    Returns
+    -------
+    Those that pass every gate; none where the effect is not such a one.
+    """
+    effect = best.score.effect
+    if not effect.at_every_joint:
+        return ()
+    siblings = tuple(
+        one
+        for one in type(effect).candidates(fitted.model.robot)
+        if one.joint != effect.joint and one not in fitted.model
+    )
+    if not siblings:
+        return ()
+    ranking = rank(evidence, fitted, added, only=tuple(e.on(fitted.model.robot) for e in siblings))
+    return tuple(
+        AddedEffect(one, ranking.corrected(one), (), with_it=effect.label)
+        for one in ranking.passing
+    )
 
 
 def _alike_once_fitted(

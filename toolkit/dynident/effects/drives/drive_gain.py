@@ -26,7 +26,8 @@ class DriveGain(Forceless, JointEffect):
     linear_in_torque = True
 
     def parameters(self, robot):
-        return (Parameter("e", "1", -0.9, 9.0),)
+        # Beyond a factor of 1.5 it is another unit, or another column, and no torque constant.
+        return (Parameter("e", "1", -1 / 3, 0.5),)
 
     def at_joint(self, block: Block) -> np.ndarray:
         if block.torque is None:

@@ -11,6 +11,7 @@ class RotorInertia(Forceless, JointEffect):
     """Torque proportional to the joint's own acceleration: Ia a."""
 
     name = "rotor_inertia"
+    at_every_joint = True
     law = "Ia a"
     sign_of = "a slope against the joint's own acceleration"
     shown_by = "acceleration"

@@ -12,6 +12,7 @@ class TorqueOffset(JointEffect):
     """The same torque whatever the robot does."""
 
     name = "torque_offset"
+    at_every_joint = True
     law = "offset"
     sign_of = "a constant, whatever the joint does"
     confounded_with = ("asymmetric_friction", "joint_spring")

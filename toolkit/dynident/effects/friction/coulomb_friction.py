@@ -12,6 +12,8 @@ class CoulombFriction(JointEffect):
     """Constant torque against the motion: Fc tanh(v / w), with the package's one width w."""
 
     name = "coulomb_friction"
+    opposes_motion = True
+    at_every_joint = True
     law = "Fc sign(v)"
     sign_of = "a step at zero velocity"
     confounded_with = ("viscous_friction", "stribeck_friction")

@@ -11,6 +11,7 @@ class QuadraticDrag(JointEffect):
     """Torque of air, grease or a fan: Fq v abs(v)."""
 
     name = "quadratic_drag"
+    opposes_motion = True
     law = "Fq v |v|"
     sign_of = "a curve against velocity, steeper at speed"
     confounded_with = ("viscous_friction", "coulomb_friction")

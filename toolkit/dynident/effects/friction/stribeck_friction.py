@@ -18,6 +18,7 @@ class StribeckFriction(JointEffect):
     """Extra dry friction at low speed: Fs tanh(v / w) exp(-(v / vs)^2)."""
 
     name = "stribeck_friction"
+    opposes_motion = True
     law = "Fs sign(v) exp(-(v/vs)^2)"
     sign_of = "spikes on both sides of zero velocity"
     confounded_with = ("coulomb_friction", "viscous_friction")

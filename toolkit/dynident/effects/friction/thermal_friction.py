@@ -30,6 +30,7 @@ class ThermalFriction(JointEffect):
     """
 
     name = "thermal_friction"
+    opposes_motion = True
     time_varying = True
     # Where the session is short beside T nothing warms up, and these two are what it looks like.
     stands_in_for = ("viscous_friction", "coulomb_friction")

@@ -12,6 +12,8 @@ class ViscousFriction(JointEffect):
     """Torque proportional to speed: Fv v."""
 
     name = "viscous_friction"
+    opposes_motion = True
+    at_every_joint = True
     law = "Fv v"
     sign_of = "a slope against velocity"
     confounded_with = ("coulomb_friction", "quadratic_drag")

@@ -1,0 +1,55 @@
+"""Every block of time left out in turn, and predicted with an effect and without it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.evidence.evidence_fit import EvidenceFit
+from dynident.moments.second_moments import SecondMoments
+from dynident.moments.solution import regress
+
+
+def cross_validate(
+    fitted: EvidenceFit, with_model: SecondMoments, with_self: SecondMoments
+) -> tuple[np.ndarray, np.ndarray]:
+    """Leave out every block in turn, and predict it by the model with and without an effect.
+
+    Parameters
+    ----------
+    fitted : the model without the effect.
+    with_model : of the effect's columns with the model's and the torque, (B, p + 1, k).
+    with_self : of the effect's columns with themselves, (B, k, k).
+
+    Returns
+    -------
+    Held-out squared residuals per block, whitened: (B,) without and (B,) with the effect.
+    """
+    both = SecondMoments(
+        _joined(fitted.moments.total, with_model.total, with_self.total),
+        fitted.moments.counts,
+        None,
+        _joined(fitted.moments.signal, with_model.signal, with_self.signal),
+    )
+    without = np.r_[0 : len(fitted.values), both.inputs]
+    reliable = fitted.criteria.noise.reliable
+    return held_out_losses(both.among(without), reliable), held_out_losses(both, reliable)
+
+
+def held_out_losses(summed: SecondMoments, least_reliability: float) -> np.ndarray:
+    """Squared residual of each block under the fit to all others, free of noise in the mean."""
+    found = []
+    for block in range(len(summed.signal)):
+        values = regress(summed.without(block), least_reliability).values
+        combination = np.append(-values, 1.0)
+        found.append(combination @ summed.signal[block] @ combination)
+    return np.array(found)
+
+
+def _joined(model: np.ndarray, cross: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Moments of [model columns, effect columns, torque], from their parts."""
+    p = model.shape[1] - 1
+    top = np.concatenate([model[:, :p, :p], cross[:, :p], model[:, :p, p:]], axis=2)
+    turned = cross.transpose(0, 2, 1)
+    middle = np.concatenate([turned[:, :, :p], own, turned[:, :, p:]], axis=2)
+    bottom = np.concatenate([model[:, p:, :p], cross[:, p:], model[:, p:, p:]], axis=2)
+    return np.concatenate([top, middle, bottom], axis=1)

@@ -1,0 +1,134 @@
+"""Steps that a fit refuses: impossible together with the model, or made by the filter.
+
+Where nothing repeats and no noise is stated, columns carry noise that nothing takes out: least
+squares shrinks what is multiplied with it, and other effects stand in. That noise changes with the
+filter, and a physical parameter does not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from dynident.diagnosis.search.payload_recordings import with_payload
+from dynident.diagnosis.search.scoring import Score
+from dynident.effects import Block
+from dynident.errors import RecordingError
+from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
+from dynident.evidence.runs import gather
+from dynident.model import Impossible, Model, impossible_at
+from dynident.recording import Dataset, default_filter
+from dynident.tables import number
+
+_STATES = 50  # of each recording, over which what must hold at every state is asked
+
+
+def recorded_states(evidence: Evidence, model: Model) -> Block:
+    """Return states of all recordings, spread evenly over each, as effects see them."""
+    blocks = []
+    for run in evidence.runs:
+        rows = run.rows(model)
+        at = np.unique(np.linspace(0, len(rows.t) - 1, _STATES).round().astype(int))
+        warm = None if rows.temperature is None else rows.temperature[at]
+        some = replace(rows, t=rows.t[at], q=rows.q[at], v=rows.v[at], a=rows.a[at])
+        blocks.append(replace(some, temperature=warm))
+    warm = [one.temperature for one in blocks if one.temperature is not None]
+    return replace(
+        blocks[0],
+        t=np.concatenate([one.t for one in blocks]),
+        q=np.concatenate([one.q for one in blocks]),
+        v=np.concatenate([one.v for one in blocks]),
+        a=np.concatenate([one.a for one in blocks]),
+        temperature=np.concatenate(warm) if len(warm) == len(blocks) else None,
+    )
+
+
+def impossible_in(evidence: Evidence, fitted: EvidenceFit) -> tuple[Impossible, ...]:
+    """Return what the fitted values make, at the states recorded, that no robot can have."""
+    return impossible_at(
+        fitted.model,
+        fitted.values,
+        fitted.covariance,
+        recorded_states(evidence, fitted.model),
+        evidence.criteria.gates.beyond_bounds,
+    )
+
+
+def newly_impossible(evidence: Evidence, fitted: EvidenceFit, wider: EvidenceFit) -> str:
+    """Say what a wider model makes impossible that was possible without its last effect.
+
+    Parameters
+    ----------
+    evidence : the training recordings.
+    fitted, wider : the model without the effect and with it.
+
+    Returns
+    -------
+    In words; empty where there is nothing.
+    """
+    found = impossible_in(evidence, wider)
+    if not found:
+        return ""
+    before = {one.where for one in impossible_in(evidence, fitted)}
+    new = [one.what for one in found if one.where not in before]
+    return f"makes the impossible: {'; '.join(new)}" if new else ""
+
+
+def narrower(evidence: Evidence, train: Dataset) -> Evidence | None:
+    """Return the evidence of the same recordings behind a filter with lower cut-offs.
+
+    Parameters
+    ----------
+    evidence : of the training recordings.
+    train : these recordings.
+
+    Returns
+    -------
+    None where noise in the columns is known, and allowed for; or nothing is left of a recording.
+    """
+    if any(run.kind != "single" or run.columns_from != "recording" for run in evidence.runs):
+        return None
+    rate = min(one.rate_hz for one in train.recordings)
+    settings = (train.filter or default_filter(rate)).narrowed(
+        evidence.criteria.gates.filter_share, rate
+    )
+    try:
+        runs = gather(replace(train, filter=settings), evidence.criteria.noise)
+    except RecordingError:
+        return None
+    return Evidence(evidence.model, runs, criteria=evidence.criteria)
+
+
+def follows_the_filter(narrow: Evidence | None, wider: EvidenceFit, one: Score) -> str:
+    """Say by how much an effect's value changes with the filter, if it does.
+
+    Parameters
+    ----------
+    narrow : as from `narrower`.
+    wider : the model with the effect, as it fits the recordings behind their own filter.
+    one : the score by which the effect was added.
+
+    Returns
+    -------
+    In words; empty where its values are the same, or that does not matter.
+    """
+    if narrow is None:
+        return ""
+    narrow = with_payload(narrow, one)
+    gates, label = narrow.criteria.gates, one.effect.label
+    again = fit_evidence(narrow, wider.model)
+    own = wider.model.slices[label]
+    parameters = one.effect.parameters(wider.model.robot)
+    for k, parameter in zip(range(own.start, own.stop), parameters, strict=True):
+        first, second = wider.values[k], again.values[k]
+        sigma = np.sqrt(np.clip([wider.covariance[k, k], again.covariance[k, k]], 0.0, None))
+        apart = abs(first - second)
+        certain = apart > gates.beyond_bounds * float(sigma.max())
+        if certain and apart > gates.same_value * max(abs(first), abs(second)):
+            return (
+                f"changes with the filter: {parameter.name} = {number(first, 3)} and "
+                f"{number(second, 3)} behind lower cut-offs, so noise in the columns makes it"
+            )
+    return ""

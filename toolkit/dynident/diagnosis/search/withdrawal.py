@@ -1,0 +1,130 @@
+"""Steps taken back: effects that held-out recordings are predicted worse with.
+
+In: the model with all effects that the search added. Out: the path of models from the given one to
+the final one, along which the held-out error falls from step to step, and what was withdrawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+from dynident.diagnosis.details import Withdrawn
+from dynident.diagnosis.search.refusal import newly_impossible
+from dynident.diagnosis.search.selection import AddedEffect
+from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
+from dynident.evidence.held_out import HeldOut, on_blocks, on_recordings, with_noise_of
+from dynident.tables import percent
+
+
+@dataclass(frozen=True, kw_only=True)
+class Path:
+    """From the model as given to the final one, an effect a step.
+
+    Attributes
+    ----------
+    found : the effects, in the order of the steps.
+    stages : the fits before any step and after each of them.
+    judged : held-out errors of the same; they fall from step to step.
+    withdrawn : effects that were taken back.
+    """
+
+    found: tuple[AddedEffect, ...]
+    stages: tuple[EvidenceFit, ...]
+    judged: tuple[HeldOut, ...]
+    withdrawn: tuple[Withdrawn, ...] = ()
+
+    @property
+    def final(self) -> EvidenceFit:
+        """The fit of the model with all effects that are kept."""
+        return self.stages[-1]
+
+
+def path_of(
+    evidence: Evidence,
+    held: Evidence | None,
+    start: EvidenceFit,
+    fitted: EvidenceFit,
+    found: tuple[AddedEffect, ...],
+    progress: Callable[[str], None],
+) -> Path:
+    """Return the steps along which the held-out error falls; the others are withdrawn.
+
+    A step with which it rises, or the values become impossible, is tried last, where another effect
+    may be what it needs; if that does not help, the effect is withdrawn and all else fitted anew.
+
+    Parameters
+    ----------
+    evidence, held : training and test recordings; without the latter blocks of time are held out.
+    start, fitted : the model as given, and with all effects.
+    found : these effects, in the order in which they were added.
+    progress : is called with what is being done.
+
+    Returns
+    -------
+    Fits and held-out errors along the path, and what was withdrawn.
+    """
+    withdrawn: tuple[Withdrawn, ...] = ()
+    late: set[str] = set()
+    while True:
+        stages = _stages(evidence, start, fitted, found)
+        judged = tuple(_judged(evidence, held, one) for one in stages)
+        reasons = [
+            newly_impossible(evidence, *fits) or _why(held, *errors)
+            for fits, errors in zip(pairwise(stages), pairwise(judged), strict=True)
+        ]
+        wrong = next((k for k, why in enumerate(reasons) if why), None)
+        if wrong is None:
+            return Path(found=found, stages=stages, judged=judged, withdrawn=withdrawn)
+        one = found[wrong]
+        label = one.score.effect.label
+        others = (*found[:wrong], *found[wrong + 1 :])
+        if wrong < len(found) - 1 and label not in late:
+            late.add(label)
+            found = (*others, one)
+            continue
+        progress(f"withdrawing {label}")
+        withdrawn = (*withdrawn, Withdrawn(effect=one.score.effect, why=reasons[wrong]))
+        found = others
+        effect = next(e for e in fitted.model.effects if e.label == label)
+        fitted = fit_evidence(evidence, fitted.model - effect, fitted) if found else start
+
+
+def _why(held: Evidence | None, before: HeldOut, after: HeldOut) -> str:
+    """Why a step is taken back; empty where the held-out error does not rise."""
+    if after.error <= before.error:
+        return ""
+    where = "the test recordings" if held else "held-out blocks of time"
+    digits = 2
+    while percent(before.error, digits) == percent(after.error, digits) and digits < 6:
+        digits += 1
+    return (
+        f"raises the error on {where} from {percent(before.error, digits)} to "
+        f"{percent(after.error, digits)}"
+    )
+
+
+def _stages(
+    evidence: Evidence,
+    start: EvidenceFit,
+    fitted: EvidenceFit,
+    found: tuple[AddedEffect, ...],
+) -> tuple[EvidenceFit, ...]:
+    by_label = {e.label: e for e in fitted.model.effects}
+    stages = [start]
+    for one in found[:-1]:
+        wider = stages[-1].model + by_label[one.score.effect.label]
+        stages.append(fit_evidence(evidence, wider.with_shapes(fitted.model.effects), stages[-1]))
+    if found:
+        # With another friction width where that was called for later.
+        stages.append(fitted)
+    return tuple(stages)
+
+
+def _judged(evidence: Evidence, held: Evidence | None, stage: EvidenceFit) -> HeldOut:
+    if held is None:
+        return on_blocks(evidence, stage)
+    noise = evidence.criteria.noise
+    return with_noise_of(on_recordings(held, stage), on_recordings(evidence, stage), noise)
