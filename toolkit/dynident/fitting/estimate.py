@@ -57,6 +57,7 @@ class Estimate:
     history : the iterations of an instrumental variable estimate.
     details : tables of what else the method has to say.
     sigma_words : what the standard deviations hold, where the method has its own.
+    headline : what is to be read before any number: that the model is rejected; empty if it is not.
     """
 
     model: Model
@@ -77,6 +78,7 @@ class Estimate:
     history: Convergence | None = None
     details: tuple[Table, ...] = ()
     sigma_words: str = ""
+    headline: str = ""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -174,7 +176,8 @@ class Estimate:
         proved = (self.certificate.table(),) if self.certificate else ()
         iterated = self.history.tables() if self.history else ()
         own = (*iterated, *self.details)
-        return (self.parameter_table(), *own, self.error_table(), *proved, *self.notes)
+        first = (self.headline,) if self.headline else ()
+        return (*first, self.parameter_table(), *own, self.error_table(), *proved, *self.notes)
 
     def summary(self) -> str:
         """The tables as text."""
@@ -236,6 +239,7 @@ class Estimate:
             "rows": self.rows,
             "notes": list(self.notes),
             "sigma_words": self.words_of_sigma,
+            "headline": self.headline,
             "recordings": [vars(source) for source in self.sources],
             "links": self.links and {name: phi.tolist() for name, phi in self.links.items()},
             "certificate": self.certificate and self.certificate.to_dict(),

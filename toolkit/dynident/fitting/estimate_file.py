@@ -97,6 +97,7 @@ def _estimate(content: EstimateFile, model: Model, where: str) -> Estimate:
         sources=tuple(DataSource(one.file, one.sha256, one.filter) for one in content.recordings),
         links=links,
         sigma_words=content.sigma_words,
+        headline=content.headline,
     )
 
 

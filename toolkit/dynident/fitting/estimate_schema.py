@@ -104,6 +104,7 @@ class EstimateFile(_Part):
     rows: Annotated[int, Field(ge=0, le=10**15)]
     notes: list[str]
     sigma_words: str = ""
+    headline: str = ""
     recordings: list[_Recording]
     links: dict[str, list[_Number]] | None = None
     certificate: dict[str, Any] | None = None

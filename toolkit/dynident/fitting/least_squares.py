@@ -12,6 +12,7 @@ from dynident.fitting.estimate import DataSource, Estimate
 from dynident.fitting.fixed_point import FixedPoint, not_converged
 from dynident.fitting.linear_solution import LinearSolution, solve_factors
 from dynident.fitting.sampling import rows
+from dynident.fitting.uncertainty.lack_of_fit import lack_of_fit, widened
 from dynident.fitting.uncertainty.row_errors import row_errors
 from dynident.model import Model
 from dynident.moments.factors import TriangularFactors, factorise
@@ -59,10 +60,15 @@ class LeastSquares:
         if self.errors == "independent":
             return estimate
         found = row_errors(model, dataset, solution.values, solution)
+        covariance, words, headline = found.covariance, found.words, ""
+        judged = lack_of_fit(model, dataset, solution.values, solution)
+        if judged is not None and judged.rejected:
+            covariance = widened(covariance, judged.covariance)
+            words, headline = judged.words, judged.headline
         kept = list(solution.basis.independent)
-        covariance = np.zeros_like(solution.covariance)
-        covariance[np.ix_(kept, kept)] = found.covariance
-        return replace(estimate, covariance=covariance, sigma_words=found.words)
+        whole = np.zeros_like(solution.covariance)
+        whole[np.ix_(kept, kept)] = covariance
+        return replace(estimate, covariance=whole, sigma_words=words, headline=headline)
 
     def _iterate(
         self, model: Model, dataset: Dataset, values: np.ndarray

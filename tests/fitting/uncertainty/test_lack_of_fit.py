@@ -1,0 +1,64 @@
+"""A model that repetitions reject says so first, and its intervals hold the lack of fit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import two_link_loop as lab
+from dynident.fitting import Estimate, LeastSquares, fit, load_estimate
+from dynident.fitting.uncertainty.lack_of_fit import widened
+from dynident.recording import Dataset
+
+STD = (0.5, 0.2)
+
+
+def repeated(**more: float) -> Dataset:
+    return Dataset(tuple(lab.Lab(torque_std=STD, period=True, **more).recordings(range(1))))
+
+
+@pytest.fixture(scope="module")
+def rejected() -> Estimate:
+    return fit(lab.model(), repeated(stribeck=0.4))
+
+
+def test_a_missing_effect_is_said_in_the_first_line(rejected: Estimate, tmp_path) -> None:
+    first = rejected.summary().splitlines()[0]
+    assert first.startswith("The model is rejected") and "at shoulder" in first
+    assert "cluster sandwich" in rejected.words_of_sigma
+    assert load_estimate(rejected.save(tmp_path / "e.json")).headline == rejected.headline
+
+
+def test_its_intervals_are_wider_in_every_direction(rejected: Estimate) -> None:
+    plain = fit(lab.model(), repeated(stribeck=0.4), LeastSquares(errors="independent"))
+    kept = list(rejected.basis.independent)
+    ratio = rejected.sigma[kept] / plain.sigma[kept]
+    assert np.all(ratio > 1.0) and ratio.max() > 1.5
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_whole_model_is_not_rejected(seed: int) -> None:
+    (one,) = lab.Lab(torque_std=STD, period=True).recordings(range(seed, seed + 1))
+    found = fit(lab.model(), one)
+    assert not found.headline and "colour" in found.words_of_sigma
+
+
+def test_without_repetition_nothing_is_said() -> None:
+    (one,) = lab.Lab(torque_std=STD, stribeck=0.4).recordings(range(1))
+    assert not fit(lab.model(), one).headline
+
+
+def test_less_than_two_periods_are_no_mistake() -> None:
+    (one,) = repeated().recordings
+    assert not fit(lab.model(), one.replace(period=11.0)).headline
+
+
+def test_the_wider_of_two_covariances_is_at_least_each() -> None:
+    rng = np.random.default_rng(0)
+    A, B = rng.normal(size=(2, 4, 6)) * np.geomspace(1e-3, 1e3, 4)[:, None]
+    one, other = A @ A.T, B @ B.T
+    size = np.sqrt(np.diag(one + other))
+    for less in (one, other):
+        gap = (widened(one, other) - less) / np.outer(size, size)
+        assert np.linalg.eigvalsh(gap)[0] > -1e-9
+    np.testing.assert_allclose(widened(one, 0.5 * one), one, rtol=1e-9)
