@@ -66,6 +66,7 @@ def test_settings_of_filter_suit_every_sampling_rate(rate: float, tmp_path: Path
     assert "recordings" in study.read_text()
 
 
+@pytest.mark.slow
 def test_records_of_a_case_are_cut_out_of_motion_and_say_nothing_of_it(tmp_path: Path) -> None:
     case = next(
         c
