@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from dynident.effects.bodies.turn import turn_about
 from dynident.effects.effect import Block, Forceless, Parameter
 from dynident.effects.traits import Needs
 
@@ -74,4 +74,6 @@ def _sine_and_cosine(angle: float) -> tuple[float, float]:
 
 def _rotation(values) -> np.ndarray:
     """Rotation matrix of the rotation vector (rx, ry, 0)."""
-    return Rotation.from_rotvec([values[0], values[1], 0.0]).as_matrix()
+    r = np.array([values[0], values[1], 0.0])
+    angle = float(np.linalg.norm(r))
+    return turn_about(r, angle) if angle > 0 else np.eye(3)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from dynident.effects.bodies.turn import turn_about
 from dynident.effects.effect import Block, Forceless, Parameter, motion_unit
 from dynident.effects.traits import Needs
 
@@ -55,6 +55,5 @@ class JointZero(Forceless):
         if joint.kind == "prismatic":
             moved = replace(joint, p=joint.p + joint.R @ joint.axis * values[0])
         else:
-            turn = Rotation.from_rotvec(values[0] * joint.axis).as_matrix()
-            moved = replace(joint, R=joint.R @ turn)
+            moved = replace(joint, R=joint.R @ turn_about(joint.axis, values[0]))
         return replace(robot, joints=(*robot.joints[:index], moved, *robot.joints[index + 1 :]))
