@@ -235,24 +235,33 @@ def test_compare_needs_recordings_and_a_period_must_repeat(model: Model) -> None
         find(model, wrong)
 
 
-def test_blunted_friction_is_a_nuisance_that_is_told_not_a_missing_effect(model: Model) -> None:
-    """The truth reverses its friction at the elbow over 0.04 rad/s where the model says 0.01."""
+@pytest.mark.parametrize("width", [0.04, 0.002])
+def test_the_friction_width_of_a_joint_is_found_and_is_no_missing_effect(
+    model: Model, width: float
+) -> None:
+    """The friction at the elbow reverses over another width than the 0.01 rad/s of the model."""
     train, test = recordings(model, None, {}, **NOISE)
 
-    def blunt(recording):
+    def with_width(recording):
         v = np.gradient(recording.q, 1 / 250.0, axis=0)[:, 1]
         tau = np.array(recording.tau)
-        tau[:, 1] += 3.0 * (np.tanh(v / 0.04) - np.tanh(v / 0.01))
+        tau[:, 1] += 3.0 * np.tanh(v / width) - FRICTION["Fc__elbow"] * np.tanh(v / 0.01)
         return recording.replace(tau=tau)
 
-    def stiffer(recordings):
-        return Dataset(tuple(blunt(r) for r in recordings))
-
-    found = find(model, stiffer(train), stiffer(test))
+    made = (Dataset(tuple(with_width(r) for r in some)) for some in (train, test))
+    found = find(model, *made)
     assert (found.verdict, found.steps) == ("nothing_missing", ())
-    assert any("at elbow is blunter" in note for note in found.notes)
-    assert not any("at shoulder is blunter" in note for note in found.notes)
-    assert "blunted_friction" not in {c.effect.name for c in found.candidates}
+    found_widths = found.after.model.friction_widths
+    if width > 0.01:
+        assert found_widths[1] == pytest.approx(width, rel=0.1)
+    else:  # below what the samples show
+        assert found_widths[1] < 0.006
+    assert found_widths[0] == 0.01
+    (note,) = (one for one in found.notes if one.startswith("Friction width at"))
+    assert "at elbow" in note
+    assert ("95 % interval" in note) or ("at most" in note)
+    assert found.after.value("Fc@elbow") == pytest.approx(3.0, rel=0.02)
+    assert not any(name.startswith("Fb") for name in found.after.names)
 
 
 @pytest.mark.slow

@@ -234,7 +234,7 @@ def test_terms_of_the_simulator_are_the_simulated_force(effect: Effect) -> None:
         "constant": lambda x, v: np.ones(len(block.t)),
         "position": lambda x, v: x,
         "speed": lambda x, v: v,
-        "sign": lambda x, v: block.sign(v),
+        "sign": lambda x, v: np.tanh(v / block.friction_width),
         "magnitude": lambda x, v: np.abs(v),
     }
     total = np.zeros_like(block.q)

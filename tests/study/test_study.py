@@ -190,6 +190,14 @@ def test_a_choice_of_joints_locks_the_others(study):
     assert made.robot.locked == ("shoulder",)
 
 
+def test_friction_width_of_some_joints(study):
+    line = "friction_width = { elbow = 0.05 }\n[[recordings]]"
+    made = load(study(STUDY.replace("[[recordings]]", line, 1)))
+    assert made.model.friction_width == (0.01, 0.05)
+    with pytest.raises(StudyError, match="no joint 'elbo'"):
+        load(study(STUDY.replace("[[recordings]]", line.replace("elbow", "elbo"), 1)))
+
+
 def test_gravity_and_friction_width(study):
     made = study("gravity = [0.0, 0.0, -1.62]\nfriction_width = 0.2\n" + STUDY)
     assert made.robot.gravity.tolist() == [0.0, 0.0, -1.62]

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import tomlkit
@@ -20,7 +20,7 @@ from dynident import files
 from dynident.closed_loop import Controller, ControllerFile
 from dynident.criteria import DEFAULTS, Criteria
 from dynident.effects import FRICTION_WIDTH, Effect, effects_of
-from dynident.errors import DynidentError, RobotError, StudyError
+from dynident.errors import DynidentError, EffectError, RobotError, StudyError
 from dynident.model import Model
 from dynident.recording import (
     Column,
@@ -37,6 +37,9 @@ from dynident.robot import Robot
 from dynident.settings import SettingsTable, read_toml
 
 Positive = Field(default=None, gt=0)
+
+
+_Width = Annotated[float, Field(gt=0)]
 
 
 class _RecordingEntry(SettingsTable):
@@ -73,7 +76,7 @@ class _StudyFile(SettingsTable):
     joints: list[str] | None = None
     effects: list[str] = Field(default_factory=list)
     torque: Literal["measured", "held_command"] = "measured"
-    friction_width: float = Field(default=FRICTION_WIDTH, gt=0)
+    friction_width: _Width | dict[str, _Width] = FRICTION_WIDTH
     gravity: tuple[float, float, float] | None = None
     recordings: list[_RecordingEntry]
     filter: _FilterEntry | None = None
@@ -139,7 +142,7 @@ def load(path: str | Path) -> Study:
     robot = _robot(said, path)
     try:
         effects = tuple(effect for label in said.effects for effect in effects_of(label, robot))
-        model = Model(robot, effects, said.friction_width)
+        model = Model(robot, effects, _widths(said.friction_width, robot))
     except DynidentError as error:
         raise StudyError(str(error), f"{path}: effects") from None
     recordings = _recordings(said, path, robot)
@@ -255,6 +258,17 @@ def _robot(said: _StudyFile, path: Path) -> Robot:
             what, remedy = "its inertia is not finite", "fix the numbers of its inertial element"
             raise RobotError(what, f"{file}: link '{link.name}'", remedy)
     return robot
+
+
+def _widths(said: float | dict[str, float], robot: Robot) -> float | tuple[float, ...]:
+    """Friction width of all joints, or of each: of those that are not named, the default."""
+    if not isinstance(said, dict):
+        return said
+    for name in said:
+        if name not in robot.names:
+            remedy = f"joints: {', '.join(robot.names)}"
+            raise EffectError(f"the robot has no joint '{name}'", "friction_width", remedy)
+    return tuple(said.get(name, FRICTION_WIDTH) for name in robot.names)
 
 
 def _recordings(said: _StudyFile, path: Path, robot: Robot) -> list[Recording]:

@@ -50,7 +50,7 @@ class Mechanism(ActingEffects):
         cls,
         robot: Robot,
         effects: Sequence[TrueEffect] = (),
-        friction_width: float = FRICTION_WIDTH,
+        friction_width: float | tuple[float, ...] = FRICTION_WIDTH,
         *,
         carries_payload: bool = False,
     ) -> Mechanism:
@@ -180,7 +180,7 @@ class Mechanism(ActingEffects):
         return self.gain * (load + self.loss * np.abs(load) * self._sign(v))
 
     def _sign(self, v: np.ndarray) -> np.ndarray:
-        return np.tanh(v / self.friction_width)
+        return np.tanh(v / self.friction_widths)
 
     def _require_no_past(self) -> None:
         if self._with_a_past is not None:

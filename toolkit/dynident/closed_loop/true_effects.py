@@ -127,9 +127,14 @@ class ActingEffects:
     robot: Robot
     effects: tuple[TrueEffect, ...] = ()
     _: KW_ONLY
-    friction_width: float = FRICTION_WIDTH
+    friction_width: float | tuple[float, ...] = FRICTION_WIDTH
     carries_payload: bool = False
     number: int = 0
+
+    @property
+    def friction_widths(self) -> np.ndarray:
+        """Friction width of each joint, (n,) rad/s or m/s."""
+        return np.broadcast_to(self.friction_width, self.robot.n)
 
     def numbered(self, number: int) -> Self:
         """Return it as it is in one recording; itself where recordings do not differ."""
@@ -206,7 +211,7 @@ class ActingEffects:
             v,
             np.zeros_like(q),
             names=self.robot.names,
-            friction_width=self.friction_width,
+            friction_width=self.friction_widths,
             carries_payload=self.carries_payload,
             number=self.number,
         )

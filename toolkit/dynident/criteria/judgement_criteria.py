@@ -116,13 +116,6 @@ class ContactCriteria(CriteriaGroup):
 class NuisanceCriteria(CriteriaGroup):
     """What is allowed for beside contacts: friction widths, the steps of encoders."""
 
-    friction_width_share: float = criterion(
-        0.05,
-        "1",
-        "share of a joint's dry friction with another width, from which that is reported",
-        least=0,
-        most=1,
-    )
     rounding_recordings: int = criterion(
         2, "recordings", "recordings along which the steps of encoders are looked at", least=1
     )

@@ -97,4 +97,4 @@ def notes_on(evidence, held, fitted: EvidenceFit, source: NoiseSource) -> tuple[
             "it into the study, set payload = true in the [[recordings]] of these, and false in "
             "the others."
         )
-    return (*notes, *friction_width_notes(fitted))
+    return (*notes, *friction_width_notes(evidence, fitted))

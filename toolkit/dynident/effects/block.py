@@ -15,7 +15,8 @@ FRICTION_WIDTH = 0.01
 """Speed (rad/s, or m/s for a prismatic joint) over which dry friction changes its sign.
 
 The one law of dry friction in this package, in regression and in simulation, is
-tanh(v / FRICTION_WIDTH); a study may set another width for all of its joints at once.
+tanh(v / FRICTION_WIDTH); a study may set another width for all of its joints at once, and a model
+another one for each joint.
 """
 
 
@@ -28,7 +29,7 @@ class Block:
     t : (T,) s, from the start of the session.
     q, v, a : (T, n) rad or m, and their derivatives.
     names : the joints, in the order of the columns of q.
-    friction_width : rad/s or m/s, see `FRICTION_WIDTH`.
+    friction_width : rad/s or m/s, see `FRICTION_WIDTH`; of all joints, or (n,) of each.
     carries_payload : whether the payload under study is on the robot.
     tip : column of the joint that carries the last link, where a payload is mounted.
     rigid : (T, n, 10 n) the rigid-body regressor; None where no effect in use needs it.
@@ -50,7 +51,7 @@ class Block:
     a: np.ndarray
     _: KW_ONLY
     names: tuple[str, ...]
-    friction_width: float = FRICTION_WIDTH
+    friction_width: float | np.ndarray = FRICTION_WIDTH
     carries_payload: bool = False
     tip: int = -1
     rigid: np.ndarray | None = None
@@ -88,6 +89,10 @@ class Block:
             self.q, self.v, self.a
         )
 
-    def sign(self, speed: np.ndarray) -> np.ndarray:
-        """Smoothed sign of a speed, the package's one law of dry friction."""
-        return np.tanh(speed / self.friction_width)
+    def sign(self, speed: np.ndarray, *joints: str | None) -> np.ndarray:
+        """Smoothed sign of a speed at joints, the package's one law of dry friction.
+
+        Of several joints, whose speeds were added, the largest width counts.
+        """
+        widths = np.broadcast_to(self.friction_width, len(self.names))
+        return np.tanh(speed / max(float(widths[self.index(joint)]) for joint in joints))

@@ -62,7 +62,7 @@ class Evidence:
 
     def rigid(self, run: int) -> Signals:
         """Columns of the base parameters, (T, n, b) for each replicate."""
-        return [self._rigid(sampled) for sampled in self.runs[run].replicates]
+        return [self._rigid(sampled, self.model) for sampled in self.runs[run].replicates]
 
     def of(self, effect: Effect, run: int, model: Model, values: np.ndarray | None) -> Signals:
         """Columns of an effect at the joints where it acts in one run.
@@ -153,7 +153,7 @@ class Evidence:
             return kept[key]
         if effect.linear_in_torque:
             torque = self._filtered_torque(sampled, model, values)
-            return effect.acting_columns(replace(self._rows(sampled), torque=torque))
+            return effect.acting_columns(replace(self._rows(sampled, model), torque=torque))
         found = sampled.filtered(effect.acting_columns(self._block(effect, sampled, model, values)))
         if effect in model.effects:
             kept[key] = found
@@ -161,16 +161,16 @@ class Evidence:
 
     def _plain(self, effect: Effect, sampled: Sampled, model: Model) -> np.ndarray:
         """Columns that follow from the motion alone."""
-        known, key = self.cache.along(sampled.motion), (self._robot, effect)
+        known, key = self.cache.along(sampled.motion), _plain_key(effect, model)
         if key in known:
             return known[key]
         if effect in self._evaluated_at_once(sampled):
-            self._pass_through(sampled)
+            self._pass_through(sampled, model)
             return known[key]
         if effect.is_instantaneous:
-            (found,) = sampled.decimate(self.model, lambda block: [self._loaded(effect, block)])
+            (found,) = sampled.decimate(model, lambda block: [self._loaded(effect, block)])
         else:
-            found = sampled.filtered(self._loaded(effect, sampled.block(self.model)))
+            found = sampled.filtered(self._loaded(effect, sampled.block(model)))
         if effect in self._kept or effect in model.effects:
             known[key] = found
         return found
@@ -180,11 +180,11 @@ class Evidence:
         block = replace(block, carries_payload=True)
         return effect.acting_columns(self.model.ready(effect, block, None))
 
-    def _rigid(self, sampled: Sampled) -> np.ndarray:
+    def _rigid(self, sampled: Sampled, model: Model) -> np.ndarray:
         known = self.cache.along(sampled.motion)
-        if self._robot not in known:
-            self._pass_through(sampled)
-        return known[self._robot]
+        if self.model.robot not in known:
+            self._pass_through(sampled, model)
+        return known[self.model.robot]
 
     def _evaluated_at_once(self, sampled: Sampled) -> list[Effect]:
         """Effects that need nothing but samples, as far as they are asked for along a motion."""
@@ -193,20 +193,24 @@ class Evidence:
             return [effect for effect in every if effect in self.model]
         return every
 
-    def _pass_through(self, sampled: Sampled) -> None:
-        """Evaluate the rigid body and many effects in one pass."""
+    def _pass_through(self, sampled: Sampled, model: Model) -> None:
+        """Evaluate the rigid body and many effects in one pass, as far as they are not known."""
         known, base = self.cache.along(sampled.motion), self.model.base.independent
         every = self._evaluated_at_once(sampled)
-        wanted = [effect for effect in every if (self._robot, effect) not in known]
+        wanted = [effect for effect in every if _plain_key(effect, model) not in known]
+        new = self.model.robot not in known
 
         def evaluate(block: Block) -> list[np.ndarray]:
-            block = self.model.with_regressor(block)
-            assert block.rigid is not None
             loaded = replace(block, carries_payload=True)
-            return [block.rigid[:, :, base], *(effect.acting_columns(loaded) for effect in wanted)]
+            if new or any(effect.needs_regressor for effect in wanted):
+                loaded = self.model.with_regressor(loaded)
+            rigid = [] if loaded.rigid is None else [loaded.rigid[:, :, base]]
+            return [*rigid, *(effect.acting_columns(loaded) for effect in wanted)]
 
-        known[self._robot], *others = sampled.decimate(self.model, evaluate)
-        known.update(zip([(self._robot, effect) for effect in wanted], others, strict=True))
+        found = sampled.decimate(model, evaluate)
+        if len(found) > len(wanted):
+            known[self.model.robot] = found.pop(0)
+        known.update(zip([_plain_key(effect, model) for effect in wanted], found, strict=True))
 
     def _together(
         self, variants: Sequence[Effect], model: Model, values: np.ndarray
@@ -232,11 +236,6 @@ class Evidence:
     # --- what they are made of ------------------------------------------------------------------
 
     @cached_property
-    def _robot(self) -> Hashable:
-        """What columns depend on that follow from the motion alone."""
-        return self.model.robot, self.model.friction_width
-
-    @cached_property
     def _kept(self) -> dict[Effect, None]:
         return dict.fromkeys((*self.model.effects, *self.candidates))
 
@@ -252,7 +251,8 @@ class Evidence:
 
     def _at(self, model: Model, values: np.ndarray) -> Kept:
         """What is kept of a linearisation."""
-        return self.cache.at((self._robot, model.effects, values.tobytes()))
+        widths = tuple(model.friction_widths)
+        return self.cache.at((self.model.robot, widths, model.effects, values.tobytes()))
 
     def _block(self, effect: Effect, sampled: Sampled, model: Model, values: np.ndarray) -> Block:
         """A whole replicate with what an effect needs of the model; shared by many."""
@@ -282,7 +282,7 @@ class Evidence:
         if any(one.needs_bodies for one in model.effects) or len(block.t) > _SHARED:
             return model.torque_without_loads(block, values)
         base, tip = list(model.base.independent), 10 * (model.robot.tip % model.robot.n)
-        known, key = self.cache.along(sampled.motion), (self._robot, "full rate")
+        known, key = self.cache.along(sampled.motion), (self.model.robot, "full rate")
         if key not in known:
             whole = model.robot.regressor(block.q, block.v, block.a)
             known[key] = whole[:, :, [*base, *range(tip, tip + 10)]]
@@ -300,7 +300,7 @@ class Evidence:
         """Decimated rows of the torque that the model predicts, but for effects that scale it."""
         kept, key = self._at(model, values), ("torque", _recorded(sampled))
         if key not in kept:
-            torque = self._rigid(sampled) @ values[: len(self.model.base.independent)]
+            torque = self._rigid(sampled, model) @ values[: len(self.model.base.independent)]
             for effect in model.effects:
                 if effect.needs_torque or (effect.is_payload and not sampled.recording.payload):
                     continue
@@ -310,8 +310,15 @@ class Evidence:
             kept[key] = torque
         return kept[key]
 
-    def _rows(self, sampled: Sampled) -> Block:
-        return self.model.block(sampled.t, sampled.q, sampled.v, sampled.a)
+    def _rows(self, sampled: Sampled, model: Model) -> Block:
+        return model.block(sampled.t, sampled.q, sampled.v, sampled.a)
+
+
+def _plain_key(effect: Effect, model: Model) -> Hashable:
+    """What columns depend on that follow from the motion alone: dry friction where they act."""
+    widths = dict(zip(model.robot.names, model.friction_widths, strict=True))
+    joints = [joint for joint in (effect.joint, effect.source) if joint is not None]
+    return model.robot, effect, tuple(widths[joint] for joint in joints or widths)
 
 
 def _recorded(sampled: Sampled) -> Hashable:

@@ -114,7 +114,9 @@ def _model(given: ModelPart, where: str) -> Model:
             known[one.effect](one.joint, one.source, tuple(one.shape), tuple(one.point))
             for one in given.effects
         )
-        model = Model(robot, effects, given.friction_width)
+        width = given.friction_width
+        width = tuple(width) if isinstance(width, list) else width
+        model = Model(robot, effects, width)
         # The names are found from the dynamics: some descriptions fail only there.
         assert model.names
     except DynidentError as error:

@@ -84,7 +84,7 @@ class ModelPart(_Part):
     robot: str
     joints: list[str]
     gravity: list[_Number]
-    friction_width: _Positive
+    friction_width: _Positive | list[_Positive]
     effects: list[_Effect]
 
 
@@ -126,6 +126,10 @@ def basis_part(basis: BaseParameters) -> dict[str, Any]:
     }
 
 
+def _width(width: float | tuple[float, ...]) -> float | list[float]:
+    return list(width) if isinstance(width, tuple) else width
+
+
 def model_part(model: Model) -> dict[str, Any]:
     """Return a model as JSON holds it, with the robot description in it."""
     description = model.robot.description
@@ -133,7 +137,7 @@ def model_part(model: Model) -> dict[str, Any]:
         "robot": description.text if description else None,
         "joints": list(model.robot.names),
         "gravity": [float(g) for g in model.robot.gravity],
-        "friction_width": model.friction_width,
+        "friction_width": _width(model.friction_width),
         "effects": [
             {
                 "effect": effect.name,

@@ -24,12 +24,13 @@ class ParametrisedRobot:
     ----------
     robot : the tree of joints and links.
     effects : at most one of a label.
-    friction_width : rad/s or m/s, see `dynident.effects.FRICTION_WIDTH`.
+    friction_width : rad/s or m/s, see `dynident.effects.FRICTION_WIDTH`; of all joints, or n of
+        them.
     """
 
     robot: Robot
     effects: tuple[Effect, ...] = ()
-    friction_width: float = FRICTION_WIDTH
+    friction_width: float | tuple[float, ...] = FRICTION_WIDTH
 
     def __post_init__(self) -> None:
         checked = tuple(effect.on(self.robot) for effect in self.effects)
@@ -37,11 +38,23 @@ class ParametrisedRobot:
         for label in labels:
             if labels.count(label) > 1:
                 raise EffectError("is in the model twice", label, "name it once")
-        if not self.friction_width > 0:
-            raise EffectError(
-                f"friction_width = {self.friction_width:g}", remedy="choose it above 0"
-            )
+        if not np.all(np.asarray(self.friction_width) > 0):
+            raise EffectError(f"friction_width = {self.friction_width}", remedy="choose it above 0")
+        if np.size(self.friction_width) not in (1, self.robot.n):
+            what = f"{np.size(self.friction_width)} friction widths for {self.robot.n} joints"
+            raise EffectError(what, remedy="give one for all of them, or one for each")
         object.__setattr__(self, "effects", checked)
+
+    @property
+    def friction_widths(self) -> np.ndarray:
+        """Friction width of each joint, (n,) rad/s or m/s."""
+        return np.broadcast_to(self.friction_width, self.robot.n)
+
+    def with_friction_width(self, joint: str, width: float) -> Self:
+        """Return the model with another friction width, in rad/s or m/s, at one joint."""
+        widths = [float(w) for w in self.friction_widths]
+        widths[self.robot.names.index(joint)] = float(width)
+        return replace(self, friction_width=tuple(widths))
 
     # --- with other effects --------------------------------------------------------------------
 

@@ -94,7 +94,7 @@ def _driving_friction(
         v = states.v[:, j]
         power = v * (columns @ values[own])
         doubt = np.abs(v) * np.sqrt(np.sum((columns @ covariance[np.ix_(own, own)]) * columns, 1))
-        moving = np.abs(v) > _FAST * model.friction_width
+        moving = np.abs(v) > _FAST * model.friction_widths[j]
         driving = moving & (power < -deviations * doubt)
         if np.count_nonzero(driving) > _SHARE * max(np.count_nonzero(moving), 1):
             worst = int(np.argmin(np.where(driving, power, np.inf)))

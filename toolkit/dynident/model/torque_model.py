@@ -22,7 +22,8 @@ class Model(ParametrisedRobot):
     ----------
     robot : the tree of joints and links.
     effects : at most one of a label.
-    friction_width : rad/s or m/s, see `dynident.effects.FRICTION_WIDTH`.
+    friction_width : rad/s or m/s, see `dynident.effects.FRICTION_WIDTH`; of all joints, or n of
+        them.
     """
 
     # --- torque --------------------------------------------------------------------------------
@@ -58,7 +59,7 @@ class Model(ParametrisedRobot):
             v,
             a,
             names=self.robot.names,
-            friction_width=self.friction_width,
+            friction_width=self.friction_widths,
             carries_payload=carries_payload,
             tip=self.robot.tip,
             number=number,

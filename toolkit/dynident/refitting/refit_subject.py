@@ -174,7 +174,7 @@ def in_study(subject: RefitSubject, model: Model) -> RefitSubject:
     effects = dict(subject.effects)
     estimate = subject.estimate
     if estimate is not None:
-        same_width = estimate.model.friction_width == model.friction_width
+        same_width = np.array_equal(estimate.model.friction_widths, model.friction_widths)
         known = [one for one in estimate.model.effects if same_width and one in model.effects]
         names = [name for one in known for name in estimate.names[estimate.model.slices[one.label]]]
         effects = {name: estimate.value(name) for name in names}

@@ -51,7 +51,7 @@ class DescribedScale:
         factor, known = np.zeros(robot.n), np.zeros(robot.n, dtype=bool)
         for j in range(robot.n):
             q, v, a = motion.q[:, j], motion.v[:, j], motion.a[:, j]
-            own = [v, np.tanh(v / model.friction_width), a, q, np.ones(len(q))]
+            own = [v, np.tanh(v / model.friction_widths[j]), a, q, np.ones(len(q))]
             X = np.column_stack([described[:, j], *own])
             if not np.all(np.isfinite(X)):
                 continue

@@ -92,7 +92,7 @@ class WiringRegression:
         by_joint = columns.transpose(1, 0, 2)
         own = columns.shape[2] - OF_A_JOINT * n
         friction_of = np.zeros((n, columns.shape[2]))
-        dry = np.tanh(rows.v / model.friction_width)
+        dry = np.tanh(rows.v / model.friction_widths)
         for j in range(n):
             at = own + OF_A_JOINT * j
             friction_of[j, at] = np.mean(rows.v[:, j] ** 2)
@@ -145,7 +145,7 @@ def _columns(model: Model, rows: WiringRows) -> np.ndarray:
     samples, n = rows.q.shape
     columns = np.zeros((samples, n, len(kept) + OF_A_JOINT * n))
     columns[:, :, : len(kept)] = robot.regressor(rows.q, rows.v, rows.a)[:, :, kept]
-    dry = np.tanh(rows.v / model.friction_width)
+    dry = np.tanh(rows.v / model.friction_widths)
     for j in range(n):
         own = [rows.v[:, j], dry[:, j], rows.a[:, j], rows.q[:, j], np.ones(samples)]
         at = len(kept) + OF_A_JOINT * j

@@ -175,8 +175,7 @@ class Plant:
             what = "the inertia of a motor is coupled to a joint that gives way"
             raise SimulationError(what, remedy="leave out the coupling's ca, or the transmission")
         inertia[at, at] = 0.0
-        n = mechanisms[0].robot.n
-        widths = np.repeat([one.friction_width for one in mechanisms], n)
+        widths = np.concatenate([one.friction_widths for one in mechanisms])
         self._train.set_loss(np.concatenate([one.loss for one in mechanisms]), widths)
         self._train.gears = Gears([gear for one in mechanisms for gear in one.transmissions])
         names = [one.robot.names[gear.joint] for one in mechanisms for gear in one.transmissions]

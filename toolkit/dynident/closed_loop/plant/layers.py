@@ -52,7 +52,7 @@ class Terms:
             for term in mechanism.terms:
                 of = tuple(sorted(int(own[i]) for i in term.of))
                 terms.append(Term(int(own[term.at]), term.law, of, term.coefficient))
-                widths.append(mechanism.friction_width)
+                widths.append(float(mechanism.friction_widths[list(term.of or (term.at,))].max()))
         return cls(tuple(terms), tuple(widths), len(bodies.place))
 
     @property

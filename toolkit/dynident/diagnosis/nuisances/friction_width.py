@@ -1,81 +1,209 @@
-"""Dry friction that reverses less or more sharply than its law: a nuisance, no missing effect.
+"""The friction width of each joint: the speed over which its dry friction reverses.
 
 A drive that feeds encoder noise into its torque dithers the joint, and dithered dry friction is
 wider than that of a robot without noise; so is friction seen through noisy velocities. And the
-width that a study states may be wider or narrower than a joint's. Without a word for it, healthy
-robots would be said to lack something. So the diagnosis lets a share of a joint's dry friction
-reverse over another range of speeds, where the data call for it by the same tests as for any
-effect, and says so.
+width that a study states may be wider or narrower than a joint's. Healthy robots would then be said
+to lack something. So a joint whose data call for another width, by the same tests as for any
+effect, is given the one that fits best; unless an effect that the model lacks at that joint, drag
+say, explains more than any width.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from scipy.optimize import brentq, minimize_scalar
+from scipy.stats import chi2
 
 from dynident.diagnosis.search.ranking import rank
-from dynident.effects import Block, JointEffect, Parameter, ShapeParameter
+from dynident.diagnosis.search.scoring import candidate_moments
+from dynident.effects import Block, Effect, JointEffect, Parameter, ShapeParameter, catalogue
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
+from dynident.moments.second_moments import SecondMoments
+from dynident.moments.solution import regress
+from dynident.tables import number
 
-_BLUNTER = (
-    "blunter",
-    "Noise that the drive feeds into the joint does that, or a friction_width that is not the "
-    "joint's.",
-)
-_SHARPER = ("sharper", "The study's friction_width is larger than the joint's.")
+_LEAST, _MOST = 0.02, 15.0  # times the model's width, between which it is sought
+_GRID = 13
+_RIVALS = ("viscous_friction", "quadratic_drag", "stribeck_friction")
+_AT_BOUND = 1.05  # times a bound, within which the width is at it
 
 
 class FrictionWidthColumn(JointEffect):
-    """A share of the dry friction that reverses over k times the width: no loss at speed.
+    """What dry friction that reverses over k times the width has less: no loss at speed."""
 
-    With k below 1 it is sharper than the law, with k above 1 less sharp.
-    """
-
-    name = "blunted_friction"
-    law = "Fb (tanh(v/(k w)) - tanh(v/w))"
+    name = "friction_width"
+    law = "Fc (tanh(v/(k w)) - tanh(v/w))"
     sign_of = "opposite spikes on both sides of zero velocity"
     experiment = "move {joint} with less noise in the drive"
 
     def parameters(self, robot):
         unit = robot.torque_units[robot.names.index(str(self.joint))]
-        return (Parameter("Fb", unit, 0.0),)
+        return (Parameter("Fc", unit, 0.0),)
 
     def shape_parameters(self, robot):
-        return (ShapeParameter("k", "1", (0.5, 2.0, 4.0, 8.0), lower=0.2, upper=15.0),)
+        grid = (0.1, 0.3, 2.0, 4.0, 8.0)
+        return (ShapeParameter("k", "1", grid, lower=_LEAST, upper=_MOST),)
 
     def at_joint(self, block: Block) -> np.ndarray:
         v = block.v[:, [block.index(self.joint)]]
-        return block.sign(v / self.shape[0]) - block.sign(v)
+        return block.sign(v / self.shape[0], self.joint) - block.sign(v, self.joint)
+
+
+@dataclass(frozen=True, eq=False)
+class WidthProfile:
+    """What the model misses with each width of one joint's dry friction, all else fitted anew.
+
+    Attributes
+    ----------
+    evidence, fitted : the recordings, and the model with its width.
+    joint : whose width it is.
+    """
+
+    evidence: Evidence
+    fitted: EvidenceFit
+    joint: str
+
+    @property
+    def width(self) -> float:
+        """The model's own, rad/s or m/s."""
+        model = self.fitted.model
+        return float(model.friction_widths[model.robot.names.index(self.joint)])
+
+    def missed(self, factors: np.ndarray) -> np.ndarray:
+        """Squared systematic residual, whitened, with widths that are so many times the model's."""
+        model = self.fitted.model
+        column = FrictionWidthColumn(self.joint)
+        shaped = [column.shaped(float(k)).on(model.robot) for k in factors]
+        at = model.slices[f"coulomb_friction@{self.joint}"].start
+        known = self.fitted.moments.pooled()
+        reliable = self.fitted.criteria.noise.reliable
+        found = []
+        for beside, own in candidate_moments(self.evidence, self.fitted, shaped):
+            products = [
+                _widened(whole, cross[:, 0], square[0, 0], at)
+                for whole, cross, square in (
+                    (known.total, beside.pooled().total, own.pooled().total),
+                    (known.signal, beside.pooled().signal, own.pooled().signal),
+                )
+            ]
+            moments = SecondMoments(products[0], known.counts, None, products[1])
+            combination = np.append(-regress(moments, reliable).values, 1.0)
+            found.append(float(combination @ moments.signal @ combination))
+        return np.array(found)
+
+    def best(self) -> tuple[float, float]:
+        """Factor of the width that misses least, and what it misses."""
+        grid = np.geomspace(_LEAST, _MOST, _GRID)
+        missed = self.missed(grid)
+        k = int(np.argmin(missed))
+        low, high = grid[max(k - 1, 0)], grid[min(k + 1, _GRID - 1)]
+        found = minimize_scalar(
+            lambda x: self.missed(np.exp([x]))[0],
+            bounds=(np.log(low), np.log(high)),
+            method="bounded",
+            options={"xatol": 1e-2, "maxiter": 20},
+        )
+        if found.fun < missed[k]:
+            return float(np.exp(found.x)), float(found.fun)
+        return float(grid[k]), float(missed[k])
+
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of the width by its profile; zero or infinity where that has no end."""
+        grid = np.geomspace(_LEAST, _MOST, _GRID)
+        least = float(self.missed(np.ones(1))[0])
+        limit = least + float(chi2.ppf(0.95, 1))
+
+        def excess(x: float) -> float:
+            return float(self.missed(np.exp([x]))[0]) - limit
+
+        above = self.missed(grid) > limit
+        lower, upper = 0.0, np.inf
+        below_one, over_one = grid[(grid < 1) & above], grid[(grid > 1) & above]
+        if len(below_one):
+            lower = self.width * np.exp(brentq(excess, np.log(below_one[-1]), 0.0, xtol=1e-2))
+        if len(over_one):
+            upper = self.width * np.exp(brentq(excess, 0.0, np.log(over_one[0]), xtol=1e-2))
+        return float(lower), float(upper)
+
+
+def _widened(products: np.ndarray, cross: np.ndarray, square: float, at: int) -> np.ndarray:
+    """Products of columns of which one has another column added to it."""
+    found = products.copy()
+    found[at, :] += cross
+    found[:, at] += cross
+    found[at, at] += square
+    return found
 
 
 def with_friction_width(evidence: Evidence, fitted: EvidenceFit) -> EvidenceFit:
-    """Return the fit with another friction width at the joints where the data call for it."""
-    model = fitted.model
-    dry = [e.joint for e in model.effects if e.name == "coulomb_friction"]
-    wanted = tuple(FrictionWidthColumn(joint).on(model.robot) for joint in dry)
-    wanted = tuple(effect for effect in wanted if effect not in model)
+    """Return the fit with another friction width at the joints where the data call for it.
+
+    Parameters
+    ----------
+    evidence : the training recordings.
+    fitted : the model as it fits them.
+
+    Returns
+    -------
+    As it is where no joint calls for another width, or none fits better.
+    """
+    robot = fitted.model.robot
+    dry = [str(e.joint) for e in fitted.model.effects if e.name == "coulomb_friction"]
+    wanted = tuple(FrictionWidthColumn(joint).on(robot) for joint in dry)
     if not wanted:
         return fitted
     for score in rank(evidence, fitted, 0, only=wanted, least=0.0).passing:
-        model = model + score.effect
-    return fitted if model is fitted.model else fit_evidence(evidence, model)
+        joint = str(score.effect.joint)
+        factor, missed = WidthProfile(evidence, fitted, joint).best()
+        drop = fitted.error_signal - missed - 2.0 * np.log(fitted.rows)
+        if drop <= 0 or drop < _best_rival(evidence, fitted, joint):
+            continue
+        width = factor * WidthProfile(evidence, fitted, joint).width
+        model = fitted.model.with_friction_width(joint, width)
+        wider = fit_evidence(evidence, model, fitted)
+        if wider.misfit(fitted) < fitted.misfit(fitted):
+            fitted = wider
+    return fitted
 
 
-def friction_width_notes(fitted: EvidenceFit) -> tuple[str, ...]:
-    """Joints whose dry friction has another width, in plain words."""
-    model, notes = fitted.model, []
-    for effect in model.effects:
-        if isinstance(effect, FrictionWidthColumn):
-            wide = effect.shape[0] * model.friction_width
-            unit = model.robot.units[model.robot.names.index(str(effect.joint))]
-            share = fitted.values[model.slices[effect.label]][0]
-            whole = fitted.values[model.slices[f"coulomb_friction@{effect.joint}"]][0]
-            if share < fitted.criteria.nuisances.friction_width_share * whole:
-                continue  # what was added since has taken its place
-            part = f"{100 * share / whole:.0f} % of it" if 0 < share < whole else "it"
-            how, why = _BLUNTER if effect.shape[0] > 1 else _SHARPER
-            notes.append(
-                f"Dry friction at {effect.joint} is {how} than tanh(v / {model.friction_width:g} "
-                f"{unit}/s): {part} reverses over {wide:.2g} {unit}/s. {why}"
-            )
+def _best_rival(evidence: Evidence, fitted: EvidenceFit, joint: str) -> float:
+    """What the best effect that the model lacks at a joint explains there, less its price."""
+    robot = fitted.model.robot
+    rivals = tuple(_at(name, joint).on(robot) for name in _RIVALS)
+    rivals = tuple(effect for effect in rivals if effect not in fitted.model)
+    if not rivals:
+        return -np.inf
+    passing = rank(evidence, fitted, 0, only=rivals, least=0.0).passing
+    return max((one.penalised for one in passing), default=-np.inf)
+
+
+def _at(name: str, joint: str) -> Effect:
+    return catalogue()[name](joint)
+
+
+def friction_width_notes(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
+    """Joints whose dry friction has another width than the given model's, in plain words."""
+    model, given, notes = fitted.model, evidence.model.friction_widths, []
+    for joint, unit, stated in zip(model.robot.names, model.robot.units, given, strict=True):
+        profile = WidthProfile(evidence, fitted, joint)
+        if f"coulomb_friction@{joint}" not in model.slices or profile.width == stated:
+            continue
+        low, high = profile.interval()
+        low = 0.0 if profile.width <= _AT_BOUND * _LEAST * stated else low
+        high = np.inf if profile.width >= _MOST * stated / _AT_BOUND else high
+        if low > 0 and np.isfinite(high):
+            known = f"is {number(profile.width, 2)} {unit}/s (95 % interval {number(low, 2)} to "
+            known += f"{number(high, 2)})"
+        elif low > 0:
+            known = f"is at least {number(low, 2)} {unit}/s"
+        else:
+            known = f"is at most {number(min(high, _MOST * stated), 2)} {unit}/s"
+        wider = "; noise that the drive feeds into the joint widens it"
+        notes.append(
+            f"Friction width at {joint}, over which dry friction reverses, {known}. The study says "
+            f"{number(stated, 2)}{wider if profile.width > stated else ''}."
+        )
     return tuple(notes)

@@ -36,7 +36,8 @@ class JointCoupling(JointEffect):
     def at_joint(self, block: Block) -> np.ndarray:
         i, j = block.index(self.source), block.index(self.joint)
         v_i, v_j, a_i = block.v[:, i], block.v[:, j], block.a[:, i]
-        return np.column_stack([v_i, block.sign(v_i), a_i, block.sign(v_i + v_j)])
+        dry = block.sign(v_i, self.source), block.sign(v_i + v_j, self.source, self.joint)
+        return np.column_stack([v_i, dry[0], a_i, dry[1]])
 
     def simulated_force(self, values, block):
         # The acceleration term acts through the inertia matrix below.

@@ -9,7 +9,7 @@ from dynident.effects.terms import Term
 
 
 class CoulombFriction(JointEffect):
-    """Constant torque against the motion: Fc tanh(v / w), with the package's one width w."""
+    """Constant torque against the motion: Fc tanh(v / w), w the joint's friction width."""
 
     name = "coulomb_friction"
     opposes_motion = True
@@ -24,7 +24,7 @@ class CoulombFriction(JointEffect):
         return (Parameter("Fc", force_unit(robot, self.joint), 0.0),)
 
     def at_joint(self, block: Block) -> np.ndarray:
-        return block.sign(block.v[:, [block.index(self.joint)]])
+        return block.sign(block.v[:, [block.index(self.joint)]], self.joint)
 
     def simulated_terms(self, values, robot):
         j = robot.names.index(str(self.joint))

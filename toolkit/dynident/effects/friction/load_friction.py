@@ -32,7 +32,7 @@ class LoadFriction(Forceless, JointEffect):
         if block.torque is None:
             raise EffectError("needs the predicted torque in the block", self.label)
         j = [block.index(self.joint)]
-        return np.abs(block.torque[:, j]) * block.sign(block.v[:, j])
+        return np.abs(block.torque[:, j]) * block.sign(block.v[:, j], self.joint)
 
     def simulated_loss(self, values, robot):
         loss = np.zeros(robot.n)

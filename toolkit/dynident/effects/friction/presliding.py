@@ -45,9 +45,9 @@ class Presliding(JointEffect):
     def at_joint(self, block: Block) -> np.ndarray:
         if block.memory is not None:  # one instant of a simulation
             v = block.v[:, [block.index(self.joint)]]
-            return block.memory[:, :1] - block.sign(v)
+            return block.memory[:, :1] - block.sign(v, self.joint)
         j = block.index(self.joint)
-        return (self._state(block, j)[0] - block.sign(block.v[:, j]))[:, None]
+        return (self._state(block, j)[0] - block.sign(block.v[:, j], self.joint))[:, None]
 
     def sensitivities(self, block: Block) -> np.ndarray:
         j = block.index(self.joint)
@@ -67,7 +67,7 @@ class Presliding(JointEffect):
         step = np.diff(np.concatenate([q[:before] - q[before] + q[0], q]))
         way, sign = np.abs(step) / self.shape[0], np.sign(step)
         kept = np.exp(-way)
-        start = block.sign(block.v[:1, j])
+        start = block.sign(block.v[:1, j], self.joint)
         z = _recursion(kept, np.concatenate([start, sign * -np.expm1(-way)]))
         change = np.concatenate([[0.0], (z[:-1] - sign) * kept * way])
         return z[before:], _recursion(kept, change)[before:]

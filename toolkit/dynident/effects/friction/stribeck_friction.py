@@ -36,4 +36,4 @@ class StribeckFriction(JointEffect):
 
     def at_joint(self, block: Block) -> np.ndarray:
         v = block.v[:, [block.index(self.joint)]]
-        return block.sign(v) * np.exp(-((v / self.shape[0]) ** 2))
+        return block.sign(v, self.joint) * np.exp(-((v / self.shape[0]) ** 2))

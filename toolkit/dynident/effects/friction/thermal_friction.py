@@ -53,7 +53,7 @@ class ThermalFriction(JointEffect):
 
     def at_joint(self, block: Block) -> np.ndarray:
         v = block.v[:, [block.index(self.joint)]]
-        return self.time_factor(block)[:, None] * np.hstack([v, block.sign(v)])
+        return self.time_factor(block)[:, None] * np.hstack([v, block.sign(v, self.joint)])
 
     def sensitivities(self, block: Block) -> np.ndarray:
         columns = self.columns(block)

@@ -181,8 +181,8 @@ def _is_dry(model: Model, label: str) -> bool:
     if effect.needs_recording:
         return False
     n = model.robot.n
-    speed = np.full((1, n), model.friction_width)
+    speed = model.friction_widths[None].copy()
     block = model.block(np.zeros(1), np.zeros((1, n)), speed, np.zeros((1, n)))
     block = replace(model.ready(effect, block, None), torque=np.ones((1, n)))
-    wider = replace(block, friction_width=2.0 * model.friction_width)
+    wider = replace(block, friction_width=2.0 * model.friction_widths)
     return bool(np.any(effect.columns(block) != effect.columns(wider)))
