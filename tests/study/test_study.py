@@ -192,10 +192,10 @@ def test_a_choice_of_joints_locks_the_others(study):
 
 def test_friction_width_of_some_joints(study):
     line = "friction_width = { elbow = 0.05 }\n[[recordings]]"
-    made = load(study(STUDY.replace("[[recordings]]", line, 1)))
+    made = study(STUDY.replace("[[recordings]]", line, 1))
     assert made.model.friction_width == (0.01, 0.05)
     with pytest.raises(StudyError, match="no joint 'elbo'"):
-        load(study(STUDY.replace("[[recordings]]", line.replace("elbow", "elbo"), 1)))
+        study(STUDY.replace("[[recordings]]", line.replace("elbow", "elbo"), 1))
 
 
 def test_gravity_and_friction_width(study):

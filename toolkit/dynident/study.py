@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import tomlkit
@@ -37,9 +37,6 @@ from dynident.robot import Robot
 from dynident.settings import SettingsTable, read_toml
 
 Positive = Field(default=None, gt=0)
-
-
-_Width = Annotated[float, Field(gt=0)]
 
 
 class _RecordingEntry(SettingsTable):
@@ -76,7 +73,7 @@ class _StudyFile(SettingsTable):
     joints: list[str] | None = None
     effects: list[str] = Field(default_factory=list)
     torque: Literal["measured", "held_command"] = "measured"
-    friction_width: _Width | dict[str, _Width] = FRICTION_WIDTH
+    friction_width: float | dict[str, float] = FRICTION_WIDTH
     gravity: tuple[float, float, float] | None = None
     recordings: list[_RecordingEntry]
     filter: _FilterEntry | None = None
@@ -84,6 +81,14 @@ class _StudyFile(SettingsTable):
     controller: ControllerFile | None = None
     columns: dict[str, str | _ColumnEntry] = Field(default_factory=dict)
     criteria: dict[str, Any] = Field(default_factory=dict)
+
+    @field_validator("friction_width")
+    @classmethod
+    def _positive(cls, width: float | dict[str, float]) -> float | dict[str, float]:
+        """Refuse a width that is no width."""
+        if not all(one > 0 for one in (width.values() if isinstance(width, dict) else (width,))):
+            raise PydanticCustomError("width", "input should be greater than 0")  # pyright: ignore
+        return width
 
     @field_validator("columns", mode="before")
     @classmethod
