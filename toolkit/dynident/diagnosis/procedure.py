@@ -280,7 +280,7 @@ def _settle(stage: _Stage, task: _Task) -> tuple[_Stage, Path]:
             stage = _rank(replace(stage, refused=refused), task)
         wider = _extend(stage, task) if path.withdrawn else stage
         if wider.found == stage.found:
-            return stage, replace(path, withdrawn=withdrawn)
+            return wider, replace(path, withdrawn=withdrawn)
         stage = wider
 
 

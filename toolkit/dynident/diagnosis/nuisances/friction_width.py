@@ -72,11 +72,17 @@ class WidthProfile:
         model = self.fitted.model
         return float(model.friction_widths[model.robot.names.index(self.joint)])
 
+    def _grid(self) -> np.ndarray:
+        """Factors of the model's width, between the bounds that the given width sets."""
+        given = self.evidence.model
+        stated = float(given.friction_widths[given.robot.names.index(self.joint)])
+        return np.geomspace(_LEAST, _MOST, _GRID) * stated / self.width
+
     def missed(self, factors: np.ndarray) -> np.ndarray:
         """Squared systematic residual, whitened, with widths that are so many times the model's."""
         model = self.fitted.model
         column = FrictionWidthColumn(self.joint)
-        shaped = [column.shaped(float(k)).on(model.robot) for k in factors]
+        shaped = [column.shaped(float(k)) for k in factors]
         at = model.slices[f"coulomb_friction@{self.joint}"].start
         known = self.fitted.moments.pooled()
         reliable = self.fitted.criteria.noise.reliable
@@ -96,7 +102,7 @@ class WidthProfile:
 
     def best(self) -> tuple[float, float]:
         """Factor of the width that misses least, and what it misses."""
-        grid = np.geomspace(_LEAST, _MOST, _GRID)
+        grid = self._grid()
         missed = self.missed(grid)
         k = int(np.argmin(missed))
         low, high = grid[max(k - 1, 0)], grid[min(k + 1, _GRID - 1)]
@@ -112,7 +118,7 @@ class WidthProfile:
 
     def interval(self) -> tuple[float, float]:
         """95 % interval of the width by its profile; zero or infinity where that has no end."""
-        grid = np.geomspace(_LEAST, _MOST, _GRID)
+        grid = self._grid()
         least = float(self.missed(np.ones(1))[0])
         limit = least + float(chi2.ppf(0.95, 1))
 
@@ -199,8 +205,10 @@ def friction_width_notes(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, 
             known += f"{number(high, 2)})"
         elif low > 0:
             known = f"is at least {number(low, 2)} {unit}/s"
+        elif np.isfinite(high):
+            known = f"is at most {number(high, 2)} {unit}/s"
         else:
-            known = f"is at most {number(min(high, _MOST * stated), 2)} {unit}/s"
+            known = f"is hardly seen ({number(profile.width, 2)} {unit}/s fits best)"
         wider = "; noise that the drive feeds into the joint widens it"
         notes.append(
             f"Friction width at {joint}, over which dry friction reverses, {known}. The study says "
