@@ -42,6 +42,7 @@ def check_diagnosis(said: dict[str, Any], source: str) -> None:
         *("verdict", "noise", "joints", "steps", "candidates", "test_error", "notes"),
         "wiring",
         "withdrawn",
+        "rows",
     }
     assert said["wiring"] == []
     assert said["verdict"] in VERDICTS

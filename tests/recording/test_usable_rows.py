@@ -6,7 +6,7 @@ import pytest
 from dynident.errors import RecordingError
 from dynident.fitting.least_squares import sources_of
 from dynident.fitting.sampling import sample
-from dynident.recording import Dataset, Filter, Recording, default_filter, usable
+from dynident.recording import Dataset, Filter, Recording, count_rows, default_filter, usable
 
 T = np.arange(8000) / 1000
 USERS = Filter(cutoff_hz=18.0, rate_hz=50.0)
@@ -96,4 +96,9 @@ def test_the_provenance_says_how_many_rows_and_why():
     assert f"{rows} of 400 rows used" in words
     assert "the filter sees past the ends (0.162 and 0.162 s)" in words
     assert "standing still from 0 to 1.5" in words
+    count = count_rows(dataset.recordings[0], USERS)
+    assert (count.used, count.standstill, count.window) == (rows, 75, 0)
+    assert count.used + count.standstill + count.ends == 400
+    twice = (count + count).to_dict()
+    assert twice["used"] == 2 * rows and twice["dropped"]["ends"] == 2 * count.ends
     assert "ends kept" in sources_of(Dataset((made(still),), Filter(ends="keep")))[0].filter

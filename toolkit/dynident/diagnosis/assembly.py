@@ -24,7 +24,7 @@ from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut, on_recordings
 from dynident.evidence.maps import residual_maps
 from dynident.fitting.estimate import Estimate
-from dynident.fitting.least_squares import sources_of
+from dynident.fitting.least_squares import rows_of_recordings, sources_of
 from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.recording.dataset import NoiseSource
@@ -118,6 +118,7 @@ def assemble(
         test_sources=sources_of(test) if test is not None else (),
         criteria=evidence.criteria,
         withdrawn=path.withdrawn,
+        rows=rows_of_recordings(train if test is None else train + test),
         limit=search.limit,
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from dynident.criteria import DEFAULTS, Criteria
@@ -19,6 +19,7 @@ from dynident.diagnosis.details import (
 from dynident.diagnosis.track_record import TrackRecord, track_record
 from dynident.evidence.maps import ResidualMap
 from dynident.fitting.estimate import DataSource, Estimate
+from dynident.recording import RowCount
 from dynident.recording.dataset import NoiseSource
 from dynident.tables import Table, finite, number, percent, print_tables
 from dynident.wiring import Fault
@@ -63,6 +64,7 @@ class Diagnosis:
         answer, nothing is added, and the verdict is "unexplained".
     impossible : inertias and frictions of the final model that no robot has; likewise.
     withdrawn : effects that passed every gate and were taken back, with the reason.
+    rows : of the recordings, training and test, that are used, and why the others are not.
     limit : effects that were allowed, where the search ended there; None where it ended by itself.
     """
 
@@ -84,6 +86,7 @@ class Diagnosis:
     impossible: tuple[str, ...] = ()
     withdrawn: tuple[Withdrawn, ...] = ()
     limit: int | None = None
+    rows: RowCount = field(default_factory=RowCount)
 
     @property
     def best(self) -> Step | None:
@@ -204,6 +207,7 @@ class Diagnosis:
             },
             "wiring": [fault.to_dict() for fault in self.wiring],
             **({"impossible": list(self.impossible)} if self.impossible else {}),
+            "rows": self.rows.to_dict(),
             "withdrawn": [{**place(one.effect), "why": one.why} for one in self.withdrawn],
             "notes": list(self.caveats),
             **({"criteria": self._changed_criteria()} if self.criteria.changed else {}),

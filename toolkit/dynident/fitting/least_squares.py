@@ -16,7 +16,14 @@ from dynident.fitting.uncertainty.lack_of_fit import lack_of_fit, widened
 from dynident.fitting.uncertainty.row_errors import row_errors
 from dynident.model import Model
 from dynident.moments.factors import TriangularFactors, factorise
-from dynident.recording import Dataset, default_filter, rows_in_words, uniform
+from dynident.recording import (
+    Dataset,
+    RowCount,
+    count_rows,
+    default_filter,
+    rows_in_words,
+    uniform,
+)
 from dynident.threads import single_threaded
 
 _ROUNDS = 30  # of columns that depend on the model's own values, until they settle
@@ -129,6 +136,15 @@ def estimate_of(
         notes=solution.notes,
         sources=sources_of(dataset),
     )
+
+
+def rows_of_recordings(dataset: Dataset) -> RowCount:
+    """Count the decimated rows of a dataset that are used, and those that are not."""
+    total = RowCount()
+    for recording in dataset.recordings:
+        settings = dataset.filter or default_filter(recording.rate_hz)
+        total = total + count_rows(uniform(recording), settings)
+    return total
 
 
 def sources_of(dataset: Dataset) -> tuple[DataSource, ...]:

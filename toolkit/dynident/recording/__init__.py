@@ -32,7 +32,13 @@ from dynident.recording.plausibility import (
 )
 from dynident.recording.recording import SIGNALS, LeftOut, Provenance, Recording
 from dynident.recording.uniform import uniform
-from dynident.recording.usable_rows import rows_in_words, usable, usable_rows
+from dynident.recording.usable_rows import (
+    RowCount,
+    count_rows,
+    rows_in_words,
+    usable,
+    usable_rows,
+)
 
 __all__ = [
     "SIGNALS",
@@ -48,8 +54,10 @@ __all__ = [
     "Periods",
     "Provenance",
     "Recording",
+    "RowCount",
     "central_difference",
     "choose_factor",
+    "count_rows",
     "default_filter",
     "differentiate",
     "lowpass",

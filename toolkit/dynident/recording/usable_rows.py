@@ -8,7 +8,9 @@ pose that is held in the middle of a recording was chosen, and stays.
 
 from __future__ import annotations
 
+from dataclasses import asdict, dataclass, fields
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -100,7 +102,38 @@ def usable_rows(
     return slice(int(inside[0]), int(inside[-1]) + 1) if len(inside) else slice(0, 0)
 
 
-def rows_in_words(recording: Recording, settings: Filter) -> str:
+@dataclass(frozen=True, kw_only=True)
+class RowCount:
+    """Decimated rows of recordings: how many are used, and why the others are not.
+
+    Attributes
+    ----------
+    used : rows that count.
+    ends : near an end, where the filters see past the record.
+    standstill : before the robot moves, or after.
+    transient : before the motion repeats.
+    window : outside the windows of the study.
+    """
+
+    used: int = 0
+    ends: int = 0
+    standstill: int = 0
+    transient: int = 0
+    window: int = 0
+
+    def __add__(self, other: RowCount) -> RowCount:
+        """Count the rows of both."""
+        return RowCount(
+            **{one.name: getattr(self, one.name) + getattr(other, one.name) for one in fields(self)}
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the count as JSON says it."""
+        dropped = asdict(self)
+        return {"used": dropped.pop("used"), "dropped": dropped}
+
+
+def count_rows(recording: Recording, settings: Filter) -> RowCount:
     """Return how many decimated rows of a recording are used, and why the others are not.
 
     Parameters
@@ -111,11 +144,41 @@ def rows_in_words(recording: Recording, settings: Filter) -> str:
     parallel = ParallelFilter(settings, recording.rate_hz, recording.period, recording.where)
     first, last = settings.margins(recording.rate_hz)
     t = recording.t[first : recording.samples - last]
-    every = parallel.rows(recording.samples)
     kept = usable_rows(recording, parallel, t, parallel.times(t))
-    words = [f"{kept.stop - kept.start} of {len(every)} rows used"]
+    every = parallel.times(recording.t)
+    reasons = {STANDS_STILL: 0, TRANSIENT: 0}
+    taken = np.zeros(len(every), dtype=bool)
+    for one in recording.left_out or ():
+        inside = (every >= one.start) & (every <= one.stop) & ~taken
+        reasons[one.reason] += int(inside.sum())
+        taken |= inside
+    low, high = recording.window or (-np.inf, np.inf)
+    window = int(np.sum(((every < low) | (every >= high)) & ~taken))
+    used = kept.stop - kept.start
+    rest = len(every) - used - window - sum(reasons.values())
+    return RowCount(
+        used=used,
+        ends=max(rest, 0),
+        standstill=reasons[STANDS_STILL],
+        transient=reasons[TRANSIENT],
+        window=window,
+    )
+
+
+def rows_in_words(recording: Recording, settings: Filter) -> str:
+    """Return the same in words, with the stretches that are left out.
+
+    Parameters
+    ----------
+    recording : on a uniform clock.
+    settings : its filter.
+    """
+    parallel = ParallelFilter(settings, recording.rate_hz, recording.period, recording.where)
+    count = count_rows(recording, settings)
+    words = [f"{count.used} of {len(parallel.rows(recording.samples))} rows used"]
     if settings.ends == "drop":
-        ends = [n / recording.rate_hz + parallel.transient for n in (first, last)]
+        margins = settings.margins(recording.rate_hz)
+        ends = [n / recording.rate_hz + parallel.transient for n in margins]
         words.append(f"{FILTER_ENDS} ({ends[0]:.3g} and {ends[1]:.3g} s)")
     else:
         words.append("ends kept")
