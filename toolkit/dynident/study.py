@@ -64,6 +64,16 @@ class _NoiseEntry(SettingsTable):
 
 
 class _ColumnEntry(SettingsTable):
+    """Where a column is found in files that use other names, units or coordinates.
+
+    `name` (or a bare string in its place) is the file's name, `name[2]` the third column of a
+    table of numbers. What is no name in the file is read as a linear expression of its columns:
+    `"q.joint6" = "motor_position[5]/32 - motor_position[4]/45 - 1.5707963"`, with numbers, `pi`,
+    `+ - * /`, signs and parentheses, at most 300 characters. A name that such an expression could
+    not hold goes between backticks: "0.5 * `left current (A)` - 0.5 * `right current (A)`". It is
+    read by rules and never evaluated as code. Ours is `scale` times the whole.
+    """
+
     name: str
     scale: float = 1.0
 

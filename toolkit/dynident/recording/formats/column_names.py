@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynident.errors import RecordingError
+from dynident.recording.formats.column_expressions import ColumnExpression, may_be_expression, parse
 
 REQUIRED = ("q", "tau")
 OPTIONAL = ("v", "a", "q_ref")
@@ -26,7 +27,9 @@ class Column:
 
     Attributes
     ----------
-    name : the file's name of it; `name[2]` is the third column of a table of numbers.
+    name : the file's name of it; `name[2]` is the third column of a table of numbers. What is no
+        name in the file is read as a linear expression of its columns, as
+        `motor[5]/32 - motor[4]/45 + pi/2`; see `column_expressions.parse`.
     scale : ours = scale * theirs (pi/180 for degrees, a drive gain for volts).
 
     Raises
@@ -44,6 +47,33 @@ class Column:
         if not (math.isfinite(self.scale) and self.scale != 0):
             remedy = "give a number other than zero"
             raise RecordingError(f"scale = {self.scale!r} of '{self.name}'", "columns", remedy)
+
+
+@dataclass(frozen=True)
+class ColumnTerm:
+    """A column as a table names it, the number of one in it if it is a table too, and a factor."""
+
+    name: str
+    index: int | None
+    factor: float
+
+
+@dataclass(frozen=True)
+class LocatedColumn:
+    """One of our columns, found in a table: ours = scale * (offset + sum of factor * theirs).
+
+    Attributes
+    ----------
+    name : as the table names it, or the expression as it was written.
+    scale : of the mapping.
+    terms : columns in it.
+    offset : number in the expression.
+    """
+
+    name: str
+    scale: float
+    terms: tuple[ColumnTerm, ...]
+    offset: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -90,7 +120,7 @@ def joints_in(table: ColumnTable) -> tuple[str, ...]:
 
 def resolve(
     table: ColumnTable, joints: Sequence[str], columns: Mapping[str, Column | str] | None
-) -> dict[str, Column]:
+) -> dict[str, LocatedColumn]:
     """Find each of our columns in a table.
 
     Parameters
@@ -107,8 +137,8 @@ def resolve(
     Raises
     ------
     RecordingError
-        If the mapping names a column that is not ours, or a column is missing; the message names
-        all missing ones, what is there, and a close match.
+        If the mapping names a column that is not ours, a column is missing, or an expression is
+        none; the message names all missing ones, what is there, and a close match.
     """
     mapping = _checked(columns or {}, joints, table.file)
     wanted = ["t", *(f"{signal}.{joint}" for signal in REQUIRED for joint in joints)]
@@ -123,52 +153,53 @@ def resolve(
     return found
 
 
-def load(table: ColumnTable, columns: Mapping[str, Column]) -> dict[str, np.ndarray]:
-    """Read columns as doubles in our units, (T,) each.
-
-    Raises
-    ------
-    RecordingError
-        If one does not hold real numbers, is not one-dimensional, or is longer than another.
-    """
-    parts = {ours: _split(table, column.name) for ours, column in columns.items()}
-    arrays = table.load(list(dict.fromkeys(name for name, _ in parts.values())))
-    found: dict[str, np.ndarray] = {}
-    for ours, (name, index) in parts.items():
-        x = _vector(arrays[name], name, index, table.file)
-        scale = columns[ours].scale
-        with np.errstate(over="ignore"):
-            found[ours] = x if scale == 1.0 else scale * x
-    lengths = {ours: len(x) for ours, x in found.items()}
-    odd = [ours for ours, length in lengths.items() if length != lengths["t"]]
-    if odd:
-        raise RecordingError(
-            f"{odd[0]} has {lengths[odd[0]]} samples where t has {lengths['t']}",
-            table.file,
-            "is the file complete?",
-        )
-    return found
-
-
 def _located(
     table: ColumnTable, wanted: Sequence[str], mapping: Mapping[str, Column]
-) -> dict[str, Column]:
+) -> dict[str, LocatedColumn]:
     """Ours -> the column as the table names it, or an error that names all missing ones."""
     found, missing = {}, []
     for ours in wanted:
         theirs = mapping.get(ours, Column(ours))
-        name = _find(table, theirs.name)
-        if name is None:
-            missing.append((theirs.name, "" if theirs.name == ours else f" (for {ours})"))
+        one = _locate(table, theirs)
+        if isinstance(one, LocatedColumn):
+            found[ours] = one
         else:
-            found[ours] = Column(name, theirs.scale)
+            missing += [(name, "" if name == ours else f" (for {ours})") for name in one]
     if missing:
         raise RecordingError(
-            "no column " + ", ".join(f"'{name}'{role}" for name, role in missing),
+            "no column " + ", ".join(f"'{name}'{role}" for name, role in dict.fromkeys(missing)),
             table.file,
             _there(table) + _close(missing[0][0], table.names),
         )
     return found
+
+
+def _locate(table: ColumnTable, column: Column) -> LocatedColumn | list[str]:
+    """Where a column is in a table: under its name, else as an expression; else what is missing.
+
+    A name that the table holds is never read as an expression, whatever signs are in it.
+    """
+    name = column.name
+    if _is_there(table, name):
+        return LocatedColumn(name, column.scale, (_term(table, name),))
+    expression: ColumnExpression | None = None
+    if may_be_expression(name):
+        try:
+            expression = parse(name)
+        except RecordingError as error:
+            if _find(table, name) is None:
+                what = f"no column has this name, and {error.what}"
+                remedy = f"{error.remedy}; {_there(table)}{_close(name, table.names)}"
+                raise RecordingError(what, table.file, remedy) from None
+    if expression is not None:
+        places = {theirs: _find(table, theirs) for theirs in expression.terms}
+        if all(places.values()):
+            terms = (_term(table, str(places[n]), x) for n, x in expression.terms.items())
+            return LocatedColumn(name, column.scale, tuple(terms), expression.offset)
+        if any(places.values()):
+            return [theirs for theirs, place in places.items() if place is None]
+    near = _find(table, name)
+    return [name] if near is None else LocatedColumn(near, column.scale, (_term(table, near),))
 
 
 def _checked(
@@ -191,39 +222,21 @@ def _checked(
 
 def _find(table: ColumnTable, name: str) -> str | None:
     """Name under which a table holds a column, if it does."""
-    if name in table.names:
-        return name
-    indexed = _INDEXED.match(name)
-    if indexed and indexed["name"] in table.names:
+    if _is_there(table, name):
         return name
     return plain(name) if plain(name) in table.names else None
 
 
-def _split(table: ColumnTable, name: str) -> tuple[str, int | None]:
+def _is_there(table: ColumnTable, name: str) -> bool:
+    indexed = _INDEXED.match(name)
+    return name in table.names or bool(indexed and indexed["name"] in table.names)
+
+
+def _term(table: ColumnTable, name: str, factor: float = 1.0) -> ColumnTerm:
     indexed = _INDEXED.match(name)
     if name in table.names or not indexed:
-        return name, None
-    return indexed["name"], int(indexed["index"])
-
-
-def _vector(x: np.ndarray, name: str, index: int | None, file: str) -> np.ndarray:
-    if x.dtype.kind not in "fiub":
-        what = f"'{name}' does not hold real numbers (it is {x.dtype})"
-        raise RecordingError(what, file, "save it as an array of doubles")
-    if index is not None:
-        if x.ndim != 2 or index >= x.shape[1]:
-            remedy = "name[i] is column i, from 0, of a table with one row a sample"
-            raise RecordingError(
-                f"'{name}' has the shape {x.shape}, and no column {index}", file, remedy
-            )
-        x = x[:, index]
-    elif x.ndim == 2 and 1 in x.shape:
-        x = x.ravel()
-    if x.ndim != 1:
-        remedy = f"map the columns, as {name}[0]" if x.ndim == 2 else "make it one-dimensional"
-        raise RecordingError(f"'{name}' has the shape {x.shape}, not (T,)", file, remedy)
-    with np.errstate(over="ignore"):
-        return x.astype(np.float64)
+        return ColumnTerm(name, None, factor)
+    return ColumnTerm(indexed["name"], int(indexed["index"]), factor)
 
 
 def _there(table: ColumnTable) -> str:

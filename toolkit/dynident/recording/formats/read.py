@@ -18,9 +18,9 @@ from dynident.recording.formats.column_names import (
     REQUIRED,
     Column,
     joints_in,
-    load,
     resolve,
 )
+from dynident.recording.formats.column_values import load
 from dynident.recording.formats.csv_file import open_csv
 from dynident.recording.plausibility import warn_of_units
 from dynident.recording.recording import Provenance, Recording, _joint_names
@@ -42,11 +42,11 @@ def read(
     ----------
     path : file with `t` (s) and, for each joint, `q.<joint>` and `tau.<joint>`; optionally
         `v.<joint>`, `a.<joint>`, `q_ref.<joint>`, and `temperature.<joint>` (degrees Celsius) at
-        any of the joints; SI units. In MAT files `q_<joint>` and so on,
-        since names of variables hold no dots. Whatever else it holds is ignored.
+        any of the joints; SI units. In MAT files `q_<joint>`, without dots. Whatever else it
+        holds is ignored.
     joints : names, the order of the columns; by default every joint of the file, in its order.
-    columns : ours -> theirs for files with other names or units, as
-        `{"tau.slider": Column("vir", 35.15)}`; names that it leaves out are ours.
+    columns : ours -> theirs, or a linear expression of theirs, for files with other names or
+        units, as `{"tau.a": Column("vir", 35.15), "q.a": "x/32"}`; what it leaves out is ours.
     kinds : "revolute" or "prismatic" for each joint, for warnings of units.
     record : which one of an NPZ or MAT file that holds several: a two-dimensional array each, a row
         a sample, and one array of text, `columns`, that names the columns of all.

@@ -1,0 +1,70 @@
+"""Columns read as numbers, once it is known where they are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from dynident.errors import RecordingError
+from dynident.recording.formats.column_names import ColumnTable, LocatedColumn
+
+
+def load(table: ColumnTable, columns: Mapping[str, LocatedColumn]) -> dict[str, np.ndarray]:
+    """Read columns as doubles in our units, (T,) each.
+
+    Raises
+    ------
+    RecordingError
+        If one does not hold real numbers, is not one-dimensional, or is longer than another.
+    """
+    names = dict.fromkeys(term.name for one in columns.values() for term in one.terms)
+    arrays = table.load(list(names))
+    found = {ours: _combined(ours, one, arrays, table.file) for ours, one in columns.items()}
+    lengths = {ours: len(x) for ours, x in found.items()}
+    odd = [ours for ours, length in lengths.items() if length != lengths["t"]]
+    if odd:
+        raise RecordingError(
+            f"{odd[0]} has {lengths[odd[0]]} samples where t has {lengths['t']}",
+            table.file,
+            "is the file complete?",
+        )
+    return found
+
+
+def _combined(
+    ours: str, column: LocatedColumn, arrays: Mapping[str, np.ndarray], file: str
+) -> np.ndarray:
+    """One of our columns from theirs; a plain name without a scale keeps every bit."""
+    vectors = [_vector(arrays[one.name], one.name, one.index, file) for one in column.terms]
+    lengths = [len(x) for x in vectors]
+    if len(set(lengths)) > 1:
+        shown = ", ".join(f"'{one.name}' {n}" for one, n in zip(column.terms, lengths, strict=True))
+        what = f"columns of different lengths in the expression for {ours}: {shown} samples"
+        raise RecordingError(what, file, "is the file complete?")
+    with np.errstate(over="ignore", invalid="ignore"):
+        factors = [one.factor for one in column.terms]
+        parts = [x if f == 1.0 else f * x for f, x in zip(factors, vectors, strict=True)]
+        total = sum(parts[1:], start=parts[0])
+        total = total + column.offset if column.offset else total
+        return total if column.scale == 1.0 else column.scale * total
+
+
+def _vector(x: np.ndarray, name: str, index: int | None, file: str) -> np.ndarray:
+    if x.dtype.kind not in "fiub":
+        what = f"'{name}' does not hold real numbers (it is {x.dtype})"
+        raise RecordingError(what, file, "save it as an array of doubles")
+    if index is not None:
+        if x.ndim != 2 or index >= x.shape[1]:
+            remedy = "name[i] is column i, from 0, of a table with one row a sample"
+            raise RecordingError(
+                f"'{name}' has the shape {x.shape}, and no column {index}", file, remedy
+            )
+        x = x[:, index]
+    elif x.ndim == 2 and 1 in x.shape:
+        x = x.ravel()
+    if x.ndim != 1:
+        remedy = f"map the columns, as {name}[0]" if x.ndim == 2 else "make it one-dimensional"
+        raise RecordingError(f"'{name}' has the shape {x.shape}, not (T,)", file, remedy)
+    with np.errstate(over="ignore"):
+        return x.astype(np.float64)
