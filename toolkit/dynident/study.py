@@ -28,6 +28,7 @@ from dynident.recording import (
     Filter,
     Noise,
     Recording,
+    default_position_cutoff,
     read,
     require_motion,
     require_torque,
@@ -50,7 +51,7 @@ class _RecordingEntry(SettingsTable):
 
 
 class _FilterEntry(SettingsTable):
-    position_cutoff_hz: float | None = Positive
+    position_cutoff_hz: float | Literal["default", "none"] = "default"
     cutoff_hz: float | None = Positive
     rate_hz: float | None = Positive
     decimation: Literal["pick", "chebyshev"] = "pick"
@@ -162,7 +163,7 @@ def load(path: str | Path) -> Study:
         raise StudyError(str(error), f"{path}: effects") from None
     recordings = _recordings(said, path, robot)
     with _in(path, "filter"):
-        settings = Filter(**said.filter.model_dump()) if said.filter else None
+        settings = _filter(said.filter, recordings) if said.filter else None
     with _in(path, "criteria"):
         criteria = Criteria.with_values(said.criteria)
     noise = None
@@ -273,6 +274,18 @@ def _robot(said: _StudyFile, path: Path) -> Robot:
             what, remedy = "its inertia is not finite", "fix the numbers of its inertial element"
             raise RobotError(what, f"{file}: link '{link.name}'", remedy)
     return robot
+
+
+def _filter(said: _FilterEntry, recordings: list[Recording]) -> Filter:
+    """Filter of a study; positions are never differentiated unfiltered unless it says "none"."""
+    values = said.model_dump()
+    match said.position_cutoff_hz:
+        case "default":
+            rate = min(recording.rate_hz for recording in recordings)
+            values["position_cutoff_hz"] = default_position_cutoff(rate, said.cutoff_hz)
+        case "none":
+            values["position_cutoff_hz"] = None
+    return Filter(**values)
 
 
 def _widths(said: float | dict[str, float], robot: Robot) -> float | tuple[float, ...]:

@@ -15,6 +15,7 @@ from dynident.recording.filters import (
     Motion,
     central_difference,
     default_filter,
+    default_position_cutoff,
     differentiate,
     lowpass,
 )
@@ -59,6 +60,7 @@ __all__ = [
     "choose_factor",
     "count_rows",
     "default_filter",
+    "default_position_cutoff",
     "differentiate",
     "lowpass",
     "mismatch",
