@@ -120,7 +120,8 @@ class WiringRegression:
         for _ in range(_ROUNDS):
             weight = 1.0 / np.maximum(left, _LEAST * power)
             A = (weight @ self.gram.reshape(n, -1)).reshape(len(self.gram[0]), -1)
-            size = np.sqrt(np.maximum(np.diag(A), 1e-300))
+            # A column of zeros, of a joint at rest, is known by the ridge alone.
+            size = np.sqrt(np.where(np.diag(A) > 0, np.diag(A), 1.0))
             factor = cho_factor(A / np.outer(size, size) + _RIDGE * np.eye(len(A)))
             values = cho_solve(factor, (weight @ cross) / size) / size
             quadratic = (self.gram @ values) @ values
