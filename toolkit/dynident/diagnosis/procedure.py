@@ -296,6 +296,7 @@ def _pruned(stage: _Stage, task: _Task) -> tuple[_Stage, Path]:
         start = fit_evidence(evidence, start.model, start)
         final = fit_evidence(evidence, final.model, final)
     path = path_of(evidence, held, start, final, tuple(kept.found), task.progress)
+    path = replace(path, withdrawn=(*kept.unhelpful, *path.withdrawn))
     pruned = replace(
         stage,
         evidence=evidence,

@@ -27,7 +27,7 @@ from dynident.tables import number
 
 _LEAST, _MOST = 0.02, 15.0  # times the model's width, between which it is sought
 _GRID = 13
-_RIVALS = ("viscous_friction", "quadratic_drag", "stribeck_friction")
+_RIVALS = ("viscous_friction", "quadratic_drag")
 _AT_BOUND = 1.05  # times a bound, within which the width is at it
 
 

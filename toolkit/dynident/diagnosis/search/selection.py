@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dynident.criteria import SearchCriteria
+from dynident.diagnosis.details import Withdrawn
 from dynident.diagnosis.search.ranking import Ranking, rank
 from dynident.diagnosis.search.scoring import Score
 from dynident.effects import Effect
@@ -259,10 +260,17 @@ def confidence_set(losses: np.ndarray, criteria: SearchCriteria) -> tuple[int, .
 
 @dataclass(frozen=True)
 class Kept:
-    """What is left when superfluous effects are dropped."""
+    """What is left when superfluous effects are dropped.
+
+    Attributes
+    ----------
+    final, found : the model with the effects that are needed, and these.
+    unhelpful : effects that training recordings call for, and that help nowhere else.
+    """
 
     final: EvidenceFit
     found: list[AddedEffect]
+    unhelpful: tuple[Withdrawn, ...] = ()
 
 
 def without_superfluous(
@@ -285,7 +293,7 @@ def without_superfluous(
     -------
     The model with the effects that are needed.
     """
-    kept = list(found)
+    kept, unhelpful = list(found), []
     for one in found:
         if _belongs(one.score.effect, kept):
             continue
@@ -296,7 +304,10 @@ def without_superfluous(
         if not needed or not _helps(held, rest, fitted):
             kept.remove(one)
             fitted = rest
-    return Kept(fitted, kept)
+            if needed:
+                why = "lowers the residual of the test recordings at no joint"
+                unhelpful.append(Withdrawn(effect=effect, why=why))
+    return Kept(fitted, kept, tuple(unhelpful))
 
 
 def _helps(held: Evidence | None, without: EvidenceFit, fitted: EvidenceFit) -> bool:
