@@ -138,11 +138,6 @@ class Evidence:
                 latest[variant, _recorded(one)] = columns
         return [[seen[key(variant, run)] for variant in variants] for run in runs]
 
-    def time_factor(self, effect: Effect, run: int) -> np.ndarray:
-        """The factor of an effect's columns that depends on the time, folded, (P, S)."""
-        recorded = self.runs[run]
-        return effect.time_factor(recorded.rows(self.model))[recorded.index]
-
     # --- of one replicate, by all that they depend on -------------------------------------------
 
     def _of(self, effect: Effect, sampled: Sampled, model: Model, values: np.ndarray) -> np.ndarray:

@@ -13,9 +13,10 @@ from dynident.evidence.columns import Evidence
 from dynident.evidence.joint_residual import JointResidual
 from dynident.evidence.noise_model import NoiseModel, flat_noise
 from dynident.evidence.runs import Signals
+from dynident.evidence.time_varying import time_varying_columns, time_varying_mask
 from dynident.fitting.fixed_point import FixedPoint
 from dynident.model import Model
-from dynident.moments.replicates import TimeVarying, time_varying_products
+from dynident.moments.replicates import time_varying_products
 from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import MomentSolution, regress
 
@@ -116,7 +117,7 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
                 for r in range(len(evidence.runs))
             ]
         white = _whiten(evidence, columns, noise, values)
-        values = regress(_moments(evidence, model, white).pooled(), reliable).values
+        values = regress(_moments(evidence, model, noise, white).pooled(), reliable).values
         if round == 0 and near is None:
             # Along a robot without bodies their columns are rounding errors, and any value fits.
             values = _keeping_dependent(model, at, values)
@@ -127,7 +128,7 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
             break
         at = _held(model, fixed_point.following(model, at, values))
     white = _whiten(evidence, columns, noise, values)
-    summed = _moments(evidence, model, white)
+    summed = _moments(evidence, model, noise, white)
     solution = regress(summed.pooled(), reliable)
     values = solution.values
     left = [JointResidual.of(evidence, columns, values, j) for j in range(n)]
@@ -244,12 +245,15 @@ def _whiten(evidence: Evidence, columns, noise, values) -> tuple[tuple[np.ndarra
     )
 
 
-def _moments(evidence: Evidence, model: Model, white) -> SecondMoments:
+def _moments(evidence: Evidence, model: Model, noise, white) -> SecondMoments:
     found, time_varying = [], time_varying_mask(model)
     for r, (run, joints) in enumerate(zip(evidence.runs, white, strict=True)):
         here = reduce(add, (run.moments(w, w) for w in joints))
         if run.kind == "repeated" and time_varying.any():
-            own = [time_varying_columns(evidence, model, r, w) for w in joints]
+            own = [
+                time_varying_columns(evidence, model, r, j, noise[j], w)
+                for j, w in enumerate(joints)
+            ]
             other = np.sum([time_varying_products(one, one, run.edges) for one in own], axis=0)
             here = here.where(time_varying[:, None] | time_varying[None, :], other)
         found.append(here)
@@ -264,35 +268,3 @@ def _signal(evidence: Evidence, white, values: np.ndarray) -> float:
         for run, joints in zip(evidence.runs, white, strict=True)
         for w in joints
     )
-
-
-def time_varying_columns(
-    evidence: Evidence, model: Model, run: int, white: np.ndarray
-) -> TimeVarying:
-    """Columns of a model and the torque with the factors that the time makes of them.
-
-    Parameters
-    ----------
-    evidence, run : recordings, and which one of them.
-    model : with its effects.
-    white : (P, S, p + 1) whitened columns and torque.
-
-    Returns
-    -------
-    The columns, and their factors of the time in the session.
-    """
-    time_factor = np.ones_like(white)
-    for effect in model.effects:
-        if effect.time_varying:
-            time_factor[:, :, model.slices[effect.label]] = evidence.time_factor(effect, run)[
-                :, :, None
-            ]
-    return TimeVarying(white, time_factor, np.arange(white.shape[2]) == model.size)
-
-
-def time_varying_mask(model: Model) -> np.ndarray:
-    """Which of a model's columns, and the torque after them, depend on the time, (p + 1,)."""
-    mask = np.zeros(model.size + 1, dtype=bool)
-    for effect in model.effects:
-        mask[model.slices[effect.label]] = effect.time_varying
-    return mask

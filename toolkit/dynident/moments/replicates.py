@@ -59,26 +59,18 @@ def replicate_moments(
 
 @dataclass(frozen=True)
 class TimeVarying:
-    """Columns of a recording that repeats, with what the time of the session does to them.
+    """Columns of a recording that repeats, some of which the time of the session changes.
 
     Attributes
     ----------
     columns : (P, S, k)
-    time_factor : (P, S, k) factor of each that depends on the time; 1 where none does.
+    instruments : (P, S, k) the same of the next repetition's motion at this one's time.
     is_torque : (k,) mask.
     """
 
     columns: np.ndarray
-    time_factor: np.ndarray
+    instruments: np.ndarray
     is_torque: np.ndarray
-
-    @property
-    def instruments(self) -> np.ndarray:
-        """Columns of the next repetition's motion at this one's time, (P, S, k)."""
-        after = np.roll(self.time_factor, -1, axis=0)
-        sound = np.abs(after) > 1e-12 * np.abs(self.time_factor).max(axis=(0, 1))
-        ratio = np.where(sound, self.time_factor / np.where(sound, after, 1.0), 1.0)
-        return np.roll(self.columns, -1, axis=0) * ratio
 
 
 def time_varying_products(left: TimeVarying, right: TimeVarying, edges: np.ndarray) -> np.ndarray:

@@ -13,10 +13,15 @@ from scipy import stats
 from dynident.diagnosis.search.cleared_columns import cleared
 from dynident.effects import Effect
 from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import EvidenceFit, time_varying_columns, time_varying_mask
+from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.runs import Signals
+from dynident.evidence.time_varying import (
+    time_varying_columns,
+    time_varying_mask,
+    time_varying_variants,
+)
 from dynident.model import Model
-from dynident.moments.replicates import TimeVarying, time_varying_products
+from dynident.moments.replicates import time_varying_products
 from dynident.moments.second_moments import SecondMoments
 
 Columns = Callable[[Sequence[Effect], Model, np.ndarray], list[list[Signals]]]
@@ -104,12 +109,10 @@ def candidate_moments(
             one.append(run.moments(known, white))
             two.append(run.moments(white, white))
             if run.kind == "repeated" and mixed:
-                new = TimeVarying(
-                    white,
-                    _time_factors(evidence, variants, r, width),
-                    np.zeros(white.shape[2], bool),
-                )
-                old = time_varying_columns(evidence, fitted.model, r, known)
+                measured = [shape[0][:, position] for shape in each]
+                noise = fitted.noise[joint]
+                new = time_varying_variants(evidence, variants, r, joint, noise, (measured, white))
+                old = time_varying_columns(evidence, fitted.model, r, joint, noise, known)
                 chosen = time_varying[:, None] | np.full(white.shape[2], variants[0].time_varying)
                 one[-1] = one[-1].where(chosen, time_varying_products(old, new, run.edges))
                 if variants[0].time_varying:
@@ -121,16 +124,6 @@ def candidate_moments(
     beside, own = SecondMoments.stacked(with_model), SecondMoments.stacked(with_self)
     parts = [slice(i, i + width) for i in range(0, width * len(variants), width)]
     return [(beside.columns(part), own.among(part)) for part in parts]
-
-
-def _time_factors(
-    evidence: Evidence, variants: Sequence[Effect], run: int, width: int
-) -> np.ndarray:
-    """What the time of the session does to `width` columns of each effect, (P, S, k) in all."""
-    factors = []
-    for effect in variants:
-        factors += [evidence.time_factor(effect, run)] * width
-    return np.stack(factors, axis=2)
 
 
 def moments_with_payload(

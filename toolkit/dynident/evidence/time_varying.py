@@ -1,0 +1,110 @@
+"""Columns that depend on the time in the session: no repetition is another one's equal.
+
+Their instrument is the motion of the next repetition at the time of this one. What the time does to
+a column comes before the noise is whitened: a ramp that went through the filter is not in
+proportion to a later part of it that went through the filter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from dynident.effects import Effect
+from dynident.evidence.columns import Evidence
+from dynident.evidence.noise_model import NoiseModel
+from dynident.model import Model
+from dynident.moments.replicates import TimeVarying
+
+_NOTHING = 1e-12
+"""Part of its largest value below which a factor of the time is zero."""
+
+
+def time_varying_mask(model: Model) -> np.ndarray:
+    """Which of a model's columns, and the torque after them, depend on the time, (p + 1,)."""
+    mask = np.zeros(model.size + 1, dtype=bool)
+    for effect in model.effects:
+        mask[model.slices[effect.label]] = effect.time_varying
+    return mask
+
+
+def time_varying_columns(
+    evidence: Evidence, model: Model, run: int, joint: int, noise: NoiseModel, white: np.ndarray
+) -> TimeVarying:
+    """Columns of a model and the torque at one joint with their instruments.
+
+    Parameters
+    ----------
+    evidence, run : recordings, and which one of them.
+    model : with its effects.
+    joint, noise : column of the joint, and its noise.
+    white : (P, S, p + 1) whitened columns and torque.
+
+    Returns
+    -------
+    The columns, and what the next repetition has in their place.
+    """
+    instruments = np.roll(white, -1, axis=0)
+    for effect in model.effects:
+        joints = effect.acting_at(model.robot)
+        if effect.time_varying and joint in joints:
+            measured = evidence.of(effect, run, model, None)[0][:, joints.index(joint)]
+            found = _at_this_time(evidence, effect, run, joint, noise, measured)
+            instruments[:, :, model.slices[effect.label]] = found
+    return TimeVarying(white, instruments, np.arange(white.shape[2]) == model.size)
+
+
+def time_varying_variants(
+    evidence: Evidence,
+    variants: Sequence[Effect],
+    run: int,
+    joint: int,
+    noise: NoiseModel,
+    columns: tuple[Sequence[np.ndarray], np.ndarray],
+) -> TimeVarying:
+    """Columns of an effect with several shapes at one joint with their instruments.
+
+    Parameters
+    ----------
+    evidence, run : recordings, and which one of them.
+    variants : one effect at one place.
+    joint, noise : column of the joint, and its noise.
+    columns : (T, k) of each variant as they are, and (P, S, k of all) whitened.
+
+    Returns
+    -------
+    The columns of all variants, and what the next repetition has in their place.
+    """
+    measured, white = columns
+    instruments = np.roll(white, -1, axis=0)
+    if variants[0].time_varying:
+        found = [
+            _at_this_time(evidence, effect, run, joint, noise, one)
+            for effect, one in zip(variants, measured, strict=True)
+        ]
+        instruments = np.concatenate(found, axis=2)
+    return TimeVarying(white, instruments, np.zeros(white.shape[2], dtype=bool))
+
+
+def _at_this_time(
+    evidence: Evidence,
+    effect: Effect,
+    run: int,
+    joint: int,
+    noise: NoiseModel,
+    columns: np.ndarray,
+) -> np.ndarray:
+    """Columns (T, k) of the next repetition's motion at this one's time, whitened, (P, S, k)."""
+    recorded = evidence.runs[run]
+    speed = recorded.replicates[0].v[:, joint]
+    factor = effect.time_factor(recorded.rows(model=evidence.model))
+    sound = np.abs(factor) > _NOTHING * np.abs(factor).max()
+    found = []
+    for here, there in zip(recorded.index, np.roll(recorded.index, -1, axis=0), strict=True):
+        # Whole rows, since whitening looks back; those of no use are out of the repetition.
+        rows = np.arange(len(columns))
+        after = np.clip(rows + there[0] - here[0], 0, len(columns) - 1)
+        ratio = np.where(sound[after], factor / np.where(sound[after], factor[after], 1.0), 1.0)
+        found.append(noise.whiten(columns[after] * ratio[:, None], speed)[here])
+    return np.stack(found)
