@@ -13,7 +13,7 @@ from dynident.closed_loop.experiments.virtual_study import write_experiment
 from dynident.closed_loop.loop import ClosedLoop, simulate
 from dynident.closed_loop.mechanism import Mechanism
 from dynident.closed_loop.references import Reference, SampledReference
-from dynident.closed_loop.retrace import Retraced, retrace
+from dynident.closed_loop.retrace import EncoderNoise, Retraced, retrace
 from dynident.closed_loop.rollout import Rollout, Task
 from dynident.closed_loop.sensors import Sensors
 from dynident.closed_loop.trajectories import Fourier
@@ -23,6 +23,7 @@ __all__ = [
     "ClosedLoop",
     "Controller",
     "ControllerFile",
+    "EncoderNoise",
     "Experiment",
     "ExperimentRun",
     "Fourier",

@@ -157,7 +157,10 @@ class ClosedLoop:
         references = [_reference(task, time[:-1]) for task in tasks]
         reference = ReferenceSamples(*(np.hstack(one) for one in zip(*references, strict=True)))
         noise = np.hstack(
-            [sensors.each("position_std", n) * _normal(task.rng, (total, n)) for task in tasks]
+            [
+                sensors.each("position_std", n) * task.noise_sign * _normal(task.rng, (total, n))
+                for task in tasks
+            ]
         )
         resolution = sensors.each("position_resolution", n)
         plant = self._plant(tasks)

@@ -12,12 +12,29 @@ from dynident.closed_loop.loop import ClosedLoop, Progress
 from dynident.closed_loop.mechanism import Mechanism
 from dynident.closed_loop.references import SampledReference
 from dynident.closed_loop.rollout import Rollout, Task
+from dynident.closed_loop.sensors import Sensors
 from dynident.errors import SimulationError
 from dynident.recording import Recording
 from dynident.robot import Robot
 
 _ROUNDING = 1e-6
 """Of a sample: time stamps this near to the controller's are the controller's."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class EncoderNoise:
+    """White noise of the encoders in recordings that are run again.
+
+    Attributes
+    ----------
+    std : (n,) rad or m.
+    seed : of the first recording's noise; the others' follow from it.
+    sign : 1, or -1 for the mirror image.
+    """
+
+    std: np.ndarray
+    seed: tuple[int, ...]
+    sign: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +63,10 @@ def retrace(
     *,
     nominal: Robot | None = None,
     feedback_scale: np.ndarray | None = None,
+    noise: EncoderNoise | None = None,
     progress: Progress | None = None,
 ) -> tuple[Retraced, ...]:
-    """Run the references of recordings again, in closed loop, with ideal sensors.
+    """Run the references of recordings again, in closed loop.
 
     Each starts on its reference, with the reference's velocity, at the recording's first sample.
 
@@ -59,6 +77,7 @@ def retrace(
     recordings : with references.
     controller : of the loop in which they were made.
     nominal : the model inside the controller; None for each mechanism's own.
+    noise : of the encoders, which the loop follows; None for ideal sensors.
     feedback_scale, progress : see `ClosedLoop.simulate`.
 
     Returns
@@ -76,7 +95,7 @@ def retrace(
         raise SimulationError(what, remedy="give one for each recording")
     rate = controller.simulated_rate()
     tasks = []
-    for mechanism, recording in zip(mechanisms, recordings, strict=True):
+    for index, (mechanism, recording) in enumerate(zip(mechanisms, recordings, strict=True)):
         if recording.joints != mechanism.robot.names:
             remedy = f"the robot's are {', '.join(mechanism.robot.names)}"
             raise SimulationError("the recording has other joints", recording.where, remedy)
@@ -89,14 +108,21 @@ def retrace(
                 reference,
                 samples / rate,
                 start=recording.start,
-                rng=None,
+                rng=None if noise is None else np.random.default_rng((*noise.seed, index)),
+                noise_sign=1.0 if noise is None else noise.sign,
                 name=recording.name or recording.where,
                 nominal=nominal,
             )
         )
+    sensors = None if noise is None else Sensors(position_std=tuple(noise.std))
     try:
         rollouts = loop.simulate(
-            tasks, controller, lead_in=0.0, feedback_scale=feedback_scale, progress=progress
+            tasks,
+            controller,
+            sensors,
+            lead_in=0.0,
+            feedback_scale=feedback_scale,
+            progress=progress,
         )
     except SimulationError as error:
         if error.reason != "unstable":
@@ -122,11 +148,12 @@ def _resampled(recording: Recording, rollout: Rollout, rate: float) -> Recording
     derivatives = [name for name in ("v", "a") if getattr(recording, name) is not None]
     if np.array_equal(x, nearest):
         rows = x.astype(int)
-        q, held, torque = rollout.q[rows], rollout.u[rows], rollout.torque[rows]
+        q, held, torque = rollout.q_measured[rows], rollout.u[rows], rollout.torque[rows]
         changes = {name: getattr(rollout, name)[rows] for name in derivatives}
     else:
         q = CubicHermiteSpline(rollout.t, rollout.q, rollout.v)(x / rate)
         k = np.minimum(np.floor(x).astype(int), len(rollout.t) - 2)
+        q = q + (rollout.q_measured - rollout.q)[k]
         share = (x - k)[:, None]
         if derivatives:
             # The acceleration jumps at samples: only the one just after belongs to the interval.

@@ -27,6 +27,7 @@ class Task:
     duration : s.
     start : s, when the first sample is taken in the session.
     rng : of the encoder's noise; None for none.
+    noise_sign : 1, or -1 for the mirror image of that noise.
     name : for messages.
     nominal : the model inside the controller (a computed torque, a feed-forward): bodies alone, or
         with effects; None for the mechanism's own robot.
@@ -38,6 +39,7 @@ class Task:
     _: KW_ONLY
     start: float = 0.0
     rng: np.random.Generator | None = None
+    noise_sign: float = 1.0
     name: str = ""
     nominal: Robot | Mechanism | None = None
 

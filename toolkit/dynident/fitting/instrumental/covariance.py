@@ -95,7 +95,13 @@ def _carried(
     for start in range(0, motion.samples, _BLOCK):
         stop = min(start + _BLOCK, motion.samples)
         first, last = max(0, start - margin), min(motion.samples, stop + margin)
-        raw, core = slice(first, last), slice(start - first, stop - first)
+        raw = slice(first, last)
+        # Samples that are only differentiated: the first and the last rows have their noise.
+        before = motion.first if start == 0 else 0
+        after = sampled.recording.samples - motion.first - motion.samples
+        after = after if stop == motion.samples else 0
+        ends = ((before, after), (0, 0), (0, 0))
+        core = slice(start - first, stop - first + before + after)
         block = model.with_regressor(sampled.block(model, raw))
         here = {label: own[raw] for label, own in known.items()}
         V = model.columns(block, values, here)[:, :, kept]
@@ -105,13 +111,13 @@ def _carried(
         back = parallel.low_pass(weighted)
         jacobians = torque_jacobians(model, values, block, noise.position_std * rate)
         acceleration, speed, position = (
-            jacobian.transpose(0, 2, 1) @ back
+            np.pad(jacobian.transpose(0, 2, 1) @ back, ends)
             for jacobian in (jacobians.by_a, jacobians.by_v, jacobians.by_q)
         )
         found = _differences(_differences(acceleration, rate) - speed, rate) + position
         if cutoff:
             found = lowpass(found, rate, cutoff)
-        torque = back
+        torque = back = np.pad(back, ends)
         if sampled.recording.torque == "held_command":
             torque = np.concatenate([(back[:-1] + back[1:]) / 2, back[-1:] / 2])
         yield found[core], torque[core]

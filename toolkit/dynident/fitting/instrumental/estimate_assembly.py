@@ -18,6 +18,8 @@ from dynident.fitting.instrumental.iv_iterations import Iterations
 from dynident.fitting.instrumental.noise_level import NoiseLevel, noise_level, position_noise
 from dynident.fitting.instrumental.normal_equations import InstrumentalSolution
 from dynident.fitting.instrumental.residual_spectrum import residual_noise
+from dynident.fitting.instrumental.simulated_loop import LoopSource
+from dynident.fitting.instrumental.simulated_run import SimulatedRun
 from dynident.fitting.instrumental.source import InstrumentSource
 from dynident.fitting.least_squares import sources_of
 from dynident.fitting.linear_solution import residual_std
@@ -99,6 +101,7 @@ def _noise(
         iterations.solution,
         position,
         iterations.simulated,
+        _run_of(source, iterations),
     )
     if given:
         torque = np.asarray(given.torque_std, dtype=float)
@@ -112,6 +115,13 @@ def _noise(
         iterations.solution.rank,
     )
     return noise_level(model.robot.names, found), bias
+
+
+def _run_of(source: InstrumentSource, iterations: Iterations) -> SimulatedRun | None:
+    """The simulation behind the instruments; None where no loop is known, or a later one failed."""
+    run = source.last_run if isinstance(source, LoopSource) else None
+    known = run is not None and iterations.simulated is not None
+    return run if known and np.array_equal(run.values, iterations.simulated) else None
 
 
 def _doubted(noise: NoiseLevel) -> tuple[str, ...]:
@@ -152,8 +162,8 @@ def _notes(
         )
     if reported.size:
         notes.append(
-            "Expected bias, from adding encoder noise of this size to the instruments' own "
-            f"motion (not subtracted): {_listed(model, bias.values, reported)}."
+            "Expected bias, from simulating the same motion with encoder noise of this size "
+            f"(not subtracted): {_listed(model, bias.values, reported)}."
         )
     clock = np.flatnonzero(np.abs(bias.sampling) > history.sigma)
     if clock.size:

@@ -12,11 +12,12 @@ from typing import Literal
 
 import numpy as np
 
-from dynident.closed_loop import ClosedLoop, Controller, Mechanism, Retraced, retrace
+from dynident.closed_loop import ClosedLoop, Controller, Mechanism, Retraced
 from dynident.errors import FitError, SimulationError
 from dynident.fitting.instrumental import standard_parameters as lift
 from dynident.fitting.instrumental.gains import InertiaMatrices, poses_of, retuned, stiffness
 from dynident.fitting.instrumental.noise_level import position_noise
+from dynident.fitting.instrumental.simulated_run import SimulatedRun
 from dynident.fitting.instrumental.source import Guess, Instruments, prepared
 from dynident.fitting.sampling import LEAST_ROWS
 from dynident.model import Model
@@ -97,7 +98,13 @@ class Projected:
 
 
 class LoopSource:
-    """The closed loops of some recordings, as an `InstrumentSource`."""
+    """The closed loops of some recordings, as an `InstrumentSource`.
+
+    Attributes
+    ----------
+    transient : s that each recording's window leaves out at its start.
+    last_run : the latest simulation; None before the first.
+    """
 
     iterates = True
     noise_share = 1.0
@@ -133,6 +140,7 @@ class LoopSource:
         self.measured = replace(dataset, recordings=cut)
         self._loop = ClosedLoop()
         self._last: tuple[Retraced, ...] = ()
+        self.last_run: SimulatedRun | None = None
 
     @property
     def builds(self) -> int:
@@ -237,15 +245,15 @@ class LoopSource:
         def progress(done: float, whole: float) -> None:
             self._progress("simulating", done, whole or total)
 
-        self._last = retrace(
-            self._loop,
-            [bodies[bool(one.payload)] for one in recordings],
-            recordings,
-            self._controller,
+        self.last_run = SimulatedRun(
+            values=values,
+            mechanisms=tuple(bodies[bool(one.payload)] for one in recordings),
+            recordings=tuple(recordings),
+            controller=self._controller,
             nominal=self._settings.nominal or model.robot,
             feedback_scale=scale,
-            progress=progress,
         )
+        self._last = self.last_run.retraced(self._loop, progress)
         return replace(self.measured, recordings=tuple(one.recording for one in self._last))
 
     def _feedback_scale(self, asked: np.ndarray, values: np.ndarray) -> np.ndarray:
