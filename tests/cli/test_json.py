@@ -43,6 +43,7 @@ def check_diagnosis(said: dict[str, Any], source: str) -> None:
         "wiring",
         "withdrawn",
         "rows",
+        *(("detection_limits",) if said["verdict"] == "nothing_missing" else ()),
     }
     assert said["wiring"] == []
     assert said["verdict"] in VERDICTS
@@ -105,6 +106,10 @@ def test_nothing_missing(run, study):
     said = run("explain", study(NOTHING_MISSING), "--json").json
     check_diagnosis(said, "replicates")
     assert said["verdict"] == "nothing_missing" and said["steps"] == []
+    assert said["detection_limits"]
+    for one in said["detection_limits"]:
+        assert set(one) == {"effect", "joint", "source", "at", "torque_rms"} and is_place(one)
+        assert one["at"] in JOINTS and number(one["torque_rms"], 0)
     assert said["test_error"]["after"] <= 1.15 * said["test_error"]["noise_floor"]
 
 

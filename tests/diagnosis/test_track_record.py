@@ -29,6 +29,7 @@ def test_a_record_states_its_counts_and_their_interval(monkeypatch) -> None:
     # Wilson's interval of 45 in 50, from his formula with z = 1.96.
     assert found.interval == pytest.approx((0.7864, 0.9565), abs=1e-4)
     assert "Of 50 answers" in str(found) and "45 were right" in str(found)
+    assert "2 to 7 joints, whose recorded motion repeats" in str(found)
     assert "79 % to 96 %" in str(found) and "truly missing" in str(found)
     assert track_record("explained", named=True, over_floor=1.0) is None
 

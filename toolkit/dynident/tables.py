@@ -86,6 +86,17 @@ def number(value: float | None, digits: int = 4) -> str:
     return f"{value:.{digits}g}"
 
 
+LEAST_P = 1e-3
+"""p values below it are shown as being below it: their tails are nobody's knowledge."""
+
+
+def p_value(value: float | None) -> str:
+    """A p value in a table or a sentence; JSON has the number."""
+    if value is not None and value < LEAST_P:
+        return f"< {LEAST_P:g}"
+    return number(value, 2)
+
+
 def percent(value: float | None, digits: int = 2) -> str:
     """A fraction as a percentage with `digits` decimals, a dash where there is none."""
     if value is None or value != value:
@@ -119,7 +130,7 @@ def _print(console, table: Table) -> None:
 
 
 def _is_number(cell: str) -> bool:
-    return not cell or cell[0] in "-+.0123456789"
+    return not cell or cell[0] in "<-+.0123456789"
 
 
 def finite(value: float) -> float | None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from dynident.diagnosis.advice.experiments import Adviser
 from dynident.diagnosis.details import Candidate, JointResult, Status, Step, TestError, Trace
+from dynident.diagnosis.detection_limits import detection_limits
 from dynident.diagnosis.nuisances.contacts import Disturbance, contact_candidates
 from dynident.diagnosis.nuisances.quantisation import rounding_notes, with_rounding
 from dynident.diagnosis.result import Diagnosis
@@ -96,6 +97,8 @@ def assemble(
     steps = (*contacts, *_advised(steps, Adviser.of(evidence, stages[-1])))
     source = noise_source(evidence, held)
     verdict = verdict_of(before, after, steps, rounds[-1], evidence.criteria.verdict)
+    complete = verdict == "nothing_missing"
+    limits = detection_limits(evidence, held, stages[-1], rounds[-1]) if complete else ()
     pushed = contact_candidates(given, evidence, search.disturbances)
     first = _merged(_candidates(rounds[0], before.error, start), pushed)
     return Diagnosis(
@@ -120,6 +123,7 @@ def assemble(
         withdrawn=path.withdrawn,
         rows=rows_of_recordings(train if test is None else train + test),
         limit=search.limit,
+        detection_limits=limits,
     )
 
 

@@ -16,12 +16,13 @@ from dynident.diagnosis.details import (
     named_together,
     place,
 )
-from dynident.diagnosis.track_record import TrackRecord, track_record
+from dynident.diagnosis.detection_limits import DetectionLimit, limit_table
+from dynident.diagnosis.track_record import JOINTS, TrackRecord, track_record
 from dynident.evidence.maps import ResidualMap
 from dynident.fitting.estimate import DataSource, Estimate
 from dynident.recording import RowCount
 from dynident.recording.dataset import NoiseSource
-from dynident.tables import Table, finite, number, percent, print_tables
+from dynident.tables import Table, finite, number, p_value, percent, print_tables
 from dynident.wiring import Fault
 
 Verdict = Literal["nothing_missing", "explained", "unexplained"]
@@ -65,6 +66,7 @@ class Diagnosis:
     impossible : inertias and frictions of the final model that no robot has; likewise.
     withdrawn : effects that passed every gate and were taken back, with the reason.
     rows : of the recordings, training and test, that are used, and why the others are not.
+    detection_limits : where nothing is missing, how large each effect could have been unseen.
     limit : effects that were allowed, where the search ended there; None where it ended by itself.
     """
 
@@ -85,6 +87,7 @@ class Diagnosis:
     wiring: tuple[Fault, ...] = ()
     impossible: tuple[str, ...] = ()
     withdrawn: tuple[Withdrawn, ...] = ()
+    detection_limits: tuple[DetectionLimit, ...] = ()
     limit: int | None = None
     rows: RowCount = field(default_factory=RowCount)
 
@@ -142,10 +145,11 @@ class Diagnosis:
     def track_record(self) -> TrackRecord | None:
         """How often answers like this one were right; None where that is not known.
 
-        It holds for noise that was measured and for the default criteria.
+        It holds for noise that was measured on repetitions, for robots of as many joints as those
+        that were counted, and for the default criteria.
         """
         floor = self.test_error.noise_floor
-        if self.wiring or self.impossible:
+        if self.wiring or self.impossible or not JOINTS[0] <= len(self.joints) <= JOINTS[1]:
             return None
         if self.noise_source != "replicates" or not floor or self.criteria.changed:
             return None
@@ -209,9 +213,14 @@ class Diagnosis:
             **({"impossible": list(self.impossible)} if self.impossible else {}),
             "rows": self.rows.to_dict(),
             "withdrawn": [{**place(one.effect), "why": one.why} for one in self.withdrawn],
+            **self._limits(),
             "notes": list(self.caveats),
             **({"criteria": self._changed_criteria()} if self.criteria.changed else {}),
         }
+
+    def _limits(self) -> dict[str, Any]:
+        said = [one.to_dict() for one in self.detection_limits]
+        return {"detection_limits": said} if said else {}
 
     def _changed_criteria(self) -> dict[str, Any]:
         return {one.name: one.value for one in self.criteria.changed}
@@ -226,6 +235,7 @@ class Diagnosis:
             self.candidate_table(),
             self.step_table(),
             self.sentence,
+            *((limit_table(self.detection_limits),) if self.detection_limits else ()),
             *self.caveats,
         )
 
@@ -270,7 +280,7 @@ class Diagnosis:
         rows = tuple(
             (
                 c.effect.label,
-                number(c.p_value, 2),
+                p_value(c.p_value),
                 f"{round(100 * c.test_gain, 2) + 0.0:.2f}",
                 c.finding,
             )

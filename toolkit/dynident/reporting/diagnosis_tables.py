@@ -14,7 +14,7 @@ from dynident.diagnosis.details import Candidate, Step
 from dynident.diagnosis.result import Diagnosis
 from dynident.reporting.content import first_set
 from dynident.reporting.joint_states import states
-from dynident.tables import Table, number, percent
+from dynident.tables import Table, number, p_value, percent
 
 
 def joint_table(diagnosis: Diagnosis) -> Table:
@@ -71,7 +71,7 @@ def step_table(diagnosis: Diagnosis) -> Table:
             _values(diagnosis, step),
             percent(step.test_error_before),
             percent(step.test_error_after),
-            number(step.p_value, 2),
+            p_value(step.p_value),
             ", ".join(effect.title for effect in step.indistinguishable) or "nothing",
         )
         for step in diagnosis.steps
@@ -102,7 +102,7 @@ def candidate_table(diagnosis: Diagnosis, shown: tuple[Candidate, ...]) -> Table
     rows = tuple(
         (
             ("\u2503 " if c.effect.label in bracketed else "") + c.effect.title,
-            number(c.p_value, 2),
+            p_value(c.p_value),
             f"{round(100 * c.test_gain, 2) + 0.0:.2f}",
             "added" if c.effect.label in added else c.finding,
         )

@@ -10,6 +10,7 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from dynident import files
+from dynident.diagnosis.detection_limits import limit_table
 from dynident.diagnosis.result import Diagnosis
 from dynident.evidence.maps import ResidualMap
 from dynident.reporting.content import after_name, left, ranked, seen
@@ -169,6 +170,7 @@ def _diagnosis_page(
         candidates=candidate_table(diagnosis, ranked(diagnosis)),
         weaker=candidate_table(diagnosis, ranked(diagnosis, len(diagnosis.candidates))[10:]),
         remaining=remaining_table(diagnosis),
+        limits=limit_table(diagnosis.detection_limits) if diagnosis.detection_limits else None,
         not_identifiable=not_identifiable_table(diagnosis),
         parameters=parameter_table(
             diagnosis.after, widening_after(diagnosis), diagnosis.noise_source
@@ -226,7 +228,7 @@ def _numeric(table: Table) -> list[bool]:
     return [
         any(row[i] for row in table.rows)
         and all(
-            not row[i] or (row[i][0] in "-+.0123456789" and len(row[i]) < _HASH)
+            not row[i] or (row[i][0] in "<-+.0123456789" and len(row[i]) < _HASH)
             for row in table.rows
         )
         for i in range(len(table.columns))

@@ -44,6 +44,7 @@ class Score:
     p_value : before correction for the number of tests; blocks of time are the sampling units.
     penalised : drop less the price of its parameters and of its grid.
     values, sigma : (k,) its parameters and their standard deviations.
+    covariance : (k, k) of the values; None where nothing of them can be told.
     fall : of the squared residual with its noise, at the value at which the column is taken. A
         column that noise drives is other in every repetition: that counts against it.
     losses : (B,) held-out squared residual of each block with the effect in the model.
@@ -60,6 +61,7 @@ class Score:
     penalised: float = -np.inf
     values: tuple[float, ...] = ()
     sigma: tuple[float, ...] = ()
+    covariance: np.ndarray | None = None
     fall: float = 0.0
     losses: np.ndarray | None = None
     gains: np.ndarray | None = None
@@ -205,6 +207,7 @@ def score(
         penalised=float(penalised),
         values=tuple(float(v) for v in values),
         sigma=tuple(float(s) for s in np.sqrt(np.clip(np.diag(covariance), 0.0, None))),
+        covariance=covariance,
         fall=float(2.0 * at @ with_noise - at @ left_total @ at),
     )
 
