@@ -119,9 +119,12 @@ def _noise(
 
 def _run_of(source: InstrumentSource, iterations: Iterations) -> SimulatedRun | None:
     """The simulation behind the instruments; None where no loop is known, or a later one failed."""
-    run = source.last_run if isinstance(source, LoopSource) else None
-    known = run is not None and iterations.simulated is not None
-    return run if known and np.array_equal(run.values, iterations.simulated) else None
+    if not isinstance(source, LoopSource) or source.last_run is None:
+        return None
+    if iterations.simulated is None:
+        return None
+    same = np.array_equal(source.last_run.values, iterations.simulated)
+    return source.last_run if same else None
 
 
 def _doubted(noise: NoiseLevel) -> tuple[str, ...]:

@@ -88,7 +88,7 @@ def row_errors(
     lags = min(_LAGS, *(len(one.t) // 10 for one in samples))
     kept = list(solution.basis.independent)
     products = lagged_products(_blocks(model, samples, values, kept), lags)
-    squares = sum(np.sum(one.tau**2, axis=0) for one in samples)
+    squares = np.sum([np.sum(one.tau**2, axis=0) for one in samples], axis=0)
     return errors_of(products, noise_shapes(samples[0], lags), solution, squares)
 
 
