@@ -83,7 +83,7 @@ def test_the_closing_table_ranks_estimators_as_the_readme_says() -> None:
     rivals = script("iiwa", "rivals")
     found = rivals.rivals(1e-4, 1)
     torque = {name: one.torque for name, one in found.items()}
-    assert 0.015 < torque["OLS"] < 0.025 and 0.015 < torque["ridge"] < 0.025
+    assert 0.012 < torque["OLS"] < 0.018 and 0.012 < torque["ridge"] < 0.018
     assert torque["corrected LS, noise from the encoders"] < 0.5 * torque["OLS"]
     assert torque["corrected LS, noise from repetitions"] < 0.7 * torque["OLS"]
     assert torque["IV, simulated loop"] < 0.1 * torque["OLS"]
