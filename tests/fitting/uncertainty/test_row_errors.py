@@ -120,3 +120,14 @@ def test_a_noise_free_fit_has_next_to_no_sigma(model: Model) -> None:
     clean = synthetic(model, truth, 3, rate_hz=1000.0, duration=8.0, period=None)
     found = fit(model, Dataset((clean,), None, Noise(np.zeros(2), np.zeros(2))))
     assert np.all(found.sigma < 1e-3)
+
+
+def test_a_diagnosis_without_known_noise_has_the_intervals_of_the_same_fit(model: Model) -> None:
+    truth = true_values(model, Fv__shoulder=0.5, Fv__elbow=0.2)
+    clean = synthetic(model, truth, 3, rate_hz=200.0, duration=16.0, period=None)
+    other = synthetic(model, truth, 4, rate_hz=200.0, duration=16.0, period=None)
+    train, test = (drawn(model, one, None, k) for k, one in enumerate((clean, other)))
+    estimate = fit(model, train)
+    found = di.diagnose(estimate, train, test).after
+    assert "as much as" in found.words_of_sigma
+    np.testing.assert_allclose(found.sigma[:6], estimate.sigma[:6], rtol=0.1)

@@ -6,6 +6,7 @@ effect with the experiment that would show it or distinguish it, residual maps, 
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -20,12 +21,14 @@ from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.search.withdrawal import Path
 from dynident.diagnosis.verdict import noise_source, notes_on, verdict_of
+from dynident.errors import FitError
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut, on_recordings
 from dynident.evidence.maps import residual_maps
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import rows_of_recordings, sources_of
+from dynident.fitting.uncertainty.row_errors import row_covariance
 from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.recording.dataset import NoiseSource
@@ -209,7 +212,17 @@ def _estimate(evidence: Evidence, fitted: EvidenceFit, train: Dataset) -> Estima
     basis = base_parameters(shown, model.names, _RANK_TOLERANCE)
     kept, combination = list(basis.independent), basis.combination
     covariance = np.zeros((model.size, model.size))
-    covariance[np.ix_(kept, kept)] = combination @ fitted.covariance @ combination.T
+    whole, words = fitted.covariance, ""
+    measured = all(run.columns_from == "recording" for run in evidence.runs)
+    if measured and not fitted.noise_known:
+        # Nothing has whitened these rows: their errors hang together as the filters make them.
+        recordings = tuple(run.recording for run in evidence.runs)
+        with suppress(FitError):
+            whole, errors = row_covariance(
+                model, replace(train, recordings=recordings), fitted.values
+            )
+            words = errors.words
+    covariance[np.ix_(kept, kept)] = combination @ whole @ combination.T
     return Estimate(
         model=model,
         values=basis.lift(basis.coordinates(fitted.values), model.given_values()),
@@ -224,6 +237,7 @@ def _estimate(evidence: Evidence, fitted: EvidenceFit, train: Dataset) -> Estima
         status="solved",
         notes=(),
         sources=sources_of(train),
+        sigma_words=words,
     )
 
 

@@ -17,10 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from dynident.fitting.linear_solution import LinearSolution
-from dynident.fitting.sampling import Sampled, sample
+from dynident.fitting.linear_solution import LinearSolution, solve_factors
+from dynident.fitting.sampling import Sampled, rows, sample
 from dynident.fitting.uncertainty.noise_shapes import noise_shapes
 from dynident.model import Model
+from dynident.moments.factors import factorise
 from dynident.moments.lagged import LaggedProducts, RowBlock, lagged_products
 from dynident.recording import Dataset
 from dynident.tables import number
@@ -92,6 +93,32 @@ def row_errors(
     return errors_of(products, noise_shapes(samples[0], lags), solution, squares)
 
 
+def row_covariance(
+    model: Model, dataset: Dataset, values: np.ndarray
+) -> tuple[np.ndarray, RowErrors]:
+    """Return the covariance (p, p) of least squares at values (p,), and the errors behind it.
+
+    Parameters
+    ----------
+    model, dataset : what was fitted to what.
+    values : (p,) what came out, by whichever way.
+
+    Returns
+    -------
+    Its rows of dependent parameters are zero.
+
+    Raises
+    ------
+    FitError
+        As `solve_factors`.
+    """
+    solution = solve_factors(model, factorise(rows(model, dataset, values)))
+    found, kept = row_errors(model, dataset, values, solution), list(solution.basis.independent)
+    covariance = np.zeros_like(solution.covariance)
+    covariance[np.ix_(kept, kept)] = found.covariance
+    return covariance, found
+
+
 def errors_of(
     products: LaggedProducts,
     shapes: np.ndarray,
@@ -112,7 +139,7 @@ def errors_of(
     n, rank = len(weights), len(turn)
     inner = products.columns * (weights**2)[:, None, None, None]
     white = turn.T @ inner @ turn
-    rows = products.pairs[0]
+    count = products.pairs[0]
     # Both directions of time.
     both = white + white.transpose(0, 1, 3, 2)
     both[:, 0] = white[:, 0]
@@ -121,24 +148,24 @@ def errors_of(
     exact = products.residual[:, 0] <= _EXACT**2 * torque_squares
     found = np.empty_like(left)
     basis = np.kron(np.eye(n), shapes.T)  # (n (K + 1), n S)
-    amounts = nnls(seen @ basis / rows, left.ravel() / rows)[0]
+    amounts = nnls(seen @ basis / count, left.ravel() / count)[0]
     found = (basis @ amounts).reshape(left.shape)
     found[exact] = 0.0
-    found[exact, 0] = left[exact, 0] / rows
+    found[exact, 0] = left[exact, 0] / count
     inside = np.einsum("jk,jkab->ab", found, both)
     values, vectors = np.linalg.eigh((inside + inside.T) / 2)
     values = np.maximum(values, _LEAST * found[:, 0].mean())
     half = turn @ (vectors * np.sqrt(values))
     covariance = half @ half.T
-    plain = turn @ turn.T * float(left[:, 0].sum() / (rows * n - rank))
+    plain = turn @ turn.T * float(left[:, 0].sum() / (count * n - rank))
     ratio = np.diag(plain) / np.diag(covariance)
     wide = np.linalg.solve(turn.T, vectors * np.sqrt(values)).T @ solution.basis.combination
     return RowErrors(
         autocovariance=found / (weights**2)[:, None],
         meat=wide.T @ wide,
         covariance=covariance,
-        rows=int(rows * n),
-        effective_rows=float(rows * n * np.exp(np.mean(np.log(ratio)))),
+        rows=int(count * n),
+        effective_rows=float(count * n * np.exp(np.mean(np.log(ratio)))),
     )
 
 
