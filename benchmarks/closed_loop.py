@@ -94,7 +94,7 @@ def loop() -> Loop:
     }
     task = Task(mechanism, test.trajectory, DURATION)
     urdf = PROBLEMS / "iiwa" / "iiwa.urdf"
-    width = mechanism.friction_width
+    width = float(mechanism.friction_widths[0])
     return Loop(task, experiment.controller, urdf, q, v, *found.values(), width=width)
 
 

@@ -210,7 +210,9 @@ def test_every_effect_is_felt(name: str, circumstances: Circumstances) -> None:
         for k, other in enumerate(robot.names)
         if (one, other) != (name, robot.names[1])
     ]
-    trajectory = Fourier.random(robot, 8.0, [3], amplitude=made.amplitude, speed=made.speed)
+    trajectory = Fourier.random(
+        robot, 8.0, [3], amplitude=list(made.amplitude), speed=list(made.speed)
+    )
     t = np.arange(150) / 500.0
     q_ref, v_ref, _ = trajectory.at(t + 1.0)
     loop = replace(

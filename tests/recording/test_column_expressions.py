@@ -1,5 +1,7 @@
 """Signals as linear expressions of a file's columns: what they are worth, and what is refused."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -16,7 +18,7 @@ def log(tmp_path_factory):
     rng = np.random.default_rng(4)
     file = tmp_path_factory.mktemp("log") / "log.npz"
     names = {"a-b": 7.0, "left current (A)": 2.0, "x": 3.0, "q.x": 5.0}
-    odd = {name: value + rng.standard_normal(9) for name, value in names.items()}
+    odd: dict[str, Any] = {name: value + rng.standard_normal(9) for name, value in names.items()}
     np.savez(file, t=np.arange(9) * 1e-3, motor=rng.standard_normal((9, 2)), **odd)
     return file, dict(np.load(file))
 

@@ -70,7 +70,9 @@ def test_a_loop_that_still_settles_is_left_out_of_what_repeats():
     settling = swing() + 0.05 * np.exp(-T / 0.15) * np.cos(40 * T)
     rng = np.random.default_rng(1)
     noise = 1e-5 * rng.standard_normal(8000)
-    (left,) = usable(made(settling + noise, period=4.0)).left_out or ()
+    found = usable(made(settling + noise, period=4.0)).left_out
+    assert found is not None and len(found) == 1
+    left = found[0]
     assert left.reason == "transient before the motion repeats"
     assert 0.5 < left.stop < 1.6  # where the transient has come down to the noise
     assert usable(made(swing() + noise, period=4.0)).left_out == ()

@@ -12,13 +12,17 @@ from dynident.recording import Dataset, Filter
 from synthetic import arm, synthetic, true_values
 
 FRICTION = {"Fv__shoulder": 1.2, "Fv__elbow": 0.5, "Fc__shoulder": 1.5, "Fc__elbow": 0.6}
-NOISE = {"position_std": 2e-5, "torque_std": 0.3}
 FULL = Model(arm()) + "viscous_friction" + "coulomb_friction"
 
 
 def data(model: Model, values: dict[str, float], *seeds: int) -> Dataset:
     truth = true_values(model, **FRICTION, **values)
-    return Dataset(tuple(synthetic(model, truth, s, rate_hz=250.0, **NOISE) for s in seeds))
+    return Dataset(
+        tuple(
+            synthetic(model, truth, s, rate_hz=250.0, position_std=2e-5, torque_std=0.3)
+            for s in seeds
+        )
+    )
 
 
 @cache

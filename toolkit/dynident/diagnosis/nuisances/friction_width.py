@@ -10,7 +10,10 @@ say, explains more than any width.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
@@ -129,10 +132,16 @@ class WidthProfile:
         lower, upper = 0.0, np.inf
         below_one, over_one = grid[(grid < 1) & above], grid[(grid > 1) & above]
         if len(below_one):
-            lower = self.width * np.exp(brentq(excess, np.log(below_one[-1]), 0.0, xtol=1e-2))
+            lower = self.width * math.exp(_root(excess, float(np.log(below_one[-1])), 0.0))
         if len(over_one):
-            upper = self.width * np.exp(brentq(excess, 0.0, np.log(over_one[0]), xtol=1e-2))
-        return float(lower), float(upper)
+            upper = self.width * math.exp(_root(excess, 0.0, float(np.log(over_one[0]))))
+        return lower, upper
+
+
+def _root(excess: Callable[[float], float], low: float, high: float) -> float:
+    """Where a profile crosses its limit, to 1 %."""
+    found: Any = brentq(excess, low, high, xtol=1e-2)
+    return float(found)
 
 
 def _widened(products: np.ndarray, cross: np.ndarray, square: float, at: int) -> np.ndarray:

@@ -149,10 +149,10 @@ def _best_drop(evidence: Evidence, fitted: EvidenceFit, name: str) -> float:
             np.concatenate([b.signal for b, _ in parts], axis=1),
         )
         own = SecondMoments(
-            block_diag(*(s.total for _, s in parts)),
+            np.asarray(block_diag(*(s.total for _, s in parts))),
             parts[0][1].counts,
             None,
-            block_diag(*(s.signal for _, s in parts)),
+            np.asarray(block_diag(*(s.signal for _, s in parts))),
         )
         found = cleared(fitted, beside, own, np.diag(own.signal) > 0)
         if found is not None and found.part.rank:
