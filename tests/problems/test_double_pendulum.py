@@ -72,3 +72,16 @@ def test_instruments_give_the_same_inertias_at_every_cutoff() -> None:
 def test_they_are_near_to_the_authors_fits(name: str) -> None:
     low, high = sorted(AUTHORS[name])
     assert 0.96 * low < instruments()[name][0] < 1.04 * high
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:.*time stamps are jittered")
+def test_nothing_is_carried_and_nothing_is_invented() -> None:
+    read = di.load(ROOT / "problems" / "double_pendulum" / "study.toml")
+    found = di.diagnose(read.model, read.train)
+    assert found.steps == () and found.wiring == () and found.verdict == "nothing_missing"
+    assert not any(one.status == "material" for one in found.candidates)
+    why = {one.effect.label: one.finding for one in found.candidates}
+    assert "impossible" in why["drive_gain@elbow"]
+    assert "changes with the filter" in why["load_friction@elbow"]
+    assert why["payload"] != "significant and relevant"

@@ -1,0 +1,66 @@
+"""The Staubli TX40: what couples its wrist is found, and nothing that raises the held-out error."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynident import diagnose, files
+from dynident.diagnosis import Diagnosis
+from dynident.errors import FileError
+from dynident.study import Study, load
+
+STUDY = Path(__file__).parents[2] / "problems" / "staubli_tx40" / "study.toml"
+
+
+@pytest.fixture(scope="module")
+def study() -> Study:
+    try:
+        files.find_data("staubli_tx40/recording.npz", STUDY.parent)
+    except FileError as missing:
+        pytest.skip(str(missing))
+    return load(STUDY)
+
+
+def test_columns_are_those_of_the_joints(study: Study) -> None:
+    """q = R^-1 q_m with the zeros moved, tau = R^T c: power is the same on either side."""
+    file = files.find_data("staubli_tx40/recording.npz", STUDY.parent)
+    data = np.load(file)
+    motors, currents = data["motor_position"], data["motor_torque"]
+    gears = np.diag([32.0, 32.0, 45.0, -48.0, 45.0, 32.0])
+    gears[5, 4] = 32.0
+    recording = study.train.recordings[0]
+    zeros = np.array([0.0, -np.pi / 2, np.pi / 2, 0.0, 0.0, 0.0])
+    expected = np.linalg.solve(gears, motors.T).T + zeros
+    np.testing.assert_allclose(recording.q, expected, atol=1e-12)
+    np.testing.assert_allclose(recording.tau, currents @ gears, atol=1e-9)
+
+
+def test_every_fourth_half_second_is_to_judge_by(study: Study) -> None:
+    train, test = ([one.window for one in part.recordings] for part in (study.train, study.test))
+    assert test == [(1.5, 2.0), (3.5, 4.0), (5.5, 6.0)]
+    assert len(train) == 12 and not set(train) & set(test)
+
+
+@pytest.fixture(scope="module")
+def found(study: Study) -> Diagnosis:
+    return diagnose(study.model, study.train, study.test)
+
+
+@pytest.mark.slow
+def test_both_directions_of_the_wrist_coupling_come_first(found: Diagnosis) -> None:
+    first = {step.effect.label for step in found.steps[:2]}
+    assert first == {"joint_coupling@joint5:joint6", "joint_coupling@joint6:joint5"}
+    assert found.test_error.before > 0.10
+    assert found.steps[1].test_error_after <= 0.06
+
+
+@pytest.mark.slow
+def test_the_error_falls_to_the_published_one_and_never_rises(found: Diagnosis) -> None:
+    assert found.test_error.after <= 0.053
+    assert all(step.test_error_after <= step.test_error_before for step in found.steps)
+    wrist = {one.name: one.error_after for one in found.joints}
+    assert wrist["joint5"] < 0.12 and wrist["joint6"] < 0.12
+    assert found.wiring == () and not any("payload" in s.effect.label for s in found.steps)
