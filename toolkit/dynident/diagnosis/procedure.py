@@ -35,7 +35,11 @@ from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.nuisances.quantisation import nothing_but_rounding
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.global_search import RankedModel, global_search
-from dynident.diagnosis.search.payload_recordings import with_payload, with_payload_decided
+from dynident.diagnosis.search.payload_recordings import (
+    marked,
+    with_payload,
+    with_payload_decided,
+)
 from dynident.diagnosis.search.ranking import Ranking, candidates, rank
 from dynident.diagnosis.search.refusal import follows_the_filter, narrower, newly_impossible
 from dynident.diagnosis.search.selection import (
@@ -59,6 +63,8 @@ from dynident.fitting.estimate import Estimate
 from dynident.model import Model
 from dynident.recording import Dataset, numbered
 from dynident.threads import single_threaded
+
+_WITHDRAWALS = 8  # times that the search goes on after something was withdrawn
 
 
 @single_threaded
@@ -153,13 +159,15 @@ class _Stage:
     @property
     def proposals(self) -> int:
         """Effects added, one at several joints counting once."""
-        return sum(not one.with_it for one in self.found)
+        return len({one.with_it or one.score.effect.label for one in self.found})
 
     @property
     def latest(self) -> tuple[AddedEffect, ...]:
         """What was added last, at all of its joints."""
-        chosen = [k for k, one in enumerate(self.found) if not one.with_it]
-        return self.found[chosen[-1] :] if chosen else ()
+        groups = [one.with_it or one.score.effect.label for one in self.found]
+        return tuple(
+            one for one, group in zip(self.found, groups, strict=True) if group == groups[-1]
+        )
 
     @property
     def ranked(self) -> RankedModel:
@@ -219,7 +227,9 @@ def _extend(stage: _Stage, task: _Task) -> _Stage:
         if best is None or wider is None:
             break
         why = newly_impossible(wider.evidence, stage.fitted, wider.fitted)
-        why = why or follows_the_filter(stage.narrow, wider.fitted, best.score)
+        why = why or follows_the_filter(
+            wider.evidence, stage.narrow, wider.fitted, best.score.effect
+        )
         if why:
             ranking = stage.rounds[-1].refusing({best.score.effect.label: why})
             stage = replace(stage, rounds=(*stage.rounds[:-1], ranking))
@@ -235,7 +245,9 @@ def _add_and_refit(stage: _Stage, best: AddedEffect, task: _Task) -> _Stage | No
     """
     task.progress(f"adding {best.score.effect.label}")
     evidence, loop, before = with_payload(stage.evidence, best.score), stage.loop, stage.fitted
-    added = (best, *at_other_joints(evidence, before, best, len(stage.found)))
+    others = at_other_joints(evidence, before, best, len(stage.found))
+    others = tuple(one for one in others if one.score.effect.label not in stage.refused)
+    added = (best, *others)
     model = before.model + tuple(one.score.effect for one in added)
     wider = refitted(evidence, model, before)
     fitted = with_friction_width(evidence, wider)
@@ -271,23 +283,24 @@ def _search_globally(start: _Stage, extended: _Stage, task: _Task) -> _Stage:
 def _settle(stage: _Stage, task: _Task) -> tuple[_Stage, Path]:
     """Drop what is superfluous and withdraw what does harm; then go on with what is left."""
     withdrawn: tuple[Withdrawn, ...] = ()
-    while True:
+    for again in range(_WITHDRAWALS, -1, -1):
         many = len(stage.found)
         stage, path = _pruned(stage, task)
         withdrawn = (*withdrawn, *path.withdrawn)
         if len(path.found) < many:
             refused = {**stage.refused, **{o.effect.label: o.why for o in path.withdrawn}}
             stage = _rank(replace(stage, refused=refused), task)
-        wider = _extend(stage, task) if path.withdrawn else stage
+        wider = _extend(stage, task) if path.withdrawn and again else stage
         if wider.found == stage.found:
             return wider, replace(path, withdrawn=withdrawn)
         stage = wider
+    raise AssertionError("the last time nothing is added")
 
 
 def _pruned(stage: _Stage, task: _Task) -> tuple[_Stage, Path]:
     """Drop what is superfluous, confirm contacts, and withdraw what raises the held-out error."""
     evidence, start = stage.evidence, stage.start
-    held = None if stage.held is None else with_payload_decided(stage.held, stage.fitted)
+    held = _decided(stage)
     kept = without_superfluous(evidence, held, stage.fitted, list(stage.found), task.progress)
     final = kept.final
     contacts = stage.contacts.confirmed(evidence, held, final)
@@ -297,10 +310,12 @@ def _pruned(stage: _Stage, task: _Task) -> tuple[_Stage, Path]:
         final = fit_evidence(evidence, final.model, final)
     path = path_of(evidence, held, start, final, tuple(kept.found), task.progress)
     path = replace(path, withdrawn=(*kept.unhelpful, *path.withdrawn))
+    if not any(effect.is_payload for effect in path.final.model.effects):
+        evidence = marked(evidence, [one.payload for one in task.train.recordings])
     pruned = replace(
         stage,
         evidence=evidence,
-        held=held,
+        held=contacts.left_out_of_test(stage.held),
         contacts=contacts,
         start=start,
         fitted=path.final,
@@ -311,16 +326,21 @@ def _pruned(stage: _Stage, task: _Task) -> tuple[_Stage, Path]:
 
 def _judge(stage: _Stage, path: Path, task: _Task) -> Diagnosis:
     """Say what held-out data say of the path that the model has gone."""
-    reached = stage.proposals >= task.most > 0
+    reached, held = stage.proposals >= task.most > 0, _decided(stage)
     search = Search(
         evidence=stage.evidence,
         path=path,
         rounds=stage.rounds,
-        disturbances=stage.contacts.disturbances(stage.evidence, stage.held, stage.start),
+        disturbances=stage.contacts.disturbances(stage.evidence, held, stage.start),
         notes=stage.loop.notes,
         limit=task.most if reached and stage.rounds[-1].passing else None,
     )
-    return assemble(search, task.train, task.test, stage.held)
+    return assemble(search, task.train, task.test, held)
+
+
+def _decided(stage: _Stage) -> Evidence | None:
+    """The test recordings, with those marked that carry a payload of the model."""
+    return None if stage.held is None else with_payload_decided(stage.held, stage.fitted)
 
 
 def _has_changed(evidence: Evidence, start: EvidenceFit, fitted: EvidenceFit) -> bool:

@@ -35,8 +35,8 @@ _VERDICTS: dict[Verdict, str] = {
 }
 
 _VERDICTS_WITHOUT_NOISE: dict[Verdict, str] = {
-    "nothing_missing": "No effect in the catalogue is significant and relevant; the noise is "
-    "unknown, so whether something else is missing cannot be said.",
+    "nothing_missing": "No effect in the catalogue is significant, relevant and of use on held-out "
+    "data; the noise is unknown, so whether something else is missing cannot be said.",
     "explained": "Added: {effects}. No further effect is significant and relevant; the noise is "
     "unknown, so whether something else is missing cannot be said.",
     "unexplained": "Added: {effects}. More effects are significant and relevant; the noise is "
@@ -124,6 +124,8 @@ class Diagnosis:
                 f"{', '.join(self.impossible)}. Is the sign, the unit or the order of a column "
                 "wrong, or is the description another robot's?"
             )
+        if self.noise_source == "unknown" and self.verdict == "unexplained" and not effects:
+            return "Effects are significant and relevant, and none was added; the noise is unknown."
         if self.noise_source == "unknown":
             return _VERDICTS_WITHOUT_NOISE[self.verdict].format(effects=effects)
         left = max((j.ratio_after or 0.0 for j in self.joints), default=0.0)

@@ -229,6 +229,6 @@ def noisy(recording: Recording, noise: Noise, stream: np.random.Generator) -> Re
     return recording.replace(q=q, tau=tau)
 
 
-def flagged_run(run: Run, carries: bool) -> Run:
-    """Return a run marked as carrying the payload, or not."""
+def flagged_run(run: Run, carries: bool | None) -> Run:
+    """Return a run marked as carrying the payload, or not, or as nobody knows."""
     return replace(run, replicates=tuple(flagged(v, carries) for v in run.replicates))

@@ -173,7 +173,7 @@ def sample(recording: Recording, settings: Filter | None) -> Sampled:
     )
 
 
-def flagged(sampled: Sampled, payload: bool) -> Sampled:
+def flagged(sampled: Sampled, payload: bool | None) -> Sampled:
     """Return the recording with or without the payload on board."""
     return replace(sampled, recording=sampled.recording.replace(payload=payload))
 

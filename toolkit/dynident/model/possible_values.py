@@ -17,6 +17,7 @@ from dynident.model.torque_model import Model
 from dynident.tables import number
 
 _FAST = 5.0  # friction widths above which the direction of motion is certain
+_ROUNDING = 1e-9  # of an effect's largest value, a standard deviation that stands for none
 _SHARE = 0.01  # of the states at which friction may seem to drive
 
 
@@ -68,6 +69,8 @@ def _beyond_bounds(
         own = model.slices[effect.label]
         parameters = effect.parameters(model.robot)
         for parameter, value, s in zip(parameters, values[own], sigma[own], strict=True):
+            if not s > _ROUNDING * np.abs(values[own]).max(initial=0.0):
+                continue  # the data do not tell it: what it is, is rounding
             slack = deviations * s
             if value < parameter.lower - slack or value > parameter.upper + slack:
                 yield Impossible(
@@ -122,7 +125,7 @@ def _negative_inertia(
     u = vectors[:, :, 0]
     slope = np.einsum("ti,tijp,tj->tp", u, slopes, u)
     doubt = np.sqrt(np.clip(np.sum((slope @ covariance) * slope, axis=1), 0.0, None))
-    negative = least[:, 0] < -deviations * doubt
+    negative = least[:, 0] < -(deviations * doubt + _ROUNDING * np.abs(least[:, -1]))
     if not np.any(negative & (least[:, 0] < 0)):
         return
     t = int(np.argmin(np.where(negative, least[:, 0], np.inf)))

@@ -48,7 +48,8 @@ def usable(recording: Recording) -> Recording:
     if recording.left_out is not None:
         return recording
     start, stop = float(recording.t[0]), float(recording.t[-1])
-    begins, ends = _moves(recording)
+    # Of what repeats, standing still is a part of every repetition.
+    begins, ends = (start, stop) if recording.period else _moves(recording)
     found = []
     if begins - start >= _IDLE:
         found.append(LeftOut(reason=STANDS_STILL, start=start, stop=begins))

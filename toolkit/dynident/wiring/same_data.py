@@ -12,6 +12,8 @@ from dynident.recording.masks import within
 from dynident.tables import percent
 from dynident.wiring.fault import Fault
 
+_RUN = 20  # consecutive samples that are the same recording where they are equal
+_ODD = 0x9E3779B97F4A7C15
 _ROWS = 4000  # of a recording, for comparing columns
 
 
@@ -51,13 +53,25 @@ def shared_recordings(train: Dataset, test: Dataset, criteria: WiringCriteria) -
     )
 
 
-def _samples(recording: Recording) -> list[bytes]:
-    """Positions and torques of each sample within the window, as bytes."""
+def _samples(recording: Recording) -> list[int]:
+    """Fingerprints of each run of `_RUN` samples, positions and torques, within the window.
+
+    Single samples of two recordings of one motion may be alike to the last step of the encoders.
+    """
     kept = slice(None)
     if recording.window is not None:
         kept = within(recording.t, *recording.window, recording.where)
     rows = np.ascontiguousarray(np.column_stack([recording.q[kept], recording.tau[kept]]))
-    return rows.view(f"V{rows.shape[1] * rows.itemsize}").ravel().tolist()
+    bits = rows.view(np.uint64)
+    # Polynomials modulo 2^64 in an odd number, whose products wrap.
+    powers = np.cumprod(np.full(bits.shape[1] + _RUN, _ODD, dtype=np.uint64))
+    each = ((bits ^ (bits >> np.uint64(29))) * powers[: bits.shape[1]]).sum(axis=1, dtype=np.uint64)
+    each ^= each >> np.uint64(31)
+    run = min(_RUN, len(each))
+    found = np.zeros(len(each) - run + 1, dtype=np.uint64)
+    for k in range(run):
+        found += each[k : k + len(found)] * powers[k]
+    return found.tolist()
 
 
 def twice_recorded(dataset: Dataset, criteria: WiringCriteria) -> tuple[Fault, ...]:

@@ -9,6 +9,7 @@ other one says.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from itertools import product
 
@@ -135,7 +136,7 @@ def _best_drop(evidence: Evidence, fitted: EvidenceFit, name: str) -> float:
     every = [e.on(robot) for e in catalogue()[name].candidates(robot) if e.joint is not None]
     each = [candidate_moments(evidence, fitted, [effect])[0] for effect in every]
     choices = payload_choices(evidence.runs, evidence.criteria.search.payload_recordings)
-    price = 2.0 * np.log(max(2 ** len(evidence.runs) - 2, 1))
+    price = 2.0 * math.log(max(2 ** len(evidence.runs) - 2, 1))
     most = -np.inf
     for choice in choices:
         parts = [
@@ -168,7 +169,7 @@ def with_payload(evidence: Evidence, score: Score) -> Evidence:
     """Return the evidence with the runs marked that carry the payload, once that is known."""
     if score.payload_recordings is None:
         return evidence
-    return _flagged(evidence, score.payload_recordings)
+    return marked(evidence, score.payload_recordings)
 
 
 def with_payload_decided(held: Evidence, fitted: EvidenceFit) -> Evidence:
@@ -181,7 +182,7 @@ def with_payload_decided(held: Evidence, fitted: EvidenceFit) -> Evidence:
     said = [run.recording.payload for run in held.runs]
     sums = []
     for carries in (False, True):
-        every = _flagged(held, [carries if one is None else one for one in said])
+        every = marked(held, [carries if one is None else one for one in said])
         misfits = residuals(every, fitted.model, fitted.values)
         halves = [np.array_split(e**2 / fitted.variances, 2, axis=1) for e in misfits]
         sums.append([[float(part.sum()) for part in pair] for pair in halves])
@@ -189,11 +190,17 @@ def with_payload_decided(held: Evidence, fitted: EvidenceFit) -> Evidence:
         all(loaded < without for without, loaded in zip(*pair, strict=True)) if one is None else one
         for one, *pair in zip(said, *sums, strict=True)
     ]
-    return _flagged(held, decided)
+    return marked(held, decided)
 
 
-def _flagged(evidence: Evidence, carries: Sequence[bool]) -> Evidence:
-    """Return the evidence of the same recordings, with or without the payload on board."""
+def marked(evidence: Evidence, carries: Sequence[bool | None]) -> Evidence:
+    """Return the evidence of the same recordings, with or without the payload on board.
+
+    Parameters
+    ----------
+    evidence : of recordings.
+    carries : for each of them, what is known; None for nothing.
+    """
     return evidence.with_runs(
         tuple(flagged_run(run, own) for run, own in zip(evidence.runs, carries, strict=True))
     )

@@ -11,16 +11,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from dynident.diagnosis.search.payload_recordings import with_payload
-from dynident.diagnosis.search.scoring import Score
-from dynident.effects import Block
+from dynident.diagnosis.search.payload_recordings import marked
+from dynident.effects import Block, Effect
 from dynident.errors import RecordingError
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.runs import gather
 from dynident.model import Impossible, Model, impossible_at
 from dynident.recording import Dataset, default_filter
-from dynident.tables import number
+from dynident.tables import percent
 
 _STATES = 50  # of each recording, over which what must hold at every state is asked
 
@@ -101,34 +100,43 @@ def narrower(evidence: Evidence, train: Dataset) -> Evidence | None:
     return Evidence(evidence.model, runs, criteria=evidence.criteria)
 
 
-def follows_the_filter(narrow: Evidence | None, wider: EvidenceFit, one: Score) -> str:
-    """Say by how much an effect's value changes with the filter, if it does.
+def follows_the_filter(
+    evidence: Evidence, narrow: Evidence | None, wider: EvidenceFit, effect: Effect
+) -> str:
+    """Say by how much an effect's torque changes with the filter, if it does.
 
     Parameters
     ----------
+    evidence : the training recordings, marked with those that carry a payload.
     narrow : as from `narrower`.
     wider : the model with the effect, as it fits the recordings behind their own filter.
-    one : the score by which the effect was added.
+    effect : that was added.
 
     Returns
     -------
-    In words; empty where its values are the same, or that does not matter.
+    In words; empty where it makes the same torque, or that does not matter.
     """
     if narrow is None:
         return ""
-    narrow = with_payload(narrow, one)
-    gates, label = narrow.criteria.gates, one.effect.label
+    narrow = marked(narrow, [run.recording.payload for run in evidence.runs])
+    gates, own = narrow.criteria.gates, wider.model.slices[effect.label]
     again = fit_evidence(narrow, wider.model)
-    own = wider.model.slices[label]
-    parameters = one.effect.parameters(wider.model.robot)
-    for k, parameter in zip(range(own.start, own.stop), parameters, strict=True):
-        first, second = wider.values[k], again.values[k]
-        sigma = np.sqrt(np.clip([wider.covariance[k, k], again.covariance[k, k]], 0.0, None))
-        apart = abs(first - second)
-        certain = apart > gates.beyond_bounds * float(sigma.max())
-        if certain and apart > gates.same_value * max(abs(first), abs(second)):
-            return (
-                f"changes with the filter: {parameter.name} = {number(first, 3)} and "
-                f"{number(second, 3)} behind lower cut-offs, so noise in the columns makes it"
-            )
-    return ""
+    first, second = wider.values[own], again.values[own]
+    apart = first - second
+    doubt = again.covariance[own, own]
+    whole = next(e for e in wider.model.effects if e.label == effect.label)
+    squares = np.zeros(4)
+    for run in range(len(evidence.runs)):
+        for columns in narrow.of(whole, run, wider.model, wider.values):
+            rows = columns.reshape(-1, columns.shape[-1])
+            sizes = [rows @ first, rows @ second, rows @ apart]
+            squares[:3] += [float(x @ x) for x in sizes]
+            squares[3] += float(np.sum((rows @ doubt) * rows))
+    once, again_, change, uncertain = np.sqrt(squares)
+    if change <= gates.same_value * max(once, again_) or change <= gates.beyond_bounds * uncertain:
+        return ""
+    share = percent(again_ / once if once > 0 else np.inf, 0)
+    return (
+        f"changes with the filter: behind lower cut-offs its torque is {share} of what it is here, "
+        "so noise in the columns makes it"
+    )

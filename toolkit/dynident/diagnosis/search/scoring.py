@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
@@ -193,7 +194,7 @@ def score(
     with_model_columns = (combination @ fitted.moments.pooled().total)[:p]
     with_noise = combination @ total - with_model_columns @ back
     shapes = len(effect.shape_parameters(fitted.model.robot))
-    price = (part.rank + shapes) * np.log(fitted.rows) + 2.0 * np.log(grid)
+    price = (part.rank + shapes) * np.log(fitted.rows) + 2.0 * math.log(grid)
     penalised = drop - price
     blocks = _block_scores(fitted, with_model, with_self, back, values) @ directions @ part.basis
     return Score(

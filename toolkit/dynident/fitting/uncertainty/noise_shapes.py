@@ -33,9 +33,15 @@ def noise_shapes(sampled: Sampled, lags: int) -> np.ndarray:
     lags : longest lag, in decimated rows.
     """
     parallel, rate = sampled.parallel, sampled.motion.rate_hz
-    f = (np.arange(_GRID) + 0.5) / _GRID * rate / 2
-    power, encoder = filter_power(sampled, f)
-    top = f[np.flatnonzero(power > _OPEN * power.max())[-1]]
+    limit = rate / 2
+    while True:
+        f = (np.arange(_GRID) + 0.5) / _GRID * limit
+        power, encoder = filter_power(sampled, f)
+        top = f[np.flatnonzero(power > _OPEN * power.max())[-1]]
+        if top > limit / 64:
+            break
+        # A narrow passband needs a grid of its own, or bands in it would be empty.
+        limit = 16 * top
     band = np.minimum((f / top * _BANDS).astype(int), _BANDS - 1)
     spectra = [power * (band == b) for b in range(_BANDS)]
     slope = np.sin(2 * np.pi * f / rate) ** 2  # central differences
