@@ -19,8 +19,10 @@ MODEL = Model(arm()) + "viscous_friction" + "coulomb_friction"
 
 def recordings(model: Model, **hidden: float):
     truth = true_values(model, **FRICTION, **hidden)
-    noise = {"rate_hz": 250.0, "position_std": 2e-5, "torque_std": 0.3}
-    return tuple(synthetic(model, truth, 100 + seed, **noise) for seed in range(4))
+    return tuple(
+        synthetic(model, truth, 100 + seed, rate_hz=250.0, position_std=2e-5, torque_std=0.3)
+        for seed in range(4)
+    )
 
 
 def diagnosed(model: Model, **hidden: float) -> Diagnosis:
