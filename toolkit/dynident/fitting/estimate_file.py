@@ -7,6 +7,7 @@ that is wrong.
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from dynident.model import Model
 from dynident.robot import BaseParameters, Robot
 
 _REMEDY = "save one with Estimate.save"
+_TRIED = re.compile(r"(constrained-|list\[)")
 # Of the standard deviations: what rounding makes of a symmetric matrix is far less.
 _SKEW = 1e-6
 
@@ -166,7 +168,9 @@ def _refusal(key: str, what: str, where: str) -> FitError:
 def _first(error: ValidationError) -> tuple[str, str]:
     """The first key that is wrong, and what is wrong with it."""
     first = error.errors(include_url=False, include_input=False)[0]
-    key = ".".join(str(part)[:40] for part in first["loc"]) or "content"
+    # Where a key takes several types, pydantic appends the one that it tried.
+    own = [str(part)[:40] for part in first["loc"] if not _TRIED.match(str(part))]
+    key = ".".join(own) or "content"
     said = {
         "missing": "is missing",
         "model_type": "a table of keys and values is needed",

@@ -167,6 +167,7 @@ def with_friction_width(evidence: Evidence, fitted: EvidenceFit) -> EvidenceFit:
     """
     robot = fitted.model.robot
     dry = [str(e.joint) for e in fitted.model.effects if e.name == "coulomb_friction"]
+    fitted = _reconsidered(evidence, fitted)
     wanted = tuple(FrictionWidthColumn(joint).on(robot) for joint in dry)
     if not wanted:
         return fitted
@@ -181,6 +182,25 @@ def with_friction_width(evidence: Evidence, fitted: EvidenceFit) -> EvidenceFit:
         wider = fit_evidence(evidence, model, fitted)
         if wider.misfit(fitted) < fitted.misfit(fitted):
             fitted = wider
+    return fitted
+
+
+def _reconsidered(evidence: Evidence, fitted: EvidenceFit) -> EvidenceFit:
+    """Return the fit with the stated width where one found before is not worth its price any more.
+
+    While an effect is missing a width may have taken its part. Both are fitted: other friction at
+    the joint has the same width, which a profile of Coulomb friction's leaves as it is.
+    """
+    robot, given = fitted.model.robot, evidence.model.friction_widths
+    now = fitted.model.friction_widths
+    for joint, stated, width in zip(robot.names, given, now, strict=True):
+        if width == stated:
+            continue
+        model = fitted.model.with_friction_width(joint, float(stated))
+        back = fit_evidence(evidence, model, fitted)
+        drop = (back.misfit(back) - fitted.misfit(back)) * fitted.rows / robot.n
+        if drop <= 2.0 * np.log(fitted.rows):
+            fitted = back
     return fitted
 
 
