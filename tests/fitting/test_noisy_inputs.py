@@ -86,7 +86,8 @@ def test_corrected_least_squares_is_right_where_least_squares_is_wrong(noise) ->
     plain = di.fit(model(), noisy())
     off = np.abs(corrected.values - truth()) / corrected.sigma
     assert np.all(off < 4), off
-    assert np.max(np.abs(plain.values - truth()) / plain.sigma) > 50
+    # Its sigma holds the lack of fit that repetitions see, and still not the bias.
+    assert np.max(np.abs(plain.values - truth()) / plain.sigma) > 30
     inertia = corrected.names.index("Izz.fore")
     assert abs(plain.values[inertia]) < 0.7 * truth()[inertia]
     assert "worst direction" in corrected.summary()
