@@ -28,6 +28,7 @@ from dynident.wiring.gear_ratios import (
 from dynident.wiring.wiring_regression import TorqueFit, WiringRegression
 from dynident.wiring.wiring_rows import WiringRows
 
+_LEAST_RATIO = 3.0  # of gears and units; below it is another torque constant
 _OF_SIZE = ("torque_scale", "motor_side")
 """Faults that say of which size a torque is already."""
 _ALIKE = 0.8
@@ -115,7 +116,16 @@ class _Fits:
             motion = self.rows.moved(group[0].mended.change)
             regression = WiringRegression.of(self.model, motion)
             found += [(one, _fit(regression, one)) for one in group]
-        return [*found, *torque_scale_hypotheses(self.regression, self.now, self.start)]
+        scales = torque_scale_hypotheses(self.regression, self.now, self.start)
+        return [*found, *(one for one in scales if _is_no_gain(one[0], self.model))]
+
+
+def _is_no_gain(one: Hypothesis, model: Model) -> bool:
+    """Whether a torque's scale is no drive gain: neither of a few times, nor in the model."""
+    known = {effect.joint for effect in model.effects if effect.name == "drive_gain"}
+    if any(model.robot.names[joint] in known for joint in one.joints):
+        return False
+    return max(one.ratios[0], 1.0 / one.ratios[0]) >= _LEAST_RATIO
 
 
 def _settled(

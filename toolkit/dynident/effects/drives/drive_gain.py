@@ -26,8 +26,8 @@ class DriveGain(Forceless, JointEffect):
     linear_in_torque = True
 
     def parameters(self, robot):
-        # Beyond a factor of 1.5 it is another unit, or another column, and no torque constant.
-        return (Parameter("e", "1", -1 / 3, 0.5),)
+        # Beyond half and twice it is another unit, or another column, and no torque constant.
+        return (Parameter("e", "1", -0.5, 1.0),)
 
     def at_joint(self, block: Block) -> np.ndarray:
         if block.torque is None:
