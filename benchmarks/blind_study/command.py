@@ -9,7 +9,8 @@
 says to answers.jsonl; cases that are in there are not asked again. `table` compares the answers
 with the truth; `report` prints what is right and what is claimed without reason. `--plant mujoco`
 lets MuJoCo move robots of two to seven joints; `--filter` writes a setting of [filter] into the
-studies, or each of six in turn; `--healthy-only` hides nothing.
+studies, or each of six in turn; `--healthy-only` hides nothing. What has no answer within `--limit`
+counts as a case without an answer; 0 waits for as long as it takes.
 
 With `--backend dask` joblib spreads the cases over the cluster whose scheduler `--scheduler` names
 (its workers need this package and `benchmarks` on their PYTHONPATH, and the folder in common).
@@ -60,6 +61,7 @@ def main(arguments: list[str] | None = None) -> None:
     run.add_argument("--effects", nargs="*", help="only cases that hide one of these")
     run.add_argument("--numbers", type=int, nargs="*", help="only these cases")
     run.add_argument("--jobs", type=int, default=2)
+    run.add_argument("--limit", type=_seconds, default=600.0, help="s that an answer may take")
     run.add_argument("--backend", default="loky", help="of joblib: loky, dask ...")
     run.add_argument("--scheduler", help="address of a Dask scheduler")
     run.add_argument("--data", choices=("keep", "drop"), default="drop", help="recordings")
@@ -73,13 +75,20 @@ def main(arguments: list[str] | None = None) -> None:
         one.add_argument("--out", type=Path, default=USUAL, help="folder of the study")
     options = parser.parse_args(arguments)
     if options.command == "run":
-        place = Place(options.out.resolve(), options.data)
+        place = Place(options.out.resolve(), options.data, options.limit)
         size = Size(*options.rates, *options.runs)
         run_study(_chosen(options), place, size, options)
     if options.command == "report" or (options.command == "run" and _is_wider(options)):
         print_report(options.out)
     else:
         show(options.out)
+
+
+def _seconds(text: str) -> float:
+    seconds = float(text)
+    if not 0 <= seconds < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is no time limit: give seconds, or 0 for none")
+    return seconds
 
 
 def _is_wider(options: argparse.Namespace) -> bool:

@@ -15,6 +15,7 @@ from typing import Any
 from blind_study.cases import Case
 from blind_study.filters import state
 from blind_study.make import Size, make, unavailable
+from blind_study.time_limit import TimeUp, time_limit
 from blind_study.writing import write_truth
 from dynident.errors import DynidentError
 from dynident.threads import single_threaded
@@ -28,10 +29,12 @@ class Place:
     ----------
     folder : of everything.
     data : "keep", or "drop" to delete a case's recordings once it is answered.
+    limit_s : how long each answer may take; 0 for as long as it takes.
     """
 
     folder: Path
     data: str = "keep"
+    limit_s: float = 0.0
 
     def data_of(self, case: Case) -> Path:
         return self.folder / "data" / case.name
@@ -72,7 +75,7 @@ def answer(
     for said, filter in zip(each, filters, strict=True):
         if filter != "none":
             state(folder / "study.toml", filter, truth["rate_hz"])
-        said |= {"made_s": made, **explain(folder / "study.toml")}
+        said |= {"made_s": made, **explain(folder / "study.toml", place.limit_s)}
     if place.data == "drop":
         shutil.rmtree(folder)
     return each
@@ -83,15 +86,22 @@ def _about(case: Case, filter: str) -> dict[str, Any]:
     return said if filter == "none" else {**said, "case": case.name, "filter": filter}
 
 
-def explain(study: Path) -> dict[str, Any]:
-    """Run `dynident explain --json`; return its answer and its processor time."""
+def explain(study: Path, limit_s: float = 0.0) -> dict[str, Any]:
+    """Run `dynident explain --json`; return its answer and its processor time.
+
+    Where none has come within `limit_s` (0: without limit), that is the error.
+    """
     from dynident.cli import main
 
     out, err, status = io.StringIO(), io.StringIO(), 0
     started = time.process_time()
     with redirect_stdout(out), redirect_stderr(err):
         try:
-            main(["explain", str(study), "--json"])
+            with time_limit(limit_s):
+                main(["explain", str(study), "--json"])
+        except TimeUp:
+            spent = time.process_time() - started
+            return {"cpu_s": spent, "status": -1, "error": f"no answer within {limit_s:g} s"}
         except SystemExit as stop:
             status = int(stop.code or 0)
         except Exception as error:  # a traceback is an answer too: a wrong one

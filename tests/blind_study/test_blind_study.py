@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import signal
+import time
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +19,11 @@ from blind_study.foreign import EFFECTS, FOREIGN
 from blind_study.judge import judge, same
 from blind_study.make import Size, make, unavailable
 from blind_study.rate import Rate
+from blind_study.report import summary
 from blind_study.robots import specimen
 from blind_study.strengths import KNOWN, start
 from blind_study.table import figures, load
+from blind_study.worker import Place, explain
 from dynident.effects import catalogue
 from dynident.fitting import fit
 from dynident.study import load as load_study
@@ -104,9 +109,26 @@ def test_a_study_is_run_judged_and_goes_on_where_it_stopped(tmp_path: Path, capf
 
 
 def answered_names(folder: Path) -> set[str]:
-    from blind_study.worker import Place
-
     return answered(Place(folder))
+
+
+def test_what_has_no_answer_in_time_is_stopped_and_counted_as_not_answered(monkeypatch) -> None:
+    def endless(_: list[str]) -> None:
+        while True:
+            with suppress(Exception):
+                time.sleep(0.01)
+
+    monkeypatch.setattr("dynident.cli.main", endless)
+    before = signal.getsignal(signal.SIGALRM)
+    said = explain(Path("study.toml"), 0.05)
+    assert said["error"] == "no answer within 0.05 s" and "answer" not in said
+    assert signal.getsignal(signal.SIGALRM) == before
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+    late = judge(_truth("joint_spring", "a"), {"name": "x", **said})
+    assert late.broken == said["error"] and not late.right
+    for rates in (figures([late]), summary([late])):
+        (unanswered,) = [one for one in rates if one.what == "cases without an answer"]
+        assert unanswered.held == [True]
 
 
 def _truth(effect: str, joint: str | None, kind: str = "known", ratio: float = 3.0) -> dict:
