@@ -116,6 +116,28 @@ class ContactCriteria(CriteriaGroup):
 class NuisanceCriteria(CriteriaGroup):
     """What is allowed for beside contacts: friction widths, the steps of encoders."""
 
+    narrowest_width: float = criterion(
+        0.02,
+        "1",
+        "narrowest friction width over the stated one that is tried: below it dry friction has "
+        "reversed between two samples",
+        over=0,
+        most=1,
+    )
+    widest_width: float = criterion(
+        15.0,
+        "1",
+        "widest friction width over the stated one that is tried: above it dry friction is "
+        "viscous friction",
+        least=1,
+    )
+    widths: int = criterion(13, "1", "friction widths between these two that are tried", least=3)
+    at_bound: float = criterion(
+        1.05,
+        "1",
+        "factor of the narrowest or widest width within which a width is said to be a bound only",
+        least=1,
+    )
     rounding_recordings: int = criterion(
         2, "recordings", "recordings along which the steps of encoders are looked at", least=1
     )

@@ -19,6 +19,7 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 from scipy.stats import chi2
 
+from dynident.criteria import DEFAULTS
 from dynident.diagnosis.search.ranking import rank
 from dynident.diagnosis.search.scoring import candidate_moments
 from dynident.effects import Block, Effect, JointEffect, Parameter, ShapeParameter, catalogue
@@ -28,10 +29,7 @@ from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import regress
 from dynident.tables import number
 
-_LEAST, _MOST = 0.02, 15.0  # times the model's width, between which it is sought
-_GRID = 13
 _RIVALS = ("viscous_friction", "quadratic_drag")
-_AT_BOUND = 1.05  # times a bound, within which the width is at it
 
 
 class FrictionWidthColumn(JointEffect):
@@ -48,7 +46,10 @@ class FrictionWidthColumn(JointEffect):
 
     def shape_parameters(self, robot):
         grid = (0.1, 0.3, 2.0, 4.0, 8.0)
-        return (ShapeParameter("k", "1", grid, lower=_LEAST, upper=_MOST),)
+        # It only says whether another width is called for; which one, the profile says.
+        own = DEFAULTS.nuisances
+        bounds = {"lower": own.narrowest_width, "upper": own.widest_width}
+        return (ShapeParameter("k", "1", grid, **bounds),)
 
     def at_joint(self, block: Block) -> np.ndarray:
         v = block.v[:, [block.index(self.joint)]]
@@ -79,7 +80,9 @@ class WidthProfile:
         """Factors of the model's width, between the bounds that the given width sets."""
         given = self.evidence.model
         stated = float(given.friction_widths[given.robot.names.index(self.joint)])
-        return np.geomspace(_LEAST, _MOST, _GRID) * stated / self.width
+        own = self.evidence.criteria.nuisances
+        tried = np.geomspace(own.narrowest_width, own.widest_width, own.widths)
+        return tried * stated / self.width
 
     def missed(self, factors: np.ndarray) -> np.ndarray:
         """Squared systematic residual, whitened, with widths that are so many times the model's."""
@@ -108,7 +111,7 @@ class WidthProfile:
         grid = self._grid()
         missed = self.missed(grid)
         k = int(np.argmin(missed))
-        low, high = grid[max(k - 1, 0)], grid[min(k + 1, _GRID - 1)]
+        low, high = grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)]
         found = minimize_scalar(
             lambda x: self.missed(np.exp([x]))[0],
             bounds=(np.log(low), np.log(high)),
@@ -222,13 +225,14 @@ def _at(name: str, joint: str) -> Effect:
 def friction_width_notes(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
     """Joints whose dry friction has another width than the given model's, in plain words."""
     model, given, notes = fitted.model, evidence.model.friction_widths, []
+    own = evidence.criteria.nuisances
     for joint, unit, stated in zip(model.robot.names, model.robot.units, given, strict=True):
         profile = WidthProfile(evidence, fitted, joint)
         if f"coulomb_friction@{joint}" not in model.slices or profile.width == stated:
             continue
         low, high = profile.interval()
-        low = 0.0 if profile.width <= _AT_BOUND * _LEAST * stated else low
-        high = np.inf if profile.width >= _MOST * stated / _AT_BOUND else high
+        low = 0.0 if profile.width <= own.at_bound * own.narrowest_width * stated else low
+        high = np.inf if profile.width >= own.widest_width * stated / own.at_bound else high
         if low > 0 and np.isfinite(high):
             known = f"is {number(profile.width, 2)} {unit}/s (95 % interval {number(low, 2)} to "
             known += f"{number(high, 2)})"
