@@ -18,7 +18,6 @@ FaultKind = Literal[
     "motor_side_position",
     "motor_side_torque",
     "torque_scale",
-    "position_range",
     "same_data",
     "one_source",
     "period",
