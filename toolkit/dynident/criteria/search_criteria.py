@@ -173,7 +173,37 @@ class GateCriteria(CriteriaGroup):
         least=0,
     )
     beyond_bounds: float = criterion(
-        3.0, "1", "standard deviations by which one of several values may leave its bounds"
+        3.0,
+        "1",
+        "standard deviations by which one of several values may leave its bounds, and an inertia "
+        "or a joint's friction may be below zero",
+        over=0,
+    )
+    states: int = criterion(
+        50,
+        "states",
+        "states of each recording, evenly spread, at which inertia and friction must be possible",
+        least=2,
+    )
+    surely_moving: float = criterion(
+        5.0,
+        "1",
+        "speed over the friction width above which the direction of motion is certain",
+        least=0,
+    )
+    may_drive: float = criterion(
+        0.01,
+        "1",
+        "share of the states in motion at which a joint's friction may seem to drive it",
+        least=0,
+        most=1,
+    )
+    worth_a_word: float = criterion(
+        0.02,
+        "1",
+        "share of a joint's torque that a negative inertia or friction must make, for a model "
+        "without a residual to be called incomplete",
+        least=0,
     )
 
 

@@ -90,9 +90,3 @@ class WiringCriteria(CriteriaGroup):
     period_left: float = criterion(
         0.1, "1", "difference of positions, over the motion, with which a motion repeats", over=0
     )
-    impossible_z: float = criterion(
-        3.0, "1", "standard deviations below zero of an inertia or friction that cannot be", over=0
-    )
-    worth_a_word: float = criterion(
-        0.02, "1", "share of a joint's torque below which such a value is not worth a word"
-    )

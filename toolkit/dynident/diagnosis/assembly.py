@@ -19,6 +19,7 @@ from dynident.diagnosis.nuisances.contacts import Disturbance, contact_candidate
 from dynident.diagnosis.nuisances.quantisation import rounding_notes, with_rounding
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.ranking import Ranking
+from dynident.diagnosis.search.refusal import impossible_joints_of
 from dynident.diagnosis.search.withdrawal import Path
 from dynident.diagnosis.verdict import noise_source, notes_on, verdict_of
 from dynident.errors import FitError
@@ -100,6 +101,11 @@ def assemble(
     steps = (*contacts, *_advised(steps, Adviser.of(evidence, stages[-1])))
     source = noise_source(evidence, held)
     verdict = verdict_of(before, after, steps, rounds[-1], evidence.criteria.verdict)
+    final = _estimate(evidence, stages[-1], train)
+    impossible = ()
+    if verdict != "unexplained":
+        impossible = impossible_joints_of(evidence, final.model, final.values, final.covariance)
+        verdict = "unexplained" if impossible else verdict
     complete = verdict == "nothing_missing"
     limits = detection_limits(evidence, held, stages[-1], rounds[-1]) if complete else ()
     pushed = contact_candidates(given, evidence, search.disturbances)
@@ -113,7 +119,7 @@ def assemble(
         candidates=_revealed(first, evidence, start),
         remaining=_candidates(rounds[-1], after.error, stages[-1]),
         before=_estimate(evidence, start, train),
-        after=_estimate(evidence, stages[-1], train),
+        after=final,
         maps=residual_maps(given, before, after, evidence.criteria.maps),
         traces=_traces(given, before, after),
         notes=(
@@ -123,6 +129,7 @@ def assemble(
         ),
         test_sources=sources_of(test) if test is not None else (),
         criteria=evidence.criteria,
+        impossible=impossible,
         withdrawn=path.withdrawn,
         rows=rows_of_recordings(train if test is None else train + test),
         limit=search.limit,

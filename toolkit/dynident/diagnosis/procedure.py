@@ -52,7 +52,7 @@ from dynident.diagnosis.search.selection import (
 )
 from dynident.diagnosis.search.shaped_fit import refitted, shaped
 from dynident.diagnosis.search.withdrawal import Path, path_of
-from dynident.diagnosis.wiring_answer import Wiring
+from dynident.diagnosis.wiring_answer import answered_by
 from dynident.effects import Effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
@@ -63,6 +63,7 @@ from dynident.fitting.estimate import Estimate
 from dynident.model import Model
 from dynident.recording import Dataset, numbered
 from dynident.threads import single_threaded
+from dynident.wiring import check_wiring
 
 _WITHDRAWALS = 8  # times that the search goes on after something was withdrawn
 
@@ -109,13 +110,13 @@ def diagnose(
     train, *others = numbered(train, *([] if test is None else [test]))
     progress("checking the wiring")
     held_out = others[0] if others else None
-    wiring = Wiring.of(given, train, held_out, criteria.wiring)
-    most = 0 if wiring.faults else most
+    faults = check_wiring(given, train, held_out, criteria.wiring)
+    most = 0 if faults else most
     task = _Task(train=train, test=held_out, most=most, progress=progress)
     start = _compare(given, controller, criteria, task)
     extended = _extend(_rank(start, task), task)
     settled, path = _settle(_search_globally(start, extended, task), task)
-    return wiring.heeded(_judge(settled, path, task))
+    return answered_by(faults, _judge(settled, path, task))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ torque; and of a whole recording once. Whether values are possible together says
 `possible_values`.
 """
 
-from dynident.model.possible_values import Impossible, impossible_at
+from dynident.model.possible_values import Impossible, impossible_at, impossible_joints
 from dynident.model.torque_model import Model
 
-__all__ = ["Impossible", "Model", "impossible_at"]
+__all__ = ["Impossible", "Model", "impossible_at", "impossible_joints"]

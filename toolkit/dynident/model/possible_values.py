@@ -2,7 +2,10 @@
 
 In: a model, its values with their covariance, and states. Out: what no robot can have. A single
 parameter may pass every test and still make friction that drives the joint, or a mass matrix that
-is not positive definite, together with the others.
+is not positive definite, together with the others; and of friction that falls with speed one
+coefficient is negative in a joint that is possible.
+
+Everything is judged by its z score: how many standard deviations it is on the wrong side of zero.
 """
 
 from __future__ import annotations
@@ -12,13 +15,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dynident.criteria import GateCriteria
 from dynident.effects import Block, Effect, Parameter
 from dynident.model.torque_model import Model
 from dynident.tables import number
 
-_FAST = 5.0  # friction widths above which the direction of motion is certain
-_ROUNDING = 1e-9  # of an effect's largest value, a standard deviation that stands for none
-_SHARE = 0.01  # of the states at which friction may seem to drive
+_ROUNDING = 1e-9  # of a value, a standard deviation that stands for none
+_ALONE = ("viscous_friction", "coulomb_friction")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,8 +41,26 @@ class Impossible:
         return self.what
 
 
+@dataclass(frozen=True, kw_only=True)
+class ImpossibleJoint(Impossible):
+    """A joint whose inertia or friction is below zero, all parameters taken together.
+
+    Attributes
+    ----------
+    joint : its name.
+    torque : N m or N, about the rms of what this inertia or friction makes at the joint.
+    """
+
+    joint: str
+    torque: float
+
+
 def impossible_at(
-    model: Model, values: np.ndarray, covariance: np.ndarray, states: Block, deviations: float
+    model: Model,
+    values: np.ndarray,
+    covariance: np.ndarray,
+    states: Block,
+    criteria: GateCriteria,
 ) -> tuple[Impossible, ...]:
     """Return what the values of a model make that no robot can have.
 
@@ -48,17 +69,57 @@ def impossible_at(
     model : a robot with its effects.
     values, covariance : (p,) and (p, p) of its parameters.
     states : (T,) recorded ones, as of `Model.block`.
-    deviations : standard deviations by which something must be on the wrong side of zero.
+    criteria : how many standard deviations are beyond doubt, and when a joint moves.
 
     Returns
     -------
-    Parameters beyond their bounds, friction that drives a joint, inertia that is not positive.
+    Parameters beyond their bounds, and what `impossible_joints` finds.
     """
     return (
-        *_beyond_bounds(model, values, covariance, deviations),
-        *_driving_friction(model, values, covariance, states, deviations),
-        *_negative_inertia(model, values, covariance, states, deviations),
+        *_beyond_bounds(model, values, covariance, criteria.beyond_bounds),
+        *impossible_joints(model, values, covariance, states, criteria),
     )
+
+
+def impossible_joints(
+    model: Model,
+    values: np.ndarray,
+    covariance: np.ndarray,
+    states: Block,
+    criteria: GateCriteria,
+) -> tuple[ImpossibleJoint, ...]:
+    """Return the joints whose inertia or friction is negative beyond doubt.
+
+    Judged is what acts: the joint-space inertia, bodies and rotors together, and the power that all
+    friction of a joint takes.
+
+    Parameters
+    ----------
+    model, values, covariance, states, criteria : as in `impossible_at`.
+
+    Returns
+    -------
+    Friction that drives a joint, on average or where it is fast; inertia felt at a joint that is
+    negative on average, else the mass matrix where it is not positive definite.
+    """
+    fitted = _Fitted(model=model, values=values, covariance=covariance, states=states)
+    return (*_driving_friction(fitted, criteria), *_negative_inertia(fitted, criteria))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Fitted:
+    model: Model
+    values: np.ndarray
+    covariance: np.ndarray
+    states: Block
+
+    def judged(self, combination: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Sums (..., p) @ values, their standard deviations, and z: how far they are below zero."""
+        value = combination @ self.values
+        variance = np.sum((combination @ self.covariance) * combination, axis=-1)
+        std = np.sqrt(np.clip(variance, 0.0, None))
+        told = std > _ROUNDING * np.abs(value)  # else it is rounding that the data do not tell
+        return value, std, np.where(told, -value / np.where(told, std, 1.0), 0.0)
 
 
 def _beyond_bounds(
@@ -84,57 +145,84 @@ def _unit(parameter: Parameter) -> str:
     return "" if parameter.unit == "1" else f"{parameter.unit} "
 
 
-def _driving_friction(
-    model: Model, values: np.ndarray, covariance: np.ndarray, states: Block, deviations: float
-) -> Iterator[Impossible]:
-    """Joints whose friction, all of it together, works with the motion where that was recorded."""
+def _driving_friction(fitted: _Fitted, criteria: GateCriteria) -> Iterator[ImpossibleJoint]:
+    """Joints whose friction, all of it together, works with the motion."""
+    model, states = fitted.model, fitted.states
     for j, joint in enumerate(model.robot.names):
         every = [e for e in model.effects if e.joint == joint and e.opposes_motion]
-        if not any(e.name not in ("viscous_friction", "coulomb_friction") for e in every):
-            continue  # what these two do alone stands in their bounds
-        columns = np.hstack([e.acting_columns(states)[:, 0] for e in every])
-        own = np.concatenate([np.r_[model.slices[e.label]] for e in every])
+        if not every or not np.any(states.v[:, j]):
+            continue
         v = states.v[:, j]
-        power = v * (columns @ values[own])
-        doubt = np.abs(v) * np.sqrt(np.sum((columns @ covariance[np.ix_(own, own)]) * columns, 1))
-        moving = np.abs(v) > _FAST * model.friction_widths[j]
-        driving = moving & (power < -deviations * doubt)
-        if np.count_nonzero(driving) > _SHARE * max(np.count_nonzero(moving), 1):
-            worst = int(np.argmin(np.where(driving, power, np.inf)))
-            yield Impossible(
-                where=f"friction at {joint}",
-                what=f"friction at {joint} that drives it, at {number(v[worst], 2)} "
-                f"{model.robot.units[j]}/s",
-            )
+        power = np.zeros((len(v), model.size))
+        for effect in every:
+            columns = effect.acting_columns(states)[:, 0]
+            power[:, model.slices[effect.label]] = v[:, None] * columns
+        value, std, z = map(float, fitted.judged(power.mean(axis=0)))
+        torque, at = abs(value) / _rms(v), ""
+        if not z > criteria.beyond_bounds:
+            if all(e.name in _ALONE for e in every):
+                continue  # what these two do at one speed stands in their bounds
+            moving = np.abs(v) > criteria.surely_moving * model.friction_widths[j]
+            each, stds, zs = fitted.judged(power)
+            driving = moving & (zs > criteria.beyond_bounds)
+            if np.count_nonzero(driving) <= criteria.may_drive * np.count_nonzero(moving):
+                continue
+            worst = int(np.argmin(np.where(driving, each, np.inf)))
+            value, std = float(each[worst]), float(stds[worst])
+            torque = abs(value / v[worst])
+            at = f" at {number(v[worst], 2)} {model.robot.units[j]}/s"
+        yield ImpossibleJoint(
+            where=f"friction at {joint}",
+            what=f"the friction at {joint} ({number(value, 3)} +- {number(std, 2)} W{at})",
+            joint=joint,
+            torque=float(torque),
+        )
 
 
-def _negative_inertia(
-    model: Model, values: np.ndarray, covariance: np.ndarray, states: Block, deviations: float
-) -> Iterator[Impossible]:
-    """The mass matrix, rotors in it, where it is not positive definite."""
+def _negative_inertia(fitted: _Fitted, criteria: GateCriteria) -> Iterator[ImpossibleJoint]:
+    """The mass matrix, rotors in it: its mean diagonal, else where it is not positive definite."""
+    model, names = fitted.model, fitted.model.robot.names
+    slopes = _mass_matrix_by_value(model, fitted.states)
+    own = np.diagonal(slopes, axis1=1, axis2=2).mean(axis=0).T  # (n, p)
+    values, stds, z = fitted.judged(own)
+    for j in np.flatnonzero(z > criteria.beyond_bounds):
+        unit = "kg m^2" if model.robot.kinds[j] == "revolute" else "kg"
+        what = f"the inertia at {names[j]} ({number(values[j], 3)} +- {number(stds[j], 2)} {unit})"
+        torque = float(abs(values[j]) * _rms(fitted.states.a[:, j]))
+        yield ImpossibleJoint(
+            where=f"inertia at {names[j]}", what=what, joint=names[j], torque=torque
+        )
+    if np.any(z > criteria.beyond_bounds):
+        return
+    least, vectors = np.linalg.eigh(slopes @ fitted.values)
+    u = vectors[:, :, 0]
+    _, stds, z = fitted.judged(np.einsum("ti,tijp,tj->tp", u, slopes, u))
+    negative = (z > criteria.beyond_bounds) & (least[:, 0] < -_ROUNDING * np.abs(least[:, -1]))
+    if np.any(negative):
+        t = int(np.argmin(np.where(negative, least[:, 0], np.inf)))
+        j = int(np.argmax(np.abs(u[t])))
+        along = np.sum(fitted.states.a * u[t], axis=1)
+        yield ImpossibleJoint(
+            where="mass matrix",
+            what=f"the inertia felt at {names[j]} with the others moving "
+            f"({number(least[t, 0], 3)} +- {number(stds[t], 2)} in SI units)",
+            joint=names[j],
+            torque=float(abs(least[t, 0] * u[t, j]) * _rms(along)),
+        )
+
+
+def _mass_matrix_by_value(model: Model, states: Block) -> np.ndarray:
+    """Slopes (T, n, n, p) of the mass matrix by the values of the model, gravity off."""
     still = replace(states, v=np.zeros_like(states.v), a=np.zeros_like(states.a), rigid=None)
     bodies = [e for e in model.effects if e.is_instantaneous and not e.is_payload]
     at_rest = _accelerated(model, bodies, still)
     n = model.robot.n
-    slopes = np.empty((len(states.t), n, n, model.size))  # of M_ij by the values
+    slopes = np.empty((len(states.t), n, n, model.size))
     for j in range(n):
         a = np.zeros_like(states.a)
         a[:, j] = 1.0
         slopes[:, :, j] = _accelerated(model, bodies, replace(still, a=a)) - at_rest
-    least, vectors = np.linalg.eigh(slopes @ values)
-    u = vectors[:, :, 0]
-    slope = np.einsum("ti,tijp,tj->tp", u, slopes, u)
-    doubt = np.sqrt(np.clip(np.sum((slope @ covariance) * slope, axis=1), 0.0, None))
-    negative = least[:, 0] < -(deviations * doubt + _ROUNDING * np.abs(least[:, -1]))
-    if not np.any(negative & (least[:, 0] < 0)):
-        return
-    t = int(np.argmin(np.where(negative, least[:, 0], np.inf)))
-    j = int(np.argmax(np.abs(u[t])))
-    yield Impossible(
-        where="mass matrix",
-        what=f"a negative inertia felt at {model.robot.names[j]} "
-        f"({number(least[t, 0], 2)} in SI units)",
-    )
+    return slopes
 
 
 def _accelerated(model: Model, bodies: list[Effect], block: Block) -> np.ndarray:
@@ -147,3 +235,7 @@ def _accelerated(model: Model, bodies: list[Effect], block: Block) -> np.ndarray
     for effect in bodies:
         columns[:, :, model.slices[effect.label]] = effect.columns(block)
     return columns
+
+
+def _rms(x: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(x**2)))

@@ -18,13 +18,9 @@ tells, the unit of all torques, is judged by the described bodies (`described_to
 
 Of data: the same samples in training and test recordings, one source of two columns (`same_data`),
 a period after which the motion does not repeat (`stated_period`).
-
-`impossible_values` looks at a model that was fitted: an inertia or friction below zero by three
-standard deviations is no model of a robot, whatever its residual.
 """
 
 from dynident.wiring.fault import Fault
-from dynident.wiring.impossible_values import impossible_values
 from dynident.wiring.wiring_check import check_wiring
 
-__all__ = ["Fault", "check_wiring", "impossible_values"]
+__all__ = ["Fault", "check_wiring"]

@@ -17,19 +17,17 @@ from dynident.errors import RecordingError
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.runs import gather
-from dynident.model import Impossible, Model, impossible_at
+from dynident.model import Impossible, Model, impossible_at, impossible_joints
 from dynident.recording import Dataset, default_filter
 from dynident.tables import percent
-
-_STATES = 50  # of each recording, over which what must hold at every state is asked
 
 
 def recorded_states(evidence: Evidence, model: Model) -> Block:
     """Return states of all recordings, spread evenly over each, as effects see them."""
-    blocks = []
+    blocks, many = [], evidence.criteria.gates.states
     for run in evidence.runs:
         rows = run.rows(model)
-        at = np.unique(np.linspace(0, len(rows.t) - 1, _STATES).round().astype(int))
+        at = np.unique(np.linspace(0, len(rows.t) - 1, many).round().astype(int))
         warm = None if rows.temperature is None else rows.temperature[at]
         some = replace(rows, t=rows.t[at], q=rows.q[at], v=rows.v[at], a=rows.a[at])
         blocks.append(replace(some, temperature=warm))
@@ -51,8 +49,30 @@ def impossible_in(evidence: Evidence, fitted: EvidenceFit) -> tuple[Impossible, 
         fitted.values,
         fitted.covariance,
         recorded_states(evidence, fitted.model),
-        evidence.criteria.gates.beyond_bounds,
+        evidence.criteria.gates,
     )
+
+
+def impossible_joints_of(
+    evidence: Evidence, model: Model, values: np.ndarray, covariance: np.ndarray
+) -> tuple[str, ...]:
+    """Say which joints of a model have an inertia, or a friction, that is negative beyond doubt.
+
+    Parameters
+    ----------
+    evidence : the training recordings.
+    model, values, covariance : the model, (p,) and (p, p) of its parameters.
+
+    Returns
+    -------
+    A clause for each that makes a part of the joint's torque that is worth a word.
+    """
+    gates, names = evidence.criteria.gates, model.robot.names
+    torque = np.concatenate([run.replicates[0].tau for run in evidence.runs])
+    least = gates.worth_a_word * np.sqrt(np.mean(torque**2, axis=0))
+    states = recorded_states(evidence, model)
+    found = impossible_joints(model, values, covariance, states, gates)
+    return tuple(one.what for one in found if one.torque > least[names.index(one.joint)])
 
 
 def newly_impossible(evidence: Evidence, fitted: EvidenceFit, wider: EvidenceFit) -> str:
