@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from dynident import diagnose as find
-from dynident.diagnosis import Diagnosis
+from dynident.diagnosis import Diagnosis, procedure
+from dynident.diagnosis.search.ranking import rank
+from dynident.diagnosis.search.selection import breaks_its_promise
+from dynident.effects import effects_of
+from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence_fit import fit_evidence
+from dynident.evidence.runs import gather
 from dynident.model import Model
 from dynident.recording import Dataset
 from synthetic import arm, synthetic, true_values
@@ -12,12 +20,17 @@ FULL = Model(arm()) + "viscous_friction" + "coulomb_friction"
 FRICTION = {"Fv__shoulder": 1.2, "Fv__elbow": 0.5, "Fc__shoulder": 1.5, "Fc__elbow": 0.6}
 
 
-def diagnosed(**changed: float) -> Diagnosis:
-    truth = true_values(FULL, **{**FRICTION, **changed})
-    each = tuple(
-        synthetic(FULL, truth, seed, rate_hz=250.0, position_std=2e-5, torque_std=0.3)
-        for seed in range(3)
+def recordings(true: Model, changed: dict[str, float], many: int) -> Dataset:
+    truth = true_values(true, **{**FRICTION, **changed})
+    made = (
+        synthetic(true, truth, seed, rate_hz=250.0, position_std=2e-5, torque_std=0.3)
+        for seed in range(many)
     )
+    return Dataset(tuple(made))
+
+
+def diagnosed(true: Model = FULL, **changed: float) -> Diagnosis:
+    each = recordings(true, changed, 3).recordings
     return find(FULL, Dataset(each[:2]), Dataset(each[2:]))
 
 
@@ -36,3 +49,27 @@ def test_the_same_model_of_a_robot_that_can_be_is_complete() -> None:
     """One negative coefficient is no fault where friction as a whole takes power."""
     found = diagnosed(Fv__elbow=-0.1, Fc__elbow=1.5)
     assert found.verdict == "nothing_missing" and found.impossible == ()
+
+
+def test_after_an_effect_that_breaks_its_promise_the_next_best_is_tried(monkeypatch) -> None:
+    def broken(fitted, wider, one) -> str:
+        return "keeps no promise" if one.effect.name == "quadratic_drag" else ""
+
+    monkeypatch.setattr(procedure, "breaks_its_promise", broken)
+    true = FULL + "quadratic_drag@shoulder" + "torque_offset@elbow"
+    found = diagnosed(true, Fq__shoulder=0.8, offset__elbow=0.4)
+    assert "torque_offset@elbow" in [one.effect.label for one in found.steps]
+    assert not [one for one in found.steps if one.effect.name == "quadratic_drag"]
+    (drag,) = (c for c in found.candidates if c.effect.label == "quadratic_drag@shoulder")
+    assert drag.status == "not_material" and drag.remark == "keeps no promise"
+
+
+def test_a_promise_is_broken_by_what_is_fitted_not_by_what_it_was_scored() -> None:
+    """Of a filtered dynamic regressor: fitted as if it had no part, it explains nothing."""
+    evidence = Evidence(FULL, gather(recordings(FULL, {}, 2)))
+    fitted = fit_evidence(evidence, FULL)
+    (one,) = rank(evidence, fitted, 0, only=effects_of("joint_elasticity@elbow", FULL.robot)).scores
+    promising = replace(one, drop=0.5 * fitted.error_signal)
+    assert "explains 0.0 % of the residual" in breaks_its_promise(fitted, fitted, promising)
+    assert "promise 50.0 %" in breaks_its_promise(fitted, fitted, promising)
+    assert breaks_its_promise(fitted, fitted, replace(one, drop=0.0)) == ""

@@ -224,13 +224,9 @@ def _extend(stage: _Stage, task: _Task) -> _Stage:
     """Add the best effect, refit, and rank again, until none passes every gate."""
     while stage.proposals < task.most and not _resolved(stage, task):
         best = choose(stage.evidence, stage.fitted, stage.rounds[-1])
-        wider = None if best is None else _add_and_refit(stage, best, task)
-        if best is None or wider is None:
+        if best is None:
             break
-        why = newly_impossible(wider.evidence, stage.fitted, wider.fitted)
-        why = why or follows_the_filter(
-            wider.evidence, stage.narrow, wider.fitted, best.score.effect
-        )
+        wider, why = _tried(stage, best, task)
         if why:
             ranking = stage.rounds[-1].refusing({best.score.effect.label: why})
             stage = replace(stage, rounds=(*stage.rounds[:-1], ranking))
@@ -239,29 +235,39 @@ def _extend(stage: _Stage, task: _Task) -> _Stage:
     return stage
 
 
-def _add_and_refit(stage: _Stage, best: AddedEffect, task: _Task) -> _Stage | None:
-    """Return the model with one effect more, all of it fitted anew.
+def _tried(stage: _Stage, best: AddedEffect, task: _Task) -> tuple[_Stage, str]:
+    """Return the model with one effect more, and why it is refused; that is empty if it is not."""
+    added = _add_and_refit(stage, best, task)
+    if why := breaks_its_promise(stage.fitted, added.fitted, best.score):
+        return added, why
+    wider = _seen_anew(stage, added)
+    why = newly_impossible(wider.evidence, stage.fitted, wider.fitted)
+    why = why or follows_the_filter(wider.evidence, stage.narrow, wider.fitted, best.score.effect)
+    return wider, why
 
-    None where the effect explains in the model next to nothing of what it explained beside it.
-    """
+
+def _add_and_refit(stage: _Stage, best: AddedEffect, task: _Task) -> _Stage:
+    """Return the model with one effect more, all of it fitted anew."""
     task.progress(f"adding {best.score.effect.label}")
-    evidence, loop, before = with_payload(stage.evidence, best.score), stage.loop, stage.fitted
+    evidence, before = with_payload(stage.evidence, best.score), stage.fitted
     others = at_other_joints(evidence, before, best, len(stage.found))
     others = tuple(one for one in others if one.score.effect.label not in stage.refused)
     added = (best, *others)
     model = before.model + tuple(one.score.effect for one in added)
-    wider = refitted(evidence, model, before)
-    fitted = with_friction_width(evidence, wider)
-    if breaks_its_promise(before, fitted, best.score):
-        return None
+    fitted = with_friction_width(evidence, refitted(evidence, model, before))
+    return replace(stage, evidence=evidence, fitted=fitted, found=(*stage.found, *added))
+
+
+def _seen_anew(stage: _Stage, added: _Stage) -> _Stage:
+    """Return a model with the evidence that calls for: other columns, a loop simulated with it."""
+    evidence, fitted = added.evidence, added.fitted
     if _has_changed(evidence, stage.start, fitted):
         evidence = evidence.looked_at_anew()
-    loop, moved = loop.renewed(evidence, fitted)
+    loop, moved = stage.loop.renewed(evidence, fitted)
     if moved is not evidence:
         evidence = moved
         fitted = with_friction_width(evidence, refitted(evidence, fitted.model, fitted))
-    found = (*stage.found, *added)
-    return replace(stage, evidence=evidence, loop=loop, fitted=fitted, found=found)
+    return replace(added, evidence=evidence, loop=loop, fitted=fitted)
 
 
 def _search_globally(start: _Stage, extended: _Stage, task: _Task) -> _Stage:

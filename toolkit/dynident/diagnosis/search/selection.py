@@ -20,6 +20,7 @@ from dynident.effects import Effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import on_recordings
+from dynident.tables import percent
 
 _SEED = 20_110  # of the bootstrap
 
@@ -142,8 +143,8 @@ def _alike_once_fitted(
     return tuple(s.effect for s in rivals if explained(s.effect) >= (1.0 - criteria.alike) * most)
 
 
-def breaks_its_promise(fitted: EvidenceFit, wider: EvidenceFit, one: Score) -> bool:
-    """Whether a filtered dynamic regressor explains less in a model than it did beside it.
+def breaks_its_promise(fitted: EvidenceFit, wider: EvidenceFit, one: Score) -> str:
+    """Say how much less a filtered dynamic regressor explains in a model than it did beside it.
 
     With it the bodies change, and with them the response, which may not follow.
 
@@ -154,13 +155,19 @@ def breaks_its_promise(fitted: EvidenceFit, wider: EvidenceFit, one: Score) -> b
 
     Returns
     -------
-    False for any other effect, and where the noise is unknown.
+    In words; empty where it keeps enough, for any other effect, and where the noise is unknown.
     """
     if not (one.effect.is_dynamic_response and fitted.noise_known):
-        return False
+        return ""
     promised = min(one.drop / fitted.error_signal, 1.0) if fitted.error_signal > 0 else 1.0
     before, after = fitted.misfit(fitted), wider.misfit(fitted)
-    return before - after < fitted.criteria.search.least_kept * promised * before
+    if before - after >= fitted.criteria.search.least_kept * promised * before:
+        return ""
+    found = percent(max(1.0 - after / before, 0.0) if before > 0 else 0.0, 1)
+    return (
+        f"fitted with the model it explains {found} of the residual, where its columns alone "
+        f"promise {percent(promised, 1)}"
+    )
 
 
 def _size(one: Score) -> int:
