@@ -1,11 +1,13 @@
-"""Effects that were added and are not needed are dropped again."""
+"""What was added and is not needed is dropped again, and each step is judged by what it adds."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.search.ranking import candidates, rank
 from dynident.diagnosis.search.selection import AddedEffect, choose, without_superfluous
+from dynident.diagnosis.search.withdrawal import path_of
 from dynident.effects import effects_of
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
@@ -80,3 +82,23 @@ def test_what_another_effect_explains_as_well_goes() -> None:
     )
     assert [one.score.effect.label for one in left.found] == [DRAG]
     assert np.isclose(left.final.values[left.final.model.slices[DRAG]], 0.4, atol=0.05)
+
+
+def test_each_stage_of_a_path_has_the_friction_width_that_it_calls_for() -> None:
+    """The study states five times the width: no step is credited with what that mends."""
+    evidence = evidence_of(range(3), 0.4, 0.4)
+    stated = 5 * PLAIN.friction_width
+    wide = PLAIN.with_friction_width("shoulder", stated).with_friction_width("elbow", stated)
+    start = fit_evidence(evidence, wide)
+    _, found = added(evidence, DRAG, OFFSET)
+    last = fit_evidence(evidence, wide + DRAG + OFFSET, start)
+    fitted = with_friction_width(evidence, last)
+    path = path_of(evidence, None, start, fitted, tuple(found), lambda _: None)
+    assert [one.score.effect.label for one in path.found] == [DRAG, OFFSET]
+    assert path.withdrawn == ()
+    first, *later = (one.model.friction_widths for one in path.stages)
+    np.testing.assert_allclose(first, stated)
+    for widths in later:
+        np.testing.assert_allclose(widths, PLAIN.friction_width, rtol=0.4)
+    errors = [one.error for one in path.judged]
+    assert errors == sorted(errors, reverse=True)

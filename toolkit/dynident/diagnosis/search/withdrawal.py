@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from dynident.diagnosis.details import Withdrawn
+from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.search.refusal import newly_impossible
 from dynident.diagnosis.search.selection import AddedEffect
 from dynident.evidence.columns import Evidence
@@ -68,9 +69,10 @@ def path_of(
     """
     withdrawn: tuple[Withdrawn, ...] = ()
     late: set[str] = set()
+    known: dict[tuple[str, ...], tuple[EvidenceFit, HeldOut]] = {}
     while True:
-        stages = _stages(evidence, start, fitted, found)
-        judged = tuple(_judged(evidence, held, one) for one in stages)
+        along = _judged_stages(evidence, held, (start, fitted), found, known)
+        stages, judged = tuple(fit for fit, _ in along), tuple(errors for _, errors in along)
         reasons = [
             newly_impossible(evidence, *fits) or _why(held, *errors)
             for fits, errors in zip(pairwise(stages), pairwise(judged), strict=True)
@@ -88,8 +90,10 @@ def path_of(
         progress(f"withdrawing {label}")
         withdrawn = (*withdrawn, Withdrawn(effect=one.score.effect, why=reasons[wrong]))
         found = others
+        known = {(): known[()]}
         effect = next(e for e in fitted.model.effects if e.label == label)
-        fitted = fit_evidence(evidence, fitted.model - effect, fitted) if found else start
+        rest = fit_evidence(evidence, fitted.model - effect, fitted) if found else start
+        fitted = with_friction_width(evidence, rest) if found else start
 
 
 def _why(held: Evidence | None, before: HeldOut, after: HeldOut) -> str:
@@ -106,21 +110,43 @@ def _why(held: Evidence | None, before: HeldOut, after: HeldOut) -> str:
     )
 
 
-def _stages(
+def _judged_stages(
     evidence: Evidence,
-    start: EvidenceFit,
-    fitted: EvidenceFit,
+    held: Evidence | None,
+    ends: tuple[EvidenceFit, EvidenceFit],
     found: tuple[AddedEffect, ...],
-) -> tuple[EvidenceFit, ...]:
+    known: dict[tuple[str, ...], tuple[EvidenceFit, HeldOut]],
+) -> tuple[tuple[EvidenceFit, HeldOut], ...]:
+    """Fit and judge the models along a path, each with the friction widths that it calls for.
+
+    An effect that another width stood in for must not be credited with what that width spoiled, nor
+    the next one with what it mends.
+
+    Parameters
+    ----------
+    evidence, held : as in `path_of`.
+    ends : the fits of the first model and the last.
+    found : the effects between them.
+    known : what earlier orders of the same effects had in common with this one, which grows.
+    """
+    start, fitted = ends
     by_label = {e.label: e for e in fitted.model.effects}
-    stages = [start]
-    for one in found[:-1]:
-        wider = stages[-1].model + by_label[one.score.effect.label]
-        stages.append(fit_evidence(evidence, wider.with_shapes(fitted.model.effects), stages[-1]))
-    if found:
-        # With another friction width where that was called for later.
-        stages.append(fitted)
-    return tuple(stages)
+    labels = tuple(one.score.effect.label for one in found)
+    for many in range(len(labels) + 1):
+        so_far = labels[:many]
+        if so_far in known:
+            continue
+        if many == 0:
+            stage = start
+        elif many == len(labels):
+            stage = fitted
+        else:
+            before = known[so_far[:-1]][0]
+            wider = before.model + by_label[so_far[-1]]
+            shapes = wider.with_shapes(fitted.model.effects)
+            stage = with_friction_width(evidence, fit_evidence(evidence, shapes, before))
+        known[so_far] = stage, _judged(evidence, held, stage)
+    return tuple(known[labels[:many]] for many in range(len(labels) + 1))
 
 
 def _judged(evidence: Evidence, held: Evidence | None, stage: EvidenceFit) -> HeldOut:
