@@ -12,6 +12,7 @@ from pathlib import Path
 HERE = Path(__file__).parent
 SCRIPTS = (
     "hidden_effects.py",
+    "batch_regressor.py",
     "least_squares_memory.py",
     "constrained_fit.py",
     "chain_length.py",

@@ -20,7 +20,7 @@ FLOORS = (
     ("files", "tables"),
     ("settings", "places", "threads"),
     ("criteria",),
-    ("inertia", "moments"),
+    ("inertia", "moments", "batch"),
     ("recording",),
     ("robot",),
     ("effects",),

@@ -61,6 +61,10 @@ class FitError(DynidentError):
     """An estimate cannot be computed from this data."""
 
 
+class SettingError(DynidentError):
+    """An environment variable says what it cannot."""
+
+
 class ProgramError(DynidentError):
     """A nonlinear program is posed wrongly, or started from an impossible point."""
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 
+from dynident.batch import wish
 from dynident.cli.output import print_json, say, show
 
 _ORDER = ("explain", "diagnose", "fit", "compare", "add", "simulate", "report", "demo", "check")
@@ -29,6 +30,7 @@ def commands() -> None:
 
     Example: dynident explain study.toml --report report.html
     """
+    wish()  # what the environment asks for is refused here or nowhere
 
 
 @dataclass(frozen=True, kw_only=True)

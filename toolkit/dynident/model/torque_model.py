@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dynident.batch import side_by_side
 from dynident.effects import Block, Effect, Needs
 from dynident.model.parametrised_robot import ParametrisedRobot
 
@@ -95,16 +96,17 @@ class Model(ParametrisedRobot):
         -------
         (T, n, p) in N m or N per unit of the parameters.
         """
-        block = self.with_regressor(block)
-        assert block.rigid is not None
-        full = np.zeros((len(block.t), self.robot.n, self.size))
-        rigid = len(self.base.independent)
-        full[:, :, :rigid] = np.take(block.rigid, self.base.independent, axis=2)
+        if any(effect.needs_regressor for effect in self.effects):
+            block = self.with_regressor(block)
+        full = side_by_side(len(block.t), (self.robot.n, self.size))
+        rank = self.base.rank
+        full[:, :, rank:] = 0.0
+        self._write_rigid(block, full[:, :, :rank])
 
         def torque(found: Mapping[str, np.ndarray]) -> np.ndarray:
             # With the regressor at hand, a product is quicker than recursive inverse dynamics.
             assert values is not None
-            return self._filled(full, found) @ self._without_loads(values)
+            return _product(self._filled(full, found), self._without_loads(values))
 
         given = known or {}
         wanted = [e for e in self.effects if not (e.needs_torque and values is None)]
@@ -135,7 +137,7 @@ class Model(ParametrisedRobot):
 
     def torque(self, block: Block, values: np.ndarray) -> np.ndarray:
         """Predicted torque, (T, n) in N m or N."""
-        return self.columns(block, values) @ values
+        return _product(self.columns(block, values), values)
 
     def torque_without_loads(
         self,
@@ -239,6 +241,13 @@ class Model(ParametrisedRobot):
             found[effect.label] = effect.columns(self.ready(effect, block, values))
         return found
 
+    def _write_rigid(self, block: Block, out: np.ndarray) -> None:
+        kept = self.base.independent
+        if block.rigid is None:
+            self.robot.regressor(block.q, block.v, block.a, columns=kept, out=out)
+        else:
+            out[:] = np.take(block.rigid, kept, axis=2)
+
     def _filled(self, full: np.ndarray, found: Mapping[str, np.ndarray]) -> np.ndarray:
         for label, own in found.items():
             full[:, :, self.slices[label]] = own
@@ -251,3 +260,8 @@ class Model(ParametrisedRobot):
             if effect.needs_torque:
                 without[self.slices[effect.label]] = 0.0
         return without
+
+
+def _product(columns: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Columns (T, n, p) @ values, for columns that have their samples side by side, (T, n)."""
+    return (values @ columns.transpose(1, 2, 0)).T

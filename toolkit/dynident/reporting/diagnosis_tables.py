@@ -10,6 +10,7 @@ from datetime import datetime
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
+from dynident.batch import evaluations
 from dynident.diagnosis.details import Candidate, Step
 from dynident.diagnosis.result import Diagnosis
 from dynident.reporting.content import first_set
@@ -171,6 +172,8 @@ def versions(command: str) -> Table:
         ("dynident", _version("dynident")),
         ("Python", f"{platform.python_version()} on {platform.platform()}"),
     ]
+    if used := evaluations():
+        made.append(("equations of motion", "; ".join(map(str, used))))
     packages = (f"{package} {_version(package)}" for package in _dependencies())
     made.append(("with", ", ".join(packages)))
     return Table("Made", ("what", "value"), tuple(made))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynident import files
+from dynident.batch import JointTree
 from dynident.errors import RobotError
 from dynident.inertia import PARAMETERS, UNITS, frame_change
 from dynident.robot.dynamics import Dynamics, TorqueDerivatives, pinocchio_model
@@ -304,24 +305,44 @@ class Robot:
     def _dynamics(self) -> Dynamics:
         return Dynamics(self.joints, self.gravity)
 
-    def regressor(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
-        """Return Y (T, n, 10 n) with tau = Y theta.
+    @property
+    def joint_tree(self) -> JointTree:
+        """Its joints and gravity as functions of many samples are written from them."""
+        return self._dynamics.tree
+
+    def regressor(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        *,
+        columns: Sequence[int] | None = None,
+        out: Array | None = None,
+    ) -> Array:
+        """Return Y (T, n, 10 n) with tau = Y theta, or some of its columns.
 
         Parameters
         ----------
         q, v, a : (T, n) array_like
             rad or m, and their first and second derivatives by s.
+        columns : sequence of int, optional
+            Which columns, as those of base parameters; default: all. Fewer take less time.
+        out : (T, n, len(columns)) ndarray, optional
+            To write to, best as `dynident.batch.side_by_side` makes it.
 
         Raises
         ------
         RobotError
             If a shape is wrong.
+        SettingError
+            If the environment says of compiling what is not understood.
 
         Notes
         -----
-        10 n^2 doubles a sample: evaluate long recordings in blocks, and keep none of them.
+        10 n^2 doubles a sample: evaluate long recordings in blocks, and keep none of them. Of many
+        samples, those of one entry lie side by side in memory.
         """
-        return self._dynamics.regressor(*self._motion(q, v, a))
+        return self._dynamics.regressor(*self._motion(q, v, a), columns=columns, out=out)
 
     def inverse_dynamics(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike, theta: ArrayLike | None = None

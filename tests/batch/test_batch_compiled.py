@@ -1,0 +1,164 @@
+"""Compiled functions: the same numbers to the bit, or a reason and the replay."""
+
+import os
+import stat
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from random_trees import random_tree, urdf
+
+from chains import chain
+from dynident.batch import compiler, evaluations, kernel, wish
+from dynident.batch.c_source import ENTRY, c_source
+from dynident.batch.kernel import Kernel
+from dynident.batch.newton_euler import regressor_equations, torque_equations
+from dynident.batch.tape import tape_of
+from dynident.errors import SettingError
+from dynident.robot import Robot
+
+needs_compiler = pytest.mark.skipif(compiler.compiler() is None, reason="no C compiler")
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setenv("DYNIDENT_COMPILE", "auto")
+
+
+def torque_of(robot: Robot) -> Kernel:
+    return Kernel(torque_equations(robot.joint_tree), (robot.n,))
+
+
+def answer(found: Kernel, robot: Robot, samples: int = 20):
+    return found(*robot.random_motion(0, samples), parameters=robot.theta.tolist())
+
+
+@needs_compiler
+def test_compiled_is_the_replay_to_the_bit(monkeypatch):
+    """For every number of samples beside the eight and the chunk that the code goes by."""
+    robot = Robot.from_text(urdf(random_tree(1, moving=6)), gravity=(3, -9, 1.5))
+    tree = robot.joint_tree
+    columns = tuple(range(10 * robot.n))
+    for made, parameters in (
+        (Kernel(regressor_equations(tree, columns), (robot.n, len(columns))), ()),
+        (Kernel(torque_equations(tree), (robot.n,)), robot.theta.tolist()),
+    ):
+        assert len(made._tape.steps) > 600, "more than one part"
+        for samples in [*range(1, 18), 255, 256, 257, 263, 264, 265, 700]:
+            motion = robot.random_motion(samples, samples)
+            monkeypatch.setenv("DYNIDENT_COMPILE", "never")
+            want = made(*motion, parameters=parameters)
+            assert made.evaluation.way == "replayed"
+            monkeypatch.setenv("DYNIDENT_COMPILE", "always")
+            np.testing.assert_array_equal(made(*motion, parameters=parameters), want)
+            assert made.evaluation.way == "compiled"
+
+
+@needs_compiler
+def test_arrays_of_any_memory_order_are_the_same(monkeypatch):
+    robot = chain(2)
+    motion = [np.asfortranarray(x) for x in robot.random_motion(0, 30)]
+    every_other = [np.repeat(x, 2, axis=0)[::2] for x in motion]
+    want = answer(torque_of(robot), robot, 30)
+    monkeypatch.setenv("DYNIDENT_COMPILE", "always")
+    for given in (motion, every_other):
+        np.testing.assert_array_equal(
+            torque_of(robot)(*given, parameters=robot.theta.tolist()), want
+        )
+
+
+@needs_compiler
+def test_compiles_when_as_much_was_replayed_and_finds_it_again(monkeypatch):
+    monkeypatch.setattr(kernel, "COMPILE_AFTER", 50)
+    robot = chain(2)
+    first = torque_of(robot)
+    answer(first, robot, 49)
+    assert str(first.evaluation) == "replayed (fewer than 50 samples)"
+    answer(first, robot, 1)
+    assert str(first.evaluation) == "compiled (from 50 samples on)"
+    second = torque_of(robot)
+    answer(second, robot, 1)
+    assert str(second.evaluation) == "compiled (from the cache)"
+    assert {first.evaluation, second.evaluation} <= set(evaluations())
+
+
+@pytest.mark.skipif(os.name == "nt", reason="shell scripts as compilers")
+@pytest.mark.parametrize("fault", ["none there", "fails", "makes rubbish", "no cache"])
+def test_what_cannot_be_compiled_is_replayed_with_a_reason(fault, tmp_path, monkeypatch):
+    robot = chain(2)
+    want = answer(torque_of(robot), robot)
+    program = tmp_path / "cc"
+    bodies = {
+        "fails": "echo 'no room left' >&2; exit 1",
+        "makes rubbish": 'while [ "$1" != -o ]; do shift; done; echo rubbish > "$2"',
+    }
+    program.write_text(f"#!/bin/sh\n{bodies.get(fault, 'exit 3')}\n")
+    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    if fault == "no cache":
+        (tmp_path / "cache").write_text("a file where the folder should be")
+    reasons = {
+        "none there": "there is no C compiler",
+        "fails": "the compiler failed: no room left",
+        "makes rubbish": "OSError",
+        "no cache": "Error",
+    }
+    there = None if fault == "none there" else str(program)
+    monkeypatch.setattr(compiler, "compiler", lambda: there)
+    monkeypatch.setenv("DYNIDENT_COMPILE", "always")
+    found = torque_of(robot)
+    for _ in range(2):
+        np.testing.assert_array_equal(answer(found, robot), want)
+        assert found.evaluation.way == "replayed"
+        assert reasons[fault] in found.evaluation.reason
+    left = tmp_path / "cache" / "dynident" / "batch"
+    assert not left.exists() or not list(left.glob("*.tmp"))
+
+
+@needs_compiler
+def test_a_broken_file_in_the_cache_is_made_anew(monkeypatch):
+    robot = chain(2)
+    want = answer(torque_of(robot), robot)
+    source = c_source(tape_of(torque_equations(robot.joint_tree)))
+    place = compiler._place(source)
+    place.parent.mkdir(parents=True)
+    place.write_bytes(b"half a library")
+    found = torque_of(robot)
+    np.testing.assert_array_equal(answer(found, robot), want)
+    assert found.evaluation.way == "compiled"
+
+
+@needs_compiler
+def test_many_may_compile_the_same_at_once(tmp_path):
+    source = c_source(tape_of(torque_equations(chain(2).joint_tree)))
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(lambda _: compiler.compiled(source, ENTRY), range(4)))
+    assert all(callable(one) for one in found)
+    names = [path.suffix for path in (tmp_path / "cache" / "dynident" / "batch").iterdir()]
+    assert names == [".so"]
+
+
+def test_the_environment_says_when_to_compile(monkeypatch):
+    for said in ("never", "auto", "always"):
+        monkeypatch.setenv("DYNIDENT_COMPILE", said)
+        assert wish() == said
+    for empty in ("", None):
+        if empty is None:
+            monkeypatch.delenv("DYNIDENT_COMPILE")
+        else:
+            monkeypatch.setenv("DYNIDENT_COMPILE", empty)
+        assert wish() == "auto"
+    monkeypatch.setenv("DYNIDENT_COMPILE", "yes")
+    with pytest.raises(SettingError, match="'yes' is none of never, auto, always"):
+        answer(torque_of(chain(2)), chain(2))
+
+
+def test_a_wrong_word_ends_the_command_with_one_line(monkeypatch):
+    environment = {**os.environ, "DYNIDENT_COMPILE": "sometimes"}
+    command = [sys.executable, "-m", "dynident.cli", "check", "nothing.urdf"]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    assert done.returncode == 2 and not done.stdout
+    (line,) = done.stderr.splitlines()
+    assert "DYNIDENT_COMPILE: 'sometimes' is none of" in line

@@ -1,0 +1,126 @@
+"""C functions compiled once and kept in the user's cache; where that fails, a reason and no error.
+
+What is kept is named after all that it depends on: the source, the compiler's options and the
+processor. It is written aside and moved into place, so that processes may do so at once.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import hashlib
+import os
+import platform
+import shutil
+import subprocess
+import tempfile
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+_OPTIONS = ("-O1", "-ffp-contract=off", "-fPIC", "-shared", "-w", "-x", "c")
+_NATIVE = "-march=native"
+_PATIENCE = 120.0  # s, after which a compiler is given up
+_COMPILERS = ("cc", "gcc", "clang")
+
+
+class NotCompiled(Exception):
+    """There is no compiled function; the message says why."""
+
+
+@cache
+def compiler() -> str | None:
+    """Path of the C compiler that is used; None if there is none."""
+    return next((path for path in map(shutil.which, _COMPILERS) if path), None)
+
+
+def cache_folder() -> Path:
+    """Folder of compiled functions, below `XDG_CACHE_HOME` or `~/.cache`."""
+    given = os.environ.get("XDG_CACHE_HOME", "")
+    base = Path(given) if os.path.isabs(given) else Path("~/.cache").expanduser()
+    return base / "dynident" / "batch"
+
+
+def is_kept(source: str) -> bool:
+    """Whether the cache has a source's library; False also where there can be no cache."""
+    try:
+        return _place(source).is_file()
+    except (OSError, RuntimeError):
+        return False
+
+
+def _place(source: str) -> Path:
+    """Where the library of a source is kept, on this machine."""
+    key = "\n".join((source, *_OPTIONS, compiler() or "", _processor()))
+    return cache_folder() / f"{hashlib.sha256(key.encode()).hexdigest()[:32]}.so"
+
+
+def compiled(source: str, entry: str) -> Any:
+    """Return a function of a C source, compiled now unless the cache has it.
+
+    Parameters
+    ----------
+    source : in C.
+    entry : name of the function.
+
+    Returns
+    -------
+    As `ctypes` has it, without types of arguments.
+
+    Raises
+    ------
+    NotCompiled
+        If there is no compiler, it fails, or the cache cannot be written or read.
+    """
+    try:
+        place = _place(source)
+        if place.is_file():
+            with contextlib.suppress(OSError, AttributeError):  # a broken file is made anew
+                return getattr(ctypes.CDLL(str(place)), entry)
+        _compile(source, place)
+        return getattr(ctypes.CDLL(str(place)), entry)
+    except subprocess.TimeoutExpired:
+        raise NotCompiled(f"the compiler took more than {_PATIENCE:.0f} s") from None
+    # RuntimeError: no home folder; AttributeError: a library of another making.
+    except (OSError, RuntimeError, AttributeError, ValueError) as error:
+        raise NotCompiled(f"{type(error).__name__}: {error}") from None
+
+
+def _compile(source: str, place: Path) -> None:
+    program = compiler()
+    if program is None:
+        raise NotCompiled("there is no C compiler")
+    place.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    handle, name = tempfile.mkstemp(suffix=".tmp", dir=place.parent)
+    os.close(handle)
+    try:
+        said = _run(program, name, source, _NATIVE)
+        if said is not None:
+            said = _run(program, name, source)
+        if said is not None:
+            raise NotCompiled(f"the compiler failed: {said}")
+        os.replace(name, place)
+    finally:
+        with contextlib.suppress(OSError):
+            os.unlink(name)
+
+
+def _run(program: str, name: str, source: str, *options: str) -> str | None:
+    """Compile into a file; return None, or the first thing that the compiler says."""
+    command = [program, *_OPTIONS, *options, "-o", name, "-"]
+    done = subprocess.run(
+        command, input=source, capture_output=True, text=True, timeout=_PATIENCE, check=False
+    )
+    if done.returncode == 0:
+        return None
+    return next(iter(done.stderr.splitlines()), f"status {done.returncode}")
+
+
+@cache
+def _processor() -> str:
+    """What the processor can do: a library for another one must not be loaded."""
+    words = [platform.machine(), platform.system()]
+    with contextlib.suppress(OSError):
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        words += sorted({line for line in lines if line.startswith(("model name", "flags"))})
+    return "\n".join(words)

@@ -1,0 +1,175 @@
+"""Functions of a tree of joints over many samples: made once a tree, kept, and shared."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from dynident.batch.c_source import ENTRY, LANES, c_source, work_size
+from dynident.batch.compiler import NotCompiled, compiled, is_kept
+from dynident.batch.evaluation import COMPILE_AFTER, VARIABLE, Evaluation, wish
+from dynident.batch.joint_tree import JointTree
+from dynident.batch.memory import side_by_side
+from dynident.batch.newton_euler import SIGNALS, Equations, regressor_equations, torque_equations
+from dynident.batch.tape import Tape, tape_of
+
+_KEPT = 32  # functions; one of 60 joints takes some MB
+_used: dict[Evaluation, None] = {}
+
+
+class Kernel:
+    """A function of joints' motion, evaluated over blocks of samples.
+
+    Parameters
+    ----------
+    terms : what is computed.
+    shape : of the result at a sample; where there is no term it is zero.
+
+    Attributes
+    ----------
+    evaluation : how it was evaluated in the last call, and why.
+    """
+
+    def __init__(self, terms: Equations, shape: tuple[int, ...]) -> None:
+        self.shape = shape
+        self.evaluation = Evaluation("replayed", "not called yet")
+        self._tape: Tape = tape_of(terms)
+        self._nowhere = np.ones(shape, dtype=bool)
+        self._nowhere[tuple(np.transpose(terms.places))] = False
+        self._seen = 0
+        self._function: Any = None
+        self._failed = ""
+
+    def __call__(
+        self,
+        q: np.ndarray,
+        v: np.ndarray,
+        a: np.ndarray,
+        *,
+        parameters: Sequence[float] = (),
+        out: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Evaluate at all samples.
+
+        Parameters
+        ----------
+        q, v, a : (T, n) rad or m, and per s and s^2.
+        parameters : what the terms depend on besides.
+        out : (T, *shape) to write to, in memory the samples of one entry side by side; if there is
+            none, it is made.
+
+        Returns
+        -------
+        (T, *shape), as `out`.
+
+        Raises
+        ------
+        SettingError
+            If the environment says something else of compiling than it can.
+        """
+        samples = len(q)
+        result = side_by_side(samples, self.shape) if out is None else out
+        rows = np.moveaxis(result, 0, -1)
+        rows[self._nowhere] = 0.0
+        inputs = [*_signals(q, v, a), *map(float, parameters)]
+        results = [rows[place] for place in self._tape.places]
+        self._seen += samples
+        self._choose()
+        if self._function is None or samples < LANES:
+            self._tape.replay(inputs, results)
+        else:
+            self._run(samples, inputs, results)
+        return result
+
+    def _choose(self) -> None:
+        """Compile, or load, if that is wanted and pays; say in `evaluation` what became of it."""
+        wanted = wish()
+        if wanted == "never":
+            self._function = None
+            self.evaluation = Evaluation("replayed", f"{VARIABLE}=never")
+        elif self._function is None and not self._failed:
+            reason = f"{VARIABLE}=always" if wanted == "always" else self._reason
+            if reason:
+                self.evaluation = self._compile(reason)
+            else:
+                few = f"fewer than {COMPILE_AFTER} samples"
+                self.evaluation = Evaluation("replayed", few)
+        _used.setdefault(self.evaluation)
+
+    @property
+    def _reason(self) -> str:
+        """Why a compiled function is to be had for little, or pays; empty if neither is so."""
+        if self._is_kept:
+            return "from the cache"
+        return f"from {COMPILE_AFTER} samples on" if self._seen >= COMPILE_AFTER else ""
+
+    @cached_property
+    def _is_kept(self) -> bool:
+        return is_kept(c_source(self._tape))
+
+    def _compile(self, reason: str) -> Evaluation:
+        try:
+            self._function = compiled(c_source(self._tape), ENTRY)
+        except NotCompiled as error:
+            self._failed = str(error)
+            return Evaluation("replayed", self._failed)
+        return Evaluation("compiled", reason)
+
+    def _run(self, samples: int, inputs: list[Any], results: list[np.ndarray]) -> None:
+        """Call the compiled function."""
+        steps = (ctypes.c_long * len(inputs))(*(int(np.ndim(one) > 0) for one in inputs))
+        held = [np.ascontiguousarray(one, dtype=float) for one in inputs]
+        work = np.empty(work_size(self._tape))
+        self._function(
+            ctypes.c_long(samples),
+            _pointers(held),
+            steps,
+            ctypes.c_void_p(work.ctypes.data),
+            _pointers(results),
+        )
+
+
+@lru_cache(maxsize=_KEPT)
+def regressor_kernel(tree: JointTree, columns: tuple[int, ...]) -> Kernel:
+    """Return the function of some columns of the regressor, (T, n, len(columns)).
+
+    Parameters
+    ----------
+    tree : the robot.
+    columns : ascending; column 10 j + k is parameter k of body j.
+    """
+    return Kernel(regressor_equations(tree, columns), (tree.n, len(columns)))
+
+
+@lru_cache(maxsize=_KEPT)
+def torque_kernel(tree: JointTree) -> Kernel:
+    """Return the function of the torque, (T, n); its parameters are the 10 n of the bodies.
+
+    Parameters
+    ----------
+    tree : the robot.
+    """
+    return Kernel(torque_equations(tree), (tree.n,))
+
+
+def evaluations() -> tuple[Evaluation, ...]:
+    """Return how the functions of many samples were evaluated in this process, each way once."""
+    return tuple(_used)
+
+
+def _signals(q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+    """The inputs (5 n, T), see `dynident.batch.newton_euler.SIGNALS`; each row in one piece."""
+    samples, n = q.shape
+    signals = np.moveaxis(side_by_side(samples, (SIGNALS, n)), 0, -1)
+    signals[2], signals[3], signals[4] = q.T, v.T, a.T
+    np.cos(signals[2], out=signals[0])
+    np.sin(signals[2], out=signals[1])
+    return signals.reshape(SIGNALS * n, samples)
+
+
+def _pointers(arrays: Sequence[np.ndarray]) -> Any:
+    return (ctypes.c_void_p * len(arrays))(*(one.ctypes.data for one in arrays))
