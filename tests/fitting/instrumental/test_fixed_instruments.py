@@ -140,7 +140,8 @@ def test_bias_of_dry_friction_is_foreseen(truth):
     assert found.history is not None
     shoulder = model.names.index("Fc@shoulder")
     bias = found.history.expected_bias[shoulder]
-    assert np.isfinite(bias) and abs(bias) > 3 * found.sigma[shoulder]
+    assert np.isfinite(bias) and abs(bias) > 3 * found.history.sigma[shoulder]
+    assert found.sigma[shoulder] >= abs(bias)
     assert found.values[shoulder] - 1.5 == pytest.approx(bias, rel=0.2)
     assert any("dry friction" in note for note in found.notes)
     assert any("Fc@shoulder" in note for note in found.notes)

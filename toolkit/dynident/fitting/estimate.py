@@ -202,10 +202,6 @@ class Estimate:
             return self.sigma_words
         if not np.any(self.covariance):
             return "No sigma: the method has none to give."
-        if self.history:
-            return (
-                "sigma carries the noise of encoders and torque; what the model lacks is not in it."
-            )
         return (
             "sigma takes the errors of the equations as independent, which those of rows behind a "
             "low-pass are not; what the model lacks is not in it."

@@ -67,7 +67,8 @@ class Convergence:
     rounds : one for each iteration.
     ending : how they ended.
     message : what stopped them, in words; empty where they converged.
-    sigma : (p,) standard deviations with the noise carried through filters and derivatives.
+    sigma : (p,) standard deviations with the noise carried through filters and derivatives,
+        without its expected bias.
     textbook_sigma : (p,) those that take the rows' errors as independent.
     expected_bias : (p,) what the encoders' noise does to the estimate in the mean, since no
         instrument corrects columns that bend within the noise (dry friction); NaN where it does
@@ -160,7 +161,7 @@ class Convergence:
         notes = (
             f"sigma: encoder noise ({stds}) and {what} ({torque}), {self.noise_source}, "
             "through derivatives and filters. textbook: errors of the rows as if independent. "
-            "bias: expected, and not subtracted.",
+            "bias: expected, and not subtracted; that of noise is in the sigma of the parameters.",
         )
         heads = ("parameter", "sigma", "textbook sigma", "bias, noise", "bias, sampling", "unit")
         return Table("Standard deviations", heads, rows, notes)

@@ -12,6 +12,8 @@ from dynident.fitting.estimate import DataSource, Estimate
 from dynident.fitting.fixed_point import FixedPoint, not_converged
 from dynident.fitting.linear_solution import LinearSolution, solve_factors
 from dynident.fitting.sampling import rows
+from dynident.fitting.uncertainty.expected_bias import held
+from dynident.fitting.uncertainty.input_bias import InputBias, input_bias
 from dynident.fitting.uncertainty.lack_of_fit import lack_of_fit, widened
 from dynident.fitting.uncertainty.row_errors import row_errors
 from dynident.model import Model
@@ -75,7 +77,9 @@ class LeastSquares:
         kept = list(solution.basis.independent)
         whole = np.zeros_like(solution.covariance)
         whole[np.ix_(kept, kept)] = covariance
-        return replace(estimate, covariance=whole, sigma_words=words, headline=headline)
+        estimate = replace(estimate, covariance=whole, sigma_words=words, headline=headline)
+        bias = input_bias(model, dataset, solution.values, solution, estimate.sigma)
+        return estimate if bias is None else _with_bias(estimate, bias)
 
     def _iterate(
         self, model: Model, dataset: Dataset, values: np.ndarray
@@ -93,6 +97,18 @@ class LeastSquares:
         else:
             solution = replace(solution, notes=(*solution.notes, not_converged(float(change))))
         return model.at(solution.values), factors, solution
+
+
+def _with_bias(estimate: Estimate, bias: InputBias) -> Estimate:
+    """Return an estimate whose sigma holds a bias, and that says so."""
+    notes = (*estimate.notes, bias.note) if bias.note else estimate.notes
+    return replace(
+        estimate,
+        covariance=held(estimate.covariance, bias.values),
+        sigma_words=bias.words(estimate.sigma_words),
+        headline=" ".join(filter(None, (estimate.headline, bias.headline))),
+        notes=notes,
+    )
 
 
 def estimate_of(

@@ -5,10 +5,11 @@ the robot that their values describe, and the columns of the regression (`torque
 the one place that knows in which order columns can be evaluated: those of effects that make the
 torque, along the bodies that the values describe, then those of effects that depend on the
 torque; and of a whole recording once. Whether values are possible together says
-`possible_values`.
+`possible_values`; `InertiaMatrices` are the joint-space inertia that they describe.
 """
 
+from dynident.model.inertia_matrices import InertiaMatrices
 from dynident.model.possible_values import Impossible, impossible_at, impossible_joints
 from dynident.model.torque_model import Model
 
-__all__ = ["Impossible", "Model", "impossible_at", "impossible_joints"]
+__all__ = ["Impossible", "InertiaMatrices", "Model", "impossible_at", "impossible_joints"]

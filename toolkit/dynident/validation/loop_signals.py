@@ -11,8 +11,8 @@ import numpy as np
 from dynident.closed_loop import Controller
 from dynident.criteria import LoopCriteria
 from dynident.errors import RecordingError
-from dynident.fitting.instrumental.noise_level import white_variance
 from dynident.fitting.sampling import Sampled, sample
+from dynident.fitting.uncertainty.white_noise import white_variance
 from dynident.model import Model
 from dynident.recording import Dataset, Noise, Recording, mismatch, periods, within, without_ends
 from dynident.validation.control_law import law_torque

@@ -23,14 +23,12 @@ from dynident.fitting.instrumental.simulated_run import SimulatedRun
 from dynident.fitting.instrumental.source import InstrumentSource
 from dynident.fitting.least_squares import sources_of
 from dynident.fitting.linear_solution import residual_std
+from dynident.fitting.uncertainty.expected_bias import held, listed, reported
 from dynident.model import Model
-from dynident.tables import number
 
 _SURE = 10.0
 """Standard errors from which an expected bias is reported: the 99.5 % quantile of Student's t with
 the two degrees of freedom of three pairs."""
-_REPORTED = 0.2
-"""Standard deviations of the estimate below which an expected bias is not reported."""
 _WEAK = 0.02
 """Canonical correlation below which instruments and regressor hardly have to do with each other."""
 
@@ -41,7 +39,10 @@ def assemble(method: str, iterations: Iterations) -> Estimate:
     found, solution, values = iterations.found, iterations.solution, iterations.values
     noise, bias = _noise(model, source, iterations)
     covariance = carried_covariance(model, values, iterations.instruments, solution, noise)
-    words = ""
+    words = (
+        "sigma carries the noise of encoders and torque, and the bias to be expected of it; what "
+        "the model lacks is not in it."
+    )
     if noise.doubt:
         # No size of the noise explains the residual: the scatter of the data has to say it.
         covariance = block_covariance(
@@ -72,7 +73,7 @@ def assemble(method: str, iterations: Iterations) -> Estimate:
     return Estimate(
         model=model,
         values=values,
-        covariance=covariance,
+        covariance=held(covariance, _held(bias)),
         basis=solution.basis,
         torque_std=residual_std(found, solution.values, solution.rank),
         joint_errors=norms / np.where(torques > 0, torques, np.nan),
@@ -156,36 +157,35 @@ def _notes(
             "its standard deviation says what is left."
         )
     dry = [label for label in (e.label for e in model.effects) if _is_dry(model, label)]
-    reported = np.flatnonzero(_sure(bias) & (np.abs(bias.values) > _REPORTED * history.sigma))
+    which = reported(_held(bias), history.sigma)
     if dry:
         notes.append(
             "Instruments do not correct the columns of dry friction: the mean of "
             "tanh((v + noise)/w) is not tanh(v/w), however long the recording. "
             "See the expected bias."
         )
-    if reported.size:
+    if which.size:
         notes.append(
             "Expected bias, from simulating the same motion with encoder noise of this size "
-            f"(not subtracted): {_listed(model, bias.values, reported)}."
+            f"(in sigma, not subtracted): {listed(model, bias.values, which)}."
         )
     clock = np.flatnonzero(np.abs(bias.sampling) > history.sigma)
     if clock.size:
         notes.append(
             "Sampling (central differences, held torques, filters) shifts some parameters by more "
             f"than their noise, which the intervals do not hold (not subtracted): "
-            f"{_listed(model, bias.sampling, clock)}."
+            f"{listed(model, bias.sampling, clock)}."
         )
     return tuple(notes)
 
 
-def _listed(model: Model, values: np.ndarray, which: np.ndarray) -> str:
-    return ", ".join(
-        f"{model.names[i]} {number(float(values[i]), 2)} {model.units[i]}" for i in which
-    )
-
-
 def _sure(bias: ExpectedBias) -> np.ndarray:
     return np.abs(bias.values) > _SURE * bias.uncertainty
+
+
+def _held(bias: ExpectedBias) -> np.ndarray:
+    """The bias (p,) as far as the draws are sure of it."""
+    return np.where(_sure(bias), bias.values, 0.0)
 
 
 def _is_dry(model: Model, label: str) -> bool:

@@ -8,11 +8,9 @@ import numpy as np
 
 from dynident.fitting.instrumental.residual_spectrum import NoiseVariances
 from dynident.fitting.instrumental.source import InstrumentSource
+from dynident.fitting.uncertainty.white_noise import white_variance
 from dynident.recording import Dataset, within
 
-_DIFFERENCES = 3
-_GAIN = 20.0
-"""Variance of the third difference of white noise of variance 1."""
 _NEGATIVE = 3.0
 """Standard errors below zero at which a variance is none: what is there is no such noise."""
 
@@ -33,12 +31,6 @@ class NoiseLevel:
     torque_std: np.ndarray
     source: str
     doubt: str = ""
-
-
-def white_variance(x: np.ndarray) -> np.ndarray:
-    """Variance of the white noise in a smooth signal (T, n), from its third differences, (n,)."""
-    rough = np.diff(x, _DIFFERENCES, axis=0)
-    return np.sum(rough**2, axis=0) / (_GAIN * max(len(rough), 1))
 
 
 def position_noise(source: InstrumentSource, instruments: Dataset) -> np.ndarray:

@@ -15,12 +15,12 @@ import numpy as np
 from dynident.closed_loop import ClosedLoop, Controller, Mechanism, Retraced
 from dynident.errors import FitError, SimulationError
 from dynident.fitting.instrumental import standard_parameters as lift
-from dynident.fitting.instrumental.gains import InertiaMatrices, poses_of, retuned, stiffness
+from dynident.fitting.instrumental.gains import poses_of, retuned, stiffness
 from dynident.fitting.instrumental.noise_level import position_noise
 from dynident.fitting.instrumental.simulated_run import SimulatedRun
 from dynident.fitting.instrumental.source import Guess, Instruments, prepared
 from dynident.fitting.sampling import LEAST_ROWS
-from dynident.model import Model
+from dynident.model import InertiaMatrices, Model
 from dynident.recording import Dataset, Recording, within
 from dynident.robot import Robot
 

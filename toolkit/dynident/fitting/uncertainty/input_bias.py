@@ -1,0 +1,293 @@
+"""The bias that noise of the positions leaves in least squares.
+
+A regressor W of noisy positions differs by D from the columns X of the true motion, and least
+squares are (W'W)^-1 W'(W - D) times the truth in the mean: not the truth, as W and D go together.
+D has two parts. What the filters leave of the encoders' noise makes columns longer, and parameters
+smaller (errors in variables). And what the filters hide of the true motion, the trembling of a
+robot that follows its encoders, has blunted its dry friction, while the columns' is sharp.
+
+Both are found by doing to the recorded motion what was done to it: noise of the measured size is
+added, behind the same filters, and so is the trembling that the recorded torque makes.
+
+Source: the regression calibration of R. J. Carroll, D. Ruppert, L. A. Stefanski and C. M.
+Crainiceanu, "Measurement Error in Nonlinear Models" (2006), chapters 3 and 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dynident.errors import RecordingError
+from dynident.fitting.linear_solution import LinearSolution
+from dynident.fitting.sampling import Sampled, sample
+from dynident.fitting.uncertainty.expected_bias import listed, reported
+from dynident.fitting.uncertainty.trembling import trembling
+from dynident.fitting.uncertainty.white_noise import encoder_noise_std
+from dynident.model import Model
+from dynident.recording import (
+    Dataset,
+    Filter,
+    Motion,
+    Recording,
+    default_filter,
+    default_position_cutoff,
+    differentiate,
+    uniform,
+)
+from dynident.tables import number
+
+_POINTS = (0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5)
+"""Shares of a step at which a mean over it is taken (Gauss, two points)."""
+_MOST = 16384
+"""Samples, of all recordings, along which the bias is looked for."""
+_BEYOND = 2.0
+"""Standard deviations from which the first line says it: 95 % intervals of the noise alone would
+then miss the truth every other time."""
+_ROUGH = 3.0
+"""Standard deviations from which what is not known of the bias is as large as the noise: it is
+foretold to about a third (measured on simulated two-link arms that follow their encoders)."""
+_LEAST = 0.1
+"""Share of signal in a direction below which the correction is not carried on: there the bias is
+nine times what is left at least."""
+_NAMED = 4
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class InputBias:
+    """Expected errors of a least squares estimate for the noise of its positions.
+
+    Attributes
+    ----------
+    model : of p parameters.
+    values : (p,) expected error; zero where a parameter is not identified.
+    trembling : (p,) the part of it that filters hide.
+    sigma : (p,) standard deviations without it; NaN where a parameter is not identified.
+    position_std : (n,) of the encoders' noise, rad or m.
+    filtered : whether the positions passed a low-pass.
+    """
+
+    model: Model
+    values: np.ndarray
+    trembling: np.ndarray
+    sigma: np.ndarray
+    position_std: np.ndarray
+    filtered: bool
+
+    @property
+    def ratio(self) -> np.ndarray:
+        """Size of the bias in standard deviations, (p,)."""
+        size = np.abs(self.values)
+        return np.divide(size, self.sigma, out=np.zeros_like(size), where=self.sigma > 0)
+
+    @property
+    def headline(self) -> str:
+        """What is to be read before any number; empty where the bias is not beyond the noise."""
+        worst = [i for i in np.argsort(-self.ratio) if self.ratio[i] > _BEYOND]
+        if not worst:
+            return ""
+        more = f" and {len(worst) - _NAMED} more" if len(worst) > _NAMED else ""
+        parts = [
+            f"{self.model.names[i]} by {number(float(self.values[i]), 2)} {self.model.units[i]} "
+            f"({number(float(self.ratio[i]), 2)} sigma)"
+            for i in worst[:_NAMED]
+        ]
+        known = "sigma holds that"
+        if self.ratio.max() > _ROUGH:
+            known = "sigma holds that roughly, and gives no 95 % intervals"
+        blunted = np.abs(self.trembling[worst[0]]) > np.abs(self.values[worst[0]]) / 2
+        why = "Noise in the positions biases this fit"
+        if blunted:
+            why = "The robot trembles under the noise of its encoders, which biases this fit"
+        return f"{why}: {', '.join(parts)}{more}; {known}. {self._remedy(bool(blunted))}"
+
+    @property
+    def note(self) -> str:
+        """The biases that are worth a word; empty where there are none."""
+        which = reported(self.values, self.sigma)
+        if not len(which):
+            return ""
+        std = ", ".join(number(x, 2) for x in self.position_std)
+        return (
+            f"Expected bias, from encoder noise of the size in the positions ({std}; in sigma, not "
+            f"subtracted): {listed(self.model, self.values, which)}."
+        )
+
+    def words(self, others: str) -> str:
+        """What the standard deviations hold; `others` without the bias."""
+        more = " The bias to be expected of noise in the positions is in sigma, too."
+        return others + more if self.note else others
+
+    def _remedy(self, blunted: bool) -> str:
+        if blunted:
+            return (
+                "No filter of the record undoes it: let the drive follow its encoders less (a "
+                "lower gain on their differences)."
+            )
+        way = "lower position_cutoff_hz in [filter]"
+        if not self.filtered:
+            way = "state position_cutoff_hz in [filter]"
+        return (
+            f"Remedy: {way}, or take a method that allows for noisy positions (--method iv, or "
+            "corrected with --input-noise encoders)."
+        )
+
+
+def input_bias(
+    model: Model, dataset: Dataset, values: np.ndarray, solution: LinearSolution, sigma: np.ndarray
+) -> InputBias | None:
+    """Return the bias to be expected of a least squares estimate.
+
+    Parameters
+    ----------
+    model : of p parameters.
+    dataset : what was fitted; without stated noise that of the positions is measured in them.
+    values : (p,) the estimate.
+    solution : its weights and independent columns.
+    sigma : (p,) its standard deviations.
+
+    Returns
+    -------
+    None where the recordings are too short to tell.
+    """
+    most = _MOST // len(dataset.recordings)
+    sums, stds = _Sums(model, values, solution), []
+    try:
+        for recording in dataset.recordings:
+            part = _Part.of(model, dataset, values, uniform(recording), most)
+            sums.add(part)
+            stds.append(part.position_std)
+    except RecordingError:
+        return None
+    kept = list(solution.basis.independent)
+    whole, noise_alone = (np.zeros(model.size) for _ in range(2))
+    whole[kept] = sums.bias(sums.noise + sums.hidden)
+    noise_alone[kept] = sums.bias(sums.noise)
+    settings = dataset.filter or default_filter(dataset.recordings[0].rate_hz)
+    return InputBias(
+        model=model,
+        values=whole,
+        trembling=whole - noise_alone,
+        sigma=sigma,
+        position_std=np.sqrt(np.mean(np.square(stds), axis=0)),
+        filtered=settings.position_cutoff_hz is not None,
+    )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Part:
+    """A recording with its motion as it was, as it is seen, and seen once more with noise.
+
+    Attributes
+    ----------
+    sampled : whose motion is the seen one.
+    true : two motions whose columns have those of the true motion for their mean, without
+        what averages out; none where all is seen.
+    noisy : with noise and with its mirror image: what is odd cancels.
+    position_std : (n,) rad or m.
+    share : of the recording's rows.
+    """
+
+    sampled: Sampled
+    true: tuple[Motion, ...]
+    noisy: tuple[Motion, Motion]
+    position_std: np.ndarray
+    share: float
+
+    @classmethod
+    def of(
+        cls,
+        model: Model,
+        dataset: Dataset,
+        values: np.ndarray,
+        recording: Recording,
+        most: int,
+    ) -> _Part:
+        """Make it of at most so many samples of a recording on a uniform clock."""
+        rate, settings = recording.rate_hz, dataset.filter or default_filter(recording.rate_hz)
+        cutoff = settings.position_cutoff_hz or default_position_cutoff(rate, settings.cutoff_hz)
+        # Without a low-pass the true motion is sought behind one, and noise is added without.
+        sampled = sample(recording, replace(settings, position_cutoff_hz=cutoff))
+        hidden = trembling(model, values, recording, cutoff)
+        std = encoder_noise_std(recording.q - hidden.q)
+        if dataset.noise is not None:
+            std = np.asarray(dataset.noise.position_std, dtype=float)
+        noise = std * np.random.default_rng(0).standard_normal(recording.q.shape)
+        seen, added = sampled.motion, _added(recording, noise, settings, sampled)
+        rows = slice(seen.first, seen.first + seen.samples)
+        if settings.position_cutoff_hz is None:
+            seen = _moved(seen, _added(recording, hidden.q, settings, sampled), 1.0)
+            true = ()
+        else:
+            # Along straight lines from sample to sample. What is odd cancels: it is no bias.
+            one, other = (hidden.between(share)[rows] for share in _POINTS)
+            true = (replace(seen, v=seen.v + one), replace(seen, v=seen.v - other))
+        count = sampled.kept.stop - sampled.kept.start
+        fewer = min(count, max(1, round(most / sampled.parallel.step)))
+        start = sampled.kept.start + (count - fewer) // 2
+        return cls(
+            sampled=replace(sampled, motion=seen, kept=slice(start, start + fewer)),
+            true=true,
+            noisy=(_moved(seen, added, 1.0), _moved(seen, added, -1.0)),
+            position_std=std,
+            share=fewer / count,
+        )
+
+    def columns(self, model: Model, values: np.ndarray) -> Iterator[tuple[np.ndarray, ...]]:
+        """Yield columns (T, n, p): seen, true, and of both draws."""
+        motions = (self.sampled.motion, *self.noisy, *self.true)
+        every = (replace(self.sampled, motion=one).columns(model, values) for one in motions)
+        for seen, one, other, *true in zip(*every, strict=True):
+            yield seen, (np.mean(true, axis=0) if true else seen), one, other
+
+
+class _Sums:
+    """Weighted products W'D of noisy columns and what they are off, over all rows.
+
+    In directions in which the fitted columns are orthonormal, so that W'W is one.
+    """
+
+    def __init__(self, model: Model, values: np.ndarray, solution: LinearSolution) -> None:
+        self._model, self._values, self._solution = model, values, solution
+        rank = len(solution.basis.independent)
+        self.noise, self.hidden = np.zeros((rank, rank)), np.zeros((rank, rank))
+
+    def add(self, part: _Part) -> None:
+        """Add the rows of a recording, for both draws."""
+        for seen, true, *drawn in part.columns(self._model, self._values):
+            one, other, *noisy = (self._turned(x) for x in (seen, true, *drawn))
+            for W in noisy:
+                self.noise += W.T @ (W - one) / (2 * part.share)
+                self.hidden += W.T @ (one - other) / (2 * part.share)
+
+    def _turned(self, columns: np.ndarray) -> np.ndarray:
+        kept = columns[:, :, list(self._solution.basis.independent)]
+        weighted = kept * self._solution.weights[:, None]
+        return weighted.reshape(-1, kept.shape[2]) @ self._solution.inverse
+
+    def bias(self, products: np.ndarray) -> np.ndarray:
+        """Error (r,) of an estimate that is (1 - W'D) times the truth."""
+        turn = self._solution.inverse
+        found = np.linalg.solve(turn, self._solution.basis.coordinates(self._values))
+        left, size, right = np.linalg.svd(np.eye(len(products)) - products)
+        true = right.T @ ((left.T @ found) / np.maximum(size, _LEAST))
+        return turn @ (found - true)
+
+
+def _added(recording: Recording, q: np.ndarray, settings: Filter, sampled: Sampled) -> Motion:
+    """What positions (T, n) do to a motion behind a filter, on the rows of a sampled recording."""
+    motion, rate = sampled.motion, sampled.motion.rate_hz
+    after = recording.samples - motion.first - motion.samples
+    edges = replace(settings, edge_s=(motion.first / rate, after / rate))
+    return differentiate(recording.replace(q=q), edges)
+
+
+def _moved(motion: Motion, other: Motion, factor: float) -> Motion:
+    return replace(
+        motion,
+        q=motion.q + factor * other.q,
+        v=motion.v + factor * other.v,
+        a=motion.a + factor * other.a,
+    )
