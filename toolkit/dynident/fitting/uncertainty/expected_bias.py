@@ -23,7 +23,14 @@ def reported(bias: np.ndarray, sigma: np.ndarray) -> np.ndarray:
 
 
 def listed(model: Model, bias: np.ndarray, which: np.ndarray) -> str:
-    """Some of the biases (p,) with their units."""
+    """Return some of the biases with their units, in words.
+
+    Parameters
+    ----------
+    model : of p parameters.
+    bias : (p,)
+    which : numbers of those to be listed.
+    """
     return ", ".join(
         f"{model.names[i]} {number(float(bias[i]), 2)} {model.units[i]}" for i in which
     )

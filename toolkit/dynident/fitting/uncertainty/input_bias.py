@@ -153,10 +153,10 @@ def input_bias(
     None where the recordings are too short to tell.
     """
     most = _MOST // len(dataset.recordings)
-    sums, stds = _Sums(model, values, solution), []
+    sums, stds = _NoiseProducts(model, values, solution), []
     try:
         for recording in dataset.recordings:
-            part = _Part.of(model, dataset, values, uniform(recording), most)
+            part = _NoisyPart.of(model, dataset, values, uniform(recording), most)
             sums.add(part)
             stds.append(part.position_std)
     except RecordingError:
@@ -177,7 +177,7 @@ def input_bias(
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class _Part:
+class _NoisyPart:
     """A recording with its motion as it was, as it is seen, and seen once more with noise.
 
     Attributes
@@ -204,7 +204,7 @@ class _Part:
         values: np.ndarray,
         recording: Recording,
         most: int,
-    ) -> _Part:
+    ) -> _NoisyPart:
         """Make it of at most so many samples of a recording on a uniform clock."""
         rate, settings = recording.rate_hz, dataset.filter or default_filter(recording.rate_hz)
         cutoff = settings.position_cutoff_hz or default_position_cutoff(rate, settings.cutoff_hz)
@@ -243,7 +243,7 @@ class _Part:
             yield seen, (np.mean(true, axis=0) if true else seen), one, other
 
 
-class _Sums:
+class _NoiseProducts:
     """Weighted products W'D of noisy columns and what they are off, over all rows.
 
     In directions in which the fitted columns are orthonormal, so that W'W is one.
@@ -254,7 +254,7 @@ class _Sums:
         rank = len(solution.basis.independent)
         self.noise, self.hidden = np.zeros((rank, rank)), np.zeros((rank, rank))
 
-    def add(self, part: _Part) -> None:
+    def add(self, part: _NoisyPart) -> None:
         """Add the rows of a recording, for both draws."""
         for seen, true, *drawn in part.columns(self._model, self._values):
             one, other, *noisy = (self._turned(x) for x in (seen, true, *drawn))
