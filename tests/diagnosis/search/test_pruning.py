@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
@@ -102,3 +104,23 @@ def test_each_stage_of_a_path_has_the_friction_width_that_it_calls_for() -> None
         np.testing.assert_allclose(widths, PLAIN.friction_width, rtol=0.4)
     errors = [one.error for one in path.judged]
     assert errors == sorted(errors, reverse=True)
+
+
+def test_what_cannot_be_told_from_a_withdrawn_effect_is_refused_with_it() -> None:
+    """The machine of the test recordings has no drag, and is not asked for a twin of it."""
+    evidence, held = evidence_of(range(3), 0.8, 0.0), evidence_of(range(3, 5), 0.0, 0.0)
+    start = fit_evidence(evidence, PLAIN)
+    fitted, (drag,) = added(evidence, DRAG)
+    twins = effects_of("torque_ripple@shoulder", PLAIN.robot) + effects_of(OFFSET, PLAIN.robot)
+    drag = replace(drag, indistinguishable=twins)
+    path = path_of(evidence, held, start, fitted, (drag,), lambda _: None)
+    (taken_back,) = path.withdrawn
+    assert path.found == () and path.final is start
+    assert "raises the error on the test recordings" in taken_back.why
+    assert taken_back.with_it == twins
+    assert set(taken_back.refusals) == {DRAG, "torque_ripple@shoulder", OFFSET}
+    assert "torque offset at elbow, which are indistinguishable from it" in taken_back.sentence
+    assert [one["effect"] for one in taken_back.to_dict()["with_it"]] == [e.name for e in twins]
+    assert replace(path, looks=2).notes == ()  # nothing is claimed
+    (note,) = replace(path, found=(drag,), looks=2).notes
+    assert "judged 2 sets of effects" in note

@@ -41,12 +41,23 @@ def test_what_raises_the_held_out_error_is_withdrawn_and_said_to_be() -> None:
     assert found.test_error.after <= found.test_error.before
     assert any("Withdrawn: joint spring at elbow" in note for note in found.caveats)
     said = found.to_dict()
-    assert {"effect": "joint_spring", "joint": "elbow", "source": None, "why": spring.why} in said[
-        "withdrawn"
-    ]
+    where = {"joint": "elbow", "source": None}
+    (one,) = (o for o in said["withdrawn"] if o["effect"] == "joint_spring")
+    twin = {"effect": "torque_ripple", **where}
+    assert one == {"effect": "joint_spring", **where, "why": spring.why, "with_it": [twin]}
     for step in said["steps"]:
         assert step["test_error_after"] <= step["test_error_before"]
     assert found.verdict != "explained"
+
+
+def test_no_twin_of_what_was_withdrawn_takes_its_place() -> None:
+    found = trained_on_what_the_test_lacks()
+    refused = {label for one in found.withdrawn for label in one.refusals}
+    assert not refused & {one.effect.label for one in found.steps}
+    (again,) = [one for one in found.remaining if one.effect.label == "joint_spring@elbow"]
+    assert again.status == "not_material"
+    for one in found.remaining:
+        assert not (one.effect.label in refused and one.status == "material")
 
 
 @cache

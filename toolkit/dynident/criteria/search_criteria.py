@@ -90,6 +90,13 @@ class SearchCriteria(CriteriaGroup):
         least=0,
         most=1,
     )
+    withdrawals: int = criterion(
+        2,
+        "times",
+        "times that the search goes on after held-out data have withdrawn an effect: each is "
+        "another look at them",
+        least=0,
+    )
     least_fall: float = criterion(
         0.015,
         "1",

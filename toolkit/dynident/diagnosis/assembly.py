@@ -125,6 +125,7 @@ def assemble(
         notes=(
             *notes_on(evidence, held, stages[-1], source),
             *rounding_notes(after, given.robot.names, evidence.criteria.verdict),
+            *path.notes,
             *search.notes,
         ),
         test_sources=sources_of(test) if test is not None else (),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -72,10 +72,39 @@ class Step:
 
 @dataclass(frozen=True, kw_only=True)
 class Withdrawn:
-    """An effect that passed every gate on the training recordings, and why it was taken back."""
+    """An effect that passed every gate on the training recordings, and was taken back.
+
+    Attributes
+    ----------
+    effect : the effect.
+    why : in words that follow its name.
+    with_it : effects that the training recordings cannot tell from it, which were not tried in its
+        place: the test recordings would have chosen among them, and then judged their choice.
+    """
 
     effect: Effect
     why: str
+    with_it: tuple[Effect, ...] = ()
+
+    @property
+    def sentence(self) -> str:
+        """The effect, why it was taken back, and what was not tried in its place."""
+        titles = " and ".join(one.title for one in self.with_it)
+        verb = "is" if len(self.with_it) == 1 else "are"
+        rest = f" Not tried in its place: {titles}, which {verb} indistinguishable from it."
+        return f"Withdrawn: {self.effect.title}, which {self.why}.{rest if titles else ''}"
+
+    @property
+    def refusals(self) -> dict[str, str]:
+        """Why it and those with it are not tried again, by label."""
+        alike = f"indistinguishable from {self.effect.title}, which {self.why}"
+        return {**{one.label: alike for one in self.with_it}, self.effect.label: self.why}
+
+    def to_dict(self) -> dict[str, Any]:
+        """The effect as JSON has it."""
+        with_it = [place(one) for one in self.with_it]
+        found = {**place(self.effect), "why": self.why}
+        return {**found, "with_it": with_it} if with_it else found
 
 
 @dataclass(frozen=True, kw_only=True)

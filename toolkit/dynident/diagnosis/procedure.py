@@ -11,12 +11,14 @@ it is called, that is the answer, and nothing is added.
   relevant.
 - *add*: the best of these, or a simpler one that explains nearly as much; what every joint has, at
   all joints that call for it.
-- *refit*: all parameters anew, shapes too; values that no robot can have refuse the effect. Then
-  rank again, until no effect passes the gates. Where a residual remains, a search through all
-  shapes of effects that ring or have backlash follows.
+- *refit*: all parameters anew, shapes too; values that no robot can have refuse the effect, and so
+  does an effect that explains less than it promised: the next best is tried. Then rank again, until
+  no effect passes the gates. Where a residual remains, a search through all shapes of effects that
+  ring or have backlash follows.
 - *judge*: what the others have made superfluous is dropped, and what raises the error on recordings
-  (or blocks of time) that were not fitted is withdrawn; errors before and after, and the verdict,
-  are those on the same.
+  (or blocks of time) that were not fitted is withdrawn, with what cannot be told from it. Then the
+  search goes on with what is left, a few times at most. Errors before and after, and the verdict,
+  are those on the same data.
 """
 
 from __future__ import annotations
@@ -64,8 +66,6 @@ from dynident.model import Model
 from dynident.recording import Dataset, numbered
 from dynident.threads import single_threaded
 from dynident.wiring import check_wiring
-
-_WITHDRAWALS = 8  # times that the search goes on after something was withdrawn
 
 
 @single_threaded
@@ -288,18 +288,25 @@ def _search_globally(start: _Stage, extended: _Stage, task: _Task) -> _Stage:
 
 
 def _settle(stage: _Stage, task: _Task) -> tuple[_Stage, Path]:
-    """Drop what is superfluous and withdraw what does harm; then go on with what is left."""
+    """Drop what is superfluous and withdraw what does harm; then go on with what is left.
+
+    Held-out data that withdraw an effect choose what comes in its place, and judge it: they are
+    asked a few times at most, and never about what is indistinguishable from what they withdrew.
+    """
     withdrawn: tuple[Withdrawn, ...] = ()
-    for again in range(_WITHDRAWALS, -1, -1):
+    most = stage.evidence.criteria.search.withdrawals
+    for looks in range(1, most + 2):
         many = len(stage.found)
         stage, path = _pruned(stage, task)
         withdrawn = (*withdrawn, *path.withdrawn)
         if len(path.found) < many:
-            refused = {**stage.refused, **{o.effect.label: o.why for o in path.withdrawn}}
+            refused = dict(stage.refused)
+            for one in path.withdrawn:
+                refused |= one.refusals
             stage = _rank(replace(stage, refused=refused), task)
-        wider = _extend(stage, task) if path.withdrawn and again else stage
+        wider = _extend(stage, task) if path.withdrawn and looks <= most else stage
         if wider.found == stage.found:
-            return wider, replace(path, withdrawn=withdrawn)
+            return wider, replace(path, withdrawn=withdrawn, looks=looks)
         stage = wider
     raise AssertionError("the last time nothing is added")
 

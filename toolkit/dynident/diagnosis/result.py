@@ -170,7 +170,7 @@ class Diagnosis:
         return (
             *((self.confidence,) if self.confidence else ()),
             *((f"Criteria of the study, not the defaults: {changed}.",) if changed else ()),
-            *(f"Withdrawn: {one.effect.title}, which {one.why}." for one in self.withdrawn),
+            *(one.sentence for one in self.withdrawn),
             *self.notes,
         )
 
@@ -214,7 +214,7 @@ class Diagnosis:
             "wiring": [fault.to_dict() for fault in self.wiring],
             **({"impossible": list(self.impossible)} if self.impossible else {}),
             "rows": self.rows.to_dict(),
-            "withdrawn": [{**place(one.effect), "why": one.why} for one in self.withdrawn],
+            "withdrawn": [one.to_dict() for one in self.withdrawn],
             **self._limits(),
             "notes": list(self.caveats),
             **({"criteria": self._changed_criteria()} if self.criteria.changed else {}),

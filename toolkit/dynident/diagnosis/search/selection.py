@@ -20,6 +20,7 @@ from dynident.effects import Effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import on_recordings
+from dynident.model import Model
 from dynident.tables import percent
 
 _SEED = 20_110  # of the bootstrap
@@ -42,6 +43,10 @@ class AddedEffect:
     p_value: float
     indistinguishable: tuple[Effect, ...]
     with_it: str = ""
+
+    def alternatives_to(self, model: Model) -> tuple[Effect, ...]:
+        """Effects that explain the same and are not in the model."""
+        return tuple(effect for effect in self.indistinguishable if effect not in model)
 
 
 def choose(evidence: Evidence, fitted: EvidenceFit, ranking: Ranking) -> AddedEffect | None:
@@ -313,7 +318,8 @@ def without_superfluous(
             fitted = rest
             if needed:
                 why = "lowers the residual of the test recordings at no joint"
-                unhelpful.append(Withdrawn(effect=effect, why=why))
+                alike = one.alternatives_to(fitted.model)
+                unhelpful.append(Withdrawn(effect=effect, why=why, with_it=alike))
     return Kept(fitted, kept, tuple(unhelpful))
 
 

@@ -30,17 +30,30 @@ class Path:
     stages : the fits before any step and after each of them.
     judged : held-out errors of the same; they fall from step to step.
     withdrawn : effects that were taken back.
+    looks : times that held-out data have judged a path: more than once where the search has gone on
+        after something was withdrawn.
     """
 
     found: tuple[AddedEffect, ...]
     stages: tuple[EvidenceFit, ...]
     judged: tuple[HeldOut, ...]
     withdrawn: tuple[Withdrawn, ...] = ()
+    looks: int = 1
 
     @property
     def final(self) -> EvidenceFit:
         """The fit of the model with all effects that are kept."""
         return self.stages[-1]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What repeated looks make of the held-out error, in plain words."""
+        if self.looks < 2 or not self.found:
+            return ()
+        return (
+            f"Held-out data judged {self.looks} sets of effects, as others were sought after some "
+            "were withdrawn: the error on them may be a little too low.",
+        )
 
 
 def path_of(
@@ -73,10 +86,9 @@ def path_of(
     while True:
         along = _judged_stages(evidence, held, (start, fitted), found, known)
         stages, judged = tuple(fit for fit, _ in along), tuple(errors for _, errors in along)
-        reasons = [
-            newly_impossible(evidence, *fits) or _why(held, *errors)
-            for fits, errors in zip(pairwise(stages), pairwise(judged), strict=True)
-        ]
+        impossible = [newly_impossible(evidence, *fits) for fits in pairwise(stages)]
+        worse = [_why(held, *errors) for errors in pairwise(judged)]
+        reasons = [one or other for one, other in zip(impossible, worse, strict=True)]
         wrong = next((k for k, why in enumerate(reasons) if why), None)
         if wrong is None:
             return Path(found=found, stages=stages, judged=judged, withdrawn=withdrawn)
@@ -88,7 +100,9 @@ def path_of(
             found = (*others, one)
             continue
         progress(f"withdrawing {label}")
-        withdrawn = (*withdrawn, Withdrawn(effect=one.score.effect, why=reasons[wrong]))
+        alike = () if impossible[wrong] else one.alternatives_to(fitted.model)
+        taken_back = Withdrawn(effect=one.score.effect, why=reasons[wrong], with_it=alike)
+        withdrawn = (*withdrawn, taken_back)
         found = others
         known = {(): known[()]}
         effect = next(e for e in fitted.model.effects if e.label == label)
