@@ -3,8 +3,8 @@
     python benchmarks/batch_regressor.py [--samples 16384] [--links 2 7 30 60]
 
 The arms of `problems/`, then chains of revolute joints, on one thread. What is printed is the time
-a sample of a loop that keeps what Pinocchio computes, and of the same through `dynident.batch`, the
-samples of one block of a fit at a time, replayed by NumPy and compiled; how many times quicker each
+a sample of a loop that keeps what Pinocchio computes, and of the same through `dynident.batch`, for
+a block of samples as fits take them, replayed by NumPy and compiled; how many times quicker each
 is; and the seconds to write the function out and to compile it. "base" is the columns of the base
 parameters, "all" all of them.
 """
@@ -34,6 +34,8 @@ ARMS = ("panda/panda.urdf", "iiwa/iiwa.urdf")
 REPEATS = 5
 LONGEST_PINOCCHIO = 200_000  # joints times samples of the loop
 LONGEST_COMPILED = 30
+MEMORY = 2**27  # bytes of the regressor of a block
+LEAST = 2048
 
 
 def seconds(what: Callable[[], Any]) -> float:
@@ -62,20 +64,23 @@ def through_pinocchio(robot: Robot, motion: tuple[np.ndarray, ...], what: str) -
     return seconds(loop) / len(q)
 
 
-def made(robot: Robot, what: str) -> Kernel:
-    """A function, written out now."""
+def made(robot: Robot, columns: tuple[int, ...]) -> Kernel:
+    """A function of columns, or of the torque if there are none, written out now."""
     tree = robot.joint_tree
-    if what == "torque":
+    if not columns:
         return Kernel(torque_equations(tree), (robot.n,))
-    columns = structural_base(robot).independent if what == "base" else range(10 * robot.n)
-    return Kernel(regressor_equations(tree, tuple(columns)), (robot.n, len(columns)))
+    return Kernel(regressor_equations(tree, columns), (robot.n, len(columns)))
 
 
 def show(name: str, robot: Robot, motion: tuple[np.ndarray, ...], what: str) -> None:
     parameters = robot.theta.tolist() if what == "torque" else []
-    structural_base(robot)  # what it loads is not to be counted
+    columns = {
+        "base": structural_base(robot).independent,
+        "all": tuple(range(10 * robot.n)),
+        "torque": (),
+    }[what]
     start = time.process_time()
-    kernel = made(robot, what)
+    kernel = made(robot, columns)
     writing = time.process_time() - start
     samples = len(motion[0])
 
@@ -110,7 +115,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         os.environ["XDG_CACHE_HOME"] = folder
         for name, robot in robots.items():
-            samples = said.samples if robot.n < 20 else said.samples // 4
+            samples = min(said.samples, max(LEAST, MEMORY // (80 * robot.n**2)))
             motion = robot.random_motion(0, samples)
             for what in ("base", "all", "torque"):
                 show(name, robot, motion, what)

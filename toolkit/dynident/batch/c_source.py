@@ -41,7 +41,7 @@ void {entry}(long samples, const double *const *x, const long *step, double *w, 
         /* The last samples again, from the inputs on, rather than fewer than lanes. */
         if (!m) m = {lanes}, s = samples - m;
         for (int i = 0; i < {inputs}; i++)
-            if (step[i]) for (long k = 0; k < m; k++) w[{row}l * i + k] = x[i][s + k];
+            if (step[i]) __builtin_memcpy(w + {row}l * i, x[i] + s, m * sizeof *w);
 {calls}
     }}
 }}

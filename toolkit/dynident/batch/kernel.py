@@ -123,7 +123,7 @@ class Kernel:
         """Call the compiled function."""
         steps = (ctypes.c_long * len(inputs))(*(int(np.ndim(one) > 0) for one in inputs))
         held = [np.ascontiguousarray(one, dtype=float) for one in inputs]
-        work = np.empty(work_size(self._tape))
+        work = side_by_side(work_size(self._tape), ())
         self._function(
             ctypes.c_long(samples),
             _pointers(held),

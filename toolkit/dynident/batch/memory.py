@@ -13,10 +13,10 @@ import numpy as np
 
 _LEAST = 2**20  # bytes: the memory of smaller arrays is used again anyway
 _LINE = 8  # numbers in a line of the cache
-_KEPT = 2**27  # bytes at most that are kept while nobody uses them
+_KEPT = 2**28  # bytes at most that are kept while nobody uses them
 
 # By their identity. Each access is one operation, for an array may go at any time in any thread.
-_free: dict[int, bytearray] = {}
+_free: dict[int, np.ndarray] = {}
 
 
 def side_by_side(samples: int, shape: tuple[int, ...]) -> np.ndarray:
@@ -34,15 +34,15 @@ def side_by_side(samples: int, shape: tuple[int, ...]) -> np.ndarray:
         flat = np.empty(count)
     else:
         memory = _taken(8 * count)
-        flat = np.frombuffer(memory, dtype=float, count=count)
-        # Every view holds `flat`, as no array lies below it: when it goes, all have gone.
+        # Every view holds `flat`, for below it is a buffer, no array: when it goes, all have gone.
+        flat = np.frombuffer(memory.data, dtype=float, count=count)
         weakref.finalize(flat, _give_back, memory).atexit = False
     start = -(flat.ctypes.data // 8) % _LINE
     rows = flat[start : start + count - _LINE].reshape(*shape, lines * _LINE)
     return np.moveaxis(rows[..., :samples], -1, 0)
 
 
-def _taken(size: int) -> bytearray:
+def _taken(size: int) -> np.ndarray:
     """Memory of about the size that is free, or new."""
     for key in list(_free):
         memory = _free.pop(key, None)
@@ -50,10 +50,10 @@ def _taken(size: int) -> bytearray:
             return memory
         if memory is not None:
             _free[key] = memory
-    return bytearray(size)
+    return np.empty(size, dtype=np.uint8)  # which asks for huge pages, where there are any
 
 
-def _give_back(memory: bytearray) -> None:
+def _give_back(memory: np.ndarray) -> None:
     _free[id(memory)] = memory
     for key in list(_free):
         if sum(map(len, list(_free.values()))) > _KEPT:

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import lazy_loader
 import numpy as np
 
+from dynident.batch.memory import side_by_side
 from dynident.batch.newton_euler import Equations
 
 ca: Any = lazy_loader.load("casadi")
@@ -21,8 +23,6 @@ ca: Any = lazy_loader.load("casadi")
 BLOCK = 4096
 """Samples of a block at most: a call costs little beside them, and a few hundred slots of them
 stay in the cache. Measured: half as many take a fifth longer, a quarter three quarters."""
-
-_ODD = 8  # numbers between rows, lest all begin at the same place of a page
 
 OPERATIONS = "+-*"
 """By the numbers that they have on a tape."""
@@ -53,6 +53,10 @@ class Tape:
     places: tuple[tuple[int, ...], ...]
     steps: np.ndarray
 
+    @cached_property
+    def _calls(self) -> list[tuple[Any, int, int, int]]:
+        return [(_UFUNCS[code], left, right, to) for code, left, right, to in self.steps.tolist()]
+
     def replay(self, inputs: Sequence[Any], results: Sequence[np.ndarray]) -> None:
         """Evaluate at all samples.
 
@@ -63,8 +67,7 @@ class Tape:
         """
         samples = len(results[0]) if results else 0
         size = min(BLOCK, samples)
-        work = np.empty((self.slots, size + _ODD))
-        steps = [(_UFUNCS[code], left, right, to) for code, left, right, to in self.steps.tolist()]
+        work = list(np.moveaxis(side_by_side(size, (self.slots,)), 0, -1))
         for start in range(0, samples, max(size, 1)):
             part = slice(start, min(start + size, samples))
             at: list[Any] = [x if np.ndim(x) == 0 else x[part] for x in inputs]
@@ -73,7 +76,7 @@ class Tape:
             at += [row[part] for row in results]
             # Overflow is the caller's to judge, from the results.
             with np.errstate(all="ignore"):
-                for ufunc, left, right, to in steps:
+                for ufunc, left, right, to in self._calls:
                     ufunc(at[left], at[right], at[to])
 
 

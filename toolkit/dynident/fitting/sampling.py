@@ -28,7 +28,10 @@ from dynident.recording import (
 )
 
 BLOCK = 16384
-"""Samples at the full rate that are evaluated at a time."""
+"""Samples at the full rate that are evaluated at a time, at most."""
+
+_MEMORY = 2**27  # bytes of the columns of so many samples: more than 12 joints get fewer
+_LEAST_BLOCK = 2048  # fewer do not pay for a function of many samples
 
 LEAST_ROWS = 20
 """Rows below which a recording says too little."""
@@ -75,7 +78,7 @@ class Sampled:
         values : (p,) parameters at which columns that depend on the fitted model are taken.
         """
         known = self.whole_columns(model, values)
-        for plan in self._plans():
+        for plan in self._plans(model):
             here = {label: own[plan.raw] for label, own in known.items()}
             columns = model.columns(self.block(model, plan.raw), values, here)
             yield self.parallel.apply_block(columns, plan)
@@ -96,7 +99,7 @@ class Sampled:
         """Evaluate columns block by block; all of their decimated rows."""
         parts = [
             [self.parallel.apply_block(one, plan) for one in evaluate(self.block(model, plan.raw))]
-            for plan in self._plans()
+            for plan in self._plans(model)
         ]
         return [np.concatenate(pieces) for pieces in zip(*parts, strict=True)]
 
@@ -123,9 +126,11 @@ class Sampled:
         )
         return replace(block, period=recording.period) if raw == slice(None) else block
 
-    def _plans(self) -> Iterator[FilterBlock]:
+    def _plans(self, model: Model) -> Iterator[FilterBlock]:
         """Blocks whose rows lie in the recording's window."""
-        for plan in self.parallel.blocks(self.motion.samples, BLOCK):
+        fitting = _MEMORY // (8 * model.robot.n * model.size)
+        size = min(BLOCK, max(_LEAST_BLOCK, fitting))
+        for plan in self.parallel.blocks(self.motion.samples, size):
             low, high = max(plan.kept.start, self.kept.start), min(plan.kept.stop, self.kept.stop)
             if high > low:
                 rows = slice(low - plan.kept.start, high - plan.kept.start)
