@@ -73,6 +73,7 @@ def test_arrays_of_any_memory_order_are_the_same(monkeypatch):
 @needs_compiler
 def test_compiles_when_as_much_was_replayed_and_finds_it_again(monkeypatch):
     monkeypatch.setattr(kernel, "COMPILE_AFTER", 50)
+    monkeypatch.setattr(kernel, "LOOK_AFTER", 10)
     robot = chain(2)
     first = torque_of(robot)
     answer(first, robot, 49)
@@ -80,6 +81,8 @@ def test_compiles_when_as_much_was_replayed_and_finds_it_again(monkeypatch):
     answer(first, robot, 1)
     assert str(first.evaluation) == "compiled (from 50 samples on)"
     second = torque_of(robot)
+    answer(second, robot, 9)
+    assert second.evaluation.way == "replayed"
     answer(second, robot, 1)
     assert str(second.evaluation) == "compiled (from the cache)"
     assert {first.evaluation, second.evaluation} <= set(evaluations())
@@ -119,6 +122,7 @@ def test_what_cannot_be_compiled_is_replayed_with_a_reason(fault, tmp_path, monk
 
 @needs_compiler
 def test_a_broken_file_in_the_cache_is_made_anew(monkeypatch):
+    monkeypatch.setattr(kernel, "LOOK_AFTER", 1)
     robot = chain(2)
     want = answer(torque_of(robot), robot)
     source = c_source(tape_of(torque_equations(robot.joint_tree)))

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from chains import chain
 from dynident import fit as fit_model
 from dynident.errors import FitError, RecordingError
-from dynident.fitting import LeastSquares, essential_parameters, load_estimate, rows
+from dynident.fitting import LeastSquares, essential_parameters, load_estimate, rows, sampling
 from dynident.model import Model
 from dynident.moments import factorise
-from dynident.recording import Dataset, Filter
+from dynident.recording import Dataset, Filter, Recording
 from dynident.robot import Robot
 from synthetic import arm, smooth_motion, synthetic, true_values
 
@@ -46,6 +47,18 @@ def test_factors_of_any_blocks_give_the_same_answer_as_one_dense_solve() -> None
         R = factors.pooled(np.array([1.0, 0.1]))
         stacked = np.vstack([columns[:, 0], 0.1 * columns[:, 1]])
         assert np.allclose(R[:6, :6].T @ R[:6, :6], stacked.T @ stacked)
+
+
+def test_blocks_of_a_long_chain_take_no_more_memory_than_those_of_an_arm() -> None:
+    long = Model(chain(24))
+    samples = 3 * sampling.BLOCK
+    times = np.arange(samples) / 1000.0
+    q = 0.1 * np.sin(times[:, None] + np.arange(24))
+    recording = Recording(times, q, np.ones_like(q), long.robot.names)
+    ready = sampling.sample(recording, Filter(cutoff_hz=100.0, rate_hz=500.0))
+    columns = next(ready.columns(long))
+    assert columns.shape[1:] == (24, long.size)
+    assert 2 * columns.size * 8 < 1.1 * 2**27, "half of the samples are kept"
 
 
 def test_noise_free_truth_is_recovered(model: Model, truth: np.ndarray) -> None:

@@ -24,9 +24,10 @@ _PART = 500  # steps of one function
 _ROW = CHUNK + LANES  # numbers from one row of work to the next; odd in lines of the cache
 
 _HEAD = f"""\
-typedef double lanes __attribute__((vector_size({8 * LANES}), aligned(8), may_alias));
+typedef double lanes __attribute__((vector_size({8 * LANES}), may_alias));
+typedef lanes loose __attribute__((aligned(8)));
 #define W(i) (*(lanes *)(w + {_ROW}l * i + k))
-#define Y(i) (*(lanes *)(y[i] + s + k))
+#define Y(i) (*(loose *)(y[i] + s + k))
 #define PART(name) static void name(double *restrict w, double *const *y, long s, long m)
 #define EACH for (long k = 0; k < m; k += {LANES})
 """
@@ -52,8 +53,8 @@ def c_source(tape: Tape) -> str:
     """Return a C function of what a tape computes.
 
     Its arguments are the number of samples, at least `LANES`; where each input begins; for each
-    input 1, or 0 if one number is for all samples; room for `work_size` numbers; and the place to
-    write each result to.
+    input 1, or 0 if one number is for all samples; room for `work_size` numbers, from the beginning
+    of a line of the cache on; and the place to write each result to.
 
     Parameters
     ----------

@@ -16,6 +16,9 @@ COMPILE_AFTER = 500_000
 0.16 ms to compile and 0.3 ns a sample to replay. Whoever pays as much for compiling as was spent
 before pays at most twice what was best."""
 
+LOOK_AFTER = 10_000
+"""Samples after which the cache is asked: to name what it may have, the source is written."""
+
 Wish = Literal["never", "auto", "always"]
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from dynident.batch.c_source import ENTRY, LANES, c_source, work_size
 from dynident.batch.compiler import NotCompiled, compiled, is_kept
-from dynident.batch.evaluation import COMPILE_AFTER, VARIABLE, Evaluation, wish
+from dynident.batch.evaluation import COMPILE_AFTER, LOOK_AFTER, VARIABLE, Evaluation, wish
 from dynident.batch.joint_tree import JointTree
 from dynident.batch.memory import side_by_side
 from dynident.batch.newton_euler import SIGNALS, Equations, regressor_equations, torque_equations
@@ -103,7 +103,7 @@ class Kernel:
     @property
     def _reason(self) -> str:
         """Why a compiled function is to be had for little, or pays; empty if neither is so."""
-        if self._is_kept:
+        if self._seen >= LOOK_AFTER and self._is_kept:
             return "from the cache"
         return f"from {COMPILE_AFTER} samples on" if self._seen >= COMPILE_AFTER else ""
 
