@@ -13,9 +13,9 @@ from dynident.fitting.linear_solution import solve_factors
 from dynident.fitting.sampling import rows
 from dynident.fitting.uncertainty.input_bias import InputBias, input_bias
 from dynident.fitting.uncertainty.trembling import trembling
-from dynident.fitting.uncertainty.white_noise import encoder_noise_std
 from dynident.moments.factors import factorise
 from dynident.recording import Dataset, Filter, Noise, Recording, lowpass
+from dynident.recording.white_noise import encoder_noise_std
 
 TORQUE = (2.0, 0.8)
 NOISY, HEALTHY, LOUD, LOUDER = 1e-5, 1e-5, 1e-4, 2e-4

@@ -34,6 +34,7 @@ from dynident.criteria.judgement_criteria import (
     ContactCriteria,
     LoopCriteria,
     NuisanceCriteria,
+    StickingCriteria,
     VerdictCriteria,
 )
 from dynident.criteria.search_criteria import (
@@ -59,6 +60,7 @@ __all__ = [
     "NuisanceCriteria",
     "SearchCriteria",
     "ShapeCriteria",
+    "StickingCriteria",
     "VerdictCriteria",
     "WiringCriteria",
 ]

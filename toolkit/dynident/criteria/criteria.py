@@ -13,6 +13,7 @@ from dynident.criteria.judgement_criteria import (
     ContactCriteria,
     LoopCriteria,
     NuisanceCriteria,
+    StickingCriteria,
     VerdictCriteria,
 )
 from dynident.criteria.search_criteria import (
@@ -38,7 +39,7 @@ class Criteria:
     search : how much is tried, which of several effects is named.
     gates : what an effect must show to be significant and relevant.
     shapes, global_search : how shape parameters are found, near a grid and among all.
-    contacts, nuisances : what is no missing physics and is allowed for.
+    contacts, nuisances, sticking : what is no missing physics and is allowed for.
     verdict : when a model is complete.
     maps : when a picture of the residual shows something.
     advice : which experiments are advised.
@@ -54,6 +55,7 @@ class Criteria:
     global_search: GlobalSearchCriteria = field(default_factory=GlobalSearchCriteria)
     contacts: ContactCriteria = field(default_factory=ContactCriteria)
     nuisances: NuisanceCriteria = field(default_factory=NuisanceCriteria)
+    sticking: StickingCriteria = field(default_factory=StickingCriteria)
     verdict: VerdictCriteria = field(default_factory=VerdictCriteria)
     maps: MapCriteria = field(default_factory=MapCriteria)
     advice: AdviceCriteria = field(default_factory=AdviceCriteria)

@@ -144,6 +144,54 @@ class NuisanceCriteria(CriteriaGroup):
 
 
 @dataclass(frozen=True, kw_only=True)
+class StickingCriteria(CriteriaGroup):
+    """When a joint sticks at its reversals, and which rows that makes useless."""
+
+    noise: float = criterion(
+        4.0, "1", "speed over its noise, within which a joint counts as standing", over=0
+    )
+    longer: float = criterion(
+        2.0,
+        "1",
+        "time within that speed over the time up to three times as much, above which a joint has "
+        "stood: passing through zero takes 0.5, turning back from it 1.4",
+        over=1.4,
+    )
+    stops: int = criterion(3, "stops", "stops at which a joint that sticks has stood", least=1)
+    stops_share: float = criterion(
+        0.1, "1", "share of its stops at which a joint that sticks has stood", over=0, most=1
+    )
+    resolved: float = criterion(
+        3.0,
+        "1",
+        "friction width over the noise of the speed, below which a width cannot be told from none",
+        over=0,
+    )
+    rounded: float = criterion(
+        0.01,
+        "1",
+        "share of a joint's root mean square speed up to which the low-pass of positions may have "
+        "rounded a reversal",
+        least=0,
+        most=0.2,
+    )
+    spread: float = criterion(
+        0.02,
+        "1",
+        "share of a row's low-pass that lies within a reversal, from which the row is left out",
+        over=0,
+        most=1,
+    )
+    most: float = criterion(
+        0.5,
+        "1",
+        "share of a recording's rows up to which reversals of a joint may be left out",
+        over=0,
+        most=0.9,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
 class VerdictCriteria(CriteriaGroup):
     """When a model is said to be complete, and when a residual counts as explained."""
 

@@ -23,8 +23,8 @@ it is called, that is the answer, and nothing is added.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -35,14 +35,15 @@ from dynident.diagnosis.details import Withdrawn
 from dynident.diagnosis.nuisances.contacts import Contacts
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.nuisances.quantisation import nothing_but_rounding
+from dynident.diagnosis.nuisances.sticking import without_sticking
 from dynident.diagnosis.result import Diagnosis
-from dynident.diagnosis.search.global_search import RankedModel, global_search
+from dynident.diagnosis.search.global_search import global_search
 from dynident.diagnosis.search.payload_recordings import (
     marked,
     with_payload,
     with_payload_decided,
 )
-from dynident.diagnosis.search.ranking import Ranking, candidates, rank
+from dynident.diagnosis.search.ranking import candidates, rank
 from dynident.diagnosis.search.refusal import follows_the_filter, narrower, newly_impossible
 from dynident.diagnosis.search.selection import (
     AddedEffect,
@@ -54,13 +55,14 @@ from dynident.diagnosis.search.selection import (
 )
 from dynident.diagnosis.search.shaped_fit import refitted, shaped
 from dynident.diagnosis.search.withdrawal import Path, path_of
+from dynident.diagnosis.stage import DiagnosisTask, Stage
 from dynident.diagnosis.wiring_answer import answered_by
 from dynident.effects import Effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.runs import gather
-from dynident.evidence.simulated_motion import SimulatedMotion, motion_of_loop
+from dynident.evidence.simulated_motion import motion_of_loop
 from dynident.fitting.estimate import Estimate
 from dynident.model import Model
 from dynident.recording import Dataset, numbered
@@ -112,73 +114,16 @@ def diagnose(
     held_out = others[0] if others else None
     faults = check_wiring(given, train, held_out, criteria.wiring)
     most = 0 if faults else most
-    task = _Task(train=train, test=held_out, most=most, progress=progress)
+    task = DiagnosisTask(train=train, test=held_out, most=most, progress=progress)
     start = _compare(given, controller, criteria, task)
     extended = _extend(_rank(start, task), task)
     settled, path = _settle(_search_globally(start, extended, task), task)
     return answered_by(faults, _judge(settled, path, task))
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Task:
-    """What is asked: see `diagnose`."""
-
-    train: Dataset
-    test: Dataset | None
-    most: int
-    progress: Callable[[str], None]
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Stage:
-    """The model as far as it is extended, and the evidence that it is fitted to.
-
-    Attributes
-    ----------
-    evidence, held : of the training and of the test recordings, contacts left out; `held` is None
-        where blocks of time are held out.
-    narrow : the training recordings behind lower cut-offs, where noise in the columns is unknown.
-    loop : behind the simulated motion in the evidence, where there is one.
-    contacts : those that were left out.
-    start, fitted : fits of the model as given, and of the one with all effects added.
-    found : these effects.
-    rounds : the ranking after each of them, the first one before any.
-    refused : labels of effects that were withdrawn, with the reason: they are not tried again.
-    """
-
-    evidence: Evidence
-    held: Evidence | None
-    narrow: Evidence | None
-    loop: SimulatedMotion
-    contacts: Contacts
-    start: EvidenceFit
-    fitted: EvidenceFit
-    found: tuple[AddedEffect, ...] = ()
-    rounds: tuple[Ranking, ...] = ()
-    refused: Mapping[str, str] = field(default_factory=dict)
-
-    @property
-    def proposals(self) -> int:
-        """Effects added, one at several joints counting once."""
-        return len({one.with_it or one.score.effect.label for one in self.found})
-
-    @property
-    def latest(self) -> tuple[AddedEffect, ...]:
-        """What was added last, at all of its joints."""
-        groups = [one.with_it or one.score.effect.label for one in self.found]
-        return tuple(
-            one for one, group in zip(self.found, groups, strict=True) if group == groups[-1]
-        )
-
-    @property
-    def ranked(self) -> RankedModel:
-        """The model with its latest ranking."""
-        return RankedModel(self.fitted, self.rounds[-1])
-
-
 def _compare(
-    given: Model, controller: Controller | None, criteria: Criteria, task: _Task
-) -> _Stage:
+    given: Model, controller: Controller | None, criteria: Criteria, task: DiagnosisTask
+) -> Stage:
     """Gather the evidence, and fit the model as given to it."""
     task.progress("reading the motion")
     loop = motion_of_loop(given, task.train, controller, task.progress, criteria)
@@ -189,12 +134,16 @@ def _compare(
         held = Evidence(given, gather(task.test, criteria.noise), criteria=criteria)
     task.progress("evaluating every effect")
     start = with_friction_width(evidence, shaped(evidence, given))
+    whole = evidence
+    evidence, held = without_sticking(evidence, held, start)
+    if evidence is not whole:
+        start = with_friction_width(evidence, shaped(evidence, given))
     task.progress("looking for contacts")
     contacts = Contacts.find(evidence, held, start)
     evidence, held = contacts.left_out(evidence), contacts.left_out_of_test(held)
     if contacts.pulses:
         start = with_friction_width(evidence, shaped(evidence, given))
-    return _Stage(
+    return Stage(
         evidence=evidence,
         held=held,
         narrow=narrower(evidence, task.train),
@@ -210,7 +159,7 @@ def _variants(given: Model) -> tuple[Effect, ...]:
     return tuple(v for effect in candidates(given) for v in effect.variants(given.robot))
 
 
-def _rank(stage: _Stage, task: _Task) -> _Stage:
+def _rank(stage: Stage, task: DiagnosisTask) -> Stage:
     """Rank every effect that the model lacks; drop alternatives that are significant beside it."""
     ranking = rank(stage.evidence, stage.fitted, len(stage.found), task.progress)
     ranking = ranking.refusing(stage.refused)
@@ -220,7 +169,7 @@ def _rank(stage: _Stage, task: _Task) -> _Stage:
     return replace(stage, found=found, rounds=(*stage.rounds, ranking))
 
 
-def _extend(stage: _Stage, task: _Task) -> _Stage:
+def _extend(stage: Stage, task: DiagnosisTask) -> Stage:
     """Add the best effect, refit, and rank again, until none passes every gate."""
     while stage.proposals < task.most and not _resolved(stage, task):
         best = choose(stage.evidence, stage.fitted, stage.rounds[-1])
@@ -235,7 +184,7 @@ def _extend(stage: _Stage, task: _Task) -> _Stage:
     return stage
 
 
-def _tried(stage: _Stage, best: AddedEffect, task: _Task) -> tuple[_Stage, str]:
+def _tried(stage: Stage, best: AddedEffect, task: DiagnosisTask) -> tuple[Stage, str]:
     """Return the model with one effect more, and why it is refused; that is empty if it is not."""
     added = _add_and_refit(stage, best, task)
     if why := breaks_its_promise(stage.fitted, added.fitted, best.score):
@@ -246,7 +195,7 @@ def _tried(stage: _Stage, best: AddedEffect, task: _Task) -> tuple[_Stage, str]:
     return wider, why
 
 
-def _add_and_refit(stage: _Stage, best: AddedEffect, task: _Task) -> _Stage:
+def _add_and_refit(stage: Stage, best: AddedEffect, task: DiagnosisTask) -> Stage:
     """Return the model with one effect more, all of it fitted anew."""
     task.progress(f"adding {best.score.effect.label}")
     evidence, before = with_payload(stage.evidence, best.score), stage.fitted
@@ -258,8 +207,8 @@ def _add_and_refit(stage: _Stage, best: AddedEffect, task: _Task) -> _Stage:
     return replace(stage, evidence=evidence, fitted=fitted, found=(*stage.found, *added))
 
 
-def _seen_anew(stage: _Stage, added: _Stage) -> _Stage:
-    """Return a model with the evidence that calls for: other columns, a loop simulated with it."""
+def _seen_anew(stage: Stage, added: Stage) -> Stage:
+    """Return a model with the evidence that it calls for: columns, a simulated loop, reversals."""
     evidence, fitted = added.evidence, added.fitted
     if _has_changed(evidence, stage.start, fitted):
         evidence = evidence.looked_at_anew()
@@ -267,10 +216,15 @@ def _seen_anew(stage: _Stage, added: _Stage) -> _Stage:
     if moved is not evidence:
         evidence = moved
         fitted = with_friction_width(evidence, refitted(evidence, fitted.model, fitted))
-    return replace(added, evidence=evidence, loop=loop, fitted=fitted)
+    whole, start = evidence, added.start
+    evidence, held = without_sticking(evidence, added.held, fitted)
+    if evidence is not whole:
+        start = fit_evidence(evidence, start.model, start)
+        fitted = fit_evidence(evidence, fitted.model, fitted)
+    return replace(added, evidence=evidence, held=held, loop=loop, start=start, fitted=fitted)
 
 
-def _search_globally(start: _Stage, extended: _Stage, task: _Task) -> _Stage:
+def _search_globally(start: Stage, extended: Stage, task: DiagnosisTask) -> Stage:
     """Look through all shapes where a residual remains, and extend again with what was missed."""
     if not task.most or start.loop.runs:
         return extended  # simulated motions are renewed as the model grows: there is no way back
@@ -287,7 +241,7 @@ def _search_globally(start: _Stage, extended: _Stage, task: _Task) -> _Stage:
     return other if better else extended
 
 
-def _settle(stage: _Stage, task: _Task) -> tuple[_Stage, Path]:
+def _settle(stage: Stage, task: DiagnosisTask) -> tuple[Stage, Path]:
     """Drop what is superfluous and withdraw what does harm; then go on with what is left.
 
     Held-out data that withdraw an effect choose what comes in its place, and judge it: they are
@@ -311,7 +265,7 @@ def _settle(stage: _Stage, task: _Task) -> tuple[_Stage, Path]:
     raise AssertionError("the last time nothing is added")
 
 
-def _pruned(stage: _Stage, task: _Task) -> tuple[_Stage, Path]:
+def _pruned(stage: Stage, task: DiagnosisTask) -> tuple[Stage, Path]:
     """Drop what is superfluous, confirm contacts, and withdraw what raises the held-out error."""
     evidence, start = stage.evidence, stage.start
     held = _decided(stage)
@@ -338,7 +292,7 @@ def _pruned(stage: _Stage, task: _Task) -> tuple[_Stage, Path]:
     return pruned, path
 
 
-def _judge(stage: _Stage, path: Path, task: _Task) -> Diagnosis:
+def _judge(stage: Stage, path: Path, task: DiagnosisTask) -> Diagnosis:
     """Say what held-out data say of the path that the model has gone."""
     reached, held = stage.proposals >= task.most > 0, _decided(stage)
     search = Search(
@@ -352,7 +306,7 @@ def _judge(stage: _Stage, path: Path, task: _Task) -> Diagnosis:
     return assemble(search, task.train, task.test, held)
 
 
-def _decided(stage: _Stage) -> Evidence | None:
+def _decided(stage: Stage) -> Evidence | None:
     """The test recordings, with those marked that carry a payload of the model."""
     return None if stage.held is None else with_payload_decided(stage.held, stage.fitted)
 
@@ -363,7 +317,7 @@ def _has_changed(evidence: Evidence, start: EvidenceFit, fitted: EvidenceFit) ->
     return now.error < before.error - evidence.criteria.search.another_model
 
 
-def _resolved(stage: _Stage, task: _Task) -> bool:
+def _resolved(stage: Stage, task: DiagnosisTask) -> bool:
     """Whether what is left is what the processing cannot resolve, or what encoders' steps leave."""
     judged = on_recordings(stage.evidence, stage.fitted)
     least = stage.evidence.criteria.verdict.resolution

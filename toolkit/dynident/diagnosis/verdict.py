@@ -6,6 +6,7 @@ import numpy as np
 
 from dynident.criteria import VerdictCriteria
 from dynident.diagnosis.nuisances.friction_width import friction_width_notes
+from dynident.diagnosis.nuisances.sticking import sticking_notes
 from dynident.diagnosis.result import Verdict
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.evidence.columns import Evidence
@@ -97,4 +98,4 @@ def notes_on(evidence, held, fitted: EvidenceFit, source: NoiseSource) -> tuple[
             "it into the study, set payload = true in the [[recordings]] of these, and false in "
             "the others."
         )
-    return (*notes, *friction_width_notes(evidence, fitted))
+    return (*notes, *sticking_notes(evidence), *friction_width_notes(evidence, fitted))

@@ -18,9 +18,15 @@ from dynident.moments.solution import regress
 
 @dataclass(frozen=True, kw_only=True)
 class HeldOutRun:
-    """One recording with its prediction, (T, n) each, SI units."""
+    """One recording with its prediction, (T, n) each, SI units.
+
+    Attributes
+    ----------
+    certain : (T, n) mask of the rows by which a joint is judged: its dry friction is known.
+    """
 
     name: str
+    certain: np.ndarray
     t: np.ndarray
     q: np.ndarray
     v: np.ndarray
@@ -60,12 +66,17 @@ class HeldOut:
     @property
     def torque_rms(self) -> np.ndarray:
         """Root mean square of the measured torque, (n,)."""
-        return np.sqrt(np.mean(np.concatenate([r.measured for r in self.runs]) ** 2, axis=0))
+        return self._rms([run.measured for run in self.runs])
 
     @property
     def residual_rms(self) -> np.ndarray:
         """Root mean square of the residual, (n,)."""
-        return np.sqrt(np.mean(np.concatenate([r.residual for r in self.runs]) ** 2, axis=0))
+        return self._rms([run.residual for run in self.runs])
+
+    def _rms(self, values: list[np.ndarray]) -> np.ndarray:
+        """Root mean square of what each run has, (T, n), over the rows that are judged."""
+        certain = np.concatenate([run.certain for run in self.runs])
+        return np.sqrt(np.mean(np.concatenate(values) ** 2, axis=0, where=certain))
 
     @property
     def joint_errors(self) -> np.ndarray:
@@ -98,6 +109,7 @@ def on_recordings(evidence: Evidence, fitted: EvidenceFit | Estimate) -> HeldOut
         runs.append(
             HeldOutRun(
                 name=run.recording.name,
+                certain=run.certain_rows[kept],
                 t=first.t[kept],
                 q=first.q[kept],
                 v=first.v[kept],
@@ -133,6 +145,7 @@ def on_blocks(evidence: Evidence, fitted: EvidenceFit) -> HeldOut:
         runs.append(
             HeldOutRun(
                 name=run.recording.name,
+                certain=run.certain_rows[rows],
                 t=first.t[rows],
                 q=first.q[rows],
                 v=first.v[rows],
@@ -223,29 +236,73 @@ def _judged(
         each run, (n,).
     """
     n, criteria = runs[0].measured.shape[1], evidence.criteria.noise
-    pairs: list[tuple[Kind, np.ndarray]] = [
-        (run.kind, e) for run, e in zip(evidence.runs, folded, strict=True) if run.kind != "single"
-    ]
+    pairs = [(run, e) for run, e in zip(evidence.runs, folded, strict=True) if run.kind != "single"]
     if not pairs:
         return HeldOut(
             runs=runs, noise_std=None, ratio=None, least_ratio=None, inflation=np.ones(n)
         )
-    noise = [[differences(e[..., j], kind) for kind, e in pairs] for j in range(n)]
-    power = np.array([np.mean(np.concatenate([d.ravel() for d in ds]) ** 2) for ds in noise])
-    sizes = np.array([e.shape[1] for _, e in pairs])
-    squares = [[systematic_square(e[..., j], kind) for j in range(n)] for kind, e in pairs]
-    excess = np.average(squares, axis=0, weights=sizes)
-    spread = np.array(
-        [[_variance(e[..., j], kind, criteria) for j in range(n)] for kind, e in pairs]
+    instants = np.array([e.shape[1] for e in folded])
+    found = [
+        _JointNoise.of(
+            [(run.kind, e[:, run.certain(j), j]) for run, e in pairs],
+            float(np.average([d[j] for d in doubt], weights=instants)),
+            criteria,
+        )
+        for j in range(n)
+    ]
+    power, excess, least = (
+        np.array([getattr(one, name) for one in found]) for name in ("power", "excess", "least")
     )
-    error = np.sqrt((sizes**2 @ spread) / sizes.sum() ** 2)
-    # Of a square over its mean, in the worst of cases.
-    largest = float(stats.chi2.ppf(criteria.confidence, 1))
-    doubtful = largest * np.average(doubt, axis=0, weights=[e.shape[1] for e in folded])
-    least = excess - float(stats.norm.ppf(criteria.confidence)) * error - doubtful
     safe = np.where(power > 0, power, 1.0)
     ratio, at_least = (np.sqrt(np.clip(x, 0.0, None) / safe) for x in (excess, least))
-    grown = np.array([inflation([row for d in ds for row in d], criteria) for ds in noise])
     return HeldOut(
-        runs=runs, noise_std=np.sqrt(power), ratio=ratio, least_ratio=at_least, inflation=grown
+        runs=runs,
+        noise_std=np.sqrt(power),
+        ratio=ratio,
+        least_ratio=at_least,
+        inflation=np.array([one.inflation for one in found]),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _JointNoise:
+    """What repeats in the residual of one joint, and what does not; mean squares.
+
+    Attributes
+    ----------
+    power : of the noise.
+    excess, least : of what is systematic, and what that is at least.
+    inflation : variance of a mean of consecutive noise over that of white noise.
+    """
+
+    power: float
+    excess: float
+    least: float
+    inflation: float
+
+    @classmethod
+    def of(
+        cls, residuals: list[tuple[Kind, np.ndarray]], doubt: float, criteria: NoiseCriteria
+    ) -> _JointNoise:
+        """Split the residuals of a joint, (P, S) of each run.
+
+        Parameters
+        ----------
+        residuals : with what their replicates are.
+        doubt : mean square of what the parameters' covariance makes uncertain.
+        criteria : for the noise, and the confidence of a lower limit.
+        """
+        noise = [differences(e, kind) for kind, e in residuals]
+        sizes = np.array([e.shape[1] for _, e in residuals])
+        excess = np.average([systematic_square(e, kind) for kind, e in residuals], weights=sizes)
+        spread = np.array([_variance(e, kind, criteria) for kind, e in residuals])
+        error = np.sqrt((sizes**2 @ spread) / sizes.sum() ** 2)
+        # Of a square over its mean, in the worst of cases.
+        largest = float(stats.chi2.ppf(criteria.confidence, 1))
+        certainly = float(stats.norm.ppf(criteria.confidence)) * error + largest * doubt
+        return cls(
+            power=float(np.mean(np.concatenate([d.ravel() for d in noise]) ** 2)),
+            excess=float(excess),
+            least=float(excess - certainly),
+            inflation=inflation([row for d in noise for row in d], criteria),
+        )

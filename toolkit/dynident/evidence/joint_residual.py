@@ -60,12 +60,13 @@ class JointResidual:
         combination = np.append(-values, 1.0)
         left = cls(criteria=evidence.criteria, stretches=[], speeds=[], plain=[], systematic=[])
         for run, joints in zip(evidence.runs, columns, strict=True):
-            residual = run.fold([c @ combination for c in joints[joint]])
+            certain = run.certain(joint)
+            residual = run.fold([c @ combination for c in joints[joint]])[:, certain]
             if run.kind == "single":
                 left.plain.append(residual[0])
                 continue
             left.systematic.append(systematic_square(residual, run.kind))
-            speed = run.replicates[0].v[:, joint][run.index]
+            speed = run.replicates[0].v[:, joint][run.index][:, certain]
             for stretch, v in zip(differences(residual, run.kind), speed, strict=False):
                 left.stretches.append(stretch)
                 left.speeds.append(v)

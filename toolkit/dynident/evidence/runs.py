@@ -48,6 +48,8 @@ class Run:
     edges : (B + 1,) blocks of instants.
     columns_from : whose motion the columns of the regression are taken along.
     left_out : (T,) rows that are not to be judged, a contact in them; None for none.
+    uncertain : (T, n) rows of a joint whose dry friction nothing tells, as it sticks: they count
+        neither in fits nor where effects are judged; None for none.
     """
 
     kind: Kind
@@ -56,6 +58,19 @@ class Run:
     edges: np.ndarray
     columns_from: Literal["recording", "simulation"] = "recording"
     left_out: np.ndarray | None = None
+    uncertain: np.ndarray | None = None
+
+    @property
+    def certain_rows(self) -> np.ndarray:
+        """Rows by which each joint is judged, (T, n) mask."""
+        everywhere = np.ones(self.replicates[0].tau.shape, dtype=bool)
+        return everywhere if self.uncertain is None else ~self.uncertain
+
+    def certain(self, joint: int) -> np.ndarray:
+        """Instants (S,) at which a joint's dry friction is known in every repetition, a mask."""
+        if self.uncertain is None:
+            return np.ones(self.index.shape[1], dtype=bool)
+        return ~self.uncertain[:, joint][self.index].any(axis=0)
 
     @property
     def kept(self) -> np.ndarray:
@@ -121,13 +136,16 @@ class Run:
 
         Returns
         -------
-        (P, S, k); of a simulated motion P = 1: there is one replicate, without noise.
+        (P, S, k), zero where the joint's dry friction is not known; of a simulated motion P = 1:
+        there is one replicate, without noise.
         """
         if self.columns_from == "simulation":
             speed = self.replicates[-1].v[:, joint]
-            return noise.whiten(signals[-1], speed)[self.index[:1]]
-        speed = self.replicates[0].v[:, joint]
-        return self.fold([noise.whiten(one, speed) for one in signals])
+            found = noise.whiten(signals[-1], speed)[self.index[:1]]
+        else:
+            speed = self.replicates[0].v[:, joint]
+            found = self.fold([noise.whiten(one, speed) for one in signals])
+        return found if self.uncertain is None else found * self.certain(joint)[:, None]
 
     def moments(self, left: np.ndarray, right: np.ndarray) -> SecondMoments:
         """Second moments of whitened columns, (P, S, a) and (P, S, b)."""

@@ -18,6 +18,7 @@ from dynident.recording.filters import Filter
 from dynident.recording.masks import within
 from dynident.recording.parallel import ParallelFilter
 from dynident.recording.recording import LeftOut, Recording
+from dynident.recording.white_noise import encoder_noise_std
 
 _IDLE = 0.25  # s of standing still at an end that are worth leaving out
 _MOVES = 1e-3  # of a joint's travel by which it must leave its place at an end
@@ -194,10 +195,7 @@ def rows_in_words(recording: Recording, settings: Filter) -> str:
 def _moves(recording: Recording) -> tuple[float, float]:
     """When a joint first leaves its place, and when the last one comes to rest, s."""
     q, t = recording.q, recording.t
-    # White noise has six times its variance in second differences; motion has next to none.
-    second = np.diff(q, n=2, axis=0)
-    noise = 1.4826 * np.median(np.abs(second), axis=0) / np.sqrt(6.0) if len(second) else 0.0
-    least = np.maximum(_MOVES * np.ptp(q, axis=0), _NOISE * noise)
+    least = np.maximum(_MOVES * np.ptp(q, axis=0), _NOISE * encoder_noise_std(q))
     from_start = np.flatnonzero(np.any(np.abs(q - q[0]) > least, axis=1))
     from_end = np.flatnonzero(np.any(np.abs(q - q[-1]) > least, axis=1))
     if not len(from_start) or not len(from_end):

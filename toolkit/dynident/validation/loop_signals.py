@@ -12,9 +12,9 @@ from dynident.closed_loop import Controller
 from dynident.criteria import LoopCriteria
 from dynident.errors import RecordingError
 from dynident.fitting.sampling import Sampled, sample
-from dynident.fitting.uncertainty.white_noise import white_variance
 from dynident.model import Model
 from dynident.recording import Dataset, Noise, Recording, mismatch, periods, within, without_ends
+from dynident.recording.white_noise import white_variance
 from dynident.validation.control_law import law_torque
 from dynident.validation.loop_errors import QUANTITIES, LoopRun, Signals
 

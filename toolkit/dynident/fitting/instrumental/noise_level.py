@@ -8,8 +8,8 @@ import numpy as np
 
 from dynident.fitting.instrumental.residual_spectrum import NoiseVariances
 from dynident.fitting.instrumental.source import InstrumentSource
-from dynident.fitting.uncertainty.white_noise import white_variance
 from dynident.recording import Dataset, within
+from dynident.recording.white_noise import white_variance
 
 _NEGATIVE = 3.0
 """Standard errors below zero at which a variance is none: what is there is no such noise."""

@@ -25,7 +25,6 @@ from dynident.fitting.linear_solution import LinearSolution
 from dynident.fitting.sampling import Sampled, sample
 from dynident.fitting.uncertainty.expected_bias import listed, reported
 from dynident.fitting.uncertainty.trembling import trembling
-from dynident.fitting.uncertainty.white_noise import encoder_noise_std
 from dynident.model import Model
 from dynident.recording import (
     Dataset,
@@ -37,6 +36,7 @@ from dynident.recording import (
     differentiate,
     uniform,
 )
+from dynident.recording.white_noise import encoder_noise_std
 from dynident.tables import number
 
 _POINTS = (0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5)

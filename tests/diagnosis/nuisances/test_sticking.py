@@ -1,0 +1,109 @@
+"""A joint that sticks at its reversals: nothing is said to be missing there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import dynident as di
+from dynident.diagnosis.nuisances.sticking import (
+    speed_noise,
+    sticking_joints,
+    sticking_notes,
+    without_reversals,
+    without_sticking,
+)
+from dynident.effects import effects_of
+from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence_fit import fit_evidence
+from dynident.evidence.runs import gather
+from dynident.fitting.sampling import sample
+from dynident.model import Model
+from dynident.recording import Dataset, Recording
+from synthetic import arm, smooth_motion, true_values
+
+RATE_HZ = 500.0
+COULOMB = np.array([3.0, 2.0])
+"""N m"""
+WIDTH = 0.02
+"""rad/s"""
+STOPPED = 0.08
+"""rad/s that the reference moves while the elbow stands."""
+
+
+def given() -> Model:
+    robot, names = arm(), ("viscous_friction", "coulomb_friction")
+    return Model(robot, tuple(e for name in names for e in effects_of(name, robot)), WIDTH)
+
+
+def record(seed: int, stands: float, stribeck: float = 0.0) -> Recording:
+    """A motion whose elbow stands while the reference is slower than `stands`, rad/s.
+
+    While it stands, its dry friction passes from one side to the other as the reference does: it
+    is no function of the elbow's speed. The shoulder's reverses over the width of the model.
+    """
+    model, rng = given(), np.random.default_rng([seed, 5])
+    t, q, v, _ = smooth_motion(2, seed, RATE_HZ, 16.0, 16.0)
+    reference = v[:, 1].copy()
+    if stands:
+        v[:, 1] -= np.clip(reference, -stands, stands)
+        q[:, 1] = q[0, 1] + np.concatenate([[0.0], np.cumsum((v[1:, 1] + v[:-1, 1]) / 2)]) / RATE_HZ
+    a = np.gradient(v, 1.0 / RATE_HZ, axis=0)
+    values = true_values(model, Fv__shoulder=1.0, Fv__elbow=0.6, Fc__shoulder=COULOMB[0])
+    tau = model.torque(model.block(t, q, v, a), values)
+    share = np.clip(reference / stands, -1, 1) if stands else np.tanh(v[:, 1] / WIDTH)
+    tau[:, 1] += share * (COULOMB[1] + stribeck * np.exp(-((v[:, 1] / 0.3) ** 2)))
+    q = q + 1e-5 * rng.normal(size=q.shape)
+    tau = tau + 0.05 * rng.normal(size=tau.shape)
+    return Recording(t, q, tau, model.robot.names, name=f"{seed}")
+
+
+def evidence(stands: float) -> Evidence:
+    return Evidence(given(), gather(Dataset(tuple(record(seed, stands) for seed in (0, 1)))))
+
+
+def test_only_the_joint_that_stands_sticks() -> None:
+    for stands, expected in ((STOPPED, ("elbow",)), (0.0, ())):
+        of = evidence(stands)
+        fitted = fit_evidence(of, of.model)
+        assert sticking_joints(of, fitted) == expected
+        without, held = without_sticking(of, None, fitted)
+        assert held is None
+        assert (without is of) == (not expected)
+        assert without_sticking(without, None, fitted)[0] is without
+
+
+def test_rows_around_reversals_count_no_more_and_the_others_do() -> None:
+    """Coulomb friction is right without them, and off with them."""
+    of = evidence(STOPPED)
+    without = without_reversals(of, ("elbow",))
+    at = of.model.names.index("Fc@elbow")
+    sharp = of.model.with_friction_width("elbow", 0.1 * WIDTH)
+    before, after = (fit_evidence(e, sharp) for e in (of, without))
+    assert abs(after.values[at] - COULOMB[1]) < 0.3 * abs(before.values[at] - COULOMB[1])
+    assert after.values[at] == pytest.approx(COULOMB[1], abs=4 * np.sqrt(after.covariance[at, at]))
+    left_out = ~np.concatenate([run.certain_rows for run in without.runs])
+    assert not left_out[:, 0].any()
+    assert 0.05 < left_out[:, 1].mean() < 0.4
+    assert sticking_notes(of) == ()
+    (note,) = sticking_notes(without)
+    assert note.startswith("elbow sticks")
+
+
+def test_noise_of_the_speed_is_that_of_encoder_and_filter() -> None:
+    clean = record(0, 0.0)
+    noise = 1e-4 * np.random.default_rng(3).normal(size=clean.q.shape)
+    without, noisy = (sample(clean.replace(q=clean.q + more), None) for more in (0.0, noise))
+    expected = np.std(noisy.motion.v - without.motion.v, axis=0)
+    np.testing.assert_allclose(speed_noise(noisy), expected, rtol=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("stribeck", "found"), [(0.0, []), (1.0, ["stribeck_friction@elbow"])])
+def test_a_robot_that_sticks_lacks_what_it_lacks_away_from_reversals(
+    stribeck: float, found: list[str]
+) -> None:
+    train = Dataset(tuple(record(seed, STOPPED, stribeck) for seed in range(3)))
+    said = di.diagnose(given(), train, Dataset((record(7, STOPPED, stribeck),)))
+    assert [step.effect.label for step in said.steps] == found
+    assert said.verdict == ("explained" if found else "nothing_missing")

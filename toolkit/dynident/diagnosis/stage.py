@@ -1,0 +1,72 @@
+"""How far a diagnosis has come: the model as it is extended, and the evidence for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from dynident.diagnosis.nuisances.contacts import Contacts
+from dynident.diagnosis.search.global_search import RankedModel
+from dynident.diagnosis.search.ranking import Ranking
+from dynident.diagnosis.search.selection import AddedEffect
+from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence_fit import EvidenceFit
+from dynident.evidence.simulated_motion import SimulatedMotion
+from dynident.recording import Dataset
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiagnosisTask:
+    """What is asked: see `dynident.diagnosis.procedure.diagnose`."""
+
+    train: Dataset
+    test: Dataset | None
+    most: int
+    progress: Callable[[str], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """The model as far as it is extended, and the evidence that it is fitted to.
+
+    Attributes
+    ----------
+    evidence, held : of the training and of the test recordings, contacts left out; `held` is None
+        where blocks of time are held out.
+    narrow : the training recordings behind lower cut-offs, where noise in the columns is unknown.
+    loop : behind the simulated motion in the evidence, where there is one.
+    contacts : those that were left out.
+    start, fitted : fits of the model as given, and of the one with all effects added.
+    found : these effects.
+    rounds : the ranking after each of them, the first one before any.
+    refused : labels of effects that were withdrawn, with the reason: they are not tried again.
+    """
+
+    evidence: Evidence
+    held: Evidence | None
+    narrow: Evidence | None
+    loop: SimulatedMotion
+    contacts: Contacts
+    start: EvidenceFit
+    fitted: EvidenceFit
+    found: tuple[AddedEffect, ...] = ()
+    rounds: tuple[Ranking, ...] = ()
+    refused: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def proposals(self) -> int:
+        """Effects added, one at several joints counting once."""
+        return len({one.with_it or one.score.effect.label for one in self.found})
+
+    @property
+    def latest(self) -> tuple[AddedEffect, ...]:
+        """What was added last, at all of its joints."""
+        groups = [one.with_it or one.score.effect.label for one in self.found]
+        return tuple(
+            one for one, group in zip(self.found, groups, strict=True) if group == groups[-1]
+        )
+
+    @property
+    def ranked(self) -> RankedModel:
+        """The model with its latest ranking."""
+        return RankedModel(self.fitted, self.rounds[-1])
