@@ -18,6 +18,7 @@ SCRIPTS = (
     "chain_length.py",
     "closed_loop.py",
     "input_noise.py",
+    "csv_reading.py",
 )
 
 

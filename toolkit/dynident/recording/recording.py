@@ -249,7 +249,7 @@ class Recording:
             self._not_finite("t", row, self.t[row])
         for signal in SIGNALS:
             x = getattr(self, signal)
-            if x is None or (np.abs(x) < LARGEST).all():
+            if x is None or (x.min() > -LARGEST and x.max() < LARGEST):  # false where one is NaN
                 continue
             bad = ~(np.abs(x) < LARGEST)
             if signal == "temperature":

@@ -7,11 +7,12 @@ that it cannot read is read again by lines, for an error that names line and col
 
 from __future__ import annotations
 
+import codecs
 import csv
 import io
 import re
-import warnings
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -32,31 +33,41 @@ def open_csv(data: bytes, file: str) -> ColumnTable:
         If there is no header, or a name is in it twice. `Table.load` raises it for a line with
         too few or too many columns, and for a cell that is not a finite number.
     """
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        what = f"is not UTF-8 text (byte {error.start})"
-        raise FileError(what, file, "is it the right file?") from None
-    if "\0" in text:
-        raise FileError("is not text (it holds NUL bytes)", file, "is it the right file?")
-    text = text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n ")
-    if not text:
+    data = _text(data, file)
+    if not data or data.isspace():
         raise RecordingError("is empty", file, "the first line names the columns: t, q.<joint> ...")
-    first, _, body = text.partition("\n")
-    separator = _separator(first, body.partition("\n")[0])
+    first, second = (line.decode() for line in _two_lines(data))
+    separator = _separator(first, second)
     names = _header(first, separator, file)
 
     def load(wanted: Sequence[str]) -> dict[str, np.ndarray]:
-        if not body.strip():
-            remedy = "is the file complete?"
-            raise RecordingError("holds a header but no samples", file, remedy)
         places = [names.index(name) for name in wanted]
-        values = _fast(body, separator, len(names), places)
-        if values is None:
-            values = _careful(body, separator, names, places, file)
-        return {name: values[:, i] for i, name in enumerate(wanted)}
+        columns = _fast(data, separator, len(names), places)
+        if columns is None:
+            columns = list(_careful(data, separator, names, places, file).T)
+        return dict(zip(wanted, columns, strict=True))
 
     return ColumnTable(file, names, load)
+
+
+def _text(data: bytes, file: str) -> bytes:
+    """Bytes of UTF-8 text, with line feeds between the lines; no copy where it is so already."""
+    try:
+        if not data.isascii():
+            data.decode()
+    except UnicodeDecodeError as error:
+        what = f"is not UTF-8 text (byte {error.start})"
+        raise FileError(what, file, "is it the right file?") from None
+    if b"\0" in data:
+        raise FileError("is not text (it holds NUL bytes)", file, "is it the right file?")
+    data = data.removeprefix(codecs.BOM_UTF8)
+    return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
+
+
+def _two_lines(data: bytes) -> tuple[bytes, bytes]:
+    """Return the header and the line below it."""
+    stream = io.BytesIO(data)
+    return stream.readline().rstrip(b"\n"), stream.readline().rstrip(b"\n")
 
 
 def _separator(header: str, row: str) -> str:
@@ -90,47 +101,57 @@ def _header(line: str, separator: str, file: str) -> tuple[str, ...]:
     return names
 
 
-def _fast(body: str, separator: str, width: int, places: list[int]) -> np.ndarray | None:
-    """Values (T, k), or None if anything is odd: then the careful reader has to say what."""
-    if '"' in body or not _is_regular(body, separator, width):
+def _fast(data: bytes, separator: str, width: int, places: list[int]) -> list[np.ndarray] | None:
+    """Columns (T,) each, or None if anything is odd: then the careful reader has to say what."""
+    rows = _regular_rows(data, separator, width)
+    if rows is None:
         return None
     import pandas as pd
 
+    stream = io.BytesIO(data)
+    stream.readline()
+    # Since 3.1 pandas rounds every number as Python does, and warns who asks for it.
+    version = tuple(int(part) for part in pd.__version__.split(".")[:2])
+    exact: dict[str, Any] = {} if version >= (3, 1) else {"float_precision": "round_trip"}
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            frame = pd.read_csv(
-                io.StringIO(body),
-                sep=separator,
-                header=None,
-                names=list(range(width)),
-                usecols=sorted(set(places)),
-                index_col=False,
-                dtype=np.float64,
-                engine="c",
-                float_precision="round_trip",
-                keep_default_na=False,
-                skip_blank_lines=False,
-                skipinitialspace=True,
-            )
-    except Exception:  # whatever pandas makes of it, the careful reader has the last word
+        frame = pd.read_csv(
+            stream,
+            sep=separator,
+            header=None,
+            names=list(range(width)),
+            usecols=sorted(set(places)),
+            index_col=False,
+            dtype=np.float64,
+            engine="c",
+            keep_default_na=False,
+            skipinitialspace=b" " in data,
+            **exact,
+        )
+    except (ValueError, OverflowError):  # of text that is no number; a ParserError is one, too
         return None
-    values = frame[places].to_numpy(dtype=np.float64)
-    return values if np.isfinite(values).all() else None
+    columns = [frame[place].to_numpy() for place in places]
+    return columns if all(len(x) == rows and np.isfinite(x).all() for x in columns) else None
 
 
-def _is_regular(body: str, separator: str, width: int) -> bool:
-    """Whether every line has as many columns as the header."""
-    bytes_ = np.frombuffer(body.encode() + b"\n", dtype=np.uint8)
-    ends = np.flatnonzero(bytes_ == ord("\n"))
-    before = np.searchsorted(np.flatnonzero(bytes_ == ord(separator)), ends)
-    return bool(np.all(np.diff(before, prepend=0) == width - 1))
+def _regular_rows(data: bytes, separator: str, width: int) -> int | None:
+    """How many rows there are, if each has as many columns as the header and none is quoted."""
+    if width < 2 or data.find(b'"', data.find(b"\n")) >= 0:
+        return None
+    mark = separator.encode()
+    others = bytes(range(256)).translate(None, mark + b"\n")
+    marks = data.translate(None, others).partition(b"\n")[2].rstrip(b"\n") + b"\n"
+    rows = len(marks) // width
+    return rows if marks == (mark * (width - 1) + b"\n") * rows else None
 
 
 def _careful(
-    body: str, separator: str, names: tuple[str, ...], places: list[int], file: str
+    data: bytes, separator: str, names: tuple[str, ...], places: list[int], file: str
 ) -> np.ndarray:
     """Values (T, k), line by line, with an error that names the line and the column."""
+    body = data.decode().partition("\n")[2].rstrip("\n ")
+    if not body.strip():
+        remedy = "is the file complete?"
+        raise RecordingError("holds a header but no samples", file, remedy)
     rows: list[list[float]] = []
     reader = csv.reader(io.StringIO(body, newline=""), delimiter=separator, skipinitialspace=True)
     line = 1

@@ -86,7 +86,7 @@ def read(
     located = resolve(table, names, columns)
     found = load(table, located)
     signals: dict[str, Any] = {
-        signal: np.column_stack([found[f"{signal}.{joint}"] for joint in names])
+        signal: _stacked([found[f"{signal}.{joint}"] for joint in names])
         for signal in (*REQUIRED, *OPTIONAL)
         if f"{signal}.{names[0]}" in found
     }
@@ -94,7 +94,7 @@ def read(
     for signal in PARTIAL:
         parts = [found.get(f"{signal}.{joint}", missing) for joint in names]
         if any(part is not missing for part in parts):
-            signals[signal] = np.column_stack(parts)
+            signals[signal] = _stacked(parts)
     recording = Recording(
         t=found["t"],
         joints=names,
@@ -109,6 +109,13 @@ def read(
     )
     warn_of_units(recording, kinds)
     return recording
+
+
+def _stacked(columns: list[np.ndarray]) -> np.ndarray:
+    """Return columns side by side, read-only: the recording then shares the array."""
+    array = np.column_stack(columns)
+    array.setflags(write=False)
+    return array
 
 
 def unknown_suffix(path: Path) -> RecordingError:

@@ -1,0 +1,80 @@
+"""The fast reader of CSV files is taken wherever nothing is odd, and never reads something else."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dynident.errors import RecordingError
+from dynident.recording import read, write
+from dynident.recording.formats import csv_file
+
+REGULAR = {
+    "point": "t,q.a,tau.a\n0,1,3\n.01,2,4\n",
+    "semicolon": "t;q.a;tau.a\n0;1;3\n.01;2e0;+4",
+    "tabs and spaces": "\ufefft\tq.a\ttau.a\r\n0\t 1 \t3\r\n.01\t2\t4\r\n\r\n",
+    "quoted names": 't, "q.a", tau.a\n 0, 1, 3\n.01, 2, 4\n \n',
+    "other columns": "t,note,q.a,tau.a,\n0,stärt,1,3,\n.01,,2,4,\n",
+}
+CELLS = (
+    "0",
+    "-1.5",
+    "+4",
+    " 2",
+    "2 ",
+    ".5",
+    "3.",
+    "1e5",
+    "1E-400",
+    "0.1000000000000000055511151231",
+)
+ODD = ("", " ", "nan", "inf", "1e999", "1_0", "0x1", "1,5", "1e", "1d5", "--1", "text", "１")
+
+
+@pytest.fixture
+def no_careful_reader(monkeypatch):
+    def fail(*_):
+        pytest.fail("the careful reader was asked")
+
+    monkeypatch.setattr(csv_file, "_careful", fail)
+
+
+@pytest.mark.parametrize("kind", REGULAR)
+def test_a_regular_file_is_read_fast(tmp_path, no_careful_reader, kind):
+    path = tmp_path / "run.csv"
+    path.write_bytes(REGULAR[kind].encode())
+    recording = read(path)
+    np.testing.assert_array_equal(recording.t, [0, 0.01])
+    np.testing.assert_array_equal(recording.q[:, 0], [1, 2])
+    np.testing.assert_array_equal(recording.tau[:, 0], [3, 4])
+
+
+def test_what_we_write_is_read_fast(arm, tmp_path, no_careful_reader):
+    np.testing.assert_array_equal(read(write(arm, tmp_path / "run.csv")).tau, arm.tau)
+
+
+def test_the_fast_reader_leaves_what_is_odd_to_the_careful_one(tmp_path, no_careful_reader):
+    path = tmp_path / "run.csv"
+    for cell in ODD:
+        path.write_text(f"t;q.a;tau.a\n0;1;3\n.01;{cell};4\n", encoding="utf-8")
+        with pytest.raises(pytest.fail.Exception, match="was asked"):
+            read(path)
+
+
+@given(
+    rows=st.lists(
+        st.lists(st.sampled_from(CELLS + ODD + CELLS * 2), min_size=2, max_size=4), max_size=4
+    ),
+    end=st.sampled_from(["", "\n", "\n\n", " \n"]),
+)
+def test_both_readers_agree(rows, end):
+    """Whatever the fast one returns, the careful one returns to the last bit."""
+    data = ("a;b;c\n" + "\n".join(map(";".join, rows)) + end).encode()
+    fast = csv_file._fast(data, ";", 3, [2, 0])
+    try:
+        careful = csv_file._careful(data, ";", ("a", "b", "c"), [2, 0], "run.csv")
+    except RecordingError:
+        assert fast is None
+    else:
+        assert fast is not None
+        np.testing.assert_array_equal(np.column_stack(fast), careful)
