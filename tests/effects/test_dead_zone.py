@@ -1,15 +1,19 @@
-"""Links in dead zones: several walked through together move as each alone."""
+"""Links in dead zones: several walked through together move as each alone, compiled or not."""
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
 
+import numpy as np
+import pytest
+
+from dynident.batch.compiler import compiler
 from dynident.effects.transmissions.dead_zone import DeadZoneLink, Transmitting, through_dead_zones
 
 STEP, STEPS = 1e-3, 4000
 
 
-def test_several_gaps_at_once_are_each_gap_alone() -> None:
+def links_of_several_lengths() -> list[DeadZoneLink]:
     rng = np.random.default_rng(0)
     links = []
     for resonance in (15.0, 40.0):
@@ -21,6 +25,13 @@ def test_several_gaps_at_once_are_each_gap_alone() -> None:
             load = np.sin(7.0 * t) + 0.1 * rng.standard_normal(len(t))
             c, g = 0.01 * np.cos(t), 0.1 * np.sin(2.0 * t)
             links.append(DeadZoneLink(m=m, load=load, c=c, g=g, gear=gear, step=t[1]))
+    return links
+
+
+@pytest.mark.parametrize("wish", ["never", "auto"])
+def test_several_gaps_at_once_are_each_gap_alone(wish, monkeypatch) -> None:
+    monkeypatch.setenv("DYNIDENT_COMPILE", wish)
+    links = links_of_several_lengths()
     for link, together in zip(links, through_dead_zones(links), strict=True):
         (alone,) = through_dead_zones([link])
         np.testing.assert_allclose(together.d, alone.d, rtol=1e-6, atol=1e-9)
@@ -31,8 +42,22 @@ def test_several_gaps_at_once_are_each_gap_alone() -> None:
         assert 0.05 < np.abs(alone.side).mean() < 1.0
 
 
-def test_a_link_that_runs_away_does_so_quietly() -> None:
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+def test_compiled_is_the_replay_to_the_bit(monkeypatch) -> None:
+    """For more links of one length than walk together, and for fewer."""
+    links = links_of_several_lengths()
+    links += [replace(links[0], load=scale * links[0].load) for scale in np.linspace(0.5, 2.0, 9)]
+    compiled = through_dead_zones(links)
+    monkeypatch.setenv("DYNIDENT_COMPILE", "never")
+    for one, replayed in zip(compiled, through_dead_zones(links), strict=True):
+        np.testing.assert_array_equal(one.d, replayed.d)
+        np.testing.assert_array_equal(one.side[:-1], replayed.side[:-1])
+
+
+@pytest.mark.parametrize("wish", ["never", "auto"])
+def test_a_link_that_runs_away_does_so_quietly(wish, monkeypatch) -> None:
     """Hanging upside down on a spring too weak to hold it, with hardly any inertia."""
+    monkeypatch.setenv("DYNIDENT_COMPILE", wish)
     m, load, still = np.full(STEPS, 1e-6), np.ones(STEPS), np.zeros(STEPS)
     gears = [Transmitting.of(1e-6, (15.0, 0.1, 0.3), gap) for gap in (1e-3, 1e-2)]
     motion = {"m": m, "load": load, "c": still, "g": still - 5.0, "step": STEP}

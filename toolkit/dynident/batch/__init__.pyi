@@ -1,3 +1,4 @@
+from .c_function import c_function as c_function
 from .evaluation import Evaluation as Evaluation
 from .evaluation import wish as wish
 from .joint_tree import JointTree as JointTree

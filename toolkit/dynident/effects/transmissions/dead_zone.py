@@ -1,11 +1,21 @@
-"""A link in the dead zone of a transmission: the recursion in time, step by step."""
+"""A link in the dead zone of a transmission: the recursion in time, step by step.
+
+Compiled from C where that can be had (`dead_zone_source`), and by NumPy elsewhere, with the same
+results to the bit.
+"""
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
+from typing import Any
 
 import numpy as np
+
+from dynident.batch import c_function
+from dynident.effects.transmissions.dead_zone_source import ENTRY, LANES, SOURCE
 
 _TOGETHER = 20_000_000
 """Steps, over all links, that are walked through at once: a dozen numbers each are in memory."""
@@ -71,12 +81,55 @@ class DeadZoneMotion:
 
 
 def through_dead_zones(links: Sequence[DeadZoneLink]) -> list[DeadZoneMotion]:
-    """Return how links move in dead zones: a step costs the same for one and for dozens."""
+    """Return how links move in dead zones."""
+    walk = c_function(SOURCE, ENTRY)
+    if walk is None:
+        return _replayed(links)
+    return [
+        one
+        for _, same in groupby(links, key=lambda link: len(link.m))
+        for some in _parts(list(same), LANES)
+        for one in _compiled(walk, some)
+    ]
+
+
+def _parts(links: Sequence[DeadZoneLink], most: int) -> list[Sequence[DeadZoneLink]]:
+    return [links[k : k + most] for k in range(0, len(links), most)]
+
+
+def _compiled(walk: Any, links: Sequence[DeadZoneLink]) -> list[DeadZoneMotion]:
+    """Return how up to `LANES` links of as many steps move, by the compiled function."""
+    steps, lanes = len(links[0].m), [*links, *[links[-1]] * (LANES - len(links))]
+    read = [
+        np.ascontiguousarray(x, dtype=float)
+        for link in lanes
+        for x in (link.m, link.load, link.c, link.g)
+    ]
+    gears = [link.gear for link in lanes]
+    values = np.array(
+        [
+            (one.stiffness, one.damping, one.half_gap, link.step)
+            for one, link in zip(gears, lanes, strict=True)
+        ]
+    ).T.copy()
+    moved = [DeadZoneMotion(np.zeros(steps), np.zeros(steps)) for _ in links]
+    moved += [moved[-1]] * (LANES - len(links))
+    written = [x for one in moved for x in (one.d, one.side)]
+    walk(
+        ctypes.c_long(steps),
+        (ctypes.c_void_p * len(read))(*(x.ctypes.data for x in read)),
+        ctypes.c_void_p(values.ctypes.data),
+        (ctypes.c_void_p * len(written))(*(x.ctypes.data for x in written)),
+    )
+    return moved[: len(links)]
+
+
+def _replayed(links: Sequence[DeadZoneLink]) -> list[DeadZoneMotion]:
+    """Return how links move, by NumPy: a step costs the same for one and for dozens."""
     longest = max(len(link.m) for link in links)
     most = max(1, _TOGETHER // longest)
     if len(links) > most:
-        parts = [links[k : k + most] for k in range(0, len(links), most)]
-        return [one for part in parts for one in through_dead_zones(part)]
+        return [one for part in _parts(links, most) for one in _replayed(part)]
     recursion = _Recursion.of(links)
     if len(links) == 1:
         return [_walk(recursion)]

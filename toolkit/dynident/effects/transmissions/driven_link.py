@@ -46,13 +46,17 @@ class DrivenLink:
         robot, along = along_motion(block)
         rotor = 0.0 if block.rotor is None else float(block.rotor[joint])
         self.joint, self.a = joint, block.a[:, joint]
-        self.M, self.C, self.G = (x[:, :, joint] for x in (along.by_a, along.by_v, along.by_q))
-        self.whole = along.by_a[:, joint, joint] + rotor
+        self.M, self.C, self.G = (
+            np.ascontiguousarray(x[:, :, joint]) for x in (along.by_a, along.by_v, along.by_q)
+        )
+        self.whole = self.M[:, joint] + rotor
         self.load = along.torque[:, joint] + rotor * self.a
         # What is stiff stays as stiff when a payload is taken up.
         self.inertia = max(mean_inertia(block.empty or robot, joint) + rotor, 1e-9)
         if len(block.t) < 3:
             raise EffectError("its response needs more than two samples")
+        self._least_whole = float(self.whole.min())
+        self._most_stiffness = float(self.G[:, joint].max())
         self.step = float(np.mean(np.diff(block.t)))
         # A record that is shorter than its period does not hold what came before it.
         whole = 0 if block.period is None else round(block.period / self.step)
@@ -69,8 +73,8 @@ class DrivenLink:
 
     def steps_per_sample(self, gear: Transmitting) -> int:
         """Return how many steps of the recursion follow an oscillation well enough."""
-        stiffest = max(float((gear.stiffness + self.G[:, self.joint]).max()), 0.0)
-        fastest = np.sqrt(stiffest / self.behind(gear).min())
+        stiffest = max(gear.stiffness + self._most_stiffness, 0.0)
+        fastest = np.sqrt(stiffest / max(self._least_whole - gear.rotor, self.least_inertia))
         return max(1, int(np.ceil(fastest * self.step / _PHASE)))
 
     def follows(self, gear: Transmitting) -> bool:

@@ -84,9 +84,7 @@ class Response:
 
     def __init__(self, link: DrivenLink, fine: Fine, gear: Transmitting) -> None:
         self.gear, self._link, self._fine = gear, link, fine
-        least = link.least_inertia
-        self.m = np.maximum(fine.whole - gear.rotor, least)
-        self._moves = fine.whole - gear.rotor > least
+        self.m = np.maximum(fine.whole - gear.rotor, link.least_inertia)
         self.load = fine.load - gear.rotor * fine.a
         self.walked: DeadZoneMotion | None = None
 
@@ -101,7 +99,7 @@ class Response:
     @cached_property
     def torque(self) -> np.ndarray:
         """The change of the torque of every joint, (T, n)."""
-        return self._torque(self._samples(self._differences(self._d)))
+        return self._torque(self._sampled(self._d))
 
     @cached_property
     def _side(self) -> np.ndarray:
@@ -150,10 +148,19 @@ class Response:
                 x[-1] = x[-2]
         return Deflection(d, rate, bend)
 
-    def _samples(self, moved: Deflection) -> Deflection:
-        """Return a deflection at the samples of the motion, from that at all steps."""
-        steps = slice(self._fine.first * self._fine.per, None, self._fine.per)
-        return Deflection(*(x[steps] for x in (moved.d, moved.rate, moved.bend)))
+    def _sampled(self, d: np.ndarray) -> Deflection:
+        """Return the deflection of every step as `_differences`, at the samples of the motion."""
+        at, h = np.arange(len(d))[self._samples], self._fine.step
+        inner = np.clip(at, 1, len(d) - 2)
+        before, now, after = d[inner - 1], d[inner], d[inner + 1]
+        rate, bend = (after - before) / (2.0 * h), (after - 2.0 * now + before) / h**2
+        rate[at == 0] = bend[at == 0] = 0.0
+        return Deflection(d[at], rate, bend)
+
+    @property
+    def _samples(self) -> slice:
+        """Steps at which the samples of the motion are."""
+        return slice(self._fine.first * self._fine.per, None, self._fine.per)
 
     def _torque(self, moved: Deflection) -> np.ndarray:
         """Return the change of the torque, (T, n), to first order in a deflection."""
@@ -161,7 +168,9 @@ class Response:
         d, rate, bend = (x[:, None] for x in (moved.d, moved.rate, moved.bend))
         changed = link.M * bend
         changed[:, j] = link.behind(self.gear) * moved.bend
-        return -(changed + link.C * rate + link.G * d)
+        changed += link.C * rate
+        changed += link.G * d
+        return np.negative(changed, out=changed)
 
     def by(
         self, stiffness: float, damping: float, rotor: float, half_gap: float = 0.0
@@ -176,7 +185,7 @@ class Response:
         -------
         (T, n), exact while the link keeps touching where it touches.
         """
-        lighter = -rotor * self._moves
+        lighter = -rotor * (self._fine.whole - self.gear.rotor > self._link.least_inertia)
         d, moved = self._d, self._differences(self._d)
         bent = d - self._side * self.gear.half_gap
         lost = rotor * self._fine.a
@@ -185,9 +194,8 @@ class Response:
         right += self._side * self.gear.stiffness * half_gap
         rest = -stiffness * (d[:2] - self._rests * self.gear.half_gap)
         rest += self._rests * self.gear.stiffness * half_gap - lost[:2]
-        change = self._torque(self._samples(self._differences(self._banded(rest, right))))
-        at = self._samples(Deflection(lighter, lighter, moved.bend))
-        change[:, self._link.joint] -= at.d * at.bend
+        change = self._torque(self._sampled(self._banded(rest, right)))
+        change[:, self._link.joint] -= (lighter * moved.bend)[self._samples]
         return change
 
 
@@ -209,7 +217,7 @@ def _bounded(d: np.ndarray) -> np.ndarray:
 
     A link of an unlikely estimate may fall instead of ring: such a transmission explains nothing.
     """
-    return d if np.all(np.abs(d) < _RUNAWAY) else np.zeros_like(d)
+    return d if d.min() > -_RUNAWAY and d.max() < _RUNAWAY else np.zeros_like(d)
 
 
 def _sign(load: np.ndarray) -> np.ndarray:
