@@ -57,7 +57,7 @@ class ContactCriteria(CriteriaGroup):
         3.0, "1", "widths about the peak that say nothing of the usual size of the noise", over=0
     )
     left_out: float = criterion(
-        0.25,
+        0.1,
         "1",
         "share of a repetition that is left out on either side, at most",
         over=0,
@@ -159,10 +159,10 @@ class StickingCriteria(CriteriaGroup):
     )
     stops: int = criterion(3, "stops", "stops at which a joint that sticks has stood", least=1)
     stops_share: float = criterion(
-        0.25,
+        0.1,
         "1",
-        "share of its stops at which a joint that sticks has stood; Stribeck friction that a model "
-        "lacks makes a joint stand now and then",
+        "share of its stops at which a joint that sticks has stood: Stribeck friction, too, lets a "
+        "joint stand now and then",
         over=0,
         most=1,
     )
