@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -12,6 +11,7 @@ from scipy import signal
 
 from dynident.errors import RecordingError
 from dynident.recording.recording import Recording
+from dynident.recording.zero_phase import zero_phase
 
 _LEAST_SHARE = 1e-6
 """Cut-off over sampling rate below which a filter's coefficients run out of digits."""
@@ -218,50 +218,6 @@ def butterworth(
             f"choose it above 0 and below {rate_hz / 2:.6g} Hz",
         )
     return np.asarray(signal.butter(order, cutoff_hz / (rate_hz / 2), output="sos"))
-
-
-def zero_phase(
-    x: np.ndarray, sections: np.ndarray, padding: int, where: str | None = None
-) -> np.ndarray:
-    """Filter forward and backward along axis 0.
-
-    Parameters
-    ----------
-    x : (T, ...) of any quantity.
-    sections : of the filter, see `butterworth`.
-    padding : samples of point reflection at each end.
-    where : file, for messages.
-
-    Returns
-    -------
-    (T, ...) filtered twice, without delay.
-
-    Raises
-    ------
-    RecordingError
-        If x has no more rows than the padding.
-    """
-    if len(x) <= padding:
-        raise RecordingError(
-            f"{len(x)} samples are too few to filter", where, f"at least {padding + 1} are needed"
-        )
-    # As scipy's sosfiltfilt with odd padding, to the last bit, but for one or two columns in half
-    # the time: the filter's state at rest is kept, and each column lies in one piece.
-    columns = x.reshape(len(x), math.prod(x.shape[1:])).T
-    y = np.empty((len(columns), len(x) + 2 * padding))
-    y[:, padding : padding + len(x)] = columns
-    y[:, :padding] = 2 * columns[:, :1] - columns[:, padding:0:-1]
-    y[:, padding + len(x) :] = 2 * columns[:, -1:] - columns[:, -2 : -padding - 2 : -1]
-    state = _state_at_rest(sections.tobytes(), len(sections))[:, None, :]
-    for _ in range(2):
-        y = signal.sosfilt(sections, y, axis=1, zi=state * y[None, :, :1])[0][:, ::-1]
-    return y[:, padding : padding + len(x)].T.reshape(x.shape)
-
-
-@lru_cache(32)
-def _state_at_rest(sections: bytes, count: int) -> np.ndarray:
-    """State of each section after a long time at one, (count, 2)."""
-    return np.asarray(signal.sosfilt_zi(np.frombuffer(sections).reshape(count, 6)))
 
 
 def central_difference(x: np.ndarray, rate_hz: float) -> np.ndarray:

@@ -14,7 +14,8 @@ import numpy as np
 from scipy import signal
 
 from dynident.errors import RecordingError
-from dynident.recording.filters import Filter, butterworth, zero_phase
+from dynident.recording.filters import Filter, butterworth
+from dynident.recording.zero_phase import zero_phase
 
 _FORGOTTEN = 1e-12
 """Share of a disturbance at a block's end that is left after the overlap."""

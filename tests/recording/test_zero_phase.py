@@ -1,0 +1,27 @@
+"""Filters forward and backward: compiled or not, they are SciPy's."""
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from dynident.recording.zero_phase import zero_phase
+
+PADDING = 12
+
+
+@pytest.mark.parametrize("wish", ["never", "auto"])
+@pytest.mark.parametrize("columns", [0, 1, 3, 8, 17])
+@pytest.mark.parametrize(
+    "sections",
+    [signal.butter(4, 0.1, output="sos"), signal.cheby1(8, 0.05, 0.2, output="sos")],
+    ids=["butterworth", "chebyshev"],
+)
+def test_is_that_of_scipy(wish, columns, sections, monkeypatch):
+    """For numbers of columns beside those that are filtered together, in any order of memory."""
+    monkeypatch.setenv("DYNIDENT_COMPILE", wish)
+    x = np.random.default_rng(0).standard_normal((150, columns)).cumsum(axis=0)
+    want = signal.sosfiltfilt(sections, x, axis=0, padtype="odd", padlen=PADDING) if columns else x
+    for given in (x, np.asfortranarray(x), x[:, ::-1][:, ::-1], np.repeat(x, 2, axis=0)[::2]):
+        np.testing.assert_allclose(zero_phase(given, sections, PADDING), want, rtol=0, atol=1e-11)
+    several = zero_phase(np.stack([x, -x], axis=1), sections, PADDING)
+    np.testing.assert_allclose(several, np.stack([want, -want], axis=1), rtol=0, atol=1e-11)
