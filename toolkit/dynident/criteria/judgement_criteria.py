@@ -57,7 +57,7 @@ class ContactCriteria(CriteriaGroup):
         3.0, "1", "widths about the peak that say nothing of the usual size of the noise", over=0
     )
     left_out: float = criterion(
-        0.1,
+        0.25,
         "1",
         "share of a repetition that is left out on either side, at most",
         over=0,
