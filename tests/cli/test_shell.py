@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import resource
 import select
 import shlex
 import signal
@@ -27,33 +26,45 @@ ENTRY = STUDY[STUDY.index("[[recordings]]") : STUDY.rindex("[[recordings]]")]
 LIMIT = 120.0
 
 
-def shell(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+HEAVY = {"arch", "casadi", "matplotlib", "pandas", "plotly", "sklearn", "statsmodels"}
+COMPUTING = HEAVY | {"numpy", "pinocchio", "pydantic", "pydrake", "scipy"}
+
+
+def shell(
+    *arguments: str | Path, cwd: Path | None = None, **environment: str
+) -> subprocess.CompletedProcess[str]:
     words = [*DYNIDENT, *map(str, arguments)]
-    return subprocess.run(words, capture_output=True, text=True, cwd=cwd, timeout=LIMIT)
+    around = {**os.environ, **environment}
+    return subprocess.run(words, capture_output=True, text=True, cwd=cwd, env=around, timeout=LIMIT)
 
 
-def cpu_of_children() -> float:
-    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return usage.ru_utime + usage.ru_stime
+def loaded(told: str) -> set[str]:
+    """Return the packages whose import Python told on standard error."""
+    lines = told.splitlines()
+    assert all(line.startswith("import time:") for line in lines)
+    return {line.rpartition("|")[2].strip().partition(".")[0] for line in lines}
 
 
-def test_help_answers_at_once_with_an_example():
-    """Under 0.3 s of CPU time; the better of two tries, since a busy machine inflates it."""
+def test_help_loads_nothing_that_computes_and_has_an_example():
     for command in ((), *((name,) for name in COMMANDS)):
-        taken = []
-        for _ in range(2):
-            before = cpu_of_children()
-            done = shell(*command, "--help")
-            taken.append(cpu_of_children() - before)
-            assert done.returncode == 0 and done.stderr == ""
-            text = " ".join(done.stdout.split())
-            start = " ".join(("Example: dynident", *(command or ("explain",))))
-            assert start in text and "\\b" not in text
-            if taken[-1] < 0.3:
-                break
-        assert min(taken) < 0.3, (command, taken)
-    for name in COMMANDS:
-        assert re.search(rf"^  {name} ", shell("--help").stdout, re.MULTILINE)
+        done = shell(*command, "--help", PYTHONPROFILEIMPORTTIME="1")
+        assert done.returncode == 0
+        text = " ".join(done.stdout.split())
+        start = " ".join(("Example: dynident", *(command or ("explain",))))
+        assert start in text and "\\b" not in text
+        assert "dynident" in (packages := loaded(done.stderr))
+        assert not packages & COMPUTING, command
+        for name in () if command else COMMANDS:
+            assert re.search(rf"^  {name} ", done.stdout, re.MULTILINE)
+
+
+@pytest.mark.slow
+def test_a_fit_loads_only_what_it_uses(tmp_path):
+    """Of what is heavy: SciPy for the filters, Drake and Pinocchio for the robot."""
+    done = shell("fit", write_study(tmp_path), PYTHONPROFILEIMPORTTIME="1")
+    assert done.returncode == 0
+    packages = loaded(done.stderr)
+    assert "scipy" in packages and not packages & HEAVY
 
 
 def test_errors_reach_the_shell(tmp_path):

@@ -22,7 +22,7 @@ LOWER, UPPER, FASTEST = (
 )
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30, derandomize=True)
 @given(seed=st.integers(0, 2**31), harmonics=st.integers(1, 12), period=st.floats(0.2, 50))
 def test_random_motions_respect_the_limits_and_repeat(seed, harmonics, period) -> None:
     found = Fourier.random(CRANE_ROBOT, period, seed, harmonics)

@@ -52,7 +52,7 @@ def fore(mass, com, inertia, shape) -> Fore:
     return Fore(repr(mass), text(com), moments, products, shape)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(SEEDS)
 def test_masses_inside_a_box_are_never_flagged(seed):
     masses, places, shape = points_in_a_box(np.random.default_rng(seed))
@@ -61,7 +61,7 @@ def test_masses_inside_a_box_are_never_flagged(seed):
     assert not any(rule.doubtful for rule in found.rules), found
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(SEEDS)
 def test_masses_out_of_the_box_are_seen(seed):
     """All of the mass beyond one face: its centre is outside."""
@@ -75,7 +75,7 @@ def test_masses_out_of_the_box_are_seen(seed):
     assert "centre_of_mass" in {one.rule for one in found.broken}
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(SEEDS)
 def test_mended_links_are_whole(seed):
     """With the numbers that the mend states, every rule holds; and a whole link needs no mend."""
@@ -122,7 +122,7 @@ def test_margins_agree_with_the_verdict_on_ten_parameters(seed):
     assert relative == sorted(relative)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(SEEDS, st.sampled_from([1e-3, 1e3]), st.sampled_from([1e-2, 30.0]))
 def test_relative_margins_know_no_units(seed, length, mass):
     """The same robot in mm, or made of lead, is as near to impossible."""

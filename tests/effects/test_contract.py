@@ -152,7 +152,7 @@ def test_zero_parameters_give_zero_torque(effect: Effect) -> None:
 
 
 @EVERY
-@settings(max_examples=5, deadline=None, derandomize=True)
+@settings(max_examples=5, derandomize=True)
 @given(seed=st.integers(0, 10_000))
 def test_columns_are_the_torque_that_the_simulator_needs(effect: Effect, seed: int) -> None:
     """Command for a motion, from all ways of acting, less the rigid robot's torque."""

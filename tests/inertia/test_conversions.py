@@ -27,7 +27,7 @@ from inertia.bodies import assert_same, bodies, matter
 
 pin: Any = pinocchio
 seeds = st.integers(0, 2**32 - 1)
-many = settings(max_examples=60, deadline=None)
+many = settings(max_examples=60)
 
 
 @given(bodies())

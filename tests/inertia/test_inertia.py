@@ -43,7 +43,7 @@ def test_order_and_units():
 
 
 @given(seeds)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_centre_of_mass_form_and_back(seed):
     points, masses, phi = cloud(seed)
     properties = to_com(phi)
@@ -56,7 +56,7 @@ def test_centre_of_mass_form_and_back(seed):
 
 
 @given(seeds)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_frame_change_moves_the_points(seed):
     points, masses, phi = cloud(seed)
     rng = np.random.default_rng(seed)
@@ -69,7 +69,7 @@ def test_frame_change_moves_the_points(seed):
 
 
 @given(seeds)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_matter_is_consistent_in_any_frame(seed):
     points, masses, phi = cloud(seed)
     homogeneous = np.column_stack([points, np.ones(len(points))])
@@ -120,7 +120,7 @@ def test_massless_with_a_first_moment_has_no_centre_of_mass():
 
 
 @given(bodies())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_verdicts_do_not_depend_on_the_size_of_the_body(body):
     phi, length = body.phi, body.size[1] / body.size[0]
     report = margins(phi)
@@ -138,7 +138,7 @@ def test_verdicts_do_not_depend_on_the_size_of_the_body(body):
 
 
 @given(st.floats(1e-4, 1e3), st.floats(0, 1), st.floats(1e-9, 1e6))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_seven_digits_of_a_thin_plate_are_forgiven(width, ratio, mass):
     x, y = mass * width**2 / 12, mass * (ratio * width) ** 2 / 12
     written = [float(f"{moment:.7g}") for moment in (x, y, x + y)]

@@ -22,7 +22,7 @@ from dynident.inertia import (
 from inertia.bodies import SINGULAR, assert_same, bodies, matter
 
 pin: Any = pinocchio
-many = settings(max_examples=60, deadline=None)
+many = settings(max_examples=60)
 
 
 @st.composite

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import threading
-import time
 from dataclasses import replace
 
 import casadi as ca
@@ -262,17 +261,21 @@ def test_ctrl_c_reaches_the_caller() -> None:
         deep = ca.sin(deep) + 1e-3 * x.symbol
     wild = Residual("wild", ca.vertcat(ca.mtimes(ca.DM(RNG.normal(size=(200, 100))), deep), deep))
     program = Program("long") + x + wild + Cost("waves", ca.sum1(ca.sin(1e3 * x.symbol)))
-    assert program.scaled  # made before the clock runs
+    assert program.scaled  # made before the signal comes
     seen = signal.getsignal(signal.SIGINT)
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    timer = threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT))
+    sent = threading.Event()
+
+    def interrupt() -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        sent.set()
+
+    timer = threading.Timer(0.5, interrupt)
     timer.start()
-    began = time.perf_counter()
     try:
         with pytest.raises(KeyboardInterrupt):
-            for _ in range(10_000):
+            while not sent.is_set():  # which the run that is interrupted does not come back to
                 program.solve(max_iterations=100_000, tolerance=1e-16)
-        assert time.perf_counter() - began < 20
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     finally:
         timer.cancel()

@@ -89,7 +89,7 @@ FILTERS = st.builds(
 )
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     filter=FILTERS,
     period=st.sampled_from([None, 2.0, 1.873]),

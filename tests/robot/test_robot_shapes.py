@@ -204,7 +204,7 @@ def test_addresses_that_name_no_file(tmp_path):
             find_mesh(uri, tmp_path)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.integers(0, 2**32 - 1))
 def test_depth_is_the_distance_to_the_surface(seed):
     rng = np.random.default_rng(seed)

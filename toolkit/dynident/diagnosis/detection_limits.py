@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from dynident.diagnosis.details import place
 from dynident.diagnosis.search.ranking import Ranking
@@ -90,7 +90,7 @@ def _deviations_to_stay(one: Score, fitted: EvidenceFit, share: float) -> float:
     joints = len(one.effect.acting_at(fitted.model.robot)) / fitted.model.robot.n
     rows = share * fitted.rows * joints
     least = fitted.criteria.search.least_fall * rows
-    return float((np.sqrt(least) + stats.norm.isf(1.0 - POWER)) / np.sqrt(share))
+    return float((np.sqrt(least) + special.ndtri(POWER)) / np.sqrt(share))
 
 
 def _rows(evidence: Evidence) -> int:
@@ -104,7 +104,7 @@ def _deviations_to_pass(one: Score, fitted: EvidenceFit, tests: int) -> float:
     wald = np.inf
     if blocks > rank + 1:
         # Of the test that takes blocks of time as its sampling units, corrected for all tests.
-        quantile = float(stats.f.isf(gates.level / max(tests, 1), rank, blocks - rank))
+        quantile = float(special.fdtri(rank, blocks - rank, 1.0 - gates.level / max(tests, 1)))
         wald = quantile * rank * (blocks - 1) / (blocks - rank)
     shapes = len(one.effect.shape_parameters(robot))
     price = (rank + shapes) * np.log(fitted.rows) + 2.0 * np.log(
@@ -112,7 +112,7 @@ def _deviations_to_pass(one: Score, fitted: EvidenceFit, tests: int) -> float:
     )
     share = max(gates.first_share, gates.least_gain)
     least = max(wald, price, share / (1.0 - share) * fitted.error_total)
-    return float(np.sqrt(least) + stats.norm.isf(1.0 - POWER))
+    return float(np.sqrt(least) + special.ndtri(POWER))
 
 
 def _mean_squares(one: Score, evidence: Evidence, fitted: EvidenceFit) -> np.ndarray:

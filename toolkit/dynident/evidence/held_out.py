@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from dynident.criteria import NoiseCriteria
 from dynident.evidence.columns import Evidence
@@ -182,7 +182,7 @@ def with_noise_of(judged: HeldOut, noise: HeldOut, criteria: NoiseCriteria) -> H
     rows = sum(len(run.t) for run in judged.runs)
     excess = judged.residual_rms**2 - power
     error = power * np.sqrt(2.0 * noise.inflation / rows)
-    quantile = float(stats.norm.ppf(criteria.confidence))
+    quantile = float(special.ndtri(criteria.confidence))
     ratio, least = (
         np.sqrt(np.clip(x, 0.0, None) / safe) for x in (excess, excess - quantile * error)
     )
@@ -298,8 +298,8 @@ class _JointNoise:
         spread = np.array([_variance(e, kind, criteria) for kind, e in residuals])
         error = np.sqrt((sizes**2 @ spread) / sizes.sum() ** 2)
         # Of a square over its mean, in the worst of cases.
-        largest = float(stats.chi2.ppf(criteria.confidence, 1))
-        certainly = float(stats.norm.ppf(criteria.confidence)) * error + largest * doubt
+        largest = float(special.chdtri(1, 1.0 - criteria.confidence))
+        certainly = float(special.ndtri(criteria.confidence)) * error + largest * doubt
         return cls(
             power=float(np.mean(np.concatenate([d.ravel() for d in noise]) ** 2)),
             excess=float(excess),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from dynident.criteria import DEFAULTS, MapCriteria
 from dynident.evidence.held_out import HeldOut
@@ -196,7 +196,7 @@ def _sentence(
         return ""
     weight = 1.0 / sigma
     power = float(np.sum((mean * weight) ** 2))
-    if stats.chi2.sf(power, len(at)) > criteria.level:
+    if special.chdtrc(len(at), power) > criteria.level:
         return ""
     scale = float(np.abs(at).max()) or 1.0
     shapes = _SHAPES[against]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from dynident.errors import RecordingError
 from dynident.recording.recording import Recording
@@ -217,7 +217,7 @@ def butterworth(
             where,
             f"choose it above 0 and below {rate_hz / 2:.6g} Hz",
         )
-    return np.asarray(signal.butter(order, cutoff_hz / (rate_hz / 2), output="sos"))
+    return np.asarray(scipy.signal.butter(order, cutoff_hz / (rate_hz / 2), output="sos"))
 
 
 def central_difference(x: np.ndarray, rate_hz: float) -> np.ndarray:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from dynident.errors import RecordingError
 from dynident.recording.filters import Filter, butterworth
@@ -101,7 +101,7 @@ class ParallelFilter:
                 )
             found.append((butterworth(self.rate_hz, cutoff, where=self.where), 12))
         if self.filter.decimation == "chebyshev" and self.factor > 1:
-            found.append((signal.cheby1(8, 0.05, 0.8 / self.factor, output="sos"), 24))
+            found.append((scipy.signal.cheby1(8, 0.05, 0.8 / self.factor, output="sos"), 24))
         return tuple(found)
 
     @cached_property
@@ -207,5 +207,5 @@ def choose_factor(rate_hz: float, target_rate: float, period: float | None = Non
 
 def _memory(sections: np.ndarray, share: float) -> int:
     """Samples in which a disturbance fades to a share; half as much again for the two passes."""
-    _, poles, _ = signal.sos2zpk(sections)
+    _, poles, _ = scipy.signal.sos2zpk(sections)
     return math.ceil(1.5 * math.log(share) / math.log(np.abs(np.asarray(poles)).max()))

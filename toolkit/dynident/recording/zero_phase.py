@@ -11,7 +11,7 @@ from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from dynident.batch import c_function
 from dynident.errors import RecordingError
@@ -131,11 +131,11 @@ def _by_scipy(x: np.ndarray, sections: np.ndarray, padding: int) -> np.ndarray:
     y[:, padding + len(x) :] = 2 * columns[:, -1:] - columns[:, -2 : -padding - 2 : -1]
     state = _state_at_rest(sections.tobytes(), len(sections))[:, None, :]
     for _ in range(2):
-        y = signal.sosfilt(sections, y, axis=1, zi=state * y[None, :, :1])[0][:, ::-1]
+        y = scipy.signal.sosfilt(sections, y, axis=1, zi=state * y[None, :, :1])[0][:, ::-1]
     return y[:, padding : padding + len(x)].T
 
 
 @lru_cache(32)
 def _state_at_rest(sections: bytes, count: int) -> np.ndarray:
     """State of each section after a long time at one, (count, 2)."""
-    return np.ascontiguousarray(signal.sosfilt_zi(np.frombuffer(sections).reshape(count, 6)))
+    return np.ascontiguousarray(scipy.signal.sosfilt_zi(np.frombuffer(sections).reshape(count, 6)))

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import stats
+from scipy import special
 from sklearn.utils.validation import check_is_fitted
 
 from dynident.errors import FitError
@@ -118,7 +118,7 @@ class JointFactorRegression(StatisticsRegressor):
             middle, sigma = self.least_squares_, self.sigma_noisy_
         else:
             middle, sigma = self.coef_true_, self.sigma_true_
-        half = stats.t.ppf((1 + level) / 2, max(self.freedom_, 1)) * sigma
+        half = special.stdtrit(max(self.freedom_, 1), (1 + level) / 2) * sigma
         return np.column_stack([middle - half, middle + half])
 
     def summary(self) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from dynident.moments import SecondMoments
 from dynident.regression.statistics_regressor import StatisticsRegressor
@@ -102,8 +102,8 @@ class StepwiseRegression(StatisticsRegressor):
         freedom = self._freedom(unit, used)
         if freedom <= 0:
             return 1.0
-        F = gain * freedom / max(left, _EXACT * unit.power)
-        return float(stats.f.sf(F, 1, freedom))
+        F = max(gain, 0.0) * freedom / max(left, _EXACT * unit.power)
+        return float(special.fdtrc(1, freedom, F))
 
 
 def _solved(unit: SecondMoments, chosen: list[int]) -> np.ndarray:

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter, oaconvolve
-from scipy.stats import t as student
+import scipy
+from scipy.special import stdtr, stdtrit
 
 from dynident.criteria import ContactCriteria, Criteria
 from dynident.effects import FRICTION_WIDTH
@@ -83,7 +83,7 @@ class Changes:
         pulse = np.exp(-(((np.arange(own.start, own.stop) - row) / width) ** 2) / 2)
         columns = np.column_stack([self.change[own], pulse, *_slow(self.of.speed[p]).T])
         columns = columns * self.still[own, None]
-        white = np.asarray(lfilter(self.colour, [1.0], columns, axis=0))
+        white = np.asarray(scipy.signal.lfilter(self.colour, [1.0], columns, axis=0))
         change, pulse, slow = white[:, 0], white[:, 1], white[:, 2:]
         power = max(float(pulse @ pulse), 1e-300)
         along = slow.T @ pulse
@@ -117,8 +117,8 @@ class Changes:
         inside = (around >= 0) & (around < length)
         at = np.clip(around, 0, length - 1)
         pulse = np.exp(-(((around - rows[:, None]) / width) ** 2) / 2) * inside
-        template = lfilter(self.colour, [1.0], pulse * self.still[at], axis=1) * inside
-        white = lfilter(self.colour, [1.0], signal * self.still)
+        template = scipy.signal.lfilter(self.colour, [1.0], pulse * self.still[at], axis=1) * inside
+        white = scipy.signal.lfilter(self.colour, [1.0], signal * self.still)
         product = np.sum(template * white[at], axis=1)
         power = np.maximum(np.sum(template**2, axis=1), 1e-300)
         return np.stack([product / np.sqrt(power), product / power])
@@ -128,8 +128,8 @@ def scanned(one: Changes, width: float) -> np.ndarray:
     """The z value of `Changes.match` at every row, (P S,), by convolutions."""
     half = int(np.ceil(one.reach * width))
     pulse = np.exp(-((np.arange(-half, half + 1) / width) ** 2) / 2)
-    white = np.asarray(lfilter(one.colour, [1.0], one.change * one.still))
-    back = np.asarray(lfilter(one.colour, [1.0], white[::-1]))[::-1] * one.still
+    white = np.asarray(scipy.signal.lfilter(one.colour, [1.0], one.change * one.still))
+    back = np.asarray(scipy.signal.lfilter(one.colour, [1.0], white[::-1]))[::-1] * one.still
     product = _convolved(back, pulse)
     # The whitened pulse's square: over the lags that the filter mixes.
     power = np.zeros(len(back))
@@ -137,7 +137,7 @@ def scanned(one: Changes, width: float) -> np.ndarray:
         both = float(one.colour[: len(one.colour) - lag] @ one.colour[lag:])
         pairs = one.still[: len(back) - lag] * one.still[lag:]
         kernel = pulse[: len(pulse) - lag] * pulse[lag:]
-        full = np.pad(oaconvolve(pairs, kernel[::-1]), len(one.colour))
+        full = np.pad(scipy.signal.oaconvolve(pairs, kernel[::-1]), len(one.colour))
         start = len(one.colour) + half - lag
         power += (1.0 if lag == 0 else 2.0) * both * full[start : start + len(back)]
     return product / np.sqrt(np.maximum(power, 1e-300))
@@ -145,7 +145,7 @@ def scanned(one: Changes, width: float) -> np.ndarray:
 
 def _convolved(signal: np.ndarray, pulse: np.ndarray) -> np.ndarray:
     half = len(pulse) // 2
-    return oaconvolve(signal, pulse)[half : half + len(signal)]
+    return scipy.signal.oaconvolve(signal, pulse)[half : half + len(signal)]
 
 
 def changes_of(
@@ -262,9 +262,9 @@ def degrees_of_freedom(z: np.ndarray, criteria: ContactCriteria) -> float:
     """Degrees of freedom of Student's distribution with tails like these, at their heaviest."""
     middle = max(float(np.median(z)), 1e-300)
     degrees, tails = np.array(criteria.degrees), criteria.tails
-    quarter = student.ppf(0.75, degrees)
+    quarter = stdtrit(degrees, 0.75)
     return min(
-        float(np.interp(-value / middle, -student.ppf(0.5 + q / 2, degrees) / quarter, degrees))
+        float(np.interp(-value / middle, -stdtrit(degrees, 0.5 + q / 2) / quarter, degrees))
         for q, value in zip(tails, np.quantile(z, tails), strict=True)
         if (1 - q) * len(z) >= criteria.least_in_tail or q == tails[0]
     )
@@ -288,4 +288,4 @@ def chance_of(z: float, degrees: float, width: float) -> float:
     """
     more = max(degrees - 4.0, 0.5) * max(1.0, width / 2)
     wide = max(degrees, 4.0 + more) if width > 2 else degrees
-    return 2 * float(student.sf(z * student.ppf(0.75, wide) / QUARTER, wide))
+    return 2 * float(stdtr(wide, -z * stdtrit(wide, 0.75) / QUARTER))

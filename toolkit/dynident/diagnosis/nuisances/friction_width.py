@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from dynident.criteria import DEFAULTS
 from dynident.diagnosis.search.ranking import rank
@@ -126,7 +126,7 @@ class WidthProfile:
         """95 % interval of the width by its profile; zero or infinity where that has no end."""
         grid = self._grid()
         least = float(self.missed(np.ones(1))[0])
-        limit = least + float(chi2.ppf(0.95, 1))
+        limit = least + float(chdtri(1, 0.05))
 
         def excess(x: float) -> float:
             return float(self.missed(np.exp([x]))[0]) - limit

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from dynident.criteria import StickingCriteria
 from dynident.evidence.columns import Evidence
@@ -158,7 +158,7 @@ def speed_noise(sampled: Sampled) -> np.ndarray:
     gain = np.sin(angle) * rate
     cutoff = sampled.parallel.filter.position_cutoff_hz
     if cutoff:
-        _, response = signal.sosfreqz(butterworth(rate, cutoff), angle)
+        _, response = scipy.signal.sosfreqz(butterworth(rate, cutoff), angle)
         gain = gain * np.abs(response) ** 2
     share = float(np.sqrt(np.trapezoid(gain**2, angle) / np.pi))
     return encoder_noise_std(sampled.recording.q) * share

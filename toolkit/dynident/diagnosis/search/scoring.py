@@ -9,7 +9,7 @@ from functools import reduce
 from operator import add
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from dynident.diagnosis.search.cleared_columns import cleared
 from dynident.effects import Effect
@@ -266,4 +266,5 @@ def _block_p_value(moment: np.ndarray, scores: np.ndarray) -> float:
         return 1.0
     spread = scores.T @ scores * blocks / (blocks - 1)
     statistic = float(moment @ np.linalg.lstsq(spread, moment, rcond=1e-12)[0])
-    return float(stats.f.sf(statistic * (blocks - k) / (k * (blocks - 1)), k, blocks - k))
+    ratio = max(statistic, 0.0) * (blocks - k) / (k * (blocks - 1))
+    return float(special.fdtrc(k, blocks - k, ratio))

@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 from dynident.moments.factors import TriangularFactors
 
@@ -62,4 +61,5 @@ def output_noise(
     """
     each = pieces.residual_norms(coefficients) ** 2 * len(pieces.R) / pieces.rows
     left = each - coefficients @ psi @ coefficients
-    return OutputNoise(float(np.mean(left)), float(stats.sem(left)) if len(left) > 1 else np.inf)
+    sigma = float(np.std(left, ddof=1) / np.sqrt(len(left))) if len(left) > 1 else np.inf
+    return OutputNoise(float(np.mean(left)), sigma)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy import stats
+from scipy import special
 from sklearn.cross_decomposition import PLSRegression
 from sklearn.linear_model import LassoCV, RidgeCV
 from sklearn.model_selection import GridSearchCV, PredefinedSplit
@@ -189,7 +189,7 @@ def _worth(regressor: CorrectedLeastSquares, noise: OutputNoise) -> tuple[str, .
             f"That share is known to {100 * doubt:.2g} % only: intervals along that direction are "
             "too narrow."
         )
-    t = float(stats.t.ppf(0.95, PIECES - 1))
+    t = float(special.stdtrit(PIECES - 1, 0.95))
     if noise.variance < -t * noise.sigma:
         notes.insert(
             0,

@@ -7,7 +7,7 @@ that it has passed are known: of its spectrum only the shape before them has to 
 from __future__ import annotations
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from dynident.fitting.sampling import Sampled
 from dynident.recording.filters import butterworth
@@ -73,4 +73,4 @@ def filter_power(sampled: Sampled, f: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def _response(sections: np.ndarray, f: np.ndarray, rate: float) -> np.ndarray:
-    return np.abs(signal.sosfreqz(sections, f, fs=rate)[1])
+    return np.abs(scipy.signal.sosfreqz(sections, f, fs=rate)[1])

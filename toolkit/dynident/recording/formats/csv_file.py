@@ -1,8 +1,8 @@
 """CSV files in: a header line, then one line of numbers a sample.
 
-Pandas reads a file in which nothing is odd. It forgives a missing cell, a comment, text that is no
-number, and does not say in which line: so what it may not forgive is looked for first, and a file
-that it cannot read is read again by lines, for an error that names line and column.
+Pandas reads a large file in which nothing is odd. It forgives a missing cell, a comment, text that
+is no number, and does not say in which line: so what it may not forgive is looked for first, and a
+file that it cannot read is read again by lines, for an error that names line and column.
 """
 
 from __future__ import annotations
@@ -18,6 +18,9 @@ import numpy as np
 
 from dynident.errors import FileError, RecordingError
 from dynident.recording.formats.column_names import ColumnTable
+
+_SMALL = 1 << 18
+"""Bytes that are read by lines sooner than pandas is loaded, which takes a third of a second."""
 
 
 def open_csv(data: bytes, file: str) -> ColumnTable:
@@ -42,7 +45,7 @@ def open_csv(data: bytes, file: str) -> ColumnTable:
 
     def load(wanted: Sequence[str]) -> dict[str, np.ndarray]:
         places = [names.index(name) for name in wanted]
-        columns = _fast(data, separator, len(names), places)
+        columns = _fast(data, separator, len(names), places) if len(data) > _SMALL else None
         if columns is None:
             columns = list(_careful(data, separator, names, places, file).T)
         return dict(zip(wanted, columns, strict=True))
