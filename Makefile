@@ -18,11 +18,14 @@ $(STAMP): pyproject.toml constraints.txt
 demo: install
 	$(BIN)/dynident demo
 
+# One worker a processor: threads of the linear algebra beside them would wait for each other.
+test test-fast: export OMP_NUM_THREADS = 1
+
 test: install
-	$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal
+	$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 test-fast: install
-	$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal -m "not slow"
+	$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder -m "not slow"
 
 lint: install
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[lint]'

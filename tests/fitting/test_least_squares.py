@@ -82,6 +82,7 @@ def test_joints_of_unequal_noise_are_weighted(model: Model, truth: np.ndarray) -
     assert errors["joint"] < 0.5 * errors["none"]
 
 
+@pytest.mark.slow
 def test_intervals_cover_the_truth(model: Model, truth: np.ndarray) -> None:
     """White torque noise, nothing missing: 95 % intervals hold in 95 % of 60 x 8 cases or so."""
     inside = []

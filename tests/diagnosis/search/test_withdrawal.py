@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from functools import cache
 
+import pytest
+
 from dynident import diagnose as find
 from dynident.diagnosis import Diagnosis
 from dynident.diagnosis.details import named_together
@@ -74,6 +76,7 @@ def test_what_every_joint_has_is_one_proposal() -> None:
     assert all(" at shoulder and elbow" in n or " at elbow and shoulder" in n for n in names)
 
 
+@pytest.mark.slow
 def test_an_end_at_the_limit_is_said_in_the_verdict() -> None:
     found = from_the_rigid_body(1)
     assert len({one.effect.name for one in found.steps}) == 1
@@ -82,6 +85,7 @@ def test_an_end_at_the_limit_is_said_in_the_verdict() -> None:
     assert from_the_rigid_body(2).limit is None
 
 
+@pytest.mark.slow
 def test_a_warm_motor_in_some_recordings_is_no_payload() -> None:
     """What an offset in the same recordings explains as well, nobody calls a load."""
     shifted = FULL + "torque_offset@shoulder"

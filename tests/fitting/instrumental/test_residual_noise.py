@@ -39,6 +39,7 @@ def test_the_loop_has_no_part_in_the_noise_of_the_residual(settings: Filter | No
     assert rough[1] > 1.05 * POSITION
 
 
+@pytest.mark.slow
 def test_a_negative_variance_is_said_and_never_zero(monkeypatch: pytest.MonkeyPatch) -> None:
     joints = ("shoulder", "elbow")
     values, std = np.array([1e-10, 1e-10, 0.1, -0.5]), np.array([1e-12, 1e-12, 0.01, 0.1])
