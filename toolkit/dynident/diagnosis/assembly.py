@@ -216,7 +216,7 @@ def _estimate(evidence: Evidence, fitted: EvidenceFit, train: Dataset) -> Estima
     judged = on_recordings(evidence, fitted)
     model = fitted.model
     # Rows that span what the data show: not the directions in which the columns are noise.
-    shown = fitted.solution.basis.T @ fitted.moments.pooled().gram
+    shown = fitted.solution.basis.T @ fitted.pooled.gram
     basis = base_parameters(shown, model.names, _RANK_TOLERANCE)
     kept, combination = list(basis.independent), basis.combination
     covariance = np.zeros((model.size, model.size))

@@ -5,7 +5,7 @@ Low-passed and decimated like the torque, for every replicate of every run.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 
@@ -100,7 +100,12 @@ class Evidence:
         if len(variants) > 1 and first.is_dynamic_response and first not in model:
             found = self._together(variants, model, values)
             return [[found[variant, run] for variant in variants] for run in runs]
-        return [[self.of(variant, run, model, values) for variant in variants] for run in runs]
+        found = []
+        for run in runs:
+            along = self._along(first, run, model)
+            each = [self._of_each(variants, one, model, values) for one in along]
+            found.append([[of_one[v] for of_one in each] for v in range(len(variants))])
+        return found
 
     def first_look(
         self, variants: Sequence[Effect], model: Model, values: np.ndarray
@@ -140,9 +145,17 @@ class Evidence:
 
     # --- of one replicate, by all that they depend on -------------------------------------------
 
+    def _of_each(
+        self, variants: Sequence[Effect], sampled: Sampled, model: Model, values: np.ndarray
+    ) -> list[np.ndarray]:
+        """Columns of one effect with several shapes."""
+        if variants[0].depends_on_fit:
+            return [self._of(variant, sampled, model, values) for variant in variants]
+        return self._plain(variants, sampled, model)
+
     def _of(self, effect: Effect, sampled: Sampled, model: Model, values: np.ndarray) -> np.ndarray:
         if not effect.depends_on_fit:
-            return self._plain(effect, sampled, model)
+            return self._plain([effect], sampled, model)[0]
         kept, key = self._at(model, values), (effect, _recorded(sampled))
         if key in kept:
             return kept[key]
@@ -154,21 +167,32 @@ class Evidence:
             kept[key] = found
         return found
 
-    def _plain(self, effect: Effect, sampled: Sampled, model: Model) -> np.ndarray:
-        """Columns that follow from the motion alone."""
-        known, key = self.cache.along(sampled.motion), _plain_key(effect, model)
-        if key in known:
-            return known[key]
-        if effect in self._evaluated_at_once(sampled):
-            self._pass_through(sampled, model)
-            return known[key]
-        if effect.is_instantaneous:
-            (found,) = sampled.decimate(model, lambda block: [self._loaded(effect, block)])
-        else:
-            found = sampled.filtered(self._loaded(effect, sampled.block(model)))
-        if effect in self._kept or effect in model.effects:
-            known[key] = found
-        return found
+    def _plain(self, effects: Sequence[Effect], sampled: Sampled, model: Model) -> list[np.ndarray]:
+        """Columns that follow from the motion alone, of one effect with any number of shapes."""
+        known = self.cache.along(sampled.motion)
+        keys = {_plain_key(effect, model): effect for effect in effects}
+        at_once = self._evaluated_at_once(sampled)
+        if any(key not in known and effect in at_once for key, effect in keys.items()):
+            # Many a friction width is tried without a look at the candidates.
+            own = all(effect in model.effects for effect in effects)
+            self._pass_through(sampled, model, model.effects if own else at_once)
+        found = {key: known[key] for key in keys if key in known}
+        new = {key: effect for key, effect in keys.items() if key not in known}
+        if new:
+            found |= zip(new, self._evaluated(list(new.values()), sampled, model), strict=True)
+        for key, effect in new.items():
+            if effect in self._kept or effect in model.effects:
+                known[key] = found[key]
+        return [found[_plain_key(effect, model)] for effect in effects]
+
+    def _evaluated(
+        self, effects: Sequence[Effect], sampled: Sampled, model: Model
+    ) -> list[np.ndarray]:
+        """Columns that follow from the motion alone, all in one pass through it."""
+        if effects[0].is_instantaneous:
+            return sampled.decimate(model, lambda block: [self._loaded(e, block) for e in effects])
+        block = sampled.block(model)
+        return sampled.filtered_each([self._loaded(effect, block) for effect in effects])
 
     def _loaded(self, effect: Effect, block: Block) -> np.ndarray:
         """Columns that follow from the motion alone, with the payload on board."""
@@ -178,21 +202,24 @@ class Evidence:
     def _rigid(self, sampled: Sampled, model: Model) -> np.ndarray:
         known = self.cache.along(sampled.motion)
         if self.model.robot not in known:
-            self._pass_through(sampled, model)
+            self._pass_through(sampled, model, self._evaluated_at_once(sampled))
         return known[self.model.robot]
 
-    def _evaluated_at_once(self, sampled: Sampled) -> list[Effect]:
+    def _evaluated_at_once(self, sampled: Sampled) -> dict[Effect, None]:
         """Effects that need nothing but samples, as far as they are asked for along a motion."""
-        every = [effect for effect in self._kept if effect.is_instantaneous]
         if self._from_simulation and all(r.replicates[-1] is not sampled for r in self.runs):
-            return [effect for effect in every if effect in self.model]
-        return every
+            return {effect: None for effect in self._instantaneous if effect in self.model}
+        return self._instantaneous
 
-    def _pass_through(self, sampled: Sampled, model: Model) -> None:
+    @cached_property
+    def _instantaneous(self) -> dict[Effect, None]:
+        return {effect: None for effect in self._kept if effect.is_instantaneous}
+
+    def _pass_through(self, sampled: Sampled, model: Model, effects: Iterable[Effect]) -> None:
         """Evaluate the rigid body and many effects in one pass, as far as they are not known."""
         known, base = self.cache.along(sampled.motion), self.model.base.independent
-        every = self._evaluated_at_once(sampled)
-        wanted = [effect for effect in every if _plain_key(effect, model) not in known]
+        at_once = self._evaluated_at_once(sampled)
+        wanted = [e for e in effects if e in at_once and _plain_key(e, model) not in known]
         new = self.model.robot not in known
 
         def evaluate(block: Block) -> list[np.ndarray]:
@@ -224,8 +251,8 @@ class Evidence:
             some = places[start : start + step]
             blocks = [self._block(first, one, model, values) for _, one in some]
             for (run, one), each in zip(some, first.family(new, blocks), strict=True):
-                for variant, columns in zip(new, each, strict=True):
-                    found[variant, run].append(one.filtered(columns))
+                for variant, columns in zip(new, one.filtered_each(each), strict=True):
+                    found[variant, run].append(columns)
         return found
 
     # --- what they are made of ------------------------------------------------------------------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import reduce
+from functools import cached_property, reduce
 from operator import add
 
 import numpy as np
@@ -67,11 +67,16 @@ class EvidenceFit:
         """Whitened rows, over all repetitions and joints; noisy copies do not count."""
         return self.moments.count
 
-    @property
+    @cached_property
+    def pooled(self) -> SecondMoments:
+        """The moments of all blocks together; every candidate asks for them."""
+        return self.moments.pooled()
+
+    @cached_property
     def error_total(self) -> float:
         """Squared residual, whitened, with its noise."""
         combination = np.append(-self.values, 1.0)
-        return float(combination @ self.moments.pooled().total @ combination)
+        return float(combination @ self.pooled.total @ combination)
 
 
 def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = None) -> EvidenceFit:
@@ -203,11 +208,12 @@ def model_columns(
     recording = evidence.runs[run].recording
     parts = [[rigid[:, joint] for rigid in evidence.rigid(run)]]
     for effect in model.effects:
-        columns, joints = evidence.of(effect, run, model, values), effect.acting_at(model.robot)
-        if joint in joints:
-            at = [c[:, joints.index(joint)] for c in columns]
-        else:
-            at = [np.zeros_like(c[:, 0]) for c in columns]
+        joints = effect.acting_at(model.robot)
+        if joint not in joints:
+            own = model.slices[effect.label]
+            parts.append([np.zeros((len(one), own.stop - own.start)) for one in parts[0]])
+            continue
+        at = [c[:, joints.index(joint)] for c in evidence.of(effect, run, model, values)]
         if effect.is_payload:
             at = [c * float(bool(recording.payload)) for c in at]
         parts.append(at)

@@ -6,7 +6,7 @@ low-pass as the torque; in blocks, so that a regressor at the full rate never ex
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -93,12 +93,16 @@ class Sampled:
 
     def filtered(self, columns: np.ndarray) -> np.ndarray:
         """Decimated rows of columns at the full rate, (T, ...)."""
-        return self.parallel.apply(columns)[self.kept]
+        return self.filtered_each([columns])[0]
+
+    def filtered_each(self, columns: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Decimated rows of several columns at the full rate, (T, ...) each."""
+        return [one[self.kept] for one in self.parallel.apply_each(columns)]
 
     def decimate(self, model: Model, evaluate: Evaluate) -> list[np.ndarray]:
         """Evaluate columns block by block; all of their decimated rows."""
         parts = [
-            [self.parallel.apply_block(one, plan) for one in evaluate(self.block(model, plan.raw))]
+            self.parallel.apply_each(evaluate(self.block(model, plan.raw)), plan)
             for plan in self._plans(model)
         ]
         return [np.concatenate(pieces) for pieces in zip(*parts, strict=True)]

@@ -7,6 +7,7 @@ blocks of samples, so that a regressor never exists as a whole.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -160,6 +161,28 @@ class ParallelFilter:
         """Filter and decimate one block, `x` being the record's samples `block.raw`."""
         return self._filtered(np.asarray(x, dtype=float), block.rows)
 
+    def apply_each(
+        self, xs: Sequence[np.ndarray], block: FilterBlock | None = None
+    ) -> list[np.ndarray]:
+        """As `apply`, or `apply_block`, of several: narrow ones together, which costs less.
+
+        Parameters
+        ----------
+        xs : (T, ...) each, of as many samples.
+        block : of which they are the samples; None for complete records.
+        """
+        found = []
+        for group in _narrow_together(xs):
+            rows = self.rows(len(group[0])) if block is None else block.rows
+            flat = [np.asarray(x, dtype=float).reshape(len(x), _width(x)) for x in group]
+            together = self._filtered(flat[0] if len(flat) == 1 else np.hstack(flat), rows)
+            parts = np.split(together, np.cumsum([_width(x) for x in group[:-1]]), axis=1)
+            found += [
+                np.ascontiguousarray(part).reshape(len(rows), *x.shape[1:])
+                for part, x in zip(parts, group, strict=True)
+            ]
+        return found
+
     def low_pass(self, x: np.ndarray) -> np.ndarray:
         """Filter without decimating, (T, ...) -> (T, ...); symmetric but for the ends."""
         return self._filtered(np.asarray(x, dtype=float), np.arange(len(x)))
@@ -167,7 +190,7 @@ class ParallelFilter:
     def _filtered(self, x: np.ndarray, rows: np.ndarray) -> np.ndarray:
         if not self.stages:
             return x[rows]
-        flat = x.reshape(len(x), math.prod(x.shape[1:]))
+        flat = x.reshape(len(x), _width(x))
         result = np.zeros((len(rows), flat.shape[1]))
         # Many columns of a regressor are zero (a link does not load the joints beyond it).
         few = flat.shape[1] < _FEW
@@ -179,6 +202,22 @@ class ParallelFilter:
                 y = zero_phase(y, sections, padding, self.where)
             result[:, some] = y[rows]
         return result.reshape(len(rows), *x.shape[1:])
+
+
+def _width(x: np.ndarray) -> int:
+    return math.prod(x.shape[1:])
+
+
+def _narrow_together(xs: Sequence[np.ndarray]) -> Iterator[list[np.ndarray]]:
+    """Arrays in their order, in groups of no more columns than are filtered at a time."""
+    group: list[np.ndarray] = []
+    for x in xs:
+        if group and sum(map(_width, group)) + _width(x) > _AT_ONCE:
+            yield group
+            group = []
+        group.append(x)
+    if group:
+        yield group
 
 
 def choose_factor(rate_hz: float, target_rate: float, period: float | None = None) -> int:

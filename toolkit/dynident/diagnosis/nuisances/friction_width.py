@@ -90,7 +90,7 @@ class WidthProfile:
         column = FrictionWidthColumn(self.joint)
         shaped = [column.shaped(float(k)) for k in factors]
         at = model.slices[f"coulomb_friction@{self.joint}"].start
-        known = self.fitted.moments.pooled()
+        known = self.fitted.pooled
         reliable = self.fitted.criteria.noise.reliable
         found = []
         for beside, own in candidate_moments(self.evidence, self.fitted, shaped):

@@ -52,7 +52,7 @@ def cleared(
     -------
     None where nothing of them is left beside the model.
     """
-    p, solution, known = len(fitted.values), fitted.solution, fitted.moments.pooled()
+    p, solution, known = len(fitted.values), fitted.solution, fitted.pooled
     signal, total = with_model.signal, with_model.total
     back = solution.project(signal[:p])
     left_signal = with_self.signal - signal[:p].T @ back

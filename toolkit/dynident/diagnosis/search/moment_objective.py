@@ -215,7 +215,7 @@ def _square_root(
     with_model, with_self = with_model @ along, along.T @ with_self @ along
     back = fitted.solution.project(with_model[:p])
     left = with_self - with_model[:p].T @ back
-    right = with_model[p] - back.T @ fitted.moments.pooled().signal[:p, p]
+    right = with_model[p] - back.T @ fitted.pooled.signal[:p, p]
     curvature, slope = left[k:, k:], right[k:] - left[k:, :k] @ values
     if not found.effect.point:
         # Linear parameters follow (Kaufman): what they can do is not the shapes' merit.

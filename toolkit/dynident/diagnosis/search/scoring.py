@@ -179,19 +179,20 @@ def score(
     seen = _seen(effect, fitted, scale)
     if not np.any(seen) or not np.all(np.isfinite(own.signal)):
         return Score(effect=effect, payload_recordings=payload_recordings, not_identifiable=True)
-    found = cleared(fitted, with_model.pooled(), own, seen)
+    beside = with_model.pooled()
+    found = cleared(fitted, beside, own, seen)
     if found is None:
         return Score(effect=effect, payload_recordings=payload_recordings, not_identifiable=True)
     part, directions, back = found.part, found.directions, found.back
     if part.rank == 0:
         return Score(effect=effect, payload_recordings=payload_recordings, not_identifiable=False)
-    p, total, left_total = len(fitted.values), with_model.pooled().total, found.left_total
+    p, total, left_total = len(fitted.values), beside.total, found.left_total
     values = directions @ part.values
     drop = found.drop
     covariance = directions @ part.covariance @ directions.T
     at = np.array(effect.point) if len(effect.point) == len(values) else values
     combination = np.append(-fitted.values, 1.0)
-    with_model_columns = (combination @ fitted.moments.pooled().total)[:p]
+    with_model_columns = (combination @ fitted.pooled.total)[:p]
     with_noise = combination @ total - with_model_columns @ back
     shapes = len(effect.shape_parameters(fitted.model.robot))
     price = (part.rank + shapes) * np.log(fitted.rows) + 2.0 * math.log(grid)
