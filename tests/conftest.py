@@ -10,6 +10,7 @@ settings.load_profile("without deadlines")
 
 HERE = Path(__file__).parent
 LONGEST = (
+    "problems/test_staubli_tx40.py",
     "notebooks/test_notebooks.py",
     "problems/test_panda.py",
     "fitting/instrumental/test_monte_carlo.py",
