@@ -19,6 +19,7 @@ LONGEST = (
     "diagnosis/nuisances/test_quantisation.py",
     "diagnosis/test_whole_catalogue.py",
     "problems/test_hidden_effects.py",
+    "problems/test_tracking.py",
     "diagnosis/test_diagnose.py",
     "fitting/uncertainty/test_input_bias.py",
     "fitting/instrumental/test_expected_bias.py",
