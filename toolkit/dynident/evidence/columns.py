@@ -338,9 +338,9 @@ class Evidence:
 
 def _plain_key(effect: Effect, model: Model) -> Hashable:
     """What columns depend on that follow from the motion alone: dry friction where they act."""
-    widths = dict(zip(model.robot.names, model.friction_widths, strict=True))
+    names, widths = model.robot.names, model.friction_widths
     joints = [joint for joint in (effect.joint, effect.source) if joint is not None]
-    return model.robot, effect, tuple(widths[joint] for joint in joints or widths)
+    return model.robot, effect, tuple(widths[names.index(joint)] for joint in joints or names)
 
 
 def _recorded(sampled: Sampled) -> Hashable:

@@ -197,7 +197,7 @@ class ParallelFilter:
         used = np.arange(flat.shape[1]) if few else np.flatnonzero(flat.any(axis=0))
         for start in range(0, max(1, len(used)), _AT_ONCE):
             some = used[start : start + _AT_ONCE]
-            y = flat[:, some]
+            y = flat if len(some) == flat.shape[1] else flat[:, some]
             for sections, padding in self.stages:
                 y = zero_phase(y, sections, padding, self.where)
             result[:, some] = y[rows]

@@ -152,7 +152,7 @@ class Robot:
         """Number of joints."""
         return len(self.joints)
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the joints."""
         return tuple(joint.name for joint in self.joints)

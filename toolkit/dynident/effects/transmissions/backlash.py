@@ -10,7 +10,6 @@ import numpy as np
 from dynident.effects.effect import Block, Parameter, ShapeParameter, motion_unit
 from dynident.effects.transmissions.along import mean_inertia
 from dynident.effects.transmissions.dead_zone import Transmitting
-from dynident.effects.transmissions.driven_link import DrivenLink
 from dynident.effects.transmissions.flexible import DAMPING, RESONANCE, ROTOR_SHARE, FlexibleJoint
 from dynident.effects.transmissions.link_response import responses
 
@@ -65,7 +64,7 @@ class Backlash(FlexibleJoint):
     def family(
         self, variants: Sequence[Backlash], blocks: Sequence[Block]
     ) -> list[list[np.ndarray]]:
-        links = [DrivenLink(block, block.index(self.joint)) for block in blocks]
+        links = [self._link(block) for block in blocks]
         gears = [
             [Transmitting.of(link.inertia, one.shape, one.gap) for one in variants]
             for link in links
@@ -79,7 +78,7 @@ class Backlash(FlexibleJoint):
         ]
 
     def point_slope(self, block):
-        _, response = self._response(block)
+        _, response = self._response(self._link(block))
         return response.by(0.0, 0.0, 0.0, half_gap=0.5)[:, :, None]
 
     def per_unit(self, stiffness):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -47,11 +48,16 @@ class FlexibleJoint(Forceless):
         return self if share is None else self.shaped(*self.shape[:2], share)
 
     def columns(self, block: Block) -> np.ndarray:
-        gear, response = self._response(block)
-        return (self.per_unit(gear.stiffness) * response.torque)[:, :, None]
+        return self._column(self._link(block))
+
+    def family(
+        self, variants: Sequence[FlexibleJoint], blocks: Sequence[Block]
+    ) -> list[list[np.ndarray]]:
+        # One after the other, each in the steps that its own resonance asks for.
+        return [[one._column(link) for one in variants] for link in map(self._link, blocks)]
 
     def sensitivities(self, block: Block) -> np.ndarray:
-        gear, response = self._response(block)
+        gear, response = self._response(self._link(block))
         K, D, B = gear.stiffness, gear.damping, gear.rotor
         # The shares of motor and link sum to one: what the motor gains, the link has not.
         other = -self.shape[2] / (1.0 - self.shape[2])
@@ -66,8 +72,14 @@ class FlexibleJoint(Forceless):
             found.append(self.per_unit(K) * by + change * response.torque)
         return stacked(found)
 
-    def _response(self, block: Block) -> tuple[Transmitting, Response]:
-        link = DrivenLink(block, block.index(self.joint))
+    def _link(self, block: Block) -> DrivenLink:
+        return DrivenLink(block, block.index(self.joint))
+
+    def _column(self, link: DrivenLink) -> np.ndarray:
+        gear, response = self._response(link)
+        return (self.per_unit(gear.stiffness) * response.torque)[:, :, None]
+
+    def _response(self, link: DrivenLink) -> tuple[Transmitting, Response]:
         gear = Transmitting.of(link.inertia, self.shape, self.gap)
         ((response,),) = responses([link], [[gear]])
         return gear, response
