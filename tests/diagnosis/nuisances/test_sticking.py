@@ -87,7 +87,7 @@ def test_rows_around_reversals_count_no_more_and_the_others_do() -> None:
     assert 0.05 < left_out[:, 1].mean() < 0.4
     assert sticking_notes(of) == ()
     (note,) = sticking_notes(without)
-    assert note.startswith("elbow sticks")
+    assert note.startswith("elbow stands still")
 
 
 def test_noise_of_the_speed_is_that_of_encoder_and_filter() -> None:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from dynident import diagnose as find
 from dynident.diagnosis import Diagnosis, procedure
 from dynident.diagnosis.search.ranking import rank
+from dynident.diagnosis.search.refusal import newly_impossible
 from dynident.diagnosis.search.selection import breaks_its_promise
 from dynident.effects import effects_of
 from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import fit_evidence
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.runs import gather
 from dynident.model import Model
 from dynident.recording import Dataset
@@ -49,6 +52,24 @@ def test_the_same_model_of_a_robot_that_can_be_is_complete() -> None:
     """One negative coefficient is no fault where friction as a whole takes power."""
     found = diagnosed(Fv__elbow=-0.1, Fc__elbow=1.5)
     assert found.verdict == "nothing_missing" and found.impossible == ()
+
+
+def test_what_was_impossible_already_is_no_fault_of_the_effect_that_makes_it_certain() -> None:
+    """An inertia of -3 kg m^2 in doubt, then beyond doubt; and one that the effect has made."""
+    model = FULL + "rotor_inertia@elbow"
+    evidence = Evidence(model, gather(recordings(FULL, {}, 1)))
+    fitted = fit_evidence(evidence, model)
+
+    def at(rotor: float, sigma: float) -> EvidenceFit:
+        values, at = fitted.values.copy(), model.names.index("Ia@elbow")
+        values[at] = rotor
+        covariance = 1e-8 * np.eye(len(values))
+        covariance[at, at] = sigma**2
+        return replace(fitted, values=values, covariance=covariance)
+
+    certain = at(-3.0, 0.1)
+    assert newly_impossible(evidence, at(-3.0, 1.5), certain) == ""
+    assert "inertia at elbow" in newly_impossible(evidence, at(0.0, 1.5), certain)
 
 
 def test_after_an_effect_that_breaks_its_promise_the_next_best_is_tried(monkeypatch) -> None:

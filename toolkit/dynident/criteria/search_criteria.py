@@ -186,6 +186,12 @@ class GateCriteria(CriteriaGroup):
         "or a joint's friction may be below zero",
         over=0,
     )
+    doubtful: float = criterion(
+        1.0,
+        "1",
+        "standard deviations on the wrong side of zero, from which what is impossible with an "
+        "effect was so without it: another effect only makes the model more certain of it",
+    )
     states: int = criterion(
         50,
         "states",

@@ -99,9 +99,9 @@ def sticking_notes(evidence: Evidence) -> tuple[str, ...]:
         return ()
     uncertain = ~np.concatenate([run.certain_rows for run in evidence.runs])
     return tuple(
-        f"{joint} sticks at its reversals, or dry friction reverses there within the noise of its "
-        f"speed: no data tell that friction, and {share:.0%} of the joint's rows, those around "
-        "reversals, count neither in the fit nor in the errors."
+        f"{joint} stands still at many of its stops, or its dry friction reverses within the noise "
+        f"of its speed: no data tell that friction, and {share:.0%} of the joint's rows, those "
+        "around its stops, count neither in the fit nor in the errors."
         for joint, share in zip(evidence.model.robot.names, uncertain.mean(axis=0), strict=True)
         if share
     )

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from dynident.criteria import GateCriteria
 from dynident.diagnosis.search.payload_recordings import marked
 from dynident.effects import Block, Effect
 from dynident.errors import RecordingError
@@ -42,14 +43,16 @@ def recorded_states(evidence: Evidence, model: Model) -> Block:
     )
 
 
-def impossible_in(evidence: Evidence, fitted: EvidenceFit) -> tuple[Impossible, ...]:
+def impossible_in(
+    evidence: Evidence, fitted: EvidenceFit, gates: GateCriteria
+) -> tuple[Impossible, ...]:
     """Return what the fitted values make, at the states recorded, that no robot can have."""
     return impossible_at(
         fitted.model,
         fitted.values,
         fitted.covariance,
         recorded_states(evidence, fitted.model),
-        evidence.criteria.gates,
+        gates,
     )
 
 
@@ -87,10 +90,15 @@ def newly_impossible(evidence: Evidence, fitted: EvidenceFit, wider: EvidenceFit
     -------
     In words; empty where there is nothing.
     """
-    found = impossible_in(evidence, wider)
+    gates = evidence.criteria.gates
+    found = impossible_in(evidence, wider, gates)
     if not found:
         return ""
-    before = {one.where for one in impossible_in(evidence, fitted)}
+    doubtful = replace(gates, beyond_bounds=min(gates.doubtful, gates.beyond_bounds))
+    before = {one.where for one in impossible_in(evidence, fitted, doubtful)}
+    if any(where.startswith("inertia at") for where in before):
+        # A joint's negative inertia is the mass matrix's: one that is left of it is not new.
+        before.add("mass matrix")
     new = [one.what for one in found if one.where not in before]
     return f"makes the impossible: {'; '.join(new)}" if new else ""
 
