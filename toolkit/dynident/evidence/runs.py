@@ -70,7 +70,7 @@ class Run:
         """Instants (S,) at which a joint's dry friction is known in every repetition, a mask."""
         if self.uncertain is None:
             return np.ones(self.index.shape[1], dtype=bool)
-        return ~self.uncertain[:, joint][self.index].any(axis=0)
+        return np.asarray(~self.uncertain[:, joint][self.index].any(axis=0))
 
     @property
     def kept(self) -> np.ndarray:

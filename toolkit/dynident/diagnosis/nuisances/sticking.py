@@ -56,9 +56,9 @@ def without_sticking(
 
 def _left_out(evidence: Evidence) -> tuple[str, ...]:
     """Return the joints whose reversals are left out."""
-    certain = np.concatenate([run.certain_rows for run in evidence.runs]).all(axis=0)
+    certain = np.all(np.concatenate([run.certain_rows for run in evidence.runs]), axis=0)
     names = evidence.model.robot.names
-    return tuple(joint for joint, whole in zip(names, certain, strict=True) if not whole)
+    return tuple(joint for joint, whole in zip(names, certain.tolist(), strict=True) if not whole)
 
 
 def sticking_joints(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:

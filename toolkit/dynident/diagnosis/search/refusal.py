@@ -46,7 +46,14 @@ def recorded_states(evidence: Evidence, model: Model) -> Block:
 def impossible_in(
     evidence: Evidence, fitted: EvidenceFit, gates: GateCriteria
 ) -> tuple[Impossible, ...]:
-    """Return what the fitted values make, at the states recorded, that no robot can have."""
+    """Return what the fitted values make, at the states recorded, that no robot can have.
+
+    Parameters
+    ----------
+    evidence : the training recordings.
+    fitted : the model as it fits them.
+    gates : from how many standard deviations something is impossible.
+    """
     return impossible_at(
         fitted.model,
         fitted.values,

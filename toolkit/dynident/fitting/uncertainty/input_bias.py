@@ -53,6 +53,9 @@ _LEAST = 0.1
 """Share of signal in a direction below which the correction is not carried on: there the bias is
 nine times what is left at least."""
 _NAMED = 4
+_FINEST = 1e-7
+"""Noise over a joint's travel that no encoder is below: what high differences show of smooth motion
+without noise is less."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -212,6 +215,7 @@ class _NoisyPart:
         sampled = sample(recording, replace(settings, position_cutoff_hz=cutoff))
         hidden = trembling(model, values, recording, cutoff)
         std = encoder_noise_std(recording.q - hidden.q)
+        std = np.where(std > _FINEST * np.ptp(recording.q, axis=0), std, 0.0)
         if dataset.noise is not None:
             std = np.asarray(dataset.noise.position_std, dtype=float)
         noise = std * np.random.default_rng(0).standard_normal(recording.q.shape)
