@@ -26,6 +26,7 @@ from dynident.fitting.sampling import Sampled
 from dynident.model import Model
 from dynident.recording.filters import butterworth
 from dynident.recording.white_noise import encoder_noise_std
+from dynident.tables import percent
 
 _FREQUENCIES = 4096  # at which a filter's response is taken
 
@@ -100,8 +101,8 @@ def sticking_notes(evidence: Evidence) -> tuple[str, ...]:
     uncertain = ~np.concatenate([run.certain_rows for run in evidence.runs])
     return tuple(
         f"{joint} stands still at many of its stops, or its dry friction reverses within the noise "
-        f"of its speed: no data tell that friction, and {share:.0%} of the joint's rows, those "
-        "around its stops, count neither in the fit nor in the errors."
+        f"of its speed: no data tell that friction, and {percent(share, 0)} of the joint's rows, "
+        "those around its stops, count neither in the fit nor in the errors."
         for joint, share in zip(evidence.model.robot.names, uncertain.mean(axis=0), strict=True)
         if share
     )
