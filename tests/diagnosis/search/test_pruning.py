@@ -89,7 +89,7 @@ def test_what_another_effect_explains_as_well_goes() -> None:
 def test_each_stage_of_a_path_has_the_friction_width_that_it_calls_for() -> None:
     """The study states five times the width: no step is credited with what that mends."""
     evidence = evidence_of(range(3), 0.4, 0.4)
-    stated = 5 * PLAIN.friction_width
+    stated = 5 * float(PLAIN.friction_widths[0])
     wide = PLAIN.with_friction_width("shoulder", stated).with_friction_width("elbow", stated)
     start = fit_evidence(evidence, wide)
     _, found = added(evidence, DRAG, OFFSET)

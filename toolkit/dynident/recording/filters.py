@@ -30,7 +30,8 @@ class Filter:
         does before it picks.
     edge_s : s dropped at the start and at the end after differentiation.
     ends : "drop" leaves out, beyond `edge_s`, what the filters and differences make up where they
-        see past the record; "keep" uses all of the record, as some published recipes do.
+        see past the record; "keep" uses all of the record, as some published recipes do, also where
+        a joint sticks.
 
     Raises
     ------
