@@ -71,6 +71,33 @@ def test_arrays_of_any_memory_order_are_the_same(monkeypatch):
 
 
 @needs_compiler
+@pytest.mark.parametrize("wish", ["never", "always"])
+def test_out_of_any_memory_and_precision_is_written(wish, monkeypatch):
+    monkeypatch.setenv("DYNIDENT_COMPILE", wish)
+    robot = chain(2)
+    made = Kernel(regressor_equations(robot.joint_tree, tuple(range(20))), (2, 20))
+    motion = robot.random_motion(0, 30)
+    want = made(*motion)
+    beyond = np.full((40, 2, 20), 7.0)
+    raw = np.zeros(30 * 40 * 8 + 1, dtype=np.uint8)[1:]
+    records = np.zeros((30, 2, 20), dtype=[("x", "f8"), ("k", "i4")])
+    for out in (
+        beyond[:30],
+        np.full(want.shape, np.nan, order="F"),
+        beyond[10:].astype(np.float32),
+        beyond[10:].astype(">f8"),
+        raw.view(float).reshape(30, 2, 20),
+        records["x"],
+    ):
+        assert made(*motion, out=out) is out
+        np.testing.assert_array_equal(out, want.astype(out.dtype))
+    assert np.all(beyond[30:] == 7.0)
+    for wrong, error in ((beyond, ValueError), (beyond[:30].astype(int), TypeError)):
+        with pytest.raises(error):
+            made(*motion, out=wrong)
+
+
+@needs_compiler
 def test_compiles_when_as_much_was_replayed_and_finds_it_again(monkeypatch):
     monkeypatch.setattr(kernel, "COMPILE_AFTER", 50)
     monkeypatch.setattr(kernel, "LOOK_AFTER", 10)
@@ -127,11 +154,69 @@ def test_a_broken_file_in_the_cache_is_made_anew(monkeypatch):
     want = answer(torque_of(robot), robot)
     source = c_source(tape_of(torque_equations(robot.joint_tree)))
     place = compiler._place(source)
-    place.parent.mkdir(parents=True)
+    place.parent.mkdir(parents=True, mode=0o700)
     place.write_bytes(b"half a library")
+    place.chmod(0o600)
     found = torque_of(robot)
     np.testing.assert_array_equal(answer(found, robot), want)
     assert found.evaluation.way == "compiled"
+
+
+@needs_compiler
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no owners of files")
+@pytest.mark.parametrize("fault", ["file", "folder", "no file", "owner"])
+def test_what_others_may_write_is_not_loaded(fault, tmp_path, monkeypatch):
+    robot = chain(2)
+    want = answer(torque_of(robot), robot)
+    monkeypatch.setenv("DYNIDENT_COMPILE", "always")
+    first = torque_of(robot)
+    answer(first, robot)
+    assert first.evaluation.way == "compiled"
+    (place,) = (tmp_path / "cache" / "dynident" / "batch").iterdir()
+    assert stat.S_IMODE(place.stat().st_mode) == 0o700
+    if fault == "owner":
+        own = os.geteuid()
+        monkeypatch.setattr(os, "geteuid", lambda: own + 1)
+    elif fault == "file":
+        place.chmod(0o720)
+    else:
+        place.parent.chmod(0o702)
+    if fault == "no file":
+        place.unlink()
+    monkeypatch.setattr(compiler.ctypes, "CDLL", lambda _: pytest.fail("loaded"))
+    found = torque_of(robot)
+    np.testing.assert_array_equal(answer(found, robot), want)
+    assert found.evaluation.way == "replayed"
+    blamed = place if fault == "file" else place.parent
+    what = "belongs to another user" if fault == "owner" else "may be written by other users"
+    assert found.evaluation.reason == f"{blamed} {what}"
+
+
+X86 = "model name\t: A\ncpu MHz\t\t: 2596.098\nflags\t\t: sse2 avx2\n"
+ARM = "BogoMIPS\t: 50.00\nFeatures\t: fp asimd sve\nCPU implementer\t: 0x41\nCPU part\t: 0xd40\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "change"),
+    [(X86, ("avx2", "avx")), (ARM, ("sve", "")), (ARM, ("0xd40", "0xd0c")), ("", None)],
+    ids=["x86", "arm", "another arm", "unknown"],
+)
+def test_a_library_is_for_its_processor_alone(text, change, tmp_path, monkeypatch):
+    monkeypatch.setattr(compiler, "_processor", compiler._processor.__wrapped__)
+    monkeypatch.setattr(compiler, "_CPU_INFO", tmp_path / "cpuinfo")
+    if change is None:
+        assert compiler._tuning() == ()
+        return
+    places = []
+    for said in (
+        text,
+        text.replace("2596", "2600").replace("50.00", "60.00"),
+        text.replace(*change),
+    ):
+        compiler._CPU_INFO.write_text(said)
+        assert compiler._tuning() == ("-march=native",)
+        places.append(compiler._place("source"))
+    assert places[0] == places[1] != places[2]
 
 
 @needs_compiler

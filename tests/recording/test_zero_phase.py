@@ -25,3 +25,17 @@ def test_is_that_of_scipy(wish, columns, sections, monkeypatch):
         np.testing.assert_allclose(zero_phase(given, sections, PADDING), want, rtol=0, atol=1e-11)
     several = zero_phase(np.stack([x, -x], axis=1), sections, PADDING)
     np.testing.assert_allclose(several, np.stack([want, -want], axis=1), rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("wish", ["never", "auto"])
+def test_a_field_of_packed_records_is_read_as_its_numbers(wish, monkeypatch):
+    """Its numbers are no whole number of numbers apart, or begin between two of them."""
+    monkeypatch.setenv("DYNIDENT_COMPILE", wish)
+    sections = signal.butter(4, 0.1, output="sos")
+    x = np.random.default_rng(0).standard_normal((150, 2)).cumsum(axis=0)
+    want = zero_phase(x, sections, PADDING)
+    apart = np.zeros(150, dtype=[("x", "f8", 2), ("k", "i4")])
+    between = np.zeros(150, dtype=[("k", "i4"), ("x", "f8", 2), ("l", "i4")])
+    for records in (apart, between):
+        records["x"] = x
+        np.testing.assert_array_equal(zero_phase(records["x"], sections, PADDING), want)

@@ -1,7 +1,8 @@
 """C functions compiled once and kept in the user's cache; where that fails, a reason and no error.
 
 What is kept is named after all that it depends on: the source, the compiler's options and the
-processor. It is written aside and moved into place, so that processes may do so at once.
+processor. It is written aside and moved into place, so that processes may do so at once. Nothing is
+loaded that another user may have written.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import hashlib
 import os
 import platform
 import shutil
+import stat
 import subprocess
 import tempfile
 from functools import cache
@@ -20,6 +22,10 @@ from typing import Any
 
 _OPTIONS = ("-O1", "-ffp-contract=off", "-fPIC", "-shared", "-w", "-x", "c")
 _NATIVE = "-march=native"
+_CPU_INFO = Path("/proc/cpuinfo")
+# What tells a processor's instructions there, on x86 and on ARM; and what tells its make besides.
+_INSTRUCTIONS = ("flags", "Features")
+_MAKE = ("model name", "CPU ")
 _PATIENCE = 120.0  # s, after which a compiler is given up
 _COMPILERS = ("cc", "gcc", "clang")
 
@@ -51,7 +57,7 @@ def is_kept(source: str) -> bool:
 
 def _place(source: str) -> Path:
     """Where the library of a source is kept, on this machine."""
-    key = "\n".join((source, *_OPTIONS, compiler() or "", _processor()))
+    key = "\n".join((source, *_OPTIONS, compiler() or "", *_processor()))
     return cache_folder() / f"{hashlib.sha256(key.encode()).hexdigest()[:32]}.so"
 
 
@@ -70,15 +76,16 @@ def compiled(source: str, entry: str) -> Any:
     Raises
     ------
     NotCompiled
-        If there is no compiler, it fails, or the cache cannot be written or read.
+        If there is no compiler, it fails, or the cache cannot be written or read, or another user
+        may write it.
     """
     try:
         place = _place(source)
         if place.is_file():
             with contextlib.suppress(OSError, AttributeError):  # a broken file is made anew
-                return getattr(ctypes.CDLL(str(place)), entry)
+                return _loaded(place, entry)
         _compile(source, place)
-        return getattr(ctypes.CDLL(str(place)), entry)
+        return _loaded(place, entry)
     except subprocess.TimeoutExpired:
         raise NotCompiled(f"the compiler took more than {_PATIENCE:.0f} s") from None
     # RuntimeError: no home folder; AttributeError: a library of another making.
@@ -86,19 +93,41 @@ def compiled(source: str, entry: str) -> Any:
         raise NotCompiled(f"{type(error).__name__}: {error}") from None
 
 
+def _loaded(place: Path, entry: str) -> Any:
+    _refuse_what_others_write(place.parent)
+    _refuse_what_others_write(place)
+    return getattr(ctypes.CDLL(str(place)), entry)
+
+
+def _refuse_what_others_write(path: Path) -> None:
+    """Raise `NotCompiled` if a file or folder is not this user's alone to write.
+
+    To load a library is to run it. Where there are no such owners, as on Windows, all is accepted.
+    """
+    if not hasattr(os, "geteuid"):
+        return
+    status = path.stat()
+    if status.st_uid != os.geteuid():
+        raise NotCompiled(f"{path} belongs to another user")
+    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        raise NotCompiled(f"{path} may be written by other users")
+
+
 def _compile(source: str, place: Path) -> None:
     program = compiler()
     if program is None:
         raise NotCompiled("there is no C compiler")
     place.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    _refuse_what_others_write(place.parent)
     handle, name = tempfile.mkstemp(suffix=".tmp", dir=place.parent)
     os.close(handle)
     try:
-        said = _run(program, name, source, _NATIVE)
-        if said is not None:
+        said = _run(program, name, source, *_tuning())
+        if said is not None and _tuning():
             said = _run(program, name, source)
         if said is not None:
             raise NotCompiled(f"the compiler failed: {said}")
+        os.chmod(name, stat.S_IRWXU)  # a linker may have made the file anew, open to a group
         os.replace(name, place)
     finally:
         with contextlib.suppress(OSError):
@@ -116,11 +145,18 @@ def _run(program: str, name: str, source: str, *options: str) -> str | None:
     return next(iter(done.stderr.splitlines()), f"status {done.returncode}")
 
 
+def _tuning() -> tuple[str, ...]:
+    """Options for this very processor; none where its instructions are not in the key."""
+    told = any(line.startswith(_INSTRUCTIONS) for line in _processor())
+    return (_NATIVE,) if told else ()
+
+
 @cache
-def _processor() -> str:
+def _processor() -> tuple[str, ...]:
     """What the processor can do: a library for another one must not be loaded."""
-    words = [platform.machine(), platform.system()]
-    with contextlib.suppress(OSError):
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-        words += sorted({line for line in lines if line.startswith(("model name", "flags"))})
-    return "\n".join(words)
+    words = (platform.machine(), platform.system())
+    try:
+        lines = _CPU_INFO.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:  # as on macOS
+        return words
+    return words + tuple(sorted({x for x in lines if x.startswith((*_INSTRUCTIONS, *_MAKE))}))

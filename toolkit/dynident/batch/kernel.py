@@ -59,8 +59,8 @@ class Kernel:
         ----------
         q, v, a : (T, n) rad or m, and per s and s^2.
         parameters : what the terms depend on besides.
-        out : (T, *shape) to write to, in memory the samples of one entry side by side; if there is
-            none, it is made.
+        out : (T, *shape) to write to, fastest where its memory is that of `side_by_side`; if there
+            is none, it is made.
 
         Returns
         -------
@@ -70,9 +70,14 @@ class Kernel:
         ------
         SettingError
             If the environment says something else of compiling than it can.
+        TypeError, ValueError
+            If the result does not fit into `out`, by its kind of number or its shape, or `out` is
+            read-only.
         """
         samples = len(q)
-        result = side_by_side(samples, self.shape) if out is None else out
+        shape = (samples, *self.shape)
+        direct = out is not None and _is_side_by_side(out, shape)
+        result = out if out is not None and direct else side_by_side(samples, self.shape)
         rows = np.moveaxis(result, 0, -1)
         rows[self._nowhere] = 0.0
         inputs = [*_signals(q, v, a), *map(float, parameters)]
@@ -83,7 +88,10 @@ class Kernel:
             self._tape.replay(inputs, results)
         else:
             self._run(samples, inputs, results)
-        return result
+        if out is None or direct:
+            return result
+        np.copyto(out, result)
+        return out
 
     def _choose(self) -> None:
         """Compile, or load, if that is wanted and pays; say in `evaluation` what became of it."""
@@ -169,6 +177,12 @@ def _signals(q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
     np.cos(signals[2], out=signals[0])
     np.sin(signals[2], out=signals[1])
     return signals.reshape(SIGNALS * n, samples)
+
+
+def _is_side_by_side(out: np.ndarray, shape: tuple[int, ...]) -> bool:
+    """Whether an array can be written from where each entry begins, sample after sample."""
+    fits = out.shape == shape and out.dtype == np.float64 and out.strides[0] == out.itemsize
+    return fits and out.flags.aligned and out.flags.writeable
 
 
 def _pointers(arrays: Sequence[np.ndarray]) -> Any:

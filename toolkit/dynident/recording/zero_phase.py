@@ -111,6 +111,8 @@ def _source(sections: int) -> str:
 
 def _compiled(function: Any, x: np.ndarray, sections: np.ndarray, padding: int) -> np.ndarray:
     samples, columns = x.shape
+    if not x.flags.aligned or any(stride % x.itemsize for stride in x.strides):
+        x = x.copy()  # a field of packed records: its numbers are no whole numbers apart
     y = np.empty_like(x, order="C")
     work = np.empty((samples + 2 * padding, _LANES))
     sos, rest = np.ascontiguousarray(sections), _state_at_rest(sections.tobytes(), len(sections))
