@@ -73,6 +73,26 @@ def test_only_the_joint_that_stands_sticks() -> None:
         assert without_sticking(without, None, fitted)[0] is without
 
 
+def rested(recording: Recording, still: slice | None = None) -> Recording:
+    """The same after a second at rest, and before another; or with an elbow that is idle."""
+    rows = round(RATE_HZ)
+    q, tau = (
+        np.concatenate([np.repeat(x[:1], rows, 0), x, np.repeat(x[-1:], rows, 0)])
+        for x in (recording.q, recording.tau)
+    )
+    if still is not None:
+        q[:, still] = q[0, still]
+    noise = 1e-5 * np.random.default_rng(9).normal(size=q.shape)
+    return recording.replace(t=np.arange(len(q)) / RATE_HZ, q=q + noise, tau=tau)
+
+
+@pytest.mark.parametrize("still", [None, slice(1, 2)])
+def test_a_rest_at_an_end_or_an_idle_joint_is_no_sticking(still: slice | None) -> None:
+    each = tuple(rested(record(seed, 0.0), still) for seed in range(3))
+    of = Evidence(given(), gather(Dataset((*each, record(5, 0.0)))))
+    assert sticking_joints(of, fit_evidence(of, of.model)) == ()
+
+
 def test_rows_around_reversals_count_no_more_and_the_others_do() -> None:
     """Coulomb friction is right without them, and off with them."""
     of = evidence(STOPPED)

@@ -35,7 +35,7 @@ from dynident.diagnosis.details import Withdrawn
 from dynident.diagnosis.nuisances.contacts import Contacts
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.nuisances.quantisation import nothing_but_rounding
-from dynident.diagnosis.nuisances.sticking import without_sticking
+from dynident.diagnosis.nuisances.sticking import left_out_at, without_reversals, without_sticking
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.global_search import global_search
 from dynident.diagnosis.search.payload_recordings import (
@@ -191,7 +191,8 @@ def _tried(stage: Stage, best: AddedEffect, task: DiagnosisTask) -> tuple[Stage,
         return added, why
     wider = _seen_anew(stage, added)
     why = newly_impossible(wider.evidence, stage.fitted, wider.fitted)
-    why = why or follows_the_filter(wider.evidence, stage.narrow, wider.fitted, best.score.effect)
+    narrow = stage.narrow and without_reversals(stage.narrow, left_out_at(wider.evidence))
+    why = why or follows_the_filter(wider.evidence, narrow, wider.fitted, best.score.effect)
     return wider, why
 
 

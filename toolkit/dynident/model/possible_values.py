@@ -32,10 +32,14 @@ class Impossible:
     ----------
     where : the parameter, joint or robot that it is about; of the same in two models it is equal.
     what : in words, with the value.
+    value, std : how far it is below what is possible, a negative number, and its standard
+        deviation; SI units.
     """
 
     where: str
     what: str
+    value: float
+    std: float
 
     def __str__(self) -> str:
         return self.what
@@ -138,6 +142,8 @@ def _beyond_bounds(
                     where=f"{parameter.name} of {effect.label}",
                     what=f"{parameter.name} = {number(value, 3)} {_unit(parameter)}"
                     f"at {effect.joint or 'the robot'}",
+                    value=float(min(value - parameter.lower, parameter.upper - value)),
+                    std=float(s),
                 )
 
 
@@ -174,6 +180,8 @@ def _driving_friction(fitted: _Fitted, criteria: GateCriteria) -> Iterator[Impos
         yield ImpossibleJoint(
             where=f"friction at {joint}",
             what=f"the friction at {joint} ({number(value, 3)} +- {number(std, 2)} W{at})",
+            value=value,
+            std=std,
             joint=joint,
             torque=float(torque),
         )
@@ -190,7 +198,12 @@ def _negative_inertia(fitted: _Fitted, criteria: GateCriteria) -> Iterator[Impos
         what = f"the inertia at {names[j]} ({number(values[j], 3)} +- {number(stds[j], 2)} {unit})"
         torque = float(abs(values[j]) * _rms(fitted.states.a[:, j]))
         yield ImpossibleJoint(
-            where=f"inertia at {names[j]}", what=what, joint=names[j], torque=torque
+            where=f"inertia at {names[j]}",
+            what=what,
+            value=float(values[j]),
+            std=float(stds[j]),
+            joint=names[j],
+            torque=torque,
         )
     if np.any(z > criteria.beyond_bounds):
         return
@@ -206,6 +219,8 @@ def _negative_inertia(fitted: _Fitted, criteria: GateCriteria) -> Iterator[Impos
             where="mass matrix",
             what=f"the inertia felt at {names[j]} with the others moving "
             f"({number(least[t, 0], 3)} +- {number(stds[t], 2)} in SI units)",
+            value=float(least[t, 0]),
+            std=float(stds[t]),
             joint=names[j],
             torque=float(abs(least[t, 0] * u[t, j]) * _rms(along)),
         )

@@ -23,7 +23,6 @@ from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.runs import Run
 from dynident.fitting.sampling import Sampled
-from dynident.model import Model
 from dynident.recording.filters import butterworth
 from dynident.recording.white_noise import encoder_noise_std
 from dynident.tables import percent
@@ -48,18 +47,11 @@ def without_sticking(
     sticks, or the reversals of all that do are left out already.
     """
     joints = sticking_joints(evidence, fitted)
-    known = _left_out(evidence)
+    known = left_out_at(evidence)
     if set(joints) <= set(known):
         return evidence, held
     every = (*known, *(joint for joint in joints if joint not in known))
     return without_reversals(evidence, every), held and without_reversals(held, every)
-
-
-def _left_out(evidence: Evidence) -> tuple[str, ...]:
-    """Return the joints whose reversals are left out."""
-    certain = np.all(np.concatenate([run.certain_rows for run in evidence.runs]), axis=0)
-    names = evidence.model.robot.names
-    return tuple(joint for joint, whole in zip(names, certain.tolist(), strict=True) if not whole)
 
 
 def sticking_joints(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
@@ -71,8 +63,8 @@ def sticking_joints(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
 
     Returns
     -------
-    In the order of the robot's joints; only those with dry friction in the model. None where the
-    study asks for every row (`Filter.ends` is "keep").
+    In the order of the robot's joints; only those with dry friction in the model, of which enough
+    rows are left. None where the study asks for every row (`Filter.ends` is "keep").
     """
     if any(run.replicates[0].parallel.filter.ends == "keep" for run in evidence.runs):
         return ()  # a published recipe uses every row
@@ -86,15 +78,32 @@ def sticking_joints(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
         for j, joint in enumerate(model.robot.names)
         if f"coulomb_friction@{joint}" in model.slices
         and (model.friction_widths[j] <= resolved[j] or _stands(evidence, j, criteria))
+        and _share(evidence, j, criteria) <= criteria.most
     )
 
 
 def without_reversals(evidence: Evidence, joints: tuple[str, ...]) -> Evidence:
-    """Return the evidence without the rows of these joints around their reversals, no others."""
-    model, criteria = evidence.model, evidence.criteria.sticking
-    return evidence.with_runs(
-        tuple(_without_reversals(run, model, joints, criteria) for run in evidence.runs)
-    )
+    """Return the evidence without the rows of these joints around their reversals, no others.
+
+    All rows of a joint stay of which these recordings would leave too few.
+    """
+    criteria, names = evidence.criteria.sticking, evidence.model.robot.names
+    columns = [names.index(joint) for joint in joints]
+    columns = [j for j in columns if _share(evidence, j, criteria) <= criteria.most]
+    runs = []
+    for run in evidence.runs:
+        uncertain = np.zeros(run.replicates[0].v.shape, dtype=bool)
+        for j in columns:
+            uncertain[:, j] = _near_stops(run, j, criteria)
+        runs.append(replace(run, uncertain=uncertain))
+    return evidence.with_runs(tuple(runs))
+
+
+def left_out_at(evidence: Evidence) -> tuple[str, ...]:
+    """Return the joints whose reversals are left out."""
+    certain = np.all(np.concatenate([run.certain_rows for run in evidence.runs]), axis=0)
+    names = evidence.model.robot.names
+    return tuple(joint for joint, whole in zip(names, certain.tolist(), strict=True) if not whole)
 
 
 def sticking_notes(evidence: Evidence) -> tuple[str, ...]:
@@ -111,31 +120,40 @@ def sticking_notes(evidence: Evidence) -> tuple[str, ...]:
     )
 
 
-def _without_reversals(
-    run: Run, model: Model, joints: tuple[str, ...], criteria: StickingCriteria
-) -> Run:
+def _share(evidence: Evidence, j: int, criteria: StickingCriteria) -> float:
+    """Share of a joint's rows that leaving out its reversals takes."""
+    runs = [replace(run, uncertain=None) for run in evidence.runs]
+    near = [
+        np.any(_near_stops(run, j, criteria)[run.index], axis=0)
+        for run in runs
+        if run.index.shape[1]
+    ]
+    return float(np.mean(np.concatenate(near))) if near else 1.0
+
+
+def _near_stops(run: Run, j: int, criteria: StickingCriteria) -> np.ndarray:
+    """Rows of a joint around its reversals, (T,) mask."""
     sampled = run.replicates[0]
-    uncertain = np.zeros(sampled.v.shape, dtype=bool)
-    for joint in joints:
-        j = model.robot.names.index(joint)
-        v = sampled.motion.v[:, j]
-        # Around a reversal the speed is off by what the position's low-pass rounds.
-        rounded = criteria.rounded * float(np.sqrt(np.mean(v**2)))
-        reach = max(criteria.noise * speed_noise(sampled)[j], rounded)
-        near = sampled.filtered((np.abs(v) < reach).astype(float))
-        rows = np.abs(near) > criteria.spread
-        # What is left must say something.
-        uncertain[:, j] = rows if np.mean(rows) <= criteria.most else False
-    return replace(run, uncertain=uncertain)
+    v = sampled.motion.v[:, j]
+    # Around a reversal the speed is off by what the position's low-pass rounds.
+    rounded = criteria.rounded * float(np.sqrt(np.mean(v[_used(sampled)] ** 2)))
+    reach = max(criteria.noise * speed_noise(sampled)[j], rounded)
+    return np.abs(sampled.filtered((np.abs(v) < reach).astype(float))) > criteria.spread
+
+
+def _used(sampled: Sampled) -> slice:
+    """Samples at the full rate from the first to the last row that is used."""
+    rows = sampled.parallel.rows(sampled.motion.samples)[sampled.kept]
+    return slice(int(rows[0]), int(rows[-1]) + 1)
 
 
 def _stands(evidence: Evidence, j: int, criteria: StickingCriteria) -> bool:
-    """Whether a joint is seen to stand at many of its stops."""
+    """Whether a joint is seen to stand at many of its stops; a rest at an end is none of them."""
     stops = [
         stop
-        for run in evidence.runs
+        for sampled in (run.replicates[0] for run in evidence.runs)
         for stop in _stops(
-            run.replicates[0].motion.v[:, j], criteria.noise * speed_noise(run.replicates[0])[j]
+            sampled.motion.v[_used(sampled), j], criteria.noise * speed_noise(sampled)[j]
         )
     ]
     longer = sum(within > criteria.longer * around for within, around in stops)
@@ -143,12 +161,15 @@ def _stands(evidence: Evidence, j: int, criteria: StickingCriteria) -> bool:
 
 
 def _stops(v: np.ndarray, reach: float) -> Iterator[tuple[int, int]]:
-    """Samples of each stop within a speed, and between that and three times as much."""
+    """Samples of each stop within a speed, and between that and three times as much.
+
+    Only of stops before which and after which the joint moves.
+    """
     wide, narrow = np.abs(v) < 3.0 * reach, np.abs(v) < reach
     edges = np.diff(np.concatenate([[0], wide.astype(int), [0]]))
     for start, stop in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
         within = int(np.count_nonzero(narrow[start:stop]))
-        if within:
+        if within and start > 0 and stop < len(v):
             yield within, int(stop - start) - within
 
 

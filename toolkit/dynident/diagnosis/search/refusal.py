@@ -102,12 +102,17 @@ def newly_impossible(evidence: Evidence, fitted: EvidenceFit, wider: EvidenceFit
     if not found:
         return ""
     doubtful = replace(gates, beyond_bounds=min(gates.doubtful, gates.beyond_bounds))
-    before = {one.where for one in impossible_in(evidence, fitted, doubtful)}
-    if any(where.startswith("inertia at") for where in before):
-        # A joint's negative inertia is the mass matrix's: one that is left of it is not new.
-        before.add("mass matrix")
-    new = [one.what for one in found if one.where not in before]
+    before = impossible_in(evidence, fitted, doubtful)
+    new = [one.what for one in found if not any(_was(old, one, gates) for old in before)]
     return f"makes the impossible: {'; '.join(new)}" if new else ""
+
+
+def _was(old: Impossible, new: Impossible, gates: GateCriteria) -> bool:
+    """Whether what is impossible was as far from possible already, within its uncertainty."""
+    # A joint's negative inertia is the mass matrix's: one that is left of it is not new.
+    inertia = new.where == "mass matrix" and old.where.startswith("inertia at")
+    same = old.where == new.where or inertia
+    return same and new.value >= old.value - gates.beyond_bounds * old.std
 
 
 def narrower(evidence: Evidence, train: Dataset) -> Evidence | None:
