@@ -227,7 +227,10 @@ def _estimate(evidence: Evidence, fitted: EvidenceFit, train: Dataset) -> Estima
         recordings = tuple(run.recording for run in evidence.runs)
         with suppress(FitError):
             whole, errors = row_covariance(
-                model, replace(train, recordings=recordings), fitted.values
+                model,
+                replace(train, recordings=recordings),
+                fitted.values,
+                [run.certain_rows for run in evidence.runs],
             )
             words = errors.words
     covariance[np.ix_(kept, kept)] = combination @ whole @ combination.T

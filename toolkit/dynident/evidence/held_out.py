@@ -76,7 +76,8 @@ class HeldOut:
     def _rms(self, values: list[np.ndarray]) -> np.ndarray:
         """Root mean square of what each run has, (T, n), over the rows that are judged."""
         certain = np.concatenate([run.certain for run in self.runs])
-        return np.sqrt(np.mean(np.concatenate(values) ** 2, axis=0, where=certain))
+        squares = np.sum(np.concatenate(values) ** 2, axis=0, where=certain)
+        return np.sqrt(squares / np.maximum(certain.sum(axis=0), 1))
 
     @property
     def joint_errors(self) -> np.ndarray:
@@ -179,7 +180,7 @@ def with_noise_of(judged: HeldOut, noise: HeldOut, criteria: NoiseCriteria) -> H
         return judged
     power = noise.noise_std**2
     safe = np.where(power > 0, power, 1.0)
-    rows = sum(len(run.t) for run in judged.runs)
+    rows = np.maximum(np.sum([run.certain.sum(axis=0) for run in judged.runs], axis=0), 1)
     excess = judged.residual_rms**2 - power
     error = power * np.sqrt(2.0 * noise.inflation / rows)
     quantile = float(special.ndtri(criteria.confidence))
@@ -291,7 +292,14 @@ class _JointNoise:
         residuals : with what their replicates are.
         doubt : mean square of what the parameters' covariance makes uncertain.
         criteria : for the noise, and the confidence of a lower limit.
+
+        Returns
+        -------
+        All zero, of no colour, where no instant of the joint counts: nothing is seen of it.
         """
+        residuals = [(kind, e) for kind, e in residuals if e.shape[1]]
+        if not residuals:
+            return cls(power=0.0, excess=0.0, least=0.0, inflation=1.0)
         noise = [differences(e, kind) for kind, e in residuals]
         sizes = np.array([e.shape[1] for _, e in residuals])
         excess = np.average([systematic_square(e, kind) for kind, e in residuals], weights=sizes)

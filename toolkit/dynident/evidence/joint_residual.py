@@ -61,6 +61,8 @@ class JointResidual:
         left = cls(criteria=evidence.criteria, stretches=[], speeds=[], plain=[], systematic=[])
         for run, joints in zip(evidence.runs, columns, strict=True):
             certain = run.certain(joint)
+            if not certain.any():
+                continue
             residual = run.fold([c @ combination for c in joints[joint]])[:, certain]
             if run.kind == "single":
                 left.plain.append(residual[0])
@@ -74,10 +76,13 @@ class JointResidual:
 
     @property
     def square(self) -> float:
-        """Mean square of what is systematic; of everything, where nothing tells it from noise."""
+        """Mean square of what is systematic; of everything, where nothing tells it from noise.
+
+        Zero where no instant of the joint counts.
+        """
         if self.systematic:
             return max(float(np.mean(self.systematic)), 0.0)
-        return float(np.mean(np.concatenate(self.plain) ** 2))
+        return float(np.mean(np.concatenate(self.plain) ** 2)) if self.plain else 0.0
 
     @property
     def variance(self) -> float:

@@ -121,8 +121,12 @@ def _of_joint(
 ) -> Iterator[ResidualMap]:
     robot = model.robot
     fitted = {e.name for e in model.effects if e.joint == robot.names[j]}
-    old = np.concatenate([run.residual[:, j] for run in before.runs])
-    new = np.concatenate([run.residual[:, j] for run in after.runs])
+    certain = np.concatenate([run.certain[:, j] for run in before.runs])
+    if not certain.any():
+        return
+    old, new = (
+        np.concatenate([run.residual[:, j] for run in one.runs])[certain] for one in (before, after)
+    )
     motion = robot.units[j]
     noise = None if before.noise_std is None else float(before.noise_std[j])
     quantities = {
@@ -133,7 +137,7 @@ def _of_joint(
         "time": ("s", [run.t for run in before.runs]),
     }
     for against, (unit, parts) in quantities.items():
-        x = np.concatenate(parts)
+        x = np.concatenate(parts)[certain]
         space: Space = "root" if against == "velocity" else "linear"
         at, means, count = _binned(x, np.column_stack([old, new]), space, criteria)
         if len(at) < 4:
@@ -153,7 +157,7 @@ def _of_joint(
             band=band,
             sentence=sentence,
         )
-    yield _spectrum(robot, j, before, (old, new), noise, criteria)
+    yield _spectrum(robot, j, before, (old, new), criteria)
 
 
 def _binned(
@@ -227,12 +231,12 @@ def _spectrum(
     j: int,
     before: HeldOut,
     residuals: tuple[np.ndarray, np.ndarray],
-    noise: float | None,
     criteria: MapCriteria,
 ) -> ResidualMap:
-    """Amplitudes of the residuals before and after, (T,) each, by cycles per revolution."""
+    """Amplitudes of the residuals before and after by cycles per revolution, over certain rows."""
     harmonics = np.arange(1, criteria.harmonics + 1)
-    q = np.concatenate([run.q[:, j] for run in before.runs])
+    q = np.concatenate([run.q[run.certain[:, j], j] for run in before.runs])
+    noise = None if before.noise_std is None else float(before.noise_std[j])
     waves = np.exp(-1j * np.outer(harmonics, q))
     amplitudes = [2.0 * np.abs(waves @ (e - e.mean())) / len(q) for e in residuals]
     size = len(harmonics)

@@ -164,5 +164,5 @@ def residual_std(factors: TriangularFactors, values: np.ndarray, rank: int) -> n
     """
     share = rank / len(factors.counts)
     std = factors.residual_norms(values) / np.sqrt(np.maximum(factors.counts - share, 1.0))
-    least = 1e-12 * np.max(factors.torque_norms / np.sqrt(factors.counts))
+    least = 1e-12 * np.max(factors.torque_norms / np.sqrt(np.maximum(factors.counts, 1)))
     return np.maximum(std, least)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-RowBlock = tuple[bool, np.ndarray, np.ndarray]
-"""Whether a new stretch begins; columns (T, n, p); residual (T, n)."""
+RowBlock = tuple[bool, np.ndarray, np.ndarray, np.ndarray]
+"""Whether a new stretch begins; columns (T, n, p); residual (T, n); mask of what counts (T, n)."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -23,7 +23,7 @@ class LaggedProducts:
     ----------
     columns : (n, K + 1, p, p) sums of x(t) x(t + k)' of each joint, k = 0 ... K.
     residual : (n, K + 1) sums of e(t) e(t + k).
-    pairs : (K + 1,) number of such pairs at each joint.
+    pairs : (n, K + 1) number of such pairs at each joint, of rows that both count.
     """
 
     columns: np.ndarray
@@ -33,7 +33,7 @@ class LaggedProducts:
     @property
     def lags(self) -> int:
         """The longest lag, K."""
-        return len(self.pairs) - 1
+        return self.pairs.shape[1] - 1
 
 
 def lagged_products(blocks: Iterable[RowBlock], lags: int) -> LaggedProducts:
@@ -55,15 +55,18 @@ def lagged_products(blocks: Iterable[RowBlock], lags: int) -> LaggedProducts:
     """
     found: LaggedProducts | None = None
     before = np.zeros((0, 0, 0))
-    for begins, columns, residual in blocks:
-        # Joint by joint, the residual beside the columns: one matrix product each.
-        here = np.concatenate([columns, residual[:, :, None]], axis=2).transpose(1, 0, 2)
+    for begins, columns, residual, counts in blocks:
+        # Joint by joint, the residual beside the columns: one matrix product each. What does not
+        # count stays as rows of zeros, so that lags remain lags.
+        beside = np.stack([residual, np.ones_like(residual)], axis=2)
+        here = np.concatenate([columns, beside], axis=2) * counts[:, :, None]
+        here = here.transpose(1, 0, 2)
         n, _, m = here.shape
         if found is None:
             found = LaggedProducts(
-                columns=np.zeros((n, lags + 1, m - 1, m - 1)),
+                columns=np.zeros((n, lags + 1, m - 2, m - 2)),
                 residual=np.zeros((n, lags + 1)),
-                pairs=np.zeros(lags + 1, dtype=int),
+                pairs=np.zeros((n, lags + 1)),
             )
         if begins:
             before = here[:, :0]
@@ -74,9 +77,9 @@ def lagged_products(blocks: Iterable[RowBlock], lags: int) -> LaggedProducts:
             early = rows[:, max(old, k) - k : rows.shape[1] - k]
             if not late.shape[1]:
                 continue
-            found.columns[:, k] += early[:, :, :-1].transpose(0, 2, 1) @ late[:, :, :-1]
-            found.residual[:, k] += np.einsum("jt,jt->j", early[:, :, -1], late[:, :, -1])
-            found.pairs[k] += late.shape[1]
+            found.columns[:, k] += early[:, :, :-2].transpose(0, 2, 1) @ late[:, :, :-2]
+            found.residual[:, k] += np.einsum("jt,jt->j", early[:, :, -2], late[:, :, -2])
+            found.pairs[:, k] += np.einsum("jt,jt->j", early[:, :, -1], late[:, :, -1])
         before = rows[:, max(0, rows.shape[1] - lags) :]
     if found is None:
         raise ValueError("no rows")

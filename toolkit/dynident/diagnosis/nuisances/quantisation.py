@@ -6,6 +6,7 @@ them, and nothing of the robot's.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from dynident.criteria import VerdictCriteria
 from dynident.diagnosis.verdict import within_noise
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, model_columns
-from dynident.evidence.held_out import HeldOut
+from dynident.evidence.held_out import HeldOut, HeldOutRun
 from dynident.evidence.runs import gather
 from dynident.fitting.sampling import sample
 from dynident.recording import Dataset, Recording, resolution, uniform
@@ -33,7 +34,7 @@ def with_rounding(judged: HeldOut, fitted: EvidenceFit, dataset: Dataset) -> Hel
     """
     if judged.least_ratio is None or within_noise(judged, fitted.criteria.verdict):
         return judged
-    return replace(judged, rounding=rounding_power(fitted, dataset))
+    return replace(judged, rounding=rounding_power(fitted, dataset, judged.runs))
 
 
 def nothing_but_rounding(judged: HeldOut, fitted: EvidenceFit, dataset: Dataset) -> bool:
@@ -53,7 +54,9 @@ def nothing_but_rounding(judged: HeldOut, fitted: EvidenceFit, dataset: Dataset)
     return rounded.rounding is not None and within_noise(rounded, fitted.criteria.verdict)
 
 
-def rounding_power(fitted: EvidenceFit, dataset: Dataset) -> np.ndarray:
+def rounding_power(
+    fitted: EvidenceFit, dataset: Dataset, judged: Sequence[HeldOutRun] = ()
+) -> np.ndarray:
     """Mean square of the torque error that repeats because positions are rounded, (n,).
 
     The filtered motion is rounded again, on a lattice that is moved, with two draws of the noise
@@ -63,18 +66,35 @@ def rounding_power(fitted: EvidenceFit, dataset: Dataset) -> np.ndarray:
     ----------
     fitted : the model.
     dataset : recordings; positions that lie on no lattice count as not rounded.
+    judged : the recordings as they are judged, in the same order: the mean is over their certain
+        rows, as that of the residual is. All rows count without it.
+
+    Returns
+    -------
+    Mean over the recordings in which rows of a joint count; zero where none does.
     """
-    n = fitted.model.robot.n
-    found = []
-    for recording in dataset.recordings[: fitted.criteria.nuisances.rounding_recordings]:
+    looked_at = dataset.recordings[: fitted.criteria.nuisances.rounding_recordings]
+    total, recordings = np.zeros((2, fitted.model.robot.n))
+    for number, recording in enumerate(looked_at):
         steps = resolution(recording.q)
         if not steps.any():
-            found.append(np.zeros(n))
+            recordings += 1
             continue
-        smooth, *rounded = _predicted(fitted, dataset, _again(recording, dataset, steps))
+        t, (smooth, *rounded) = _predicted(fitted, dataset, _again(recording, dataset, steps))
+        certain = _certain(t, judged[number]) if judged else np.ones(smooth.shape, dtype=bool)
+        rows = certain.sum(axis=0)
         first, second = (one - smooth for one in rounded)
-        found.append(np.clip(np.mean(first * second, axis=0), 0.0, None))
-    return np.mean(found, axis=0)
+        common = np.sum(first * second, axis=0, where=certain) / np.maximum(rows, 1)
+        total += np.clip(common, 0.0, None)
+        recordings += rows > 0
+    return total / np.maximum(recordings, 1)
+
+
+def _certain(t: np.ndarray, judged: HeldOutRun) -> np.ndarray:
+    """Rows at times t (T,) by which each joint is judged, (T, n) mask."""
+    certain = np.zeros((len(t), judged.certain.shape[1]), dtype=bool)
+    certain[np.searchsorted((t[1:] + t[:-1]) / 2, judged.t)] = judged.certain
+    return certain
 
 
 def _again(recording: Recording, dataset: Dataset, steps: np.ndarray) -> list[Recording]:
@@ -100,8 +120,8 @@ def _again(recording: Recording, dataset: Dataset, steps: np.ndarray) -> list[Re
 
 def _predicted(
     fitted: EvidenceFit, dataset: Dataset, recordings: list[Recording]
-) -> list[np.ndarray]:
-    """Torque that the model predicts along each recording, (T, n)."""
+) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Times (T,) s, and the torque that the model predicts along each recording, (T, n)."""
     runs = gather(Dataset(tuple(recordings), dataset.filter), fitted.criteria.noise)
     evidence = Evidence(fitted.model, runs, criteria=fitted.criteria)
     joints = range(fitted.model.robot.n)
@@ -109,7 +129,7 @@ def _predicted(
     for r in range(len(recordings)):
         columns = [model_columns(evidence, fitted.model, r, j, fitted.values)[0] for j in joints]
         each.append(np.stack([c[:, :-1] @ fitted.values for c in columns], axis=1))
-    return each
+    return runs[0].replicates[0].t, each
 
 
 def rounding_notes(

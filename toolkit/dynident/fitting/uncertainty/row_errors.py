@@ -11,8 +11,8 @@ errors. That a fit takes freedom from its residual is accounted for exactly (`_s
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import nnls
@@ -21,7 +21,7 @@ from dynident.fitting.linear_solution import LinearSolution, solve_factors
 from dynident.fitting.sampling import Sampled, rows, sample
 from dynident.fitting.uncertainty.noise_shapes import noise_shapes
 from dynident.model import Model
-from dynident.moments.factors import factorise
+from dynident.moments.factors import TriangularFactors, factorise
 from dynident.moments.lagged import LaggedProducts, RowBlock, lagged_products
 from dynident.recording import Dataset
 from dynident.tables import number
@@ -71,6 +71,7 @@ def row_errors(
     dataset: Dataset,
     values: np.ndarray,
     solution: LinearSolution,
+    counting: Sequence[np.ndarray] | None = None,
 ) -> RowErrors:
     """Measure the errors of a fit in one more pass over its rows.
 
@@ -80,6 +81,8 @@ def row_errors(
     dataset : what was fitted.
     values : (p,) the estimate, and where columns that depend on it are taken.
     solution : its weights and independent columns.
+    counting : mask (T, n) for each recording of the decimated rows that were fitted, joint by
+        joint; None for all.
 
     Returns
     -------
@@ -88,13 +91,20 @@ def row_errors(
     samples = [sample(recording, dataset.filter) for recording in dataset.recordings]
     lags = min(_LAGS, *(len(one.t) // 10 for one in samples))
     kept = list(solution.basis.independent)
-    products = lagged_products(_blocks(model, samples, values, kept), lags)
-    squares = np.sum([np.sum(one.tau**2, axis=0) for one in samples], axis=0)
+    masks = _masks(samples, counting)
+    products = lagged_products(_blocks(model, zip(samples, masks, strict=True), values, kept), lags)
+    squares = np.sum(
+        [np.sum((one.tau * mask) ** 2, axis=0) for one, mask in zip(samples, masks, strict=True)],
+        axis=0,
+    )
     return errors_of(products, noise_shapes(samples[0], lags), solution, squares)
 
 
 def row_covariance(
-    model: Model, dataset: Dataset, values: np.ndarray
+    model: Model,
+    dataset: Dataset,
+    values: np.ndarray,
+    counting: Sequence[np.ndarray] | None = None,
 ) -> tuple[np.ndarray, RowErrors]:
     """Return the covariance (p, p) of least squares at values (p,), and the errors behind it.
 
@@ -102,6 +112,7 @@ def row_covariance(
     ----------
     model, dataset : what was fitted to what.
     values : (p,) what came out, by whichever way.
+    counting : as of `row_errors`.
 
     Returns
     -------
@@ -112,8 +123,9 @@ def row_covariance(
     FitError
         As `solve_factors`.
     """
-    solution = solve_factors(model, factorise(rows(model, dataset, values)))
-    found, kept = row_errors(model, dataset, values, solution), list(solution.basis.independent)
+    solution = solve_factors(model, _factors(model, dataset, values, counting))
+    found = row_errors(model, dataset, values, solution, counting)
+    kept = list(solution.basis.independent)
     covariance = np.zeros_like(solution.covariance)
     covariance[np.ix_(kept, kept)] = found.covariance
     return covariance, found
@@ -139,7 +151,8 @@ def errors_of(
     n, rank = len(weights), len(turn)
     inner = products.columns * (weights**2)[:, None, None, None]
     white = turn.T @ inner @ turn
-    count = products.pairs[0]
+    counts = products.pairs[:, 0]
+    count, total = float(counts.mean()), float(counts.sum())
     # Both directions of time.
     both = white + white.transpose(0, 1, 3, 2)
     both[:, 0] = white[:, 0]
@@ -151,21 +164,21 @@ def errors_of(
     amounts = nnls(seen @ basis / count, left.ravel() / count)[0]
     found = (basis @ amounts).reshape(left.shape)
     found[exact] = 0.0
-    found[exact, 0] = left[exact, 0] / count
+    found[exact, 0] = left[exact, 0] / np.maximum(counts[exact], 1.0)
     inside = np.einsum("jk,jkab->ab", found, both)
     values, vectors = np.linalg.eigh((inside + inside.T) / 2)
     values = np.maximum(values, _LEAST * found[:, 0].mean())
     half = turn @ (vectors * np.sqrt(values))
     covariance = half @ half.T
-    plain = turn @ turn.T * float(left[:, 0].sum() / (count * n - rank))
+    plain = turn @ turn.T * float(left[:, 0].sum() / (total - rank))
     ratio = np.diag(plain) / np.diag(covariance)
     wide = np.linalg.solve(turn.T, vectors * np.sqrt(values)).T @ solution.basis.combination
     return RowErrors(
         autocovariance=found / (weights**2)[:, None],
         meat=wide.T @ wide,
         covariance=covariance,
-        rows=int(count * n),
-        effective_rows=float(count * n * np.exp(np.mean(np.log(ratio)))),
+        rows=int(total),
+        effective_rows=float(total * np.exp(np.mean(np.log(ratio)))),
     )
 
 
@@ -178,7 +191,7 @@ def _seen(white: np.ndarray, both: np.ndarray, pairs: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     white, both : (n, K + 1, r, r) lagged products of orthonormal columns, and of both directions.
-    pairs : (K + 1,) of rows.
+    pairs : (n, K + 1) of rows.
 
     Returns
     -------
@@ -191,7 +204,7 @@ def _seen(white: np.ndarray, both: np.ndarray, pairs: np.ndarray) -> np.ndarray:
     for j in range(n):
         here = found[j * count : (j + 1) * count, j * count : (j + 1) * count]
         for k in range(count):
-            here[k, k] += pairs[k]
+            here[k, k] += pairs[j, k]
             for m in range(count):
                 for lag in (k + m, abs(k - m)) if m else (k,):
                     if lag < count:
@@ -199,11 +212,39 @@ def _seen(white: np.ndarray, both: np.ndarray, pairs: np.ndarray) -> np.ndarray:
     return found
 
 
+def _masks(samples: list[Sampled], counting: Sequence[np.ndarray] | None) -> list[np.ndarray]:
+    """Rows that count, (T, n) of each recording."""
+    if counting is None:
+        return [np.ones(one.tau.shape, dtype=bool) for one in samples]
+    return list(counting)
+
+
+def _factors(
+    model: Model, dataset: Dataset, values: np.ndarray, counting: Sequence[np.ndarray] | None
+) -> TriangularFactors:
+    """Factors of the rows that count."""
+    if counting is None:
+        return factorise(rows(model, dataset, values))
+    counts = np.concatenate(counting)
+
+    def weighted() -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        start = 0
+        for columns, torque in rows(model, dataset, values):
+            mask = counts[start : start + len(torque)]
+            yield columns * mask[:, :, None], torque * mask
+            start += len(torque)
+
+    return replace(factorise(weighted()), counts=counts.sum(axis=0))
+
+
 def _blocks(
-    model: Model, samples: list[Sampled], values: np.ndarray, kept: list[int]
+    model: Model,
+    sampled_with_counts: Iterable[tuple[Sampled, np.ndarray]],
+    values: np.ndarray,
+    kept: list[int],
 ) -> Iterator[RowBlock]:
     """Independent columns and residuals, with a mark where a stretch of rows begins."""
-    for sampled in samples:
+    for sampled, counts in sampled_with_counts:
         start, step = 0, _GAP / sampled.rate_hz
         for columns in sampled.columns(model, values):
             stop = start + len(columns)
@@ -212,5 +253,6 @@ def _blocks(
             begins = start == 0 or sampled.t[start] - sampled.t[start - 1] > step
             for first, last in zip([0, *gaps], [*gaps, len(columns)], strict=True):
                 part = slice(first, last)
-                yield bool(begins or first), columns[part][:, :, kept], residual[part]
+                mask = counts[start:stop][part]
+                yield bool(begins or first), columns[part][:, :, kept], residual[part], mask
             start = stop
