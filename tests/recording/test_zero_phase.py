@@ -31,7 +31,7 @@ def test_is_that_of_scipy(wish, columns, sections, monkeypatch):
 def test_a_field_of_packed_records_is_read_as_its_numbers(wish, monkeypatch):
     """Its numbers are no whole number of numbers apart, or begin between two of them."""
     monkeypatch.setenv("DYNIDENT_COMPILE", wish)
-    sections = signal.butter(4, 0.1, output="sos")
+    sections = np.asarray(signal.butter(4, 0.1, output="sos"))
     x = np.random.default_rng(0).standard_normal((150, 2)).cumsum(axis=0)
     want = zero_phase(x, sections, PADDING)
     apart = np.zeros(150, dtype=[("x", "f8", 2), ("k", "i4")])
