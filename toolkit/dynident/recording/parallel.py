@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 import scipy
 
+from dynident.batch import side_by_side
 from dynident.errors import RecordingError
 from dynident.recording.filters import Filter, butterworth
 from dynident.recording.zero_phase import zero_phase
@@ -189,19 +190,42 @@ class ParallelFilter:
 
     def _filtered(self, x: np.ndarray, rows: np.ndarray) -> np.ndarray:
         if not self.stages:
-            return x[rows]
+            return x[_as_slice(rows)]
         flat = x.reshape(len(x), _width(x))
-        result = np.zeros((len(rows), flat.shape[1]))
-        # Many columns of a regressor are zero (a link does not load the joints beyond it).
-        few = flat.shape[1] < _FEW
-        used = np.arange(flat.shape[1]) if few else np.flatnonzero(flat.any(axis=0))
-        for start in range(0, max(1, len(used)), _AT_ONCE):
-            some = used[start : start + _AT_ONCE]
-            y = flat if len(some) == flat.shape[1] else flat[:, some]
-            for sections, padding in self.stages:
-                y = zero_phase(y, sections, padding, self.where)
-            result[:, some] = y[rows]
+        aside = x.ndim > 2 and x.strides[0] == x.itemsize
+        shape = (len(rows), flat.shape[1])
+        result = side_by_side(len(rows), shape[1:]) if aside else np.empty(shape)
+        used = _used(flat)
+        if len(used) < flat.shape[1]:
+            result[:] = 0.0
+        y = flat
+        for sections, padding in self.stages[:-1]:
+            y = zero_phase(y, sections, padding, self.where, columns=used)
+        sections, padding = self.stages[-1]
+        zero_phase(y, sections, padding, self.where, rows=rows, columns=used, out=result)
         return result.reshape(len(rows), *x.shape[1:])
+
+
+def _used(flat: np.ndarray) -> np.ndarray:
+    """Numbers of the columns that are not zero throughout.
+
+    Many columns of a regressor are: a link does not load the joints beyond it.
+    """
+    if flat.shape[1] < _FEW:
+        return np.arange(flat.shape[1])
+    some = flat[0] != 0.0
+    for column in np.flatnonzero(~some):
+        some[column] = flat[:, column].any()
+    return np.flatnonzero(some)
+
+
+def _as_slice(rows: np.ndarray) -> np.ndarray | slice:
+    """Rows that are evenly apart as a slice, which copies nothing."""
+    if len(rows) < 2:
+        return rows
+    step = int(rows[1] - rows[0])
+    even = rows[-1] - rows[0] == step * (len(rows) - 1) and np.all(np.diff(rows) == step)
+    return slice(int(rows[0]), int(rows[-1]) + 1, step) if even else rows
 
 
 def _width(x: np.ndarray) -> int:

@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 import scipy
 
-from dynident.batch import c_function
+from dynident.batch import c_function, side_by_side
 from dynident.errors import RecordingError
 
 _LANES = 8  # columns that are filtered together
+_AT_ONCE = 64  # columns that SciPy filters at a time; bounds the temporary memory
 _ENTRY = "dynident_zero_phase"
 _SOURCE = """\
 typedef double lanes __attribute__((vector_size({bytes}), aligned(8)));
@@ -33,30 +34,39 @@ static void filter(long samples, const double *sos, const double *rest, lanes *w
 }}
 
 void {entry}(long samples, long padding, long columns, const double *sos, const double *rest,
-    const double *x, long down, long across, lanes *w, double *y)
+    const double *x, long down, const long *from, lanes *w,
+    long kept, const long *rows, double *y, long below, const long *to)
 {{
     const long all = samples + 2 * padding;
     lanes *first = w + padding, *last = first + samples - 1;
-    for (long c = 0; c < columns; c += {lanes}, x += {lanes} * across, y += {lanes}) {{
+    for (long c = 0; c < columns; c += {lanes}) {{
         const long some = columns - c < {lanes} ? columns - c : {lanes};
+        const double *each[{lanes}];
+        for (long v = 0; v < {lanes}; v++) each[v] = x + from[c + (v < some ? v : 0)];
         for (long k = 0; k < samples; k++)
-            for (long v = 0; v < {lanes}; v++)
-                first[k][v] = x[k * down + (v < some ? v : 0) * across];
+            for (long v = 0; v < {lanes}; v++) first[k][v] = each[v][k * down];
         for (long k = 1; k <= padding; k++) {{
             first[-k] = 2.0 * *first - first[k];
             last[k] = 2.0 * *last - last[-k];
         }}
         filter(all, sos, rest, w, 1);
         filter(all, sos, rest, w + all - 1, -1);
-        for (long k = 0; k < samples; k++)
-            for (long v = 0; v < some; v++) y[k * columns + v] = first[k][v];
+        for (long v = 0; v < some; v++)
+            for (long k = 0; k < kept; k++) y[to[c + v] + k * below] = first[rows[k]][v];
     }}
 }}
 """
 
 
 def zero_phase(
-    x: np.ndarray, sections: np.ndarray, padding: int, where: str | None = None
+    x: np.ndarray,
+    sections: np.ndarray,
+    padding: int,
+    where: str | None = None,
+    *,
+    rows: np.ndarray | None = None,
+    columns: np.ndarray | None = None,
+    out: np.ndarray | None = None,
 ) -> np.ndarray:
     """Filter forward and backward along axis 0, as SciPy's `sosfiltfilt` with odd padding.
 
@@ -66,10 +76,13 @@ def zero_phase(
     sections : of the filter, (s, 6) as `scipy.signal.butter` gives them.
     padding : samples of point reflection at each end.
     where : file, for messages.
+    rows : (R,) the rows that are wanted; None for all.
+    columns : which of the columns of a two-dimensional x are filtered; None for all.
+    out : (R, columns of x) whose other columns stay as they are; if there is none, it is made.
 
     Returns
     -------
-    (T, ...) filtered twice, without delay.
+    (R, ...) filtered twice, without delay.
 
     Raises
     ------
@@ -81,10 +94,18 @@ def zero_phase(
             f"{len(x)} samples are too few to filter", where, f"at least {padding + 1} are needed"
         )
     flat = np.asarray(x, dtype=float).reshape(len(x), math.prod(x.shape[1:]))
+    some = np.arange(flat.shape[1]) if columns is None else columns
+    kept = len(x) if rows is None else len(rows)
+    result = np.empty((kept, flat.shape[1])) if out is None else out
     function = c_function(_source(len(sections)), _ENTRY)
     if function is None:
-        return _by_scipy(flat, sections, padding).reshape(x.shape)
-    return _compiled(function, flat, sections, padding).reshape(x.shape)
+        for part in np.array_split(some, max(1, len(some) // _AT_ONCE)):
+            y = _by_scipy(flat[:, part], sections, padding)
+            result[:, part] = y if rows is None else y[rows]
+    else:
+        rows = np.arange(kept) if rows is None else rows
+        _compiled(function, flat, sections, padding, (rows, some, result))
+    return result.reshape(kept, *x.shape[1:]) if out is None else result
 
 
 @cache
@@ -109,18 +130,35 @@ def _source(sections: int) -> str:
     )
 
 
-def _compiled(function: Any, x: np.ndarray, sections: np.ndarray, padding: int) -> np.ndarray:
-    samples, columns = x.shape
+def _compiled(
+    function: Any,
+    x: np.ndarray,
+    sections: np.ndarray,
+    padding: int,
+    wanted: tuple[np.ndarray, np.ndarray, np.ndarray],
+) -> None:
+    """Write wanted rows of the wanted columns to their places in an array."""
+    rows, columns, y = wanted
     if not x.flags.aligned or any(stride % x.itemsize for stride in x.strides):
         x = x.copy()  # a field of packed records: its numbers are no whole numbers apart
-    y = np.empty_like(x, order="C")
-    work = np.empty((samples + 2 * padding, _LANES))
+    samples = len(x)
+    work = side_by_side((samples + 2 * padding) * _LANES, ())
     sos, rest = np.ascontiguousarray(sections), _state_at_rest(sections.tobytes(), len(sections))
-    places = [ctypes.c_void_p(one.ctypes.data) for one in (sos, rest, x, work, y)]
-    sizes = [ctypes.c_long(size) for size in (samples, padding, columns)]
-    strides = [ctypes.c_long(stride // x.itemsize) for stride in x.strides]
-    function(*sizes, *places[:3], *strides, *places[3:])
-    return y
+    (down, across), (below, beside) = ((s // 8 for s in one.strides) for one in (x, y))
+    rows = np.ascontiguousarray(rows, dtype=ctypes.c_long)
+    places, to = (np.asarray(columns * step, dtype=ctypes.c_long) for step in (across, beside))
+    pointer = {id(one): ctypes.c_void_p(one.ctypes.data) for one in (sos, rest, x, places, work)}
+    sizes = [ctypes.c_long(size) for size in (samples, padding, len(columns))]
+    function(
+        *sizes,
+        *(pointer[id(one)] for one in (sos, rest, x)),
+        ctypes.c_long(down),
+        *(pointer[id(one)] for one in (places, work)),
+        ctypes.c_long(len(rows)),
+        *(ctypes.c_void_p(one.ctypes.data) for one in (rows, y)),
+        ctypes.c_long(below),
+        ctypes.c_void_p(to.ctypes.data),
+    )
 
 
 def _by_scipy(x: np.ndarray, sections: np.ndarray, padding: int) -> np.ndarray:
