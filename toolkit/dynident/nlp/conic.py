@@ -93,6 +93,8 @@ class ConicProgram:
         factor = 1.0
         if problem.entropy is None:
             factor = float(np.linalg.norm(problem.A @ x - problem.b))
+        else:
+            factor = _unit(problem.entropy.weight)
         size = problem.matrices.shape[1]
         bodies = np.zeros((len(self._bodies), size, size))
         rows, columns = np.tril_indices(size)
@@ -173,8 +175,10 @@ def _add_objective(program: Any, z: np.ndarray, problem: Problem, origin: np.nda
         program.AddL2NormCost(A, rest, z)
         return
     if len(A):
-        _add_half_square(program, z, A, rest)
+        root_unit = _unit(problem.entropy.weight) ** 0.5
+        _add_half_square(program, z, A / root_unit, rest / root_unit)
     weight, basis = problem.entropy.weight, pseudo_basis()
+    weight = weight / _unit(weight)
     for k, centre in enumerate(problem.entropy.centres):
         part = slice(10 * k, 10 * k + 10)
         root = np.linalg.inv(np.linalg.cholesky(pseudo_inertia(centre)))
@@ -187,6 +191,14 @@ def _add_objective(program: Any, z: np.ndarray, problem: Problem, origin: np.nda
             ratio = 0.5 * (ratio + ratio.T)
         cost, t, _ = program.AddMaximizeLogDeterminantCost(ratio)
         cost.evaluator().UpdateCoefficients(-weight * np.ones(len(t)))
+
+
+def _unit(weight: float) -> float:
+    """What an objective with an entropy of this weight is measured in: no cost far above one.
+
+    Of costs of a million Clarabel makes an answer or none, as the last digits fall.
+    """
+    return max(weight, 1.0)
 
 
 def _add_half_square(program: Any, z: np.ndarray, A: np.ndarray, rest: np.ndarray) -> None:
