@@ -18,7 +18,7 @@ FACADES = ("__init__.py", "__init__.pyi")
 FLOORS = (
     ("errors",),
     ("files", "tables"),
-    ("settings", "places", "threads"),
+    ("settings", "data_files", "places", "threads"),
     ("criteria",),
     ("inertia", "moments", "batch"),
     ("recording",),

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from dynident import diagnose, files, load
+from dynident import diagnose, load
+from dynident.data_files import find_data
 from dynident.errors import FileError
 
 STUDY = Path(__file__).parents[2] / "problems" / "panda" / "study.toml"
@@ -16,7 +17,7 @@ STUDY = Path(__file__).parents[2] / "problems" / "panda" / "study.toml"
 @pytest.mark.filterwarnings("ignore:.*time stamps are jittered")
 def test_the_error_falls_below_the_published_one_and_never_rises() -> None:
     try:
-        files.find_data("panda/recording.npz", STUDY.parent)
+        find_data("panda/recording.npz", STUDY.parent)
     except FileError as missing:
         pytest.skip(str(missing))
     study = load(STUDY)

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynident import diagnose, files
+from dynident import diagnose
+from dynident.data_files import find_data
 from dynident.diagnosis import Diagnosis
 from dynident.errors import FileError
 from dynident.study import Study, load
@@ -18,7 +19,7 @@ STUDY = Path(__file__).parents[2] / "problems" / "staubli_tx40" / "study.toml"
 @pytest.fixture(scope="module")
 def study() -> Study:
     try:
-        files.find_data("staubli_tx40/recording.npz", STUDY.parent)
+        find_data("staubli_tx40/recording.npz", STUDY.parent)
     except FileError as missing:
         pytest.skip(str(missing))
     return load(STUDY)
@@ -26,7 +27,7 @@ def study() -> Study:
 
 def test_columns_are_those_of_the_joints(study: Study) -> None:
     """q = R^-1 q_m with the zeros moved, tau = R^T c: power is the same on either side."""
-    file = files.find_data("staubli_tx40/recording.npz", STUDY.parent)
+    file = find_data("staubli_tx40/recording.npz", STUDY.parent)
     data = np.load(file)
     motors, currents = data["motor_position"], data["motor_torque"]
     gears = np.diag([32.0, 32.0, 45.0, -48.0, 45.0, 32.0])

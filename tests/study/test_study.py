@@ -379,3 +379,59 @@ def test_criteria_that_make_no_sense_are_refused(study, table: str, message: str
     with pytest.raises(StudyError) as refused:
         study(STUDY + table + "\n")
     assert "study.toml: criteria: " in str(refused.value) and message in str(refused.value)
+
+
+def test_one_entry_may_name_several_files(tmp_path):
+    """They share what the entry says, and are numbered as if each had an entry of its own."""
+    path = write_study(tmp_path)
+    (tmp_path / "train.csv").rename(tmp_path / "train_10.csv")
+    (tmp_path / "train_9.csv").write_bytes((tmp_path / "train_10.csv").read_bytes())
+    for file in (
+        '"train_*.csv"',
+        '["train_9.csv", "train_10.csv"]',
+        '["train_9.csv", "t*_10.csv"]',
+    ):
+        path.write_text(STUDY.replace('"train.csv"', file))
+        study = load(path)
+        assert [one.name for one in study.train.recordings] == ["train_9.csv", "train_10.csv"]
+        assert [one.period for one in study.train.recordings] == [8.0, 8.0]
+        numbers = [one.number for one in (*study.train.recordings, *study.test.recordings)]
+        assert numbers == [1, 2, 3]
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ('file = "none_*.csv"', r"none_\*.csv: no file matches. check the pattern"),
+        ("file = []", r"recordings.0: file = \[\] names no file"),
+        ('file = "t*.csv"\nrecord = "a"', r"record = 'a' is of one file, and 2 are named"),
+        ('file = "train.csv"\nrate_hz = 1e9', r"recordings.0: rate_hz = 1000000000.0"),
+        (
+            'file = "train.csv"\nrate_hz = 100.0',
+            "rate_hz = 100 is given, and the file has a",
+        ),
+        ('file = "train.csv"\ncolumns = ["t"]', "the first line names the columns, and the"),
+    ],
+)
+def test_entries_that_fit_no_file(tmp_path, entry, message):
+    path = write_study(tmp_path)
+    path.write_text(STUDY.replace('file = "train.csv"', entry))
+    with pytest.raises(DynidentError, match=message) as told:
+        load(path)
+    assert "\n" not in str(told.value)
+
+
+def test_a_study_of_files_without_names_and_time(tmp_path):
+    """Headers and the time are taken out, and said by the study: nothing else changes."""
+    path = write_study(tmp_path)
+    before = load(path)
+    for name in ("train", "test"):
+        header, *rows = (tmp_path / f"{name}.csv").read_text().splitlines()
+        names = header.split(",")[1:]
+        (tmp_path / f"{name}.csv").write_text("\n".join(row.partition(",")[2] for row in rows))
+        said = f'file = "{name}.csv"\ncolumns = {names}\nrate_hz = 100.0'
+        path.write_text(path.read_text().replace(f'file = "{name}.csv"', said))
+    after = load(path)
+    for one, other in zip(before.train.recordings, after.train.recordings, strict=True):
+        np.testing.assert_allclose(one.t - one.t[0], other.t, atol=1e-9)
+        np.testing.assert_array_equal(one.tau, other.tau)

@@ -1,4 +1,4 @@
-"""Whole files in and out, nothing ever half written; and where the data of a study lies."""
+"""Whole files in, of a size that is bounded, and out, never half written."""
 
 from __future__ import annotations
 
@@ -6,32 +6,101 @@ import hashlib
 import os
 import stat
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 from dynident.errors import FileError
 
-VARIABLE = "DYNIDENT_DATA"
-"""Environment variable that names a folder of measured data."""
+LARGEST_DOCUMENT = 1 << 26
+"""Bytes of a robot description, a study or an estimate; formats of data have other limits."""
+_BLOCK = 1 << 20
 
 
-def read_bytes(path: str | Path) -> bytes:
-    """Return the content of a file.
+@contextmanager
+def open_regular(path: str | Path) -> Iterator[BinaryIO]:
+    """Open a regular file for reading; whatever else is under its name never blocks.
 
     Raises
     ------
     FileError
-        If there is no such file, it is a folder, or it may not be read.
+        If there is no such file, it may not be read, or it is a folder, a device, a pipe or a
+        socket: those may never end, or wait for somebody to write.
     """
     path = Path(path)
     try:
-        return path.read_bytes()
+        # Without O_NONBLOCK, opening a pipe waits until somebody opens its other end.
+        number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except FileNotFoundError:
         raise FileError("no such file", str(path), "check the path") from None
-    except IsADirectoryError:
-        raise FileError("is a folder, not a file", str(path), "name a file in it") from None
     except OSError as error:
         raise FileError(f"cannot be read ({error.strerror or error})", str(path)) from None
+    except ValueError:
+        raise FileError("its name holds a NUL character", ascii(str(path))) from None
+    mode = os.fstat(number).st_mode
+    if not stat.S_ISREG(mode):
+        os.close(number)
+        if stat.S_ISDIR(mode):
+            raise FileError("is a folder, not a file", str(path), "name a file in it")
+        what = "is not a regular file, but a device, a pipe or a socket"
+        raise FileError(what, str(path), "write its content to a file first")
+    with open(number, "rb") as stream:
+        yield stream
+
+
+def read_bytes(
+    path: str | Path, largest: int = LARGEST_DOCUMENT, remedy: str = "is it the right file?"
+) -> bytes:
+    """Return the content of a file.
+
+    Parameters
+    ----------
+    path : the file.
+    largest : bytes that it may hold.
+    remedy : what to do where it holds more.
+
+    Raises
+    ------
+    FileError
+        If there is no such file, it is not a regular one, it may not be read, or it is too large
+        for its kind or for the memory.
+    """
+    with open_regular(path) as stream:
+        size = os.fstat(stream.fileno()).st_size
+        if size > largest:
+            raise too_large(path, size, largest, remedy)
+        try:
+            # Some files of the system say that they are empty, and are not.
+            data = stream.read(largest + 1) if size == 0 else stream.read(size)
+        except MemoryError:
+            raise FileError("does not fit into memory", str(path), remedy) from None
+        except OSError as error:
+            raise FileError(f"cannot be read ({error.strerror or error})", str(path)) from None
+    if len(data) > largest:
+        raise too_large(path, len(data), largest, remedy)
+    return data
+
+
+def too_large(path: str | Path, size: int, largest: int, remedy: str) -> FileError:
+    """Return the error for a file, or what is packed into it, that is larger than it may be.
+
+    Parameters
+    ----------
+    path : the file.
+    size, largest : bytes that it holds, and may hold.
+    remedy : what to do about it.
+    """
+    what = f"holds {size_in_words(size)}, and {size_in_words(largest)} is the limit"
+    return FileError(what, str(path), remedy)
+
+
+def size_in_words(size: int) -> str:
+    """Return a number of bytes with a unit, as `2.3 GB`."""
+    for unit, one in (("GB", 1 << 30), ("MB", 1 << 20), ("kB", 1 << 10)):
+        if size >= one:
+            return f"{size / one:.4g} {unit}"
+    return f"{size} bytes"
 
 
 def read_text(path: str | Path) -> str:
@@ -162,61 +231,15 @@ def write_text(path: str | Path, text: str) -> Path:
 
 
 def sha256(path: str | Path) -> str:
-    """Return the SHA-256 of a file's content as hexadecimal digits."""
-    return hashlib.sha256(read_bytes(path)).hexdigest()
-
-
-def find_data(file: str, folder: Path) -> Path:
-    """Find a data file that a study names.
-
-    It is looked for beside the study, in the folder that `DYNIDENT_DATA` names, in `shared/data`
-    beside the project, and for the EMPS benchmark through the optional package
-    `nonlinear-benchmarks`, which downloads it.
-
-    Parameters
-    ----------
-    file : as the study names it.
-    folder : the folder of the study.
-
-    Returns
-    -------
-    Path of the file.
+    """Return the SHA-256 of a file's content as hexadecimal digits; a file of any size.
 
     Raises
     ------
     FileError
-        If it is nowhere: the message lists the places.
+        As `open_regular`.
     """
-    folder = folder.resolve()
-    tried = [folder / file]
-    if os.environ.get(VARIABLE):
-        tried.append(Path(os.environ[VARIABLE]) / file)
-    tried += [parent / "shared" / "data" / file for parent in folder.parents]
-    for path in tried:
-        if path.is_file():
-            return path
-    downloaded = _download(Path(file).name)
-    if downloaded is not None:
-        return downloaded
-    remedy = f"put it beside the study, or name the data folder in the variable {VARIABLE}"
-    if "EMPS" in file:
-        remedy += "; or `pip install nonlinear-benchmarks`, which downloads this benchmark"
-    raise FileError("no such data file", str(tried[0]), remedy)
-
-
-def _download(name: str) -> Path | None:
-    if name not in ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"):
-        return None
-    try:
-        from nonlinear_benchmarks import EMPS  # pyright: ignore[reportMissingImports]
-    except ImportError:
-        return None
-    try:
-        locations = EMPS(data_file_locations=True)
-    except Exception as error:  # its downloads fail in many ways; all mean: not to be had
-        remedy = f"name the data folder in the variable {VARIABLE}"
-        raise FileError(f"the download failed ({error})", name, remedy) from None
-    for location in locations:
-        if Path(location).name == name:
-            return Path(location)
-    return None
+    digest = hashlib.sha256()
+    with open_regular(path) as stream:
+        while block := stream.read(_BLOCK):
+            digest.update(block)
+    return digest.hexdigest()

@@ -19,12 +19,14 @@ from pydantic_core import PydanticCustomError
 from dynident import files
 from dynident.closed_loop import Controller, ControllerFile
 from dynident.criteria import DEFAULTS, Criteria
+from dynident.data_files import find_all
 from dynident.effects import FRICTION_WIDTH, Effect, effects_of
 from dynident.errors import DynidentError, EffectError, RobotError, StudyError
 from dynident.model import Model
 from dynident.recording import (
     Column,
     Dataset,
+    FileLayout,
     Filter,
     Noise,
     Recording,
@@ -41,8 +43,30 @@ Positive = Field(default=None, gt=0)
 
 
 class _RecordingEntry(SettingsTable):
-    file: str
+    """A file of data, or several that have the rest in common.
+
+    Attributes
+    ----------
+    file : its name, from the folder of the study; a pattern, as `"runs/train_*.csv"`, one
+        recording for each file that matches, in the order of the numbers in their names; or a list
+        of either.
+    record : which one of an NPZ or MAT file that holds several; then it is one file.
+    columns : names of the columns of a text file without a header line, by position, as
+        `["t", "q.joint1", "-"]`; "" or "-" skips one.
+    rate_hz : sampling rate, where the file has no column of time.
+    topic : of a bag that holds the joints on several, as `"/joint_states"`.
+    use : "train" to fit, "test" to judge by.
+    period : s after which the excitation repeats.
+    start : s, when the recording began in the session, for what warms up.
+    window : [t0, t1] in s of the file's clock: what is used of it once the whole is filtered.
+    payload : whether the load under study was on board; "unknown" asks for it.
+    """
+
+    file: str | list[str]
     record: str | None = None
+    columns: list[str] | None = None
+    rate_hz: float | None = Positive
+    topic: str = ""
     use: Literal["train", "test"] = "train"
     period: float | None = Positive
     start: float = 0.0
@@ -309,25 +333,47 @@ def _recordings(said: _StudyFile, path: Path, robot: Robot) -> list[Recording]:
     if "unknown" in payloads and payloads & {True, False}:
         remedy = 'state true or false for every recording, or "unknown" for all of them'
         raise StudyError("a payload is known and unknown", f"{path}: recordings", remedy)
-    known: dict[tuple[Path, str | None], Recording] = {}
-    found = []
-    for number, entry in enumerate(said.recordings, start=1):
-        file = files.find_data(entry.file, path.parent)
-        key = (file, entry.record)
-        if key not in known:
-            known[key] = read(file, robot.names, columns, robot.kinds, entry.record)
-        found.append(
-            known[key].replace(
-                name=entry.record or entry.file,
-                use=entry.use,
-                period=entry.period,
-                start=entry.start,
-                window=entry.window,
-                payload=None if entry.payload == "unknown" else entry.payload,
-                torque=said.torque,
-                number=number,
+    known: dict[tuple[Path, str | None, FileLayout], Recording] = {}
+    found: list[Recording] = []
+    for place, entry in enumerate(said.recordings):
+        where = f"{path}: recordings.{place}"
+        with _in(path, f"recordings.{place}"):
+            layout = FileLayout(
+                names=tuple(entry.columns or ()), rate_hz=entry.rate_hz, topic=entry.topic
             )
-        )
+        matched = _files(entry, path.parent, where)
+        for name, file in matched.items():
+            key = (file, entry.record, layout)
+            if key not in known:
+                known[key] = read(
+                    file, robot.names, columns, robot.kinds, entry.record, layout=layout
+                )
+            found.append(
+                known[key].replace(
+                    name=entry.record or name,
+                    use=entry.use,
+                    period=entry.period,
+                    start=entry.start,
+                    window=entry.window,
+                    payload=None if entry.payload == "unknown" else entry.payload,
+                    torque=said.torque,
+                    number=len(found) + 1,
+                )
+            )
+    return found
+
+
+def _files(entry: _RecordingEntry, folder: Path, where: str) -> dict[str, Path]:
+    """Name of each file that an entry names -> where it is."""
+    patterns = [entry.file] if isinstance(entry.file, str) else entry.file
+    found: dict[str, Path] = {}
+    for pattern in patterns:
+        found |= find_all(pattern, folder)
+    if not found:
+        raise StudyError("file = [] names no file", where, "name at least one")
+    if entry.record is not None and len(found) > 1:
+        what = f"record = {entry.record!r} is of one file, and {len(found)} are named"
+        raise StudyError(what, where, "write an entry for each file")
     return found
 
 

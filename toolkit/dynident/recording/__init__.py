@@ -1,9 +1,11 @@
 """Recordings: what a robot did and which torques it took.
 
 `read` and `write` exchange them with CSV, NPZ, MAT and Parquet files (other names and units
-through `Column`), `Recording` checks them. `uniform` puts jittered time stamps on a uniform clock.
-`differentiate` turns positions into a `Motion`; `ParallelFilter` passes regressor columns and
-torque through one low-pass and decimation, in blocks if asked; both follow a `Filter`.
+through `Column`; what a file does not say of itself through `FileLayout`), `open_table` opens any
+file with its columns under its own names, `Recording` checks what is read.
+`uniform` puts jittered time stamps on a uniform clock. `differentiate` turns positions into a
+`Motion`; `ParallelFilter` passes regressor columns and torque through one low-pass and decimation,
+in blocks if asked; both follow a `Filter`.
 `usable` and `usable_rows` decide which rows count, `within` and `moving` pick some of them;
 `periods` lays repetitions side by side; `require_motion` and `require_torque` refuse recordings
 that show nothing.
@@ -20,6 +22,8 @@ from dynident.recording.filters import (
     lowpass,
 )
 from dynident.recording.formats.column_names import Column
+from dynident.recording.formats.column_table import ColumnTable, FileLayout
+from dynident.recording.formats.open_table import READABLE, open_table
 from dynident.recording.formats.read import SUFFIXES, read
 from dynident.recording.formats.write import write
 from dynident.recording.masks import moving, within
@@ -42,10 +46,13 @@ from dynident.recording.usable_rows import (
 )
 
 __all__ = [
+    "READABLE",
     "SIGNALS",
     "SUFFIXES",
     "Column",
+    "ColumnTable",
     "Dataset",
+    "FileLayout",
     "Filter",
     "FilterBlock",
     "LeftOut",
@@ -66,6 +73,7 @@ __all__ = [
     "mismatch",
     "moving",
     "numbered",
+    "open_table",
     "periods",
     "read",
     "require_motion",

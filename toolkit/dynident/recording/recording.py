@@ -32,6 +32,8 @@ class Provenance:
     filter : what was done to the numbers since, in words; empty if nothing.
     record : which recording of a file that holds several; empty if it holds one.
     columns : (ours, the file's name of it, scale) of each column that was read; empty likewise.
+    skipped : what else the file holds that was not read, in words each.
+    first_line : line of the first sample in a text file, from 1.
     """
 
     file: str = ""
@@ -40,6 +42,8 @@ class Provenance:
     record: str = ""
     _: KW_ONLY
     columns: tuple[tuple[str, str, float], ...] = ()
+    skipped: tuple[str, ...] = ()
+    first_line: int = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,7 +167,11 @@ class Recording:
 
     def row(self, index: int) -> str:
         """How messages call a sample, given its index from 0: file and row (and line, in CSV)."""
-        line = f" (line {index + 2})" if self.where.lower().endswith(".csv") else ""
+        line = (
+            f" (line {index + self.provenance.first_line})"
+            if self.where.lower().endswith(".csv")
+            else ""
+        )
         return f"{self.where}, row {index + 1}{line}"
 
     def __repr__(self) -> str:

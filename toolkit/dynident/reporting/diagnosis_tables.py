@@ -10,6 +10,7 @@ from datetime import datetime
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
+from dynident import files
 from dynident.batch import evaluations
 from dynident.diagnosis.details import Candidate, Step
 from dynident.diagnosis.result import Diagnosis
@@ -146,7 +147,7 @@ def provenance(diagnosis: Diagnosis, command: str, study: Path | None) -> tuple[
     description = diagnosis.after.model.robot.description
     rows = []
     if study is not None and study.is_file():
-        digest = hashlib.sha256(study.read_bytes()).hexdigest()
+        digest = files.sha256(study)
         rows.append((str(study), "study", digest, ""))
     if description is not None:
         digest = hashlib.sha256(description.text.encode()).hexdigest()

@@ -62,9 +62,7 @@ def mesh_points(path: Path) -> Array:
     if reader is None:
         raise FileError(f"'{path.suffix}' files are not read", str(path), "use .stl or .obj")
     try:
-        if path.stat().st_size > _LARGEST:
-            raise FileError("is too large", str(path))
-        points = reader(files.read_bytes(path))
+        points = reader(files.read_bytes(path, _LARGEST, "simplify the mesh"))
     except DynidentError:
         raise
     except (OSError, ValueError, IndexError):

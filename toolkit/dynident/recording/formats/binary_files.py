@@ -4,18 +4,31 @@ from __future__ import annotations
 
 import difflib
 import io
+import math
 import warnings
 import zipfile
+import zlib
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from dynident.errors import DynidentError, RecordingError
-from dynident.recording.formats.column_names import ColumnTable
+from dynident.errors import RecordingError
+from dynident.recording.formats.column_table import ColumnTable
+from dynident.recording.formats.limits import (
+    ARRAYS,
+    COMPLETE,
+    damaged,
+    require_distinct,
+    require_few,
+    require_unpacked,
+)
 
 COLUMNS = "columns"
 """Array of text, in the same file, that names the columns of every record."""
-_COMPLETE = "is the file complete, and of this format?"
+_MAT_HEADER, _MAT_COMPRESSED = 128, 15
+_MOST_DEFLATED = 1032
+"""Bytes that one compressed byte can become."""
 
 
 def open_npz(data: bytes, file: str) -> ColumnTable:
@@ -28,14 +41,18 @@ def open_npz(data: bytes, file: str) -> ColumnTable:
         have to be unpickled, which can run any code) and for a damaged one.
     """
     if not zipfile.is_zipfile(io.BytesIO(data)):
-        raise RecordingError("is not an NPZ file", file, _COMPLETE)
+        raise RecordingError("is not an NPZ file", file, COMPLETE)
     try:
         archive = np.load(io.BytesIO(data), allow_pickle=False)
         names = tuple(archive.files)
+        sizes = {one.filename: one.file_size for one in archive.zip.infolist()}
     except Exception as error:
-        raise _damaged("an NPZ file", file, error) from None
+        raise damaged("an NPZ file", file, error) from None
+    require_few(len(names), "arrays", file)
 
     def load(wanted: Sequence[str]) -> dict[str, np.ndarray]:
+        size = sum(sizes.get(f"{name}.npy", sizes.get(name, 0)) for name in wanted)
+        require_unpacked(size, ARRAYS, file)
         found = {}
         for name in wanted:
             try:
@@ -45,7 +62,7 @@ def open_npz(data: bytes, file: str) -> ColumnTable:
                     what = f"'{name}' holds Python objects, which are never loaded"
                     remedy = "save it as an array of doubles"
                     raise RecordingError(what, file, remedy) from None
-                raise _damaged(f"the array '{name}'", file, error) from None
+                raise damaged(f"the array '{name}'", file, error) from None
             if not isinstance(found[name], np.ndarray):
                 raise RecordingError(f"'{name}' is not an array", file, "save it with numpy.savez")
         return found
@@ -69,23 +86,52 @@ def open_mat(data: bytes, file: str) -> ColumnTable:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            names = tuple(name for name, _, _ in scipy.io.whosmat(io.BytesIO(data)))
+            sizes = {}
+            names = []
+            for name, shape, _ in scipy.io.whosmat(io.BytesIO(data)):
+                names.append(name)
+                sizes[name] = 8 * math.prod(shape)
     except Exception as error:
-        raise _damaged("a MATLAB file", file, error) from None
-    repeated = [name for name in names if names.count(name) > 1]
-    if repeated:
-        raise RecordingError(f"the variable '{repeated[0]}' is there twice", file)
+        raise damaged("a MATLAB file", file, error) from None
+    require_few(len(names), "variables", file)
+    require_distinct(names, "variable", file)
 
     def load(wanted: Sequence[str]) -> dict[str, np.ndarray]:
+        require_unpacked(sum(sizes[name] for name in wanted), ARRAYS, file)
+        require_unpacked(_unpacked_mat(data), ARRAYS, file)
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 found = scipy.io.loadmat(io.BytesIO(data), variable_names=list(wanted))
                 return {name: np.asarray(found[name]) for name in wanted}
         except Exception as error:
-            raise _damaged("the MATLAB file", file, error) from None
+            raise damaged("the MATLAB file", file, error) from None
 
-    return ColumnTable(file, names, load)
+    return ColumnTable(file, tuple(names), load)
+
+
+def _unpacked_mat(data: bytes) -> int:
+    """Bytes that the compressed variables of a MATLAB file unpack to; more than allowed ends it.
+
+    What a variable says of its size need not be so, and is not what is then unpacked.
+    """
+    if len(data) * _MOST_DEFLATED < ARRAYS.unpacked:
+        return 0
+    order = "little" if data[126:128] == b"IM" else "big"
+    place, total = _MAT_HEADER, 0
+    while place + 8 <= len(data) and total <= ARRAYS.unpacked:
+        kind, size = (int.from_bytes(data[place + k : place + k + 4], order) for k in (0, 4))
+        if kind == _MAT_COMPRESSED:
+            unpack = zlib.decompressobj()
+            rest = data[place + 8 : place + 8 + size]
+            while rest and total <= ARRAYS.unpacked:
+                try:
+                    total += len(unpack.decompress(rest, 1 << 24))
+                except zlib.error:
+                    break  # who reads it says so
+                rest = unpack.unconsumed_tail
+        place += 8 + size
+    return total
 
 
 def open_parquet(data: bytes, file: str) -> ColumnTable:
@@ -102,21 +148,17 @@ def open_parquet(data: bytes, file: str) -> ColumnTable:
         source = parquet.ParquetFile(io.BytesIO(data))
         names = tuple(source.schema_arrow.names)
     except Exception as error:
-        raise _damaged("a Parquet file", file, error) from None
-    for name in names:
-        if names.count(name) > 1:
-            raise RecordingError(
-                f"the column '{name}' is there {names.count(name)} times",
-                file,
-                "name each column once",
-            )
+        raise damaged("a Parquet file", file, error) from None
+    require_few(len(names), "columns", file)
+    require_distinct(names, "column", file)
 
     def load(wanted: Sequence[str]) -> dict[str, np.ndarray]:
+        require_unpacked(8 * source.metadata.num_rows * len(wanted), ARRAYS, file)
         try:
             content = source.read(columns=list(dict.fromkeys(wanted)))
             return {name: content.column(name).to_numpy() for name in wanted}
         except Exception as error:
-            raise _damaged("the Parquet file", file, error) from None
+            raise damaged("the Parquet file", file, error) from None
 
     return ColumnTable(file, names, load)
 
@@ -135,15 +177,6 @@ def pyarrow_parquet(file: str):
         remedy = "pip install 'dynident[parquet]'"
         raise RecordingError("Parquet files need pyarrow", file, remedy) from None
     return parquet
-
-
-def _damaged(what: str, file: str, error: Exception) -> DynidentError:
-    """One line for whatever a library says of a broken file."""
-    reason = " ".join(str(error).split()) or type(error).__name__
-    reason = reason if len(reason) <= 120 else reason[:117] + "..."
-    return RecordingError(
-        f"cannot be read as {what.removeprefix('the ')} ({reason})", file, _COMPLETE
-    )
 
 
 def pick(table: ColumnTable, record: str) -> ColumnTable:
@@ -180,7 +213,9 @@ def pick(table: ColumnTable, record: str) -> ColumnTable:
             raise RecordingError(what, where, "save one row a sample and one column a name")
         return {name: x[:, names.index(name)] for name in wanted}
 
-    return ColumnTable(where, names, load)
+    others = [name for name in records if name != record]
+    also = (f"{len(others)} other record{'s' * (len(others) != 1)}",) if others else ()
+    return replace(table, file=where, names=names, load=load, skipped=lambda _: also)
 
 
 def _column_names(table: ColumnTable) -> tuple[str, ...]:
@@ -190,6 +225,7 @@ def _column_names(table: ColumnTable) -> tuple[str, ...]:
         raise RecordingError(what, table.file, "save it as an array of text")
     # MATLAB pads the rows of a table of letters to one length.
     names = tuple(str(name).strip() for name in array.ravel())
+    require_few(len(names), "columns", table.file)
     for name in names:
         if names.count(name) > 1:
             what = f"'{COLUMNS}' holds the name '{name}' twice"

@@ -5,13 +5,12 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-
-import numpy as np
 
 from dynident.errors import RecordingError
 from dynident.recording.formats.column_expressions import ColumnExpression, may_be_expression, parse
+from dynident.recording.formats.column_table import ColumnTable
 
 REQUIRED = ("q", "tau")
 OPTIONAL = ("v", "a", "q_ref")
@@ -74,22 +73,6 @@ class LocatedColumn:
     scale: float
     terms: tuple[ColumnTerm, ...]
     offset: float = 0.0
-
-
-@dataclass(frozen=True)
-class ColumnTable:
-    """A file whose columns are named but not yet read.
-
-    Attributes
-    ----------
-    file : for messages.
-    names : what the file holds, in its order.
-    load : (names) -> arrays of these names, as they are in the file.
-    """
-
-    file: str
-    names: tuple[str, ...]
-    load: Callable[[Sequence[str]], dict[str, np.ndarray]]
 
 
 def plain(name: str) -> str:
@@ -207,8 +190,9 @@ def _checked(
 ) -> dict[str, Column]:
     signals = (*REQUIRED, *OPTIONAL, *PARTIAL)
     valid = ["t", *(f"{signal}.{joint}" for signal in signals for joint in joints)]
+    known = frozenset(valid)
     for ours in columns:
-        if ours not in valid:
+        if ours not in known:
             remedy = f"columns: t, {', '.join(f'{s}.<joint>' for s in signals)}; " + (
                 f"joints: {', '.join(joints)}"
             )
@@ -224,17 +208,17 @@ def _find(table: ColumnTable, name: str) -> str | None:
     """Name under which a table holds a column, if it does."""
     if _is_there(table, name):
         return name
-    return plain(name) if plain(name) in table.names else None
+    return plain(name) if plain(name) in table.there else None
 
 
 def _is_there(table: ColumnTable, name: str) -> bool:
     indexed = _INDEXED.match(name)
-    return name in table.names or bool(indexed and indexed["name"] in table.names)
+    return name in table.there or bool(indexed and indexed["name"] in table.there)
 
 
 def _term(table: ColumnTable, name: str, factor: float = 1.0) -> ColumnTerm:
     indexed = _INDEXED.match(name)
-    if name in table.names or not indexed:
+    if name in table.there or not indexed:
         return ColumnTerm(name, None, factor)
     return ColumnTerm(indexed["name"], int(indexed["index"]), factor)
 

@@ -1,4 +1,4 @@
-"""CSV files in: a header line, then one line of numbers a sample.
+"""CSV files in: a header line, where there is one, then one line of numbers a sample.
 
 Pandas reads a large file in which nothing is odd. It forgives a missing cell, a comment, text that
 is no number, and does not say in which line: so what it may not forgive is looked for first, and a
@@ -11,46 +11,70 @@ import codecs
 import csv
 import io
 import re
+from array import array
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from dynident.errors import FileError, RecordingError
-from dynident.recording.formats.column_names import ColumnTable
+from dynident.recording.formats.column_table import UNWANTED, ColumnTable, FileLayout
+from dynident.recording.formats.limits import (
+    TEXT,
+    require_distinct,
+    require_few,
+    require_unpacked,
+)
 
 _SMALL = 1 << 18
 """Bytes that are read by lines sooner than pandas is loaded, which takes a third of a second."""
 
 
-def open_csv(data: bytes, file: str) -> ColumnTable:
+def open_csv(data: bytes, file: str, layout: FileLayout) -> ColumnTable:
     """Return the table that the bytes of a CSV file hold.
 
-    Commas, semicolons or tabs separate the columns; numbers have a decimal point.
+    Commas, semicolons, tabs or blanks separate the columns; numbers have a decimal point.
+
+    Parameters
+    ----------
+    data : content of the file.
+    file : for messages.
+    layout : names of the columns, where no header line names them.
 
     Raises
     ------
     FileError
         If the bytes are not UTF-8 text.
     RecordingError
-        If there is no header, or a name is in it twice. `Table.load` raises it for a line with
-        too few or too many columns, and for a cell that is not a finite number.
+        If neither a header nor the layout names the columns, or both do, a name is there twice,
+        or there are too many. `ColumnTable.load` raises it for a line with too few or too many
+        columns, for a cell that is not a finite number, and if there are too many of them.
     """
     data = _text(data, file)
     if not data or data.isspace():
         raise RecordingError("is empty", file, "the first line names the columns: t, q.<joint> ...")
+    data = _without_blanks(data)
     first, second = (line.decode() for line in _two_lines(data))
     separator = _separator(first, second)
-    names = _header(first, separator, file)
+    require_few(1 + first.count(separator), "columns", file)
+    cells = _cells(first, separator, file)
+    is_header = not all(is_number(cell) for cell in cells)
+    names = _names(cells, layout, file) if is_header else _named(len(cells), layout, file)
+    require_distinct([name for name in names if name], "column", f"{file}, line 1")
+    # The readers below skip the line of the header.
+    lines = data if is_header else b"\n" + data
+    places = {name: place for place, name in reversed([*enumerate(names)])}
 
     def load(wanted: Sequence[str]) -> dict[str, np.ndarray]:
-        places = [names.index(name) for name in wanted]
-        columns = _fast(data, separator, len(names), places) if len(data) > _SMALL else None
+        require_unpacked(8 * lines.count(b"\n") * len(wanted), TEXT, file)
+        at = [places[name] for name in wanted]
+        columns = _fast(lines, separator, len(names), at) if len(lines) > _SMALL else None
         if columns is None:
-            columns = list(_careful(data, separator, names, places, file).T)
+            above = 1 if is_header else 0
+            columns = list(_careful(lines, separator, names, at, file, lines_above=above).T)
         return dict(zip(wanted, columns, strict=True))
 
-    return ColumnTable(file, names, load)
+    return ColumnTable(file, names, load, first_line=2 if is_header else 1)
 
 
 def _text(data: bytes, file: str) -> bytes:
@@ -67,6 +91,14 @@ def _text(data: bytes, file: str) -> bytes:
     return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
 
 
+def _without_blanks(data: bytes) -> bytes:
+    """Commas in the place of blanks, where nothing but blanks separates the columns."""
+    first = data.partition(b"\n")[0].strip()
+    if b" " not in first or any(mark in first for mark in (b",", b";", b"\t", b'"')):
+        return data
+    return re.sub(rb" +", b",", re.sub(rb"^ +| +$", b"", data, flags=re.MULTILINE))
+
+
 def _two_lines(data: bytes) -> tuple[bytes, bytes]:
     """Return the header and the line below it."""
     stream = io.BytesIO(data)
@@ -80,28 +112,39 @@ def _separator(header: str, row: str) -> str:
     return max(both or ",;\t", key=bare.count)
 
 
-def _header(line: str, separator: str, file: str) -> tuple[str, ...]:
+def _cells(line: str, separator: str, file: str) -> list[str]:
+    """Cells of the first line."""
     try:
-        names = tuple(
-            name.strip()
-            for name in next(csv.reader([line], delimiter=separator, skipinitialspace=True))
-        )
+        cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
     except (csv.Error, StopIteration) as error:
         raise RecordingError(f"the header cannot be read ({error})", f"{file}, line 1") from None
-    if all(is_number(name) for name in names):
+    return [cell.strip() for cell in cells]
+
+
+def _names(cells: list[str], layout: FileLayout, file: str) -> tuple[str, ...]:
+    """Names that a header line gives."""
+    if layout.names and layout.names != "numbered":
+        what = "the first line names the columns, and the study names them by position"
+        remedy = "leave out one of them; [columns] says which of the file's names is ours"
+        raise RecordingError(what, f"{file}, line 1", remedy)
+    return tuple(cells)
+
+
+def _named(count: int, layout: FileLayout, file: str) -> tuple[str, ...]:
+    """Names of the columns of a file without a header line."""
+    if layout.names == "numbered":
+        return tuple(f"column{k}" for k in range(1, count + 1))
+    if not layout.names:
         raise RecordingError(
             "the first line holds numbers, not the names of columns",
             f"{file}, line 1",
-            "write a header line: t, q.<joint>, tau.<joint> ...",
+            "write a header line: t, q.<joint>, tau.<joint> ..., or name them by position "
+            '(columns = ["t", "q.<joint>", ...] beside the file in the study)',
         )
-    for name in names:
-        if name and names.count(name) > 1:
-            raise RecordingError(
-                f"the column '{name}' is there {names.count(name)} times",
-                f"{file}, line 1",
-                "name each column once",
-            )
-    return names
+    if len(layout.names) != count:
+        what = f"{len(layout.names)} columns are named by position, and there are {count}"
+        raise RecordingError(what, f"{file}, line 1", 'write "-" for each that is to be skipped')
+    return tuple("" if name in UNWANTED else name for name in layout.names)
 
 
 def _fast(data: bytes, separator: str, width: int, places: list[int]) -> list[np.ndarray] | None:
@@ -148,33 +191,39 @@ def _regular_rows(data: bytes, separator: str, width: int) -> int | None:
 
 
 def _careful(
-    data: bytes, separator: str, names: tuple[str, ...], places: list[int], file: str
+    data: bytes,
+    separator: str,
+    names: tuple[str, ...],
+    places: list[int],
+    file: str,
+    *,
+    lines_above: int = 1,
 ) -> np.ndarray:
     """Values (T, k), line by line, with an error that names the line and the column."""
     body = data.decode().partition("\n")[2].rstrip("\n ")
     if not body.strip():
         remedy = "is the file complete?"
         raise RecordingError("holds a header but no samples", file, remedy)
-    rows: list[list[float]] = []
+    numbers = array("d")
     reader = csv.reader(io.StringIO(body, newline=""), delimiter=separator, skipinitialspace=True)
-    line = 1
+    line = lines_above
     try:
         for cells in reader:
-            line = reader.line_num + 1
+            line = reader.line_num + lines_above
             where = f"{file}, line {line}"
             if not any(cell.strip() for cell in cells):
                 raise RecordingError("the line is empty", where, "remove it")
             if len(cells) != len(names):
                 raise RecordingError(
-                    f"{len(cells)} column{'s' * (len(cells) != 1)} where the header has "
-                    f"{len(names)}",
+                    f"{len(cells)} column{'s' * (len(cells) != 1)} where the "
+                    f"{'header' if lines_above else 'first line'} has {len(names)}",
                     where,
                     "is the file complete?" if len(cells) < len(names) else "name every column",
                 )
-            rows.append([_cell(cells[i], f"{where}, column {names[i]}") for i in places])
+            numbers.extend(_cell(cells[i], f"{where}, column {names[i] or i + 1}") for i in places)
     except csv.Error as error:
         raise RecordingError(f"cannot be read ({error})", f"{file}, after line {line}") from None
-    return np.array(rows, dtype=np.float64)
+    return np.frombuffer(numbers, dtype=np.float64).reshape(-1, len(places))
 
 
 def _cell(text: str, where: str) -> float:

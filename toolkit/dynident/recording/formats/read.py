@@ -1,17 +1,14 @@
-"""Recordings in, from CSV, NPZ, MAT and Parquet files."""
+"""Recordings in, from files of any format that is read."""
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from dynident import files
 from dynident.errors import RecordingError
-from dynident.recording.formats.binary_files import open_mat, open_npz, open_parquet, pick
 from dynident.recording.formats.column_names import (
     OPTIONAL,
     PARTIAL,
@@ -20,13 +17,15 @@ from dynident.recording.formats.column_names import (
     joints_in,
     resolve,
 )
+from dynident.recording.formats.column_table import ColumnTable, FileLayout, left_of
 from dynident.recording.formats.column_values import load
-from dynident.recording.formats.csv_file import open_csv
+from dynident.recording.formats.limits import CUT
+from dynident.recording.formats.open_table import DEFAULT_LAYOUT, open_table
 from dynident.recording.plausibility import warn_of_units
 from dynident.recording.recording import Provenance, Recording, _joint_names
 
-_OPENERS = {".csv": open_csv, ".npz": open_npz, ".mat": open_mat, ".parquet": open_parquet}
-SUFFIXES = tuple(_OPENERS)
+SUFFIXES = (".csv", ".npz", ".mat", ".parquet")
+"""Suffixes of the files that are read and written; more are read, see `open_table.READABLE`."""
 
 
 def read(
@@ -35,6 +34,8 @@ def read(
     columns: Mapping[str, Column | str] | None = None,
     kinds: Sequence[str] | None = None,
     record: str | None = None,
+    *,
+    layout: FileLayout = DEFAULT_LAYOUT,
 ) -> Recording:
     """Read a recording; the file's suffix says its format.
 
@@ -50,6 +51,8 @@ def read(
     kinds : "revolute" or "prismatic" for each joint, for warnings of units.
     record : which one of an NPZ or MAT file that holds several: a two-dimensional array each, a row
         a sample, and one array of text, `columns`, that names the columns of all.
+    layout : what the file does not say of itself: names of columns without a header line, the rate
+        where there is no column of time, the topic of a bag.
 
     Returns
     -------
@@ -60,7 +63,7 @@ def read(
     Raises
     ------
     FileError
-        If the file is not there or cannot be read.
+        If the file is not there, is no regular file, cannot be read or is too large.
     RecordingError
         If its content is not a recording: see `Recording` and the readers of each format.
 
@@ -71,44 +74,47 @@ def read(
     """
     path = Path(path)
     where = str(path)
-    opener = _OPENERS.get(path.suffix.lower())
-    if opener is None:
-        raise unknown_suffix(path)
-    data = files.read_bytes(path)
-    if not data:
-        raise RecordingError("is empty", where, "is the file complete?")
-    table = opener(data, where)
-    if record is not None:
-        table = pick(table, record)
+    table = open_table(path, record, layout=layout)
     names = joints_in(table) if joints is None else _joint_names(joints, where)
     if kinds is not None and len(kinds) != len(names):
         raise RecordingError(f"{len(kinds)} kinds for {len(names)} joints", where)
-    located = resolve(table, names, columns)
-    found = load(table, located)
-    signals: dict[str, Any] = {
-        signal: _stacked([found[f"{signal}.{joint}"] for joint in names])
-        for signal in (*REQUIRED, *OPTIONAL)
-        if f"{signal}.{names[0]}" in found
-    }
-    missing = np.full(len(found["t"]), np.nan)
-    for signal in PARTIAL:
-        parts = [found.get(f"{signal}.{joint}", missing) for joint in names]
-        if any(part is not missing for part in parts):
-            signals[signal] = _stacked(parts)
+    located = resolve(table, names, _with_rate(table, columns, layout))
+    try:
+        found = load(table, located)
+    except MemoryError:
+        raise RecordingError("does not fit into memory", where, CUT) from None
+    used = [term.name for one in located.values() for term in one.terms]
     recording = Recording(
         t=found["t"],
         joints=names,
         name=record or path.stem,
         provenance=Provenance(
             where,
-            hashlib.sha256(data).hexdigest(),
+            table.sha256,
             record=record or "",
             columns=tuple((ours, one.name, one.scale) for ours, one in located.items()),
+            skipped=left_of(table, used),
+            first_line=table.first_line,
         ),
-        **signals,
+        **_signals(found, names),
     )
     warn_of_units(recording, kinds)
     return recording
+
+
+def _signals(found: Mapping[str, np.ndarray], joints: Sequence[str]) -> dict[str, Any]:
+    """Signals (T, n) of all joints, from their columns."""
+    signals: dict[str, Any] = {
+        signal: _stacked([found[f"{signal}.{joint}"] for joint in joints])
+        for signal in (*REQUIRED, *OPTIONAL)
+        if f"{signal}.{joints[0]}" in found
+    }
+    missing = np.full(len(found["t"]), np.nan)
+    for signal in PARTIAL:
+        parts = [found.get(f"{signal}.{joint}", missing) for joint in joints]
+        if any(part is not missing for part in parts):
+            signals[signal] = _stacked(parts)
+    return signals
 
 
 def _stacked(columns: list[np.ndarray]) -> np.ndarray:
@@ -118,7 +124,15 @@ def _stacked(columns: list[np.ndarray]) -> np.ndarray:
     return array
 
 
-def unknown_suffix(path: Path) -> RecordingError:
-    """Return the error for a file whose suffix names no format."""
-    what = f"the suffix '{path.suffix}' names no format" if path.suffix else "has no suffix"
-    return RecordingError(what, str(path), f"formats: {', '.join(SUFFIXES)}")
+def _with_rate(
+    table: ColumnTable, columns: Mapping[str, Column | str] | None, layout: FileLayout
+) -> Mapping[str, Column | str]:
+    """The mapping of columns without that of the time, where a rate takes its place."""
+    mapping = dict(columns or {})
+    if layout.rate_hz is not None and "t" in mapping:
+        theirs = mapping.pop("t")
+        name = theirs.name if isinstance(theirs, Column) else theirs
+        if name in table.there:
+            what = f"rate_hz = {layout.rate_hz:g} is given, and '{name}' is the column of time"
+            raise RecordingError(what, table.file, "leave out one of them")
+    return mapping

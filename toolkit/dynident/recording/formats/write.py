@@ -11,7 +11,7 @@ from dynident import files
 from dynident.errors import RecordingError
 from dynident.recording.formats.binary_files import pyarrow_parquet
 from dynident.recording.formats.column_names import plain
-from dynident.recording.formats.read import unknown_suffix
+from dynident.recording.formats.open_table import unknown_suffix
 from dynident.recording.recording import SIGNALS, Recording
 
 _LONGEST_MATLAB_NAME = 63
@@ -43,7 +43,7 @@ def write(recording: Recording, path: str | Path) -> Path:
     path = Path(path)
     writer = _WRITERS.get(path.suffix.lower())
     if writer is None:
-        raise unknown_suffix(path)
+        raise unknown_suffix(path, tuple(_WRITERS))
     return files.write_bytes(path, writer(_columns(recording), str(path)))
 
 

@@ -1,0 +1,102 @@
+"""A file as a table of columns, before anybody asks what they are called here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import KW_ONLY, dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from dynident.errors import RecordingError
+
+SLOWEST_HZ, FASTEST_HZ = 1e-3, 1e7
+"""Sampling rates of a robot: beyond them the number is in another unit."""
+UNWANTED = ("", "-")
+"""What stands in the place of the name of a column that is skipped."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileLayout:
+    """What a file of data does not say of itself.
+
+    Attributes
+    ----------
+    names : of the columns of a text file without a header line, by position; "" or "-" skips one.
+        "numbered" calls them column1, column2, ...; where there is a header line, it counts.
+    rate_hz : sampling rate of a file without a column of time: sample k is at k/rate_hz.
+    topic : which one of a bag that holds the joints on several.
+
+    Raises
+    ------
+    RecordingError
+        If a name is no text or there twice, or the rate is none that a robot is sampled at.
+    """
+
+    names: tuple[str, ...] | Literal["numbered"] = ()
+    rate_hz: float | None = None
+    topic: str = ""
+
+    def __post_init__(self) -> None:
+        if self.names != "numbered":
+            if isinstance(self.names, str) or not all(isinstance(one, str) for one in self.names):
+                remedy = 'write a list of names: ["t", "q.joint1", ...]'
+                raise RecordingError(
+                    f"names = {self.names!r} is no list of names", "columns", remedy
+                )
+            object.__setattr__(self, "names", tuple(one.strip() for one in self.names))
+        if self.rate_hz is not None:
+            rate = self.rate_hz
+            known = isinstance(rate, int | float) and math.isfinite(rate)
+            if not (known and SLOWEST_HZ <= rate <= FASTEST_HZ):
+                remedy = f"give samples a second, from {SLOWEST_HZ:g} to {FASTEST_HZ:g}"
+                raise RecordingError(f"rate_hz = {rate!r}", "rate_hz", remedy)
+
+
+def _nothing_more(_: Sequence[str]) -> tuple[str, ...]:
+    return ()
+
+
+@dataclass(frozen=True)
+class ColumnTable:
+    """A file whose columns are named but not yet read.
+
+    Attributes
+    ----------
+    file : for messages.
+    names : what the file holds, in its order; "" for a column without a name.
+    load : (names) -> arrays of these names, as they are in the file.
+    skipped : (names) -> what else the file holds that is not read with them, in words each; what
+        is skipped of the columns themselves, `left_of` says.
+    sha256 : hexadecimal digits of the file's content.
+    first_line : line of the first sample in a text file, from 1; 0 in any other.
+    joints : "prefixed" where the names of joints may have a prefix that the robot's have not, or
+        be without one that they have, as on topics of ROS; "exact" anywhere else.
+    """
+
+    file: str
+    names: tuple[str, ...]
+    load: Callable[[Sequence[str]], dict[str, np.ndarray]]
+    _: KW_ONLY
+    skipped: Callable[[Sequence[str]], tuple[str, ...]] = _nothing_more
+    sha256: str = ""
+    first_line: int = 0
+    joints: Literal["exact", "prefixed"] = "exact"
+
+    @cached_property
+    def there(self) -> frozenset[str]:
+        """The names, for looking them up."""
+        return frozenset(self.names)
+
+
+def left_of(table: ColumnTable, used: Sequence[str]) -> tuple[str, ...]:
+    """Return what a file holds besides the columns that are used, in words each."""
+    names = [name for name in table.names if name not in set(used)]
+    columns = ()
+    if names:
+        shown = ", ".join(name or "one without a name" for name in names[:10])
+        more = f" and {len(names) - 10} more" if len(names) > 10 else ""
+        columns = (f"{len(names)} column{'s' * (len(names) != 1)}: {shown}{more}",)
+    return columns + table.skipped(used)
