@@ -1,6 +1,7 @@
 # make demo   environment, install, the main job on an embedded example, a report to open
 # make test   environment, install, all tests
 # make test-fast   the same less the tests that are marked slow
+# make bench  beside what a user would pick instead, on the same work: docs/benchmarks.md (20 minutes)
 PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
@@ -33,8 +34,11 @@ lint: install
 	$(BIN)/ruff format --check
 	$(BIN)/pyright --pythonpath $(BIN)/python
 
+# Peers get environments of their own in .bench; who cannot be installed is a line with the reason.
+bench: export OMP_NUM_THREADS = 1
+
 bench: install
 	$(BIN)/python benchmarks/run.py
 
 clean:
-	rm -rf .venv
+	rm -rf .venv .bench

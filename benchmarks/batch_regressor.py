@@ -1,31 +1,27 @@
 """Regressor and torque of many samples, beside a loop over Pinocchio.
 
-    python benchmarks/batch_regressor.py [--samples 16384] [--links 2 7 30 60]
-
-The arms of `problems/`, then chains of revolute joints, on one thread. What is printed is the time
-a sample of a loop that keeps what Pinocchio computes, and of the same through `dynident.batch`, for
-a block of samples as fits take them, replayed by NumPy and compiled; how many times quicker each
-is; and the seconds to write the function out and to compile it. "base" is the columns of the base
-parameters, "all" all of them.
+The arms of `problems/`, then chains of revolute joints: a loop that keeps what Pinocchio computes,
+and the same through `dynident.batch` for a block of samples as fits take them, replayed by NumPy
+and compiled. "base" is the columns of the base parameters, "all" all of them.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import tempfile
-import time
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pinocchio
 
-from chain_length import chain
+from arms import chain
 from dynident.batch import Kernel
 from dynident.batch.newton_euler import regressor_equations, torque_equations
 from dynident.robot import Robot, structural_base
+from side_by_side.line import Benchmark, Line, Size
+from side_by_side.measuring import cpu
 
 pin: Any = pinocchio  # its bindings carry no types
 
@@ -35,17 +31,7 @@ REPEATS = 5
 LONGEST_PINOCCHIO = 200_000  # joints times samples of the loop
 LONGEST_COMPILED = 30
 MEMORY = 2**27  # bytes of the regressor of a block
-LEAST = 2048
-
-
-def seconds(what: Callable[[], Any]) -> float:
-    """The least of some times, of the processor."""
-    found = []
-    for _ in range(REPEATS):
-        start = time.process_time()
-        what()
-        found.append(time.process_time() - start)
-    return min(found)
+SAMPLES, LEAST = 16384, 2048
 
 
 def through_pinocchio(robot: Robot, motion: tuple[np.ndarray, ...], what: str) -> float:
@@ -61,7 +47,7 @@ def through_pinocchio(robot: Robot, motion: tuple[np.ndarray, ...], what: str) -
         for k in range(len(q)):
             out[k] = function(model, data, q[k], v[k], a[k])
 
-    return seconds(loop) / len(q)
+    return cpu(loop, REPEATS)[0] / len(q)
 
 
 def made(robot: Robot, columns: tuple[int, ...]) -> Kernel:
@@ -72,54 +58,64 @@ def made(robot: Robot, columns: tuple[int, ...]) -> Kernel:
     return Kernel(regressor_equations(tree, columns), (robot.n, len(columns)))
 
 
-def show(name: str, robot: Robot, motion: tuple[np.ndarray, ...], what: str) -> None:
+def times(name: str, robot: Robot, motion: tuple[np.ndarray, ...], what: str) -> Iterator[Line]:
+    """Lines of one robot and one function of it."""
     parameters = robot.theta.tolist() if what == "torque" else []
     columns = {
         "base": structural_base(robot).independent,
         "all": tuple(range(10 * robot.n)),
         "torque": (),
     }[what]
-    start = time.process_time()
-    kernel = made(robot, columns)
-    writing = time.process_time() - start
+    writing, kernel = cpu(lambda: made(robot, columns))
     samples = len(motion[0])
+    at = float(robot.n) if name.startswith("chain") and what == "base" else None
+    case = f"{name}, {robot.n} joints, {what}"
 
     def run() -> None:
         kernel(*motion, parameters=parameters)
 
+    ways = ["never", *(["always"] if robot.n <= LONGEST_COMPILED else [])]
+    for way in ways:
+        os.environ["DYNIDENT_COMPILE"] = way
+        first, _ = cpu(run)
+        # What falls back to NumPy where there is no compiler is no second way.
+        if way == "always" and kernel.evaluation.way != "compiled":
+            yield Line(case=case, who="dynident, compiled", missing="no compiler is found")
+            continue
+        spent, _ = cpu(run, REPEATS)
+        figures = {
+            "us a sample": 1e6 * spent / samples,
+            "to write and first run, s": writing + first,
+        }
+        who = "dynident, replayed by NumPy" if way == "never" else "dynident, compiled"
+        yield Line(case=case, who=who, figures=figures, at=at)
     loop = through_pinocchio(robot, motion, what)
-    os.environ["DYNIDENT_COMPILE"] = "never"
-    times = [seconds(run) / samples]
-    compiling = float("nan")
-    if robot.n <= LONGEST_COMPILED:
-        os.environ["DYNIDENT_COMPILE"] = "always"
-        start = time.perf_counter()
-        run()
-        compiling = time.perf_counter() - start
-        if kernel.evaluation.way == "compiled":
-            times.append(seconds(run) / samples)
-    both = "".join(f"{1e6 * one:9.3f} {loop / one:6.1f}" for one in times)
-    words = f"{name:10s} {robot.n:6d} {what:7s} {1e6 * loop:9.2f} {both:32s}"
-    print(f"{words} {writing:8.3f} {compiling:9.2f}", flush=True)
+    yield Line(case=case, who="loop over Pinocchio", figures={"us a sample": 1e6 * loop}, at=at)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--samples", type=int, default=16384)
-    parser.add_argument("--links", type=int, nargs="*", default=[2, 7, 30, 60])
-    said = parser.parse_args()
-    head = f"{'Pinocchio':>9s} {'replayed':>9s} {'times':>6s}{'compiled':>9s} {'times':>6s}"
-    print(f"{'robot':10s} {'joints':>6s} {'what':7s} {head}  write, s compile, s   (us a sample)")
-    robots = {Path(arm).stem: Robot.from_file(PROBLEMS / arm) for arm in ARMS}
-    robots |= {f"chain {n}": chain(n) for n in said.links}
+def lines(size: Size) -> Iterator[Line]:
+    links = {"tiny": (2,), "quick": (2, 7), "full": (2, 7, 15, 30, 60)}[size]
+    robots = {f"chain {n}": chain(n) for n in links}
+    if size == "full":
+        robots = {Path(arm).stem: Robot.from_file(PROBLEMS / arm) for arm in ARMS} | robots
+    before = os.environ.get("DYNIDENT_COMPILE")
     with tempfile.TemporaryDirectory() as folder:
         os.environ["XDG_CACHE_HOME"] = folder
         for name, robot in robots.items():
-            samples = min(said.samples, max(LEAST, MEMORY // (80 * robot.n**2)))
+            most = LEAST if size == "tiny" else SAMPLES
+            samples = min(most, max(LEAST, MEMORY // (80 * robot.n**2)))
             motion = robot.random_motion(0, samples)
             for what in ("base", "all", "torque"):
-                show(name, robot, motion, what)
+                yield from times(name, robot, motion, what)
+    if before is not None:
+        os.environ["DYNIDENT_COMPILE"] = before
 
 
-if __name__ == "__main__":
-    main()
+BENCHMARK = Benchmark(
+    title="Regressor and torque against the number of joints",
+    work="A block of 16 384 samples (fewer for long chains), one thread. The loop keeps what "
+    "Pinocchio computes. Beyond 30 joints compilation takes too long to be tried.",
+    compared="us a sample",
+    lines=lines,
+    axis="joints",
+)

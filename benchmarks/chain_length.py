@@ -1,51 +1,30 @@
 """Time of a projection against the number of links.
 
-    python benchmarks/chain_length.py [--links 5 10 20 30 60] [--nonlinear]
-
 Chains of revolute joints with viscous friction, an estimate with much noise, the default prior with
-a spread of 10: the optimum is on the boundary for most links. What is printed is the wall clock of
-the program and its certificate, the gap that the certificate proves, and the exponent with which
-the time grows from one length to the next. --nonlinear adds Ipopt, over virtual and over
-log-Cholesky parameters, where it takes less than minutes: up to 10 links.
+a spread of 10: the optimum is on the boundary for most links. Program and certificate; Ipopt, over
+virtual and over log-Cholesky parameters, where it takes less than minutes.
 """
 
 from __future__ import annotations
 
-import argparse
-import time
+from collections.abc import Iterator
 
 import numpy as np
 
+from arms import chain
 from dynident.constraints import Consistency, ParameterSpace, Within
 from dynident.fitting.consistent.posterior import sized
 from dynident.fitting.consistent.prior import Prior
 from dynident.fitting.consistent.programs import Solver, solve
 from dynident.model import Model
 from dynident.nlp import Problem
-from dynident.robot import Robot
 from dynident.threads import single_threaded
+from side_by_side.line import Benchmark, Line, Size
+from side_by_side.measuring import cpu
 
 SAMPLES_PER_LINK, NOISE, SPREAD = 30, 1.0, 10.0
-LONGEST_NONLINEAR = 10
-
-
-def chain(n: int) -> Robot:
-    """A chain of n links, neighbouring axes at right angles."""
-    rng = np.random.default_rng(n)
-    parts = ['<robot name="chain"><link name="base"/>']
-    for k in range(n):
-        x, y, z = rng.uniform(-0.05, 0.15, 3)
-        moments = rng.uniform(0.01, 0.02, 3)
-        entries = " ".join(f'i{a}{a}="{m}"' for a, m in zip("xyz", moments, strict=True))
-        parts.append(
-            f'<link name="l{k}"><inertial><origin xyz="{x} {y} {z}"/>'
-            f'<mass value="{rng.uniform(1, 4)}"/><inertia {entries}/></inertial></link>'
-            f'<joint name="j{k}" type="revolute">'
-            f'<parent link="{f"l{k - 1}" if k else "base"}"/><child link="l{k}"/>'
-            f'<origin xyz="0 0 {0.3 if k else 0}" rpy="{1.5708 * (-1) ** k} 0 0"/>'
-            '<axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="3" effort="9"/></joint>'
-        )
-    return Robot.from_text("".join(parts) + "</robot>")
+LONGEST_NONLINEAR = 5
+NAMES: dict[Solver, str] = {"conic": "dynident, Clarabel", "nlp": "Ipopt"}
 
 
 def problem(n: int, consistency: Consistency) -> Problem:
@@ -69,35 +48,32 @@ def problem(n: int, consistency: Consistency) -> Problem:
 
 
 @single_threaded
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--links", type=int, nargs="*", default=[5, 10, 20, 30, 60])
-    parser.add_argument("--nonlinear", action="store_true")
-    said = parser.parse_args()
-    solvers: tuple[Solver, ...] = ("conic", "nlp") if said.nonlinear else ("conic",)
-    print(f"{'set':5s} {'solver':6s} {'links':>5s} {'unknowns':>8s} {'s':>8s} {'grows':>6s} gap")
+def lines(size: Size) -> Iterator[Line]:
+    links = {"tiny": (2,), "quick": (5, 10), "full": (5, 10, 20, 30, 60)}[size]
     notions: tuple[Consistency, ...] = ("full", "semi")
     for consistency in notions:
-        for solver in solvers:
-            before: tuple[int, float] | None = None
-            for n in said.links:
+        for n in links:
+            for solver, who in NAMES.items():
                 if solver == "nlp" and n > LONGEST_NONLINEAR:
                     continue
                 posed = problem(n, consistency)
-                start = time.perf_counter()
-                certificate = solve(posed, solver).certificate
-                seconds = time.perf_counter() - start
-                grows = ""
-                if before:
-                    grows = f"n^{np.log(seconds / before[1]) / np.log(n / before[0]):.1f}"
-                before = (n, seconds)
-                size, gap = posed.space.size, certificate.gap
-                print(
-                    f"{consistency:5s} {solver:6s} {n:5d} {size:8d} {seconds:8.3f} {grows:>6s} "
-                    f"{gap:.1e}",
-                    flush=True,
-                )
+                spent, found = cpu(lambda p=posed, s=solver: solve(p, s))
+                figures = {
+                    "CPU, s": spent,
+                    "unknowns": float(posed.space.size),
+                    "gap proved": found.certificate.gap,
+                }
+                case = f"{n} links, {consistency} consistency"
+                at = float(n) if consistency == "full" else None
+                yield Line(case=case, who=who, figures=figures, at=at)
 
 
-if __name__ == "__main__":
-    main()
+BENCHMARK = Benchmark(
+    title="A projection against the number of links",
+    work="The nearest physically consistent parameters of a noisy estimate of a chain, with the "
+    "certificate that bounds how far they are from the best. Ipopt solves the same program in "
+    "other coordinates.",
+    compared="CPU, s",
+    lines=lines,
+    axis="links",
+)

@@ -1,35 +1,19 @@
-"""Time of a simulated closed loop, beside the loops that one writes by hand.
+"""Simulated closed loops, beside the loops that one writes by hand.
 
-    python benchmarks/closed_loop.py [--repeats 5] [--accuracy 1e-3]
-
-The seven-joint arm of problems/iiwa follows its validation motion for 10 s under its PD law at
-200 Hz: viscous friction, Coulomb friction as tanh(v / w), rotor inertias, ideal sensors. All start
-on the reference, and hold each command to the next sample.
-
-  dynident     ClosedLoop.simulate, once built
-  drake        the same in Drake as users write it: controller and friction as LeafSystems in
-               Python, commands held by a discrete update, LogVectorOutput; same integrator
-               and accuracy
-  pinocchio    pinocchio.aba in a Python loop, RK4 with one and with two steps a sample
-
-Each is compared with the loop simulated at accuracy 1e-9: largest position error, and the rms error
-of the command over its rms. Then the instrumental variable estimate of problems/scara (40 s, from
-the regular start), and what another robot costs in a diagram that stands against building one.
-Times are the median of some runs in one process, in ms of CPU. On a machine with other work they
-are larger: look at the load that is printed first.
+The seven-joint arm of problems/iiwa follows its validation motion under its PD law: viscous
+friction, Coulomb friction as tanh(v / w), rotor inertias, ideal sensors. All start on the
+reference, and hold each command to the next sample. Then what another robot costs in a diagram that
+stands against building one, and the instrumental variable estimate of problems/scara.
 """
 
 from __future__ import annotations
 
-import argparse
-import os
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from statistics import median
 from typing import Any
 
+import mujoco
 import numpy as np
 import pinocchio as pin
 from pydrake.multibody.parsing import Parser
@@ -42,10 +26,14 @@ import dynident as di
 from dynident.closed_loop import ClosedLoop, Task
 from dynident.closed_loop.plant.diagram import Plant
 from dynident.threads import single_threaded
+from side_by_side.line import Benchmark, Line, Size
+from side_by_side.measuring import cpu
 
 PROBLEMS = Path(__file__).parents[1] / "problems"
-DURATION = 10.0  # s
+ACCURACY, EXACT = 1e-3, 1e-9  # of Drake's error control
+RATES_HZ = (200.0, 1000.0)
 PIN: Any = pin  # its modules have no stubs
+MUJOCO: Any = mujoco
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,21 +69,21 @@ class Loop:
         return kp * (self.q_ref[k] - q) + kd * (self.v_ref[k] - (q - before) / self.step)
 
 
-def loop() -> Loop:
+def loop(rate_hz: float, seconds: float) -> Loop:
     experiment = di.closed_loop.load_experiment(PROBLEMS / "iiwa" / "experiment.toml")
     mechanism = experiment.mechanism()
     (test,) = (run for run in experiment.runs if run.use == "test")
-    rate = experiment.controller.simulated_rate()
-    q, v, _ = test.trajectory.at(np.arange(round(DURATION * rate)) / rate)
+    controller = replace(experiment.controller, rate_hz=rate_hz)
+    q, v, _ = test.trajectory.at(np.arange(round(seconds * rate_hz)) / rate_hz)
     values = {one.effect.label: one.values[0] for one in experiment.effects}
     found = {
         kind: np.array([values[f"{kind}@{joint}"] for joint in mechanism.robot.names])
         for kind in ("rotor_inertia", "viscous_friction", "coulomb_friction")
     }
-    task = Task(mechanism, test.trajectory, DURATION)
+    task = Task(mechanism, test.trajectory, seconds)
     urdf = PROBLEMS / "iiwa" / "iiwa.urdf"
     width = float(mechanism.friction_widths[0])
-    return Loop(task, experiment.controller, urdf, q, v, *found.values(), width=width)
+    return Loop(task, controller, urdf, q, v, *found.values(), width=width)
 
 
 Result = tuple[np.ndarray, np.ndarray]  # positions and commands at the samples, (T, n)
@@ -182,7 +170,7 @@ def drake_by_hand(one: Loop, accuracy: float) -> Callable[[], Result]:
         ResetIntegratorFromFlags(simulator, "runge_kutta3", one.step)
         simulator.get_mutable_integrator().set_target_accuracy(accuracy)
         simulator.Initialize()
-        simulator.AdvanceTo(DURATION)
+        simulator.AdvanceTo(one.task.duration)
         count, n = one.q_ref.shape
         # A command that is logged at its sample is that of the sample before.
         return (
@@ -226,50 +214,85 @@ def pinocchio_by_hand(one: Loop, steps: int) -> Callable[[], Result]:
     return run
 
 
-# --- times ---------------------------------------------------------------------------------------
+def mujoco_by_hand(one: Loop, steps: int, integrator: str) -> Callable[[], Result]:
+    """The friction beside the viscous is an applied force, held for a step."""
+    model = MUJOCO.MjModel.from_xml_path(str(one.urdf))
+    model.opt.timestep = one.step / steps
+    model.opt.integrator = getattr(MUJOCO.mjtIntegrator, f"mjINT_{integrator.upper()}")
+    for flag in ("CONTACT", "LIMIT"):
+        model.opt.disableflags |= getattr(MUJOCO.mjtDisableBit, f"mjDSBL_{flag}")
+    model.dof_armature[:] = one.rotors
+    # A polynomial in the speed where there are several: the first is viscous.
+    model.dof_damping.reshape(model.nv, -1)[:, 0] = one.viscous
+
+    def run() -> Result:
+        data = MUJOCO.MjData(model)
+        data.qpos[:], data.qvel[:] = one.q_ref[0], one.v_ref[0]
+        before = data.qpos - one.step * data.qvel
+        positions, commands = np.empty_like(one.q_ref), np.empty_like(one.q_ref)
+        for k in range(len(one.q_ref)):
+            q = data.qpos.copy()
+            u = one.law(k, q, before)
+            before = positions[k] = q
+            commands[k] = u
+            for _ in range(steps):
+                data.qfrc_applied[:] = u - one.coulomb * np.tanh(data.qvel / one.width)
+                MUJOCO.mj_step(model, data)
+        return positions, commands
+
+    return run
 
 
-def timed(what: Callable[[], Any], repeats: int) -> tuple[float, Any]:
-    times, result = [], None
-    for _ in range(repeats):
-        start = time.process_time()
-        result = what()
-        times.append(time.process_time() - start)
-    return 1e3 * median(times), result
+# --- side by side --------------------------------------------------------------------------------
 
 
-def loops(accuracy: float, repeats: int) -> None:
-    one = loop()
-    exact, u_exact = ours(one, 1e-9)()
-    first, run = timed(lambda: ours(one, accuracy)(), 1)
-    print(f"7 joints, {DURATION:g} s at 200 Hz, accuracy {accuracy:g}; errors against 1e-9")
-    print(f"{'':28s} {'CPU ms':>8s} {'q, rad':>9s} {'command':>9s}")
-    rows = (
-        ("dynident", ours(one, accuracy)),
-        ("drake, by hand", drake_by_hand(one, accuracy)),
-        ("pinocchio, 1 step a sample", pinocchio_by_hand(one, 1)),
-        ("pinocchio, 2 steps a sample", pinocchio_by_hand(one, 2)),
-    )
-    for name, run in rows:
-        run()  # built, and loaded
-        ms, (q, u) = timed(run, repeats)
+@single_threaded
+def lines(size: Size) -> Iterator[Line]:
+    seconds, repeats = {"tiny": (0.2, 1), "quick": (2.0, 1), "full": (10.0, 5)}[size]
+    for rate in RATES_HZ[:1] if size == "tiny" else RATES_HZ:
+        yield from loops(loop(rate, seconds), repeats)
+    yield from reparametrised(loop(RATES_HZ[0], seconds), repeats)
+    if size != "tiny":
+        yield from scara(min(repeats, 3))
+
+
+def loops(one: Loop, repeats: int) -> Iterator[Line]:
+    """Everyone's loop, with its errors against one of high accuracy."""
+    exact, u_exact = ours(one, EXACT)()
+    substeps = max(1, round(one.step / 1e-3))
+    contestants = {
+        f"dynident, accuracy {ACCURACY:g}": ours(one, ACCURACY),
+        "Drake by hand, same integrator and accuracy": drake_by_hand(one, ACCURACY),
+        "RK4 over pinocchio.aba, 1 step a sample": pinocchio_by_hand(one, 1),
+        "RK4 over pinocchio.aba, 2 steps a sample": pinocchio_by_hand(one, 2),
+        "mj_step, implicitfast, 1 ms": mujoco_by_hand(one, substeps, "implicitfast"),
+        "mj_step, RK4, 1 step a sample": mujoco_by_hand(one, 1, "rk4"),
+    }
+    case = f"{one.task.duration:g} s at {1 / one.step:g} Hz"
+    for who, run in contestants.items():
+        first, _ = cpu(run)
+        spent, (q, u) = cpu(run, repeats)
         off = np.sqrt(np.mean((u - u_exact) ** 2) / np.mean(u_exact**2))
-        print(f"{name:28s} {ms:8.0f} {np.abs(q - exact).max():9.1e} {off:9.1e}")
-    print(f"{'dynident, first run':28s} {first:8.0f}")
-    reparametrised(one, repeats)
+        figures = {
+            "CPU per simulated s, ms": 1e3 * spent / one.task.duration,
+            "first run, ms": 1e3 * first,
+            "error of q, rad": float(np.abs(q - exact).max()),
+            "of the command, %": 100 * float(off),
+        }
+        yield Line(case=case, who=who, figures=figures)
 
 
-def reparametrised(one: Loop, repeats: int) -> None:
+def reparametrised(one: Loop, repeats: int) -> Iterator[Line]:
     """Another robot in a diagram that stands, against another diagram."""
     mechanism = one.task.mechanism
-    build, plant = timed(lambda: Plant([mechanism]), repeats)
+    build, plant = cpu(lambda: Plant([mechanism]), repeats)
     heavier = replace(mechanism, robot=mechanism.robot.with_theta(1.1 * mechanism.robot.theta))
-    others = (heavier, mechanism)
-    give, _ = timed(lambda: [plant.set([other], [0.0]) for other in others], repeats)
-    print(f"other parameters: {give / 2:.2f} ms; another diagram: {build:.1f} ms")
+    give, _ = cpu(lambda: [plant.set([one], [0.0]) for one in (heavier, mechanism)], repeats)
+    for who, spent in (("dynident, the standing one set", give / 2), ("built anew", build)):
+        yield Line(case="diagram of another robot", who=who, figures={"all, ms": 1e3 * spent})
 
 
-def scara(repeats: int) -> None:
+def scara(repeats: int) -> Iterator[Line]:
     study = di.load(PROBLEMS / "scara" / "study.toml")
     assert study.controller is not None
     method = di.IV(study.controller, start="regular")
@@ -277,20 +300,16 @@ def scara(repeats: int) -> None:
         ("filtered", study.train),
         ("unfiltered", replace(study.train, filter=di.Filter())),
     ):
-        ms, found = timed(lambda d=dataset: di.fit(study.model, d, method), repeats)
-        print(f"scara, {name}: IV from the regular start {ms:.0f} ms, {found.status}")
+        spent, _ = cpu(lambda d=dataset: di.fit(study.model, d, method), repeats)
+        case = f"instrumental variables, `problems/scara`, {name}"
+        yield Line(case=case, who="dynident.IV", figures={"all, ms": 1e3 * spent})
 
 
-@single_threaded
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--accuracy", type=float, default=1e-3)
-    said = parser.parse_args()
-    print(f"load of the last minute: {os.getloadavg()[0]:.2f} on {os.cpu_count()} processors")
-    loops(said.accuracy, said.repeats)
-    scara(min(said.repeats, 3))
-
-
-if __name__ == "__main__":
-    main()
+BENCHMARK = Benchmark(
+    title="A simulated closed loop",
+    work="The arm of `problems/iiwa` along its validation motion: PD law, held commands, rotor "
+    "inertias, viscous and Coulomb friction (tanh). Errors are against the same loop at accuracy "
+    "1e-9: the largest of the positions, and the root mean square of the commands over theirs.",
+    compared="CPU per simulated s, ms",
+    lines=lines,
+)

@@ -1,35 +1,19 @@
-"""Constrained least squares by semidefinite program, beside Clarabel alone and figaroh.
-
-    python benchmarks/constrained_fit.py [--repeats 7] [--figaroh PYTHON]
+"""Constrained least squares by semidefinite program, beside what one writes by hand and figaroh.
 
 A seven-joint arm, 1000 noisy samples: 7000 rows, 91 parameters (ten of each link, rotor inertia,
-viscous and Coulomb friction). All solve the same problem: weighted least squares plus a quadratic
-prior over fully consistent links. Times are the median of several runs, in one process, in
-milliseconds of wall clock; "reading" is all from the rows in memory to the program.
-
-  by hand, solve only    the same cone program written by hand in Drake, rows reduced beforehand:
-                         only Clarabel's solve is timed
-  by hand, all           its reading (QR and symbolic-free constraints) and solve
-  by hand, 7000 rows     the same without the reduction
-  dynident               reading, solve, bound and certificate
-  figaroh                solve_direct_effort_fit (PICOS, CVXOPT), with figaroh's own prior term, in
-                         its own environment: --figaroh PYTHON names an interpreter that has it
+viscous and Coulomb friction). All solve the same problem, weighted least squares plus a quadratic
+prior over fully consistent links, from the rows in memory; figaroh has a prior of its own.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-import subprocess
-import tempfile
-import time
-from pathlib import Path
-from statistics import median
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
+from arms import arm
 from dynident.constraints import ParameterSpace, Within
 from dynident.fitting.consistent.posterior import sized
 from dynident.fitting.consistent.prior import Prior
@@ -38,38 +22,22 @@ from dynident.inertia import pseudo_inertia
 from dynident.model import Model
 from dynident.nlp import Problem
 from dynident.threads import single_threaded
-from least_squares_memory import arm
+from side_by_side.line import Benchmark, Line, Size
+from side_by_side.measuring import cpu
+from side_by_side.peer import Peer, PeerMissing
 
-SAMPLES, NOISE = 1000, 2.0  # N m: enough that least squares alone is impossible in most links
-
-FIGAROH = """
-import json, sys, time
-import numpy as np
-from figaroh.identification.physical_fit import PhysicalPolicy, build_problem
-from figaroh.identification.physical_fit import solve_direct_effort_fit
-data = np.load(sys.argv[1])
-times = []
-for _ in range(int(sys.argv[2])):
-    start = time.perf_counter()
-    problem = build_problem(data["Y"], data["tau"], list(data["names"]), list(data["joints"]),
-                            prior=data["prior"], policy=PhysicalPolicy(prior_weight=1e-6))
-    record = solve_direct_effort_fit(problem, solver="cvxopt")
-    times.append(time.perf_counter() - start)
-theta = record.theta
-residual = None if theta is None else float(np.linalg.norm(data["Y"] @ theta - data["tau"]))
-print(json.dumps({"times": times, "status": record.solver_status, "residual": residual}))
-"""
+NOISE = 2.0  # N m: enough that least squares alone is impossible in most links
 
 
-def rows() -> tuple[ParameterSpace, np.ndarray, np.ndarray, Prior, np.ndarray]:
+def rows(samples: int) -> tuple[ParameterSpace, np.ndarray, np.ndarray, Prior, np.ndarray]:
     """Space, columns (7000, 91), torque (7000,), prior and the truth, in units of the noise."""
     robot = arm()
     model = Model(robot) + "rotor_inertia" + "viscous_friction" + "coulomb_friction"
     space = ParameterSpace.of(model)
     rng = np.random.default_rng(0)
-    q, v, a = robot.random_motion(0, SAMPLES)
+    q, v, a = robot.random_motion(0, samples)
     q, v, a = 0.3 * q, 0.2 * v, 0.2 * a
-    block = model.block(np.arange(SAMPLES) * 0.01, q, v, a)
+    block = model.block(np.arange(samples) * 0.01, q, v, a)
     effects = model.columns(block)[:, :, len(model.base.independent) :]
     Y = np.concatenate([robot.regressor(q, v, a), effects], axis=2).reshape(-1, space.size)
     truth = np.concatenate([robot.theta, np.full(7, 0.2), np.full(7, 2.0), np.full(7, 4.0)])
@@ -99,80 +67,87 @@ def by_hand(space: ParameterSpace, A: np.ndarray, b: np.ndarray) -> tuple[Any, n
     return program, z
 
 
-def timed(what, repeats: int) -> tuple[float, Any]:
-    times, result = [], None
-    for _ in range(repeats):
-        start = time.perf_counter()
-        result = what()
-        times.append(time.perf_counter() - start)
-    return 1e3 * median(times), result
-
-
 def reduced(A: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     R = np.asarray(np.linalg.qr(np.column_stack([A, b]), mode="r"))
     return R[:, :-1], R[:, -1]
 
 
 @single_threaded
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--repeats", type=int, default=7)
-    parser.add_argument("--figaroh", metavar="PYTHON", help="interpreter that has figaroh")
-    said = parser.parse_args()
-    space, Y, tau, prior, truth = rows()
+def lines(size: Size) -> Iterator[Line]:
+    samples, repeats = {"tiny": (100, 1), "quick": (1000, 2), "full": (1000, 7)}[size]
+    space, Y, tau, prior, truth = rows(samples)
     whole = problem_of(space, Y, tau, prior)
+    case = f"{len(Y)} rows, {space.size} parameters"
     solver = ClarabelSolver()
 
-    A, b = reduced(whole.A, whole.b)
-    program, z = by_hand(space, A, b)
-    alone, result = timed(lambda: solver.Solve(program), said.repeats)
-    hand = space.scale * result.GetSolution(z)
+    def all_by_hand(A: np.ndarray, b: np.ndarray) -> np.ndarray:
+        program, z = by_hand(space, A, b)
+        return space.scale * solver.Solve(program).GetSolution(z)
 
-    def all_by_hand():
-        return solver.Solve(by_hand(space, *reduced(whole.A, whole.b))[0])
-
-    written, _ = timed(all_by_hand, said.repeats)
-    tall, _ = timed(lambda: solver.Solve(by_hand(space, whole.A, whole.b)[0]), said.repeats)
-    ours, answer = timed(lambda: solve(problem_of(space, Y, tau, prior), "conic"), said.repeats)
-    print(f"{len(Y)} rows, {space.size} parameters; objective relative to dynident's")
-    print(f"{'':22s} {'ms':>9s} {'of solve only':>14s} {'objective':>12s}")
+    ours, answer = cpu(lambda: solve(problem_of(space, Y, tau, prior), "conic"), repeats)
     best = whole.objective(answer.x)
-    for name, ms, x in (
-        ("by hand, solve only", alone, hand),
-        ("by hand, all", written, hand),
-        ("by hand, 7000 rows", tall, hand),
-        ("dynident", ours, answer.x),
+
+    def line(who: str, seconds: float, x: np.ndarray) -> Line:
+        figures = {
+            "CPU, ms": 1e3 * seconds,
+            "objective over ours": whole.objective(x) / best,
+            "residual, N m": NOISE * float(np.linalg.norm(Y @ x - tau)),
+        }
+        return Line(case=case, who=who, figures=figures)
+
+    yield line("dynident, certificate included", ours, answer.x)
+    spent, x = cpu(lambda: all_by_hand(*reduced(whole.A, whole.b)), repeats)
+    yield line("Drake by hand, rows reduced by QR first", spent, x)
+    spent, x = cpu(lambda: all_by_hand(whole.A, whole.b), 1)
+    yield line("Drake by hand", spent, x)
+    bodies = len(space.bodies)
+    nonnegative = np.flatnonzero(np.isfinite(space.lower))
+    given = {"scale": space.scale, "bodies": bodies, "nonnegative": nonnegative}
+    cone = Peer(script="cvxpy_constrained.py", environment="cvxpy")
+    A, b = reduced(whole.A, whole.b)
+    for who, asked in (
+        ("cvxpy by hand, rows reduced by QR first", {"A": A, "b": b}),
+        ("cvxpy by hand", {"A": whole.A, "b": whole.b}),
     ):
-        print(f"{name:22s} {ms:9.1f} {ms / alone:14.2f} {whole.objective(x) / best:12.8f}")
-    certificate = answer.certificate
-    print(f"dynident's certificate: gap {certificate.gap:.1e}; {certificate.sentence}")
-    if not said.figaroh:
-        print("figaroh: not run (--figaroh PYTHON)")
-        return
-    own = beside(said.figaroh, space, NOISE * Y, NOISE * tau, said.repeats)
-    ms = 1e3 * median(own["times"])
-    print(f"{'figaroh':22s} {ms:9.1f} {ms / alone:14.2f} {own['status']:>12s}")
-    mine, true = (NOISE * np.linalg.norm(Y @ x - tau) for x in (answer.x, truth))
-    words = f"dynident {mine:.6g}, figaroh {own['residual']:.6g}, truth {true:.6g}"
-    print(f"residual, N m: {words}")
+        yield from beside(case, who, cone, {**given, **asked}, line)
+    yield from beside(
+        case,
+        "figaroh, its own prior",
+        Peer(script="figaroh_constrained.py", environment="figaroh"),
+        {"Y": NOISE * Y, "tau": NOISE * tau, "prior": space.given, **figaroh_names(space)},
+        line,
+    )
+    figures = {k: v for k, v in line("", 0.0, truth).figures.items() if k != "CPU, ms"}
+    yield Line(case=case, who="the truth", figures=figures)
 
 
 def beside(
-    python: str, space: ParameterSpace, Y: np.ndarray, tau: np.ndarray, repeats: int
-) -> dict:
-    """Run figaroh on the same rows in its own environment."""
-    joints = [f"j{k}" for k in range(7)]
+    case: str, who: str, peer: Peer, work: dict[str, Any], line: Callable[..., Line]
+) -> Iterator[Line]:
+    try:
+        said = peer.ask(work)
+    except PeerMissing as missing:
+        yield Line(case=case, who=who, missing=str(missing))
+    else:
+        yield line(who, said["warm"], np.array(said["values"]))
+
+
+def figaroh_names(space: ParameterSpace) -> dict[str, list[str]]:
+    """Columns as it calls them: kind and joint."""
+    joints = [f"j{k}" for k in range(len(space.bodies))]
+    rigid = 10 * len(joints)
     names = [
-        *(f"{p.partition('.')[0]}_{joints[k // 10]}" for k, p in enumerate(space.names[:70])),
-        *(f"extra_{name}" for name in space.names[70:]),
+        *(f"{p.partition('.')[0]}_{joints[k // 10]}" for k, p in enumerate(space.names[:rigid])),
+        *(f"extra_{name}" for name in space.names[rigid:]),
     ]
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "rows.npz"
-        np.savez(file, Y=Y, tau=tau, names=names, joints=joints, prior=space.given)
-        command = [python, "-c", FIGAROH, str(file), str(repeats)]
-        done = subprocess.run(command, check=True, capture_output=True, text=True)
-    return json.loads(done.stdout.splitlines()[-1])
+    return {"names": names, "joints": joints}
 
 
-if __name__ == "__main__":
-    main()
+BENCHMARK = Benchmark(
+    title="Physically consistent least squares",
+    work="Weighted least squares plus a quadratic prior over links whose pseudo-inertia is "
+    "positive semidefinite, with noise so large that least squares alone is impossible in most "
+    "links. From the rows in memory to the answer; all but figaroh use Clarabel.",
+    compared="CPU, ms",
+    lines=lines,
+)

@@ -1,27 +1,23 @@
-"""Time and CPU time of reading a CSV recording, beside `pandas.read_csv` on the same file.
+"""Reading a CSV recording, beside `pandas.read_csv` on the same file.
 
-    python benchmarks/csv_reading.py [--samples 1000000] [--joints 7] [--times 3]
-
-The file holds t and, for each joint, q and tau in as many digits as a double needs: 15 columns for
-seven joints. The two readers take turns, and the best of each counts. Beyond what pandas does, ours
-checks that every line has as many cells as the header and every cell a finite number, takes the
-file's SHA-256, and makes the recording, which has checks of its own.
+The two readers take turns, and the best of each counts.
 """
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from dynident.recording import Recording, read, write
+from side_by_side.line import Benchmark, Line, Size
 
-RATE_HZ = 1000.0
+RATE_HZ, JOINTS, TURNS = 1000.0, 7, 3
 
 
 def recording(samples: int, joints: int) -> Recording:
@@ -40,26 +36,29 @@ def seconds(call: Callable[[], object]) -> tuple[float, float]:
     return time.perf_counter() - wall, time.process_time() - cpu
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--samples", type=int, default=1_000_000)
-    parser.add_argument("--joints", type=int, default=7)
-    parser.add_argument("--times", type=int, default=3)
-    arguments = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        path = write(recording(arguments.samples, arguments.joints), Path(folder) / "run.csv")
-        print(f"{arguments.samples} rows of {1 + 2 * arguments.joints} columns, ", end="")
-        print(f"{path.stat().st_size / 1e6:.0f} MB")
-        calls = {"pandas.read_csv": lambda: pd.read_csv(path), "read": lambda: read(path)}
-        found = [
-            {name: seconds(call) for name, call in calls.items()} for _ in range(arguments.times)
-        ]
-    best = {name: np.min([one[name] for one in found], axis=0) for name in calls}
-    for name, (wall, cpu) in best.items():
-        print(f"{name:16} {wall:6.2f} s, CPU {cpu:6.2f} s")
-    wall, cpu = best["read"] / best["pandas.read_csv"]
-    print(f"ratio            {wall:6.2f}    CPU {cpu:6.2f}")
+def lines(size: Size) -> Iterator[Line]:
+    for samples in {"tiny": (500,), "quick": (50_000,), "full": (100_000, 1_000_000)}[size]:
+        with tempfile.TemporaryDirectory() as folder:
+            path = write(recording(samples, JOINTS), Path(folder) / "run.csv")
+            calls: dict[str, Callable[[], object]] = {
+                "dynident.read": partial(read, path),
+                "pandas.read_csv": partial(pd.read_csv, path),
+            }
+            found = [{name: seconds(call) for name, call in calls.items()} for _ in range(TURNS)]
+        for name in calls:
+            wall, cpu = np.min([one[name] for one in found], axis=0)
+            figures = {"CPU, s": cpu, "wall, s": wall}
+            yield Line(
+                case=f"{samples} rows of {1 + 2 * JOINTS} columns", who=name, figures=figures
+            )
 
 
-if __name__ == "__main__":
-    main()
+BENCHMARK = Benchmark(
+    title="Reading a CSV recording",
+    work="A file with t and, for each of seven joints, q and tau in as many digits as a double "
+    "needs. Beyond what pandas does, ours checks that every line has as many cells as the header "
+    "and every cell a finite number, takes the file's SHA-256, and makes the recording, which has "
+    "checks of its own.",
+    compared="CPU, s",
+    lines=lines,
+)

@@ -1,46 +1,62 @@
-"""One pass over a million rows, then iterations that cost the same for any number of them.
+"""Bayesian regression from sums of products, beside scikit-learn's on all the rows.
 
-    python benchmarks/input_noise.py [--rows 1000000] [--inputs 110]
-
-The statistics are compared with the bare product X'X of the same blocks, in turn in one run, and an
-iteration on statistics with one that passes over all rows, as the paper's equations read. Rows are
-made block by block and never kept. CPU times, one thread.
+One pass over the rows, then iterations that cost the same for any number of them. The pass is
+compared with the bare product X'X of the same blocks, in turn in one run, an iteration with one
+that passes over all rows, as the paper's equations read, and the whole with Bayesian ridge.
 """
 
 from __future__ import annotations
 
-import argparse
 import time
-import tracemalloc
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from sklearn.linear_model import BayesianRidge
 
 from dynident.moments import SecondMoments
+from dynident.regression import BayesianFactorRegression
 from dynident.regression.factor_analysis import Gamma, start_of
 from dynident.regression.iterations import analyse
 from dynident.threads import single_threaded
+from side_by_side.line import Benchmark, Line, Size
+from side_by_side.measuring import cpu
 
 BLOCK = 8192
 ROUNDS = 200
 PASSES = 3
+INPUTS = 110
+RELEVANT = 10
+INPUT_VARIANCE = 0.25
+"""Of the noise on inputs of unit variance."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Blocks of the same random rows, made anew whenever they are asked for."""
+    """Blocks of the same random rows, made anew whenever they are asked for.
+
+    Attributes
+    ----------
+    noise : variance of what is added to the inputs once the output is made.
+    """
 
     rows: int
-    inputs: int
+    inputs: int = INPUTS
+    noise: float = 0.0
+
+    @property
+    def true(self) -> np.ndarray:
+        return np.where(np.arange(self.inputs) < RELEVANT, np.arange(self.inputs) + 1.0, 0.0)
 
     def blocks(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         rng = np.random.default_rng(0)
-        true = np.where(np.arange(self.inputs) < 10, np.arange(self.inputs) + 1.0, 0.0)
         for start in range(0, self.rows, BLOCK):
             count = min(BLOCK, self.rows - start)
             X = rng.standard_normal((count, self.inputs))
-            yield X, X @ true + rng.standard_normal(count)
+            y = X @ self.true + rng.standard_normal(count)
+            if self.noise:
+                X += np.sqrt(self.noise) * rng.standard_normal(X.shape)
+            yield X, y
 
 
 @single_threaded
@@ -90,26 +106,45 @@ def iteration_over_rows(data: Rows) -> float:
     return spent
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--rows", type=int, default=1_000_000)
-    parser.add_argument("--inputs", type=int, default=110)
-    asked = parser.parse_args()
-    data = Rows(asked.rows, asked.inputs)
-    runs = [one_pass(data) for _ in range(PASSES)]
-    ratios = [ours / bare for _, ours, bare in runs]
-    print(f"{asked.rows} rows, {asked.inputs} inputs, {PASSES} passes")
-    print(f"X'X alone              {min(bare for *_, bare in runs):8.3f} s")
-    print(f"sufficient statistics  {min(ours for _, ours, _ in runs):8.3f} s")
-    print(f"ratio                  {min(ratios):8.2f} to {max(ratios):.2f}")
-    print(f"iteration              {1e3 * iterations(runs[0][0]):8.3f} ms")
-    print(f"iteration over rows    {1e3 * iteration_over_rows(data):8.0f} ms")
-    for rows in (asked.rows // 10, asked.rows):
-        tracemalloc.start()
-        SecondMoments.over(Rows(rows, asked.inputs).blocks())
-        print(f"peak memory, {rows:>8} rows {tracemalloc.get_traced_memory()[1] / 2**20:7.1f} MiB")
-        tracemalloc.stop()
+@single_threaded
+def estimates(rows: int) -> Iterator[Line]:
+    """Coefficients of noisy inputs, from rows that are in memory."""
+    data = Rows(rows, noise=INPUT_VARIANCE)
+    X, y = (np.concatenate(parts) for parts in zip(*data.blocks(), strict=True))
+    case = f"{rows} rows of {INPUTS} inputs with noise of a quarter of their variance"
+    contestants = {
+        "dynident, noise given": BayesianFactorRegression(
+            input_noise=np.full(INPUTS, INPUT_VARIANCE), queries="noiseless"
+        ),
+        "scikit-learn, BayesianRidge": BayesianRidge(),
+    }
+    for who, estimator in contestants.items():
+        spent, found = cpu(lambda e=estimator: e.fit(X, y), PASSES)
+        off = np.linalg.norm(found.coef_ - data.true) / np.linalg.norm(data.true)
+        figures = {"CPU, ms": 1e3 * spent, "error of the coefficients, %": 100 * float(off)}
+        yield Line(case=case, who=who, figures=figures)
 
 
-if __name__ == "__main__":
-    main()
+def lines(size: Size) -> Iterator[Line]:
+    for rows in {"tiny": (1000,), "quick": (20_000,), "full": (20_000, 200_000)}[size]:
+        yield from estimates(rows)
+    data = Rows({"tiny": 1000, "quick": 20_000, "full": 1_000_000}[size])
+    runs = [one_pass(data) for _ in range(1 if size == "tiny" else PASSES)]
+    case = f"one pass over {data.rows} rows"
+    ours, bare = 1e3 * min(run[1] for run in runs), 1e3 * min(run[2] for run in runs)
+    yield Line(case=case, who="dynident, sufficient statistics", figures={"CPU, ms": ours})
+    yield Line(case=case, who="X'X alone", figures={"CPU, ms": bare})
+    case = f"an iteration, {data.rows} rows"
+    spent = 1e3 * iterations(runs[0][0])
+    yield Line(case=case, who="dynident, on the statistics", figures={"CPU, ms": spent})
+    spent = 1e3 * iteration_over_rows(data)
+    yield Line(case=case, who="over the rows", figures={"CPU, ms": spent})
+
+
+BENCHMARK = Benchmark(
+    title="Bayesian regression",
+    work="Ten of the inputs matter. Bayesian ridge knows no noise of inputs and attenuates; it is "
+    "what one would pick. Errors are of the coefficients of the inputs without noise.",
+    compared="CPU, ms",
+    lines=lines,
+)
