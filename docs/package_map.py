@@ -34,6 +34,7 @@ FLOORS = (
     ("evidence",),
     ("diagnosis",),
     ("study",),
+    ("study_draft",),
     ("refitting",),
     ("reporting",),
     ("cli",),

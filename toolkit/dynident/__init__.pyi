@@ -15,6 +15,7 @@ from . import regression as regression
 from . import reporting as reporting
 from . import robot as robot
 from . import study as study
+from . import study_draft as study_draft
 from . import validation as validation
 from . import wiring as wiring
 from .consistency.checking import check as check
@@ -45,6 +46,7 @@ from .reporting.html import report as report
 from .robot.robot import Robot as Robot
 from .study import Study as Study
 from .study import load as load
+from .study_draft.drafting import draft_study as draft_study
 from .validation.replay import validate as validate
 
 __version__: str

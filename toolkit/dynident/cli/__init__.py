@@ -14,12 +14,18 @@ from typing import NoReturn
 
 import click
 
-from dynident.cli import fits, loops, robots, studies  # which add their commands to the group
+from dynident.cli import (  # which add their commands to the group
+    fits,
+    loops,
+    robots,
+    starting,
+    studies,
+)
 from dynident.cli.group import commands
 from dynident.cli.output import ReaderGone
 from dynident.errors import DynidentError, DynidentWarning
 
-__all__ = ["commands", "fits", "loops", "main", "robots", "studies"]
+__all__ = ["commands", "fits", "loops", "main", "robots", "starting", "studies"]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

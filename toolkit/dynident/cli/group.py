@@ -12,7 +12,19 @@ import click
 from dynident.batch import wish
 from dynident.cli.output import print_json, say, show
 
-_ORDER = ("explain", "diagnose", "fit", "compare", "add", "simulate", "report", "demo", "check")
+_ORDER = (
+    "init",
+    "show",
+    "explain",
+    "diagnose",
+    "fit",
+    "compare",
+    "add",
+    "simulate",
+    "report",
+    "demo",
+    "check",
+)
 """Commands in the order of use, not of the alphabet; others come after them."""
 
 

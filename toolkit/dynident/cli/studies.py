@@ -7,12 +7,14 @@ from pathlib import Path
 import click
 
 from dynident.cli.group import CommandAnswer, answered, commands
+from dynident.cli.output import progress
 from dynident.cli.work import (
     MOST,
     STUDY,
     comparison_of,
     diagnosis_of,
     load_study,
+    require_picture,
     require_places,
     write_report,
 )
@@ -38,6 +40,31 @@ def explain(study: Path, most: int | None, report: Path | None) -> CommandAnswer
     return CommandAnswer(
         content=diagnosis.to_dict,
         parts=lambda: (*diagnosis.tables(), diagnosis.after.parameter_table()),
+    )
+
+
+@commands.command()
+@STUDY
+@answered
+@click.option("--to", type=_PATH, default=Path("recordings.png"), show_default=True)
+def show(study: Path, to: Path) -> CommandAnswer:
+    """Draw what a study has read: positions and torques, what is fitted and what is left out.
+
+    The picture is a PNG, SVG or PDF file; rates, jitter, gaps and repetitions are printed.
+
+    Example: dynident show study.toml --to recordings.png
+    """
+    require_picture(to)
+    require_places(study, to)
+    loaded = load_study(study)
+    from dynident.reporting.recordings import record_facts, recordings_table, show_recordings
+
+    with progress("drawing"):
+        facts = record_facts(loaded)
+        show_recordings(loaded, to)
+    return CommandAnswer(
+        content=lambda: {"picture": str(to), "recordings": [one.to_dict() for one in facts]},
+        parts=lambda: (recordings_table(facts), f"The picture: {to}"),
     )
 
 

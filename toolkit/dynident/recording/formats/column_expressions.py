@@ -58,6 +58,12 @@ def may_be_expression(text: str) -> bool:
     return any(mark in text for mark in "+-*/()`")
 
 
+def quoted(name: str) -> str:
+    """Return a name of a column as an expression holds it: between backticks if it must be."""
+    plain = re.fullmatch(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*(\[\d+\])?", name, re.ASCII)
+    return name if plain and name != "pi" else f"`{name}`"
+
+
 def parse(text: str) -> ColumnExpression:
     """Read a linear expression of columns.
 

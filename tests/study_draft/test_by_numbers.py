@@ -1,0 +1,67 @@
+"""Files without a header line: columns told by how they move together."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dynident.errors import RecordingError
+from dynident.study_draft.by_numbers import UNUSED, named_by_numbers
+from study_files import recording
+from synthetic import arm
+
+NAMES = ("t", "q.shoulder", "q.elbow", "v.shoulder", "v.elbow", "tau.shoulder", "tau.elbow")
+
+
+def table(seed: int = 3) -> dict[str, np.ndarray]:
+    """Time, positions with an encoder's noise, their references, speeds, torques and a flag."""
+    one, rng = recording(seed), np.random.default_rng(seed)
+    v = np.gradient(one.q, one.t, axis=0)
+    blocks = {
+        "t": one.t[:, None] + 1.7e9,
+        "q_ref": one.q,
+        "v_ref": v,
+        "q": one.q + 1e-5 * rng.normal(size=one.q.shape),
+        "v": v + 1e-4 * rng.normal(size=v.shape),
+        "noise": rng.normal(size=one.q.shape),
+        "tau": one.tau,
+        "flag": np.zeros((one.samples, 1)),
+    }
+    return blocks
+
+
+ORDERS = (
+    ("t", "q", "v", "tau"),
+    ("tau", "t", "q", "v"),
+    ("t", "q_ref", "v_ref", "q", "v", "noise", "tau", "flag"),
+    ("flag", "t", "v", "q", "tau", "noise"),
+)
+
+
+@pytest.mark.parametrize("order", ORDERS, ids=" ".join)
+def test_blocks_are_told_in_whatever_order(order: tuple[str, ...]) -> None:
+    blocks = table()
+    x = np.hstack([blocks[name] for name in order])
+    found = named_by_numbers(x, arm(), None, "log.csv")
+    wanted = [
+        f"{name}.{joint}" if name in ("q", "v", "tau") else "t" if name == "t" else UNUSED
+        for name in order
+        for joint in (("shoulder", "elbow") if blocks[name].shape[1] == 2 else ("",))
+    ]
+    assert list(found.names) == wanted
+
+
+def test_a_rate_stands_in_for_a_clock() -> None:
+    blocks = table()
+    x = np.hstack([blocks[name] for name in ("q", "v", "tau")])
+    assert named_by_numbers(x, arm(), 100.0, "log.csv").names == NAMES[1:]
+    with pytest.raises(RecordingError, match="--rate"):
+        named_by_numbers(x, arm(), None, "log.csv")
+
+
+def test_what_is_no_motion_or_has_no_torque_is_refused() -> None:
+    blocks = table()
+    with pytest.raises(RecordingError, match="are the speeds"):
+        named_by_numbers(np.hstack([blocks["t"], blocks["q"], blocks["tau"]]), arm(), None, "x")
+    with pytest.raises(RecordingError, match="may be torques"):
+        named_by_numbers(np.hstack([blocks["t"], blocks["q"], blocks["v"]]), arm(), None, "x")

@@ -1,0 +1,129 @@
+"""Columns of other people's logs: what their names say, and which joint each is of."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dynident.errors import RecordingError
+from dynident.robot import Robot
+from dynident.study_draft.column_roles import role_of
+from dynident.study_draft.log import Log
+from dynident.study_draft.matching import match
+from synthetic import ARM
+
+JOINTS = ("shoulder", "elbow")
+
+
+def two_links() -> Robot:
+    return Robot.from_text(ARM)
+
+
+def log_of(*names: str, **values: np.ndarray) -> Log:
+    """A log of 50 samples; the columns are alike but for those given, and the clocks."""
+    rng = np.random.default_rng(0)
+    columns = {name: rng.normal(size=50) for name in names}
+    columns |= values
+    return Log(file="log.csv", record="", columns=columns, skipped=())  # type: ignore[arg-type]
+
+
+CLOCK = np.arange(50) / 100
+
+LAYOUTS = {
+    "ours": ("q.shoulder q.elbow", "tau.shoulder tau.elbow"),
+    "order of a table": ("q[0] q[1]", "tau[0] tau[1]"),
+    "counted from one": ("q1 q2", "tau1 tau2"),
+    "joints lead": ("J1_pos J2_pos", "J1_torque J2_torque"),
+    "a controller's": ("actual_q_0 actual_q_1", "actual_current_0 actual_current_1"),
+    "joint states by name": (
+        "/joint_states/shoulder/position /joint_states/elbow/position",
+        "/joint_states/shoulder/effort /joint_states/elbow/effort",
+    ),
+    "joint states by number": ("field.position0 field.position1", "field.effort0 field.effort1"),
+    "long names": ("arm_shoulder_position arm_elbow_position", "arm_shoulder_trq arm_elbow_trq"),
+    "camel case": ("jointPosition1 jointPosition2", "jointTorque1 jointTorque2"),
+    "a drive's": ("motorPos_1 motorPos_2", "motorCurrent_1 motorCurrent_2"),
+}
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_layouts_are_matched_whatever_order_the_columns_are_in(layout: str) -> None:
+    positions, torques = (names.split() for names in LAYOUTS[layout])
+    log = log_of(*torques[::-1], *positions[::-1], t=CLOCK)
+    matched = match(log, two_links())
+    found = matched.columns(two_links(), {})
+    assert found["t"].name == "t"
+    assert [found[f"q.{joint}"].name for joint in JOINTS] == positions
+    assert [found[f"tau.{joint}"].name for joint in JOINTS] == torques
+
+
+def test_speeds_references_and_temperatures_are_not_taken_for_positions() -> None:
+    names = [
+        f"{kind}_{k}"
+        for k in (0, 1)
+        for kind in ("target_q", "actual_q", "actual_qd", "target_qd", "effort", "motor_temp")
+    ]
+    found = match(log_of(*names, timestamp=CLOCK), two_links()).columns(two_links(), {})
+    kinds = {ours: theirs.name for ours, theirs in found.items() if ours.endswith("elbow")}
+    assert kinds == {
+        "q.elbow": "actual_q_1",
+        "v.elbow": "actual_qd_1",
+        "tau.elbow": "effort_1",
+        "q_ref.elbow": "target_q_1",
+        "temperature.elbow": "motor_temp_1",
+    }
+
+
+def test_measured_torques_come_before_commands_and_the_others_are_told() -> None:
+    names = ["q1", "q2", "tau_con1", "tau_con2", "tau_meas1", "tau_meas2"]
+    groups = match(log_of(*names, t=CLOCK), two_links()).groups["tau"]
+    assert [group.title for group in groups] == [
+        "tau_meas1 ... tau_meas2",
+        "tau_con1 ... tau_con2",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "scale"),
+    [
+        ("q1_deg", np.pi / 180),
+        ("velocity_deg_1", np.pi / 180),
+        ("time_ms", 1e-3),
+        ("tau1_mNm", 1e-3),
+    ],
+)
+def test_units_in_names_become_scales(name: str, scale: float) -> None:
+    role = role_of(name, JOINTS)
+    assert role is not None and role.scale == pytest.approx(scale)
+
+
+def test_seconds_and_nanoseconds_make_one_clock() -> None:
+    names = ["q1", "q2", "tau1", "tau2"]
+    stamps = 1.7e9 + CLOCK
+    log = log_of(
+        *names, **{"stamp.sec": np.floor(stamps), "stamp.nanosec": np.round(stamps % 1 * 1e9)}
+    )
+    time = match(log, two_links()).time
+    assert time is not None and time[0].name == "stamp.sec + 1e-9*stamp.nanosec"
+
+
+def test_a_clock_that_does_not_go_forward_is_none() -> None:
+    log = log_of("q1", "q2", "tau1", "tau2", t=np.zeros(50))
+    assert match(log, two_links()).time is None
+
+
+@pytest.mark.parametrize(
+    ("names", "what"),
+    [
+        (["tau1", "tau2", "x1", "x2"], "no positions"),
+        (["q1", "q2", "x1", "x2"], "no torques or currents"),
+        (["q1", "tau1", "tau2"], "no positions of 2 joints"),
+        (["q.shoulder", "q1", "tau1", "tau2"], "no positions of 2 joints"),
+    ],
+)
+def test_what_is_not_told_by_name_is_refused_with_what_is_there(
+    names: list[str], what: str
+) -> None:
+    with pytest.raises(RecordingError, match=what) as caught:
+        match(log_of(*names, t=CLOCK), two_links())
+    assert "it holds" in str(caught.value) and "shoulder, elbow" in str(caught.value)

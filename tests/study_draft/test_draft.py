@@ -1,0 +1,180 @@
+"""Drafts of studies: files in other units and orders become the recordings that they are of."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dynident as di
+from dynident.errors import DynidentError, RecordingError
+from dynident.recording import Recording
+from dynident.recording.formats.write import write
+from dynident.study_draft import Decision, draft_study
+from study_files import recording
+from synthetic import ARM
+
+DEG = 180 / np.pi
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Path:
+    path = tmp_path / "arm.urdf"
+    path.write_text(ARM)
+    return path
+
+
+def written(path: Path, columns: dict[str, np.ndarray]) -> Path:
+    rows = np.column_stack(list(columns.values()))
+    header = ",".join(columns)
+    np.savetxt(path, rows, delimiter=",", header=header, comments="", fmt="%.17g")
+    return path
+
+
+def as_logged(one: Recording, **changes: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns with names of nobody's in particular."""
+    plain = {"time": one.t, "pos_1": one.q[:, 0], "pos_2": one.q[:, 1]}
+    return {**plain, "trq_1": one.tau[:, 0], "trq_2": one.tau[:, 1], **changes}
+
+
+def read_back(arm: Path, columns: dict[str, np.ndarray]) -> tuple[di.Study, tuple[Decision, ...]]:
+    data = written(arm.parent / "run.csv", columns)
+    draft = draft_study(arm, [data])
+    return di.load(draft.write(arm.parent / "study.toml")), draft.decisions
+
+
+def assert_same(study: di.Study, one: Recording) -> None:
+    found = study.train.recordings[0]
+    np.testing.assert_allclose(found.t - found.t[0], one.t - one.t[0], atol=1e-9)
+    np.testing.assert_allclose(found.q, one.q, atol=1e-9)
+    np.testing.assert_allclose(found.tau, one.tau, atol=1e-9)
+
+
+def test_plain_columns_are_taken_as_they_are(arm: Path) -> None:
+    one = recording(1)
+    study, decisions = read_back(arm, as_logged(one))
+    assert_same(study, one)
+    assert study.train.recordings[0].period == pytest.approx(8.0, rel=1e-4)
+    assert not any(decision.is_open for decision in decisions if decision.subject != "period")
+
+
+FAULTS = {
+    "degrees": {"pos_1": lambda x: x.q[:, 0] * DEG, "pos_2": lambda x: x.q[:, 1] * DEG},
+    "a sign": {"trq_2": lambda x: -x.tau[:, 1]},
+    "milliseconds": {"time": lambda x: x.t * 1e3},
+    "nanoseconds since long ago": {"time": lambda x: np.round((x.t + 1000.0) * 1e9)},
+    "exchanged torques": {"trq_1": lambda x: x.tau[:, 1], "trq_2": lambda x: x.tau[:, 0]},
+    "a zero a quarter turn off": {"pos_1": lambda x: x.q[:, 0] - np.pi / 2},
+    "milli-newton-metres": {
+        "trq_1": lambda x: x.tau[:, 0] * 1e3,
+        "trq_2": lambda x: x.tau[:, 1] * 1e3,
+    },
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_units_signs_order_and_zeros_are_found_and_said(arm: Path, fault: str) -> None:
+    one = recording(1)
+    study, decisions = read_back(
+        arm, as_logged(one, **{name: change(one) for name, change in FAULTS[fault].items()})
+    )
+    assert_same(study, one)
+    plain = {"q", "tau", "use", "torque", "period"}
+    said = [decision for decision in decisions if decision.subject not in plain]
+    assert any(decision.subject in ("units and signs", "zeros", "t") for decision in said)
+
+
+def test_gears_that_are_given_bring_columns_to_the_joints_side(arm: Path) -> None:
+    one, ratios = recording(1), np.array([32.0, -48.0])
+    q, tau = one.q * ratios, one.tau / ratios
+    columns = {"time": one.t, "m_pos_1": q[:, 0], "m_pos_2": q[:, 1]}
+    columns |= {"m_trq_1": tau[:, 0], "m_trq_2": tau[:, 1]}
+    data = written(arm.parent / "run.csv", columns)
+    draft = draft_study(arm, [data], gears=ratios.tolist())
+    assert "rotor_inertia" in draft.effects
+    assert_same(di.load(draft.write(arm.parent / "study.toml")), one)
+    with pytest.raises(RecordingError, match="one number for each of shoulder, elbow"):
+        draft_study(arm, [data], gears=[32.0])
+
+
+def test_held_commands_are_told_from_measured_torques(arm: Path) -> None:
+    one = recording(2)
+    slow = one.replace(t=one.t[::4], q=one.q[::4], v=None, a=None, tau=one.tau[::4])
+    study, _ = read_back(arm, as_logged(slow))
+    assert study.train.recordings[0].torque == "measured"
+    # A command holds for the step that follows: its sample is the torque half a step later.
+    late = np.stack([np.interp(slow.t + 0.02, one.t, x) for x in one.tau.T], 1)
+    (arm.parent / "study.toml").unlink()
+    study, _ = read_back(arm, as_logged(slow, trq_1=late[:, 0], trq_2=late[:, 1]))
+    assert study.train.recordings[0].torque == "held_command"
+
+
+def test_recordings_are_held_out_by_name_or_by_turns(arm: Path) -> None:
+    one = recording(1)
+    folder = arm.parent
+    named = [written(folder / f"{name}.csv", as_logged(one)) for name in ("train_a", "validation")]
+    uses = [entry.use for entry in draft_study(arm, named).recordings]
+    assert uses == ["train", "test"]
+    plain = [written(folder / f"run{k}.csv", as_logged(one)) for k in range(5)]
+    uses = [entry.use for entry in draft_study(arm, plain).recordings]
+    assert uses == ["train", "train", "train", "test", "train"]
+
+
+def test_whoever_is_asked_decides(arm: Path) -> None:
+    one = recording(1)
+    data = written(arm.parent / "run.csv", as_logged(one, trq_2=-one.tau[:, 1]))
+    asked: list[Decision] = []
+
+    def last(decision: Decision) -> int:
+        asked.append(decision)
+        return len(decision.choices) - 1
+
+    draft = draft_study(arm, [data], ask=last)
+    assert {"units and signs", "period"} <= {decision.subject for decision in asked}
+    assert all(decision.is_open for decision in asked)
+    said = tomllib.loads(draft.text(arm.parent))
+    assert "period" not in said["recordings"][0]
+    assert said["columns"]["tau.elbow"] == "trq_2"  # as recorded: the wrong sign was wanted
+
+
+def test_names_of_files_and_columns_cannot_break_out_of_the_text(arm: Path) -> None:
+    one = recording(1)
+    columns = as_logged(one)
+    columns['tau" = 1 # \t_1'] = columns.pop("trq_1")
+    columns['tau" = 1 # \t_2'] = columns.pop("trq_2")
+    data = written(arm.parent / 'odd "name" #1.csv', columns)
+    study = di.load(draft_study(arm, [data]).write(arm.parent / "study.toml"))
+    assert_same(study, one)
+
+
+def test_files_with_other_columns_and_without_a_clock_are_refused(arm: Path) -> None:
+    one = recording(1)
+    folder = arm.parent
+    first = written(folder / "a.csv", as_logged(one))
+    other = written(folder / "b.csv", as_logged(one, extra=one.t))
+    with pytest.raises(RecordingError, match="has no column 'extra'"):
+        draft_study(arm, [first, other])
+    columns = as_logged(one)
+    del columns["time"]
+    with pytest.raises(RecordingError, match="clock"):
+        draft_study(arm, [written(folder / "c.csv", columns)])
+
+
+def test_a_draft_that_cannot_be_loaded_leaves_what_was_there(arm: Path) -> None:
+    data = written(arm.parent / "run.csv", as_logged(recording(1)))
+    draft = draft_study(arm, [data])
+    out = arm.parent / "study.toml"
+    out.write_text("mine")
+    data.unlink()
+    with pytest.raises(DynidentError):
+        draft.write(out)
+    assert out.read_text() == "mine"
+    assert sorted(path.name for path in arm.parent.iterdir()) == ["arm.urdf", "study.toml"]
+
+
+def test_recordings_in_our_own_names_need_no_columns(arm: Path) -> None:
+    path = arm.parent / "ours.csv"
+    write(recording(1), path)
+    assert "columns" not in tomllib.loads(draft_study(arm, [path]).text(arm.parent))

@@ -1,0 +1,77 @@
+"""The command that begins with files, not with a study."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from dynident import files
+from dynident.cli.group import CommandAnswer, answered, commands
+from dynident.cli.output import progress
+from dynident.errors import FileError
+
+if TYPE_CHECKING:
+    from dynident.study_draft import Decision
+
+_PATH = click.Path(path_type=Path)
+
+
+@commands.command()
+@click.argument("robot", type=_PATH)
+@click.argument("data", nargs=-1, required=True, type=_PATH)
+@click.option("--out", type=_PATH, default=Path("study.toml"), show_default=True)
+@click.option("--joints", help="Joints that were recorded, in order, with commas between them.")
+@click.option("--gears", help="Ratios, where columns are of the motors' side: 32,32,45,-48,45,32.")
+@answered
+def init(
+    robot: Path, data: tuple[Path, ...], out: Path, joints: str | None, gears: str | None
+) -> CommandAnswer:
+    """Draft a study from a robot description and files of measurements.
+
+    Columns are matched to joints; units, gear side and signs are compared with the description.
+    On a terminal it asks where the files leave something open, else it takes what is likeliest.
+    The study that it writes says what was decided, and why.
+
+    Example: dynident init arm.urdf runs/*.csv --out study.toml
+    """
+    from dynident.study_draft import draft_study
+
+    files.require_place(out)
+    if out.exists():
+        raise FileError("is there already", str(out), "name another file with --out, or remove it")
+    names = None if joints is None else [name.strip() for name in joints.split(",")]
+    ask = _ask if sys.stdin.isatty() and sys.stderr.isatty() else None
+    with progress("reading"):
+        draft = draft_study(robot, data, joints=names, gears=_ratios(gears), ask=ask)
+        draft.write(out)
+    return CommandAnswer(
+        content=lambda: {"out": str(out), **draft.to_dict()},
+        parts=lambda: (
+            draft.decision_table(),
+            f"Written: {out}. Read it, then: dynident explain {out}",
+        ),
+    )
+
+
+def _ratios(text: str | None) -> list[float] | None:
+    """The numbers of an option."""
+    if text is None:
+        return None
+    try:
+        return [float(one) for one in text.split(",")]
+    except ValueError:
+        raise click.BadParameter(
+            f"'{text}' holds what is no number", param_hint="--gears"
+        ) from None
+
+
+def _ask(decision: Decision) -> int:
+    """Have a choice taken at the terminal."""
+    click.echo(f"\n{decision.subject}: likeliest 1, because {decision.reason}", err=True)
+    for number, choice in enumerate(decision.choices, start=1):
+        click.echo(f"  {number}  {choice}", err=True)
+    kind = click.IntRange(1, len(decision.choices))
+    return click.prompt("which", type=kind, default=1, err=True) - 1

@@ -1,0 +1,257 @@
+"""A drafted study: its text with the reason for each line, and the file."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from dynident import files
+from dynident.effects import FRICTION_WIDTH
+from dynident.recording import Column, default_filter
+from dynident.study import load
+from dynident.study_draft.decision import Decision
+from dynident.tables import Table
+
+_SIGNALS = ("t", "q", "v", "a", "tau", "q_ref", "temperature")
+
+
+@dataclass(frozen=True, kw_only=True)
+class DraftedRecording:
+    """An entry of `[[recordings]]`.
+
+    Attributes
+    ----------
+    file, record : where it is; `record` is empty where the file holds one.
+    use, period : as in a study.
+    remark : rate, repetitions and idle stretches, in words.
+    """
+
+    file: Path
+    record: str
+    use: Literal["train", "test"]
+    period: float | None
+    remark: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyDraft:
+    """A study that was worked out from files.
+
+    Attributes
+    ----------
+    robot : path of the description.
+    joints : that were recorded; None for all that move.
+    columns : ours -> theirs, also where both are called the same.
+    recordings : entries of the study.
+    torque : "measured" or "held_command".
+    effects : that the model starts with.
+    rate_hz : of the slowest recording.
+    gravity : (3) m/s^2, of the description.
+    has_reference : whether the files hold positions that were asked for.
+    decisions : what was decided, and why.
+    """
+
+    robot: Path
+    joints: tuple[str, ...] | None
+    columns: dict[str, Column]
+    recordings: tuple[DraftedRecording, ...]
+    torque: Literal["measured", "held_command"]
+    effects: tuple[str, ...]
+    rate_hz: float
+    gravity: tuple[float, ...]
+    has_reference: bool
+    decisions: tuple[Decision, ...]
+
+    def text(self, folder: str | Path = ".") -> str:
+        """Return the study as TOML, with paths relative to a folder."""
+        folder = Path(folder)
+        parts = [
+            self._head(folder),
+            self._model(),
+            self._columns(),
+            self._filter(),
+            *(self._recording(one, folder) for one in self.recordings),
+            self._optional(),
+        ]
+        return "".join(parts)
+
+    def write(self, path: str | Path) -> Path:
+        """Write the study, after it has been read back.
+
+        Raises
+        ------
+        FileError
+            If the file cannot be written.
+        StudyError
+            If what was drafted is no study; whatever the file held is then untouched.
+        """
+        path = files.require_place(path)
+        return files.write_bytes(path, self.text(path.parent).encode(), verify=load)
+
+    def decision_table(self) -> Table:
+        """What was decided, and why."""
+        return Table(
+            "What the files are taken for",
+            ("", "taken for", "because"),
+            tuple((one.subject, one.words, one.reason) for one in self.decisions),
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The draft as JSON has it."""
+        return {
+            "decisions": [
+                {"subject": one.subject, "choices": list(one.choices), "chosen": one.words,
+                 "reason": one.reason}
+                for one in self.decisions
+            ],
+            "study": self.text(),
+        }  # fmt: skip
+
+    # --- parts of the text ----------------------------------------------------------------------
+
+    def _head(self, folder: Path) -> str:
+        lines = [
+            "# A study of dynident, drafted from the files that it names. Read what was decided,",
+            "# correct what is wrong, then: dynident explain <this file>",
+            f"robot = {_quoted(_relative(self.robot, folder))}",
+        ]
+        if self.joints is not None:
+            lines.append(f"joints = {json.dumps(self.joints, ensure_ascii=False)}")
+        return _lines(lines)
+
+    def _model(self) -> str:
+        held = self.torque == "held_command"
+        why = "a command is held to the next sample" if held else "as a sensor or drive reports it"
+        rotor = [] if "rotor_inertia" in self.effects else ['# Behind gears add "rotor_inertia".']
+        return _lines(
+            [
+                "",
+                "# Effects that any geared joint has, at every joint; `explain` looks for others.",
+                *rotor,
+                f"effects = {json.dumps(self.effects)}",
+                f'torque = "{self.torque}"  # {why}',
+                f"# friction_width = {FRICTION_WIDTH:g}  # rad/s; or of some joints: {{ j1 = 0.05 }}",
+                f"# gravity = {json.dumps(self.gravity)}  # m/s^2 in the base's axes; a mounting on"
+                " a wall or a ceiling turns it",
+            ]
+        )
+
+    def _columns(self) -> str:
+        lines = ["", "# Ours = the file's name of it, or a linear expression of its columns."]
+        if all(one == Column(name) for name, one in self.columns.items()):
+            return _lines(["", "# The files have the names that a study asks for: no [columns]."])
+        lines.append("[columns]")
+        reasons = {one.subject: one for one in self.decisions}
+        if (units := reasons.get("units and signs")) is not None:
+            lines += _comment(f"Units and signs: {units.words}, because {units.reason}.")
+        for signal in _SIGNALS:
+            own = [name for name in self.columns if name.partition(".")[0] == signal]
+            if not own:
+                continue
+            if (one := reasons.get(signal)) is not None:
+                others = [choice for k, choice in enumerate(one.choices) if k != one.chosen]
+                said = f"{signal}: {one.words}, {one.reason}."
+                if others:
+                    said += f" There are also {'; '.join(others)}."
+                lines += _comment(said)
+            lines += [f"{_quoted(name)} = {_theirs(self.columns[name])}" for name in own]
+        return _lines(lines)
+
+    def _filter(self) -> str:
+        usual = default_filter(self.rate_hz)
+        return _lines(
+            [
+                "",
+                f"# The usual filter at {self.rate_hz:.5g} Hz; with this table, what it says.",
+                "# [filter]",
+                f"# position_cutoff_hz = {usual.position_cutoff_hz:g}  # of q, before it is"
+                " differentiated",
+                f"# cutoff_hz = {usual.cutoff_hz:g}  # of columns and torque alike",
+                f"# rate_hz = {usual.rate_hz:g}  # rows that are kept",
+            ]
+        )
+
+    def _recording(self, one: DraftedRecording, folder: Path) -> str:
+        lines = ["", *_comment(f"{one.remark}."), "[[recordings]]"]
+        lines.append(f"file = {_quoted(_relative(one.file, folder))}")
+        if one.record:
+            lines.append(f"record = {_quoted(one.record)}")
+        lines.append(f'use = "{one.use}"')
+        if one.period is not None:
+            lines.append(f"period = {one.period!r}")
+        return _lines(lines)
+
+    def _optional(self) -> str:
+        lines = [
+            "",
+            "# In an entry of [[recordings]], where it applies:",
+            "# start = 0.0            # s, when it began in the session: motors warm up",
+            "# window = [0.0, 10.0]   # s, what to use of it",
+            "# payload = true         # a load is carried; false: none; leave out: not known",
+        ]
+        if not any(one.period for one in self.recordings):
+            n = len([name for name in self.columns if name.startswith("q.")])
+            listed = ", ".join(["0.1"] * n)
+            lines += [
+                "",
+                "# Nothing repeats, so that the noise is unknown: state it if you know it.",
+                "# [noise]",
+                f"# position_std = {json.dumps([1e-5] * n)}  # rad or m",
+                f"# torque_std = [{listed}]  # N m or N",
+            ]
+        if self.has_reference:
+            lines += [
+                "",
+                "# The loop, for instruments and validation (dynident fit --method iv, simulate).",
+                "# [controller]",
+                '# kind = "pd"',
+                f"# rate_hz = {self.rate_hz:.5g}",
+            ]
+        return _lines(lines)
+
+
+def _lines(lines: list[str]) -> str:
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _comment(text: str, width: int = 98) -> list[str]:
+    """A remark as lines of comment; control characters of hostile names have no place in it."""
+    words = "".join(c if c.isprintable() else " " for c in text).split()
+    lines, line = [], "#"
+    for word in words:
+        if len(line) + 1 + len(word) > width and line != "#":
+            lines.append(line)
+            line = "#"
+        line += f" {word}"
+    return [*lines, line]
+
+
+def _relative(path: Path, folder: Path) -> str:
+    """A path as the study names it: relative where it lies below or beside, else whole."""
+    try:
+        found = os.path.relpath(path, folder)
+    except ValueError:  # another drive of Windows
+        return path.absolute().as_posix()
+    steps = Path(found).parts.count("..")
+    return Path(found).as_posix() if steps <= 4 else path.absolute().as_posix()
+
+
+def _theirs(column: Column) -> str:
+    if column.scale == 1.0:
+        return _quoted(column.name)
+    scale = repr(column.scale) if _is_exact(column.scale) else f"{column.scale:.6g}"
+    scale = scale if any(c in scale for c in ".e") else f"{scale}.0"
+    return f"{{ name = {_quoted(column.name)}, scale = {scale} }}"
+
+
+def _is_exact(scale: float) -> bool:
+    """Whether a factor is that of a unit, of which every digit counts."""
+    return any(math.isclose(abs(scale), x, rel_tol=1e-12) for x in (math.pi / 180, 1e-6, 1e-9))
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)

@@ -1,0 +1,127 @@
+"""A file of measurements as it lies there: columns with the file's own names, nothing matched."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dynident.errors import RecordingError
+from dynident.recording.formats.binary_files import COLUMNS, pick
+from dynident.recording.formats.column_names import ColumnTable
+from dynident.recording.formats.read import open_table
+
+MOST_COLUMNS = 2000
+"""Columns of a file that are looked at."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Log:
+    """One record of a file.
+
+    Attributes
+    ----------
+    file : path as it was given.
+    record : which of a file that holds several; empty where it holds one.
+    columns : name -> (T,) numbers; `name[k]` for column k of a table. Text is left out.
+    skipped : names of what is there and is no column of as many numbers as the others.
+    """
+
+    file: Path
+    record: str
+    columns: Mapping[str, np.ndarray]
+    skipped: tuple[str, ...]
+
+    @property
+    def where(self) -> str:
+        """How messages call it."""
+        return f"{self.file}, record {self.record}" if self.record else str(self.file)
+
+    @property
+    def samples(self) -> int:
+        """Number of rows, T."""
+        return len(next(iter(self.columns.values())))
+
+
+def logs_of(path: str | Path) -> tuple[Log, ...]:
+    """Open a file, every record of it.
+
+    Parameters
+    ----------
+    path : of any format that a study can name.
+
+    Returns
+    -------
+    One log, or as many as the file has records.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read.
+    RecordingError
+        If it is no file of measurements, or holds no columns of numbers.
+    """
+    path = Path(path)
+    table = open_table(path)
+    if COLUMNS in table.names:
+        records = [name for name in table.names if name != COLUMNS]
+        if records and table.load([COLUMNS])[COLUMNS].dtype.kind == "U":
+            return tuple(_log(path, record, pick(table, record)) for record in records)
+    return (_log(path, "", table),)
+
+
+def _log(path: Path, record: str, table: ColumnTable) -> Log:
+    found: dict[str, np.ndarray] = {}
+    skipped: list[str] = []
+    for name in table.names[:MOST_COLUMNS]:
+        columns = _numbers(table, name)
+        if columns is None:
+            skipped.append(name)
+        else:
+            found |= columns
+    skipped += table.names[MOST_COLUMNS:]
+    lengths = [len(x) for x in found.values()]
+    if not lengths:
+        what = "holds no column of numbers"
+        raise RecordingError(what, table.file, "is it the right file?")
+    # Of tables of several lengths (parameters beside samples) the samples are the most.
+    most = max(set(lengths), key=lambda n: (n > 1, sum(one == n for one in lengths), n))
+    skipped += [name for name, x in found.items() if len(x) != most]
+    kept = {name: x for name, x in found.items() if len(x) == most}
+    return Log(file=path, record=record, columns=kept, skipped=tuple(skipped))
+
+
+def _numbers(table: ColumnTable, name: str) -> dict[str, np.ndarray] | None:
+    """Columns of numbers under a name; None where it holds text or numbers of no use."""
+    try:
+        x = table.load([name])[name]
+    except RecordingError:
+        return None
+    if x.dtype.kind not in "fiu" or x.ndim not in (1, 2) or not x.size:
+        return None
+    if x.ndim == 2 and 1 in x.shape:
+        x = x.ravel()
+    if x.ndim == 1:
+        return {name: x.astype(float)}
+    if x.shape[1] > MOST_COLUMNS:
+        return None
+    return {f"{name}[{k}]": x[:, k].astype(float) for k in range(x.shape[1])}
+
+
+def same_columns(logs: Sequence[Log]) -> None:
+    """Refuse files that do not hold the same columns: they cannot be of one study.
+
+    Raises
+    ------
+    RecordingError
+        Naming the first that differs, and a column.
+    """
+    first = logs[0]
+    for one in logs[1:]:
+        odd = sorted(set(first.columns) ^ set(one.columns))
+        if odd:
+            have, lack = (first, one) if odd[0] in first.columns else (one, first)
+            what = f"has no column '{odd[0]}', which {have.where} has"
+            raise RecordingError(what, lack.where, "draft a study of files with the same columns")

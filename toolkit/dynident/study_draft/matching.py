@@ -1,0 +1,180 @@
+"""Columns of a log matched to signals and joints, by their names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from dynident.errors import RecordingError
+from dynident.recording import Column
+from dynident.recording.formats.column_expressions import quoted
+from dynident.robot import Robot
+from dynident.study_draft.column_roles import ColumnRole, Origin, Signal, role_of
+from dynident.study_draft.log import Log
+
+_INCREASING = 0.999  # share of the steps of a clock that go forward
+_PREFERRED: dict[str, tuple[Origin, ...]] = {
+    "q": ("measured", "plain"),
+    "v": ("measured", "plain"),
+    "tau": ("measured", "plain", "command", "reference"),
+    "current": ("measured", "plain", "command", "reference"),
+    "q_ref": ("reference", "command"),
+    "temperature": ("measured", "plain"),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Group:
+    """Columns of one signal, one for each joint.
+
+    Attributes
+    ----------
+    roles : (n) of the joints in their order.
+    reason : how columns were matched to joints, in words.
+    """
+
+    roles: tuple[ColumnRole, ...]
+    reason: str
+
+    @property
+    def title(self) -> str:
+        """The columns, the first and the last of them."""
+        names = [role.column for role in self.roles]
+        return names[0] if len(names) == 1 else f"{names[0]} ... {names[-1]}"
+
+    @property
+    def origin(self) -> Origin:
+        """Whether it was measured, a reference or a command."""
+        return self.roles[0].origin
+
+
+@dataclass(frozen=True, kw_only=True)
+class Matched:
+    """What the names of a log's columns tell.
+
+    Attributes
+    ----------
+    time : the clock, and why; None where nothing is one.
+    groups : signal ("q", "v", "tau", "q_ref", "temperature") -> groups, the likeliest first.
+    drive : whether what stands for torques are currents or voltages.
+    """
+
+    time: tuple[Column, str] | None
+    groups: dict[str, tuple[Group, ...]] = field(default_factory=dict)
+    drive: bool = False
+
+    def columns(self, robot: Robot, chosen: dict[str, int]) -> dict[str, Column]:
+        """Our columns -> those of the log.
+
+        Parameters
+        ----------
+        robot : for the joints' names.
+        chosen : signal -> which of its groups; the first where it says nothing.
+        """
+        found = {"t": self.time[0]} if self.time else {}
+        for signal, groups in self.groups.items():
+            roles = groups[chosen.get(signal, 0)].roles
+            for joint, role in zip(robot.names, roles, strict=True):
+                found[f"{signal}.{joint}"] = Column(role.column, role.scale)
+        return found
+
+
+def match(log: Log, robot: Robot) -> Matched:
+    """Match the columns of a log to time, signals and joints.
+
+    Parameters
+    ----------
+    log : of which only the clock's numbers are looked at, not those of other columns.
+    robot : whose joints they are of.
+
+    Raises
+    ------
+    RecordingError
+        If no group of columns holds a position, or none a torque, for every joint.
+    """
+    roles = [role for name in log.columns if (role := role_of(name, robot.names)) is not None]
+    groups: dict[str, tuple[Group, ...]] = {}
+    for signal in ("q", "v", "tau", "temperature"):
+        groups[signal] = _groups(roles, signal, signal, robot)
+    drive = not groups["tau"]
+    if drive:
+        groups["tau"] = _groups(roles, "current", "current", robot)
+    groups["q_ref"] = _groups(roles, "q", "q_ref", robot)
+    for signal, what in (("q", "positions"), ("tau", "torques or currents")):
+        if not groups[signal]:
+            shown = ", ".join(list(log.columns)[:20]) + (", ..." if len(log.columns) > 20 else "")
+            remedy = (
+                f"it holds {shown}; joints: {', '.join(robot.names)}. Write the study by hand, "
+                "with [columns]"
+            )
+            raise RecordingError(
+                f"no {what} of {robot.n} joints are told by name", log.where, remedy
+            )
+    found = {signal: some for signal, some in groups.items() if some}
+    return Matched(time=_clock(log, roles), groups=found, drive=drive)
+
+
+def _groups(
+    roles: Sequence[ColumnRole], signal: Signal, use: str, robot: Robot
+) -> tuple[Group, ...]:
+    """Groups of columns that hold a signal of every joint, the likeliest first."""
+    origins = _PREFERRED[use]
+    sets: dict[tuple[Origin, tuple[str, ...]], list[ColumnRole]] = {}
+    for role in roles:
+        if role.signal == signal and role.origin in origins:
+            sets.setdefault((role.origin, role.stem), []).append(role)
+    found = [
+        (origins.index(origin), len(stem), group)
+        for (origin, stem), some in sets.items()
+        if (group := _at_joints(some, robot)) is not None
+    ]
+    return tuple(group for _, _, group in sorted(found, key=lambda one: one[:2]))
+
+
+def _at_joints(roles: list[ColumnRole], robot: Robot) -> Group | None:
+    """The roles in the order of the joints, if there is one for each."""
+    n = robot.n
+    named = {role.joint: role for role in roles if role.joint is not None}
+    if set(named) == set(range(n)):
+        ordered = tuple(named[j] for j in range(n))
+        return Group(roles=ordered, reason="by the joints' names")
+    if named:
+        return None
+    numbered = sorted((r for r in roles if r.number is not None), key=_number)
+    if len({role.number for role in numbered}) < len(numbered):
+        return None
+    if len(numbered) == n:
+        return Group(roles=tuple(numbered), reason="by their numbers, in the joints' order")
+    if len(numbered) > n:
+        reason = f"the first {n} of {len(numbered)} by their numbers, in the joints' order"
+        return Group(roles=tuple(numbered[:n]), reason=reason)
+    if n == 1 and len(roles) == 1:
+        return Group(roles=tuple(roles), reason="the only one")
+    return None
+
+
+def _number(role: ColumnRole) -> int:
+    return -1 if role.number is None else role.number
+
+
+def _clock(log: Log, roles: Sequence[ColumnRole]) -> tuple[Column, str] | None:
+    """The column, or pair of seconds and nanoseconds, that goes forward."""
+    candidates = [role for role in roles if role.signal == "t" and role.joint is None]
+    whole = {role.stem: role for role in candidates if role.scale == 1.0}
+    for role in candidates:
+        other = whole.get(role.stem)
+        if role.scale != 1e-9 or other is None:
+            continue
+        if _goes_forward(log.columns[other.column] + 1e-9 * log.columns[role.column]):
+            pair = f"{quoted(other.column)} + 1e-9*{quoted(role.column)}"
+            return Column(pair), "seconds and nanoseconds"
+    for role in sorted(candidates, key=lambda one: len(one.stem)):
+        if _goes_forward(log.columns[role.column]):
+            return Column(role.column, role.scale), "it goes forward"
+    return None
+
+
+def _goes_forward(x: np.ndarray) -> bool:
+    return bool(np.isfinite(x).all() and np.mean(np.diff(x) > 0) >= _INCREASING)

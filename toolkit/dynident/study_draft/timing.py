@@ -1,0 +1,93 @@
+"""When things happen in recordings: their clock, their repetitions, and which of them are to judge.
+
+Standing still at either end needs no line in a study: `recording.usable` leaves it out by itself.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from dynident.recording import Recording
+from dynident.recording.plausibility import LONGEST_STEP
+from dynident.recording.repetition import repeats_after, shift_mismatch
+
+_CLOCKS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (1e-9, "ns"))
+_FASTEST = 2e4  # Hz that a robot is sampled at
+_REPEATS = 0.05  # of the motion that two repetitions may differ by
+_WHOLE = 0.3  # samples by which a period may miss a whole number of them
+_EVERY = 4  # of so many recordings one is held out
+_TRAIN, _TEST = ("train", "fit", "ident", "exc"), ("test", "val", "check")
+
+
+def clock_scale(t: np.ndarray) -> tuple[float, str]:
+    """Seconds per unit of a clock, and the unit's name, from its usual step.
+
+    Parameters
+    ----------
+    t : (T,) stamps.
+
+    Returns
+    -------
+    The largest unit in which samples are neither slower nor faster than those of any robot.
+    """
+    step = float(np.median(np.diff(t)))
+    for scale, unit in _CLOCKS:
+        if step * scale <= LONGEST_STEP:
+            return (scale, unit) if step * scale >= 1 / _FASTEST else (1.0, "s")
+    return 1.0, "s"
+
+
+def period_of(recording: Recording) -> float | None:
+    """Time after which the positions of a recording repeat, s; None where they do not.
+
+    Parameters
+    ----------
+    recording : on any clock; jitter counts as none.
+    """
+    moves = np.ptp(recording.q, axis=0) > 0
+    if recording.samples < 40 or not moves.any():
+        return None
+    q = recording.q[:, moves] - recording.q[:, moves].mean(axis=0)
+    q = q / np.std(q, axis=0)
+    lag = repeats_after(q, recording.samples // 2 + 1)
+    if lag is None or shift_mismatch(q, lag) > _REPEATS:
+        return None
+    if abs(lag - round(lag)) < _WHOLE:
+        lag = float(round(lag))
+    period = lag / recording.rate_hz
+    return float(f"{period:.{max(3, math.ceil(math.log10(lag)) + 2)}g}")
+
+
+def uses_of(names: Sequence[str]) -> tuple[tuple[str, ...], str]:
+    """Which recordings are to fit and which to judge by, and why.
+
+    Parameters
+    ----------
+    names : of files or records.
+
+    Returns
+    -------
+    "train" or "test" for each; at least one is "train".
+    """
+    told = [_told(name) for name in names]
+    if "train" in told and "test" in told:
+        return tuple(one or "train" for one in told), "as the names of the files say"
+    count = len(names)
+    if count == 1:
+        return ("train",), "there is one: blocks of its time are held out to judge by"
+    if count < _EVERY:
+        return (*("train",) * (count - 1), "test"), "the last one is held out to judge by"
+    uses = tuple("test" if k % _EVERY == _EVERY - 1 else "train" for k in range(count))
+    return uses, "every fourth one is held out to judge by"
+
+
+def _told(name: str) -> str:
+    words = re.findall(r"[a-z]+", name.lower())
+    for use, stems in (("train", _TRAIN), ("test", _TEST)):
+        if any(word.startswith(stem) for word in words for stem in stems):
+            return use
+    return ""
