@@ -40,7 +40,7 @@ def test_it_says_what_it_decided_and_what_to_type_next(run, study, tmp_path):
     ("arguments", "words"),
     [
         (("arm.urdf",), "DATA"),
-        (("arm.urdf", "nothing.csv"), "no such file"),
+        (("arm.urdf", "nothing.csv"), "no such data file"),
         (("nothing.urdf", "train.csv"), "no such file"),
         (("arm.urdf", "arm.urdf"), "names no format"),
         (("train.csv", "train.csv"), "not well-formed XML"),

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from dynident.errors import RecordingError
+from dynident.recording import FileLayout
 from dynident.robot import Robot
 from dynident.study_draft.column_roles import role_of
 from dynident.study_draft.log import Log
@@ -24,7 +27,7 @@ def log_of(*names: str, **values: np.ndarray) -> Log:
     rng = np.random.default_rng(0)
     columns = {name: rng.normal(size=50) for name in names}
     columns |= values
-    return Log(file="log.csv", record="", columns=columns, skipped=())  # type: ignore[arg-type]
+    return Log(file=Path("log.csv"), record="", columns=columns, skipped=(), layout=FileLayout())
 
 
 CLOCK = np.arange(50) / 100

@@ -178,3 +178,23 @@ def test_recordings_in_our_own_names_need_no_columns(arm: Path) -> None:
     path = arm.parent / "ours.csv"
     write(recording(1), path)
     assert "columns" not in tomllib.loads(draft_study(arm, [path]).text(arm.parent))
+
+
+def test_files_without_a_header_are_told_by_their_numbers(arm: Path) -> None:
+    one = recording(3)
+    v = np.gradient(one.q, one.t, axis=0)
+    x = np.column_stack([one.t, one.q, v, one.tau])
+    data = arm.parent / "bare.csv"
+    np.savetxt(data, x, delimiter=",", fmt="%.17g")
+    study = di.load(draft_study(arm, [data]).write(arm.parent / "study.toml"))
+    assert_same(study, one)
+    np.savetxt(data, x[:, 1:], delimiter=",", fmt="%.17g")
+    draft = draft_study(arm, [data], rate_hz=100.0)
+    assert_same(di.load(draft.write(arm.parent / "study.toml")), one)
+
+
+def test_patterns_stand_for_files_in_the_order_of_their_numbers(arm: Path) -> None:
+    for k in (1, 2, 10):
+        written(arm.parent / f"run{k}.csv", as_logged(recording(1)))
+    draft = draft_study(arm, [str(arm.parent / "run*.csv")])
+    assert [one.file.name for one in draft.recordings] == ["run1.csv", "run2.csv", "run10.csv"]

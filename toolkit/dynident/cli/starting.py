@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from dynident import files
-from dynident.cli.group import CommandAnswer, answered, commands
+from dynident.cli.group import CommandAnswer, answered, collected, commands
 from dynident.cli.output import progress
 from dynident.errors import FileError
 
@@ -19,16 +20,33 @@ if TYPE_CHECKING:
 _PATH = click.Path(path_type=Path)
 
 
+@dataclass(frozen=True)
+class _Told:
+    """What the files do not say and somebody knows."""
+
+    joints: str | None
+    gears: str | None
+    rate_hz: float | None
+
+    def read(self) -> dict[str, Any]:
+        """As `draft_study` takes it."""
+        return {
+            "joints": self.joints and [name.strip() for name in self.joints.split(",")],
+            "gears": self.gears and _numbers(self.gears),
+            "rate_hz": self.rate_hz,
+        }
+
+
 @commands.command()
 @click.argument("robot", type=_PATH)
-@click.argument("data", nargs=-1, required=True, type=_PATH)
+@click.argument("data", nargs=-1, required=True)
 @click.option("--out", type=_PATH, default=Path("study.toml"), show_default=True)
 @click.option("--joints", help="Joints that were recorded, in order, with commas between them.")
+@click.option("--rate", "rate_hz", type=float, help="Hz, of files without a column of time.")
 @click.option("--gears", help="Ratios, where columns are of the motors' side: 32,32,45,-48,45,32.")
 @answered
-def init(
-    robot: Path, data: tuple[Path, ...], out: Path, joints: str | None, gears: str | None
-) -> CommandAnswer:
+@collected(told=_Told)
+def init(robot: Path, data: tuple[str, ...], out: Path, told: _Told) -> CommandAnswer:
     """Draft a study from a robot description and files of measurements.
 
     Columns are matched to joints; units, gear side and signs are compared with the description.
@@ -42,10 +60,9 @@ def init(
     files.require_place(out)
     if out.exists():
         raise FileError("is there already", str(out), "name another file with --out, or remove it")
-    names = None if joints is None else [name.strip() for name in joints.split(",")]
     ask = _ask if sys.stdin.isatty() and sys.stderr.isatty() else None
     with progress("reading"):
-        draft = draft_study(robot, data, joints=names, gears=_ratios(gears), ask=ask)
+        draft = draft_study(robot, data, ask=ask, **told.read())
         draft.write(out)
     return CommandAnswer(
         content=lambda: {"out": str(out), **draft.to_dict()},
@@ -56,10 +73,8 @@ def init(
     )
 
 
-def _ratios(text: str | None) -> list[float] | None:
+def _numbers(text: str) -> list[float]:
     """The numbers of an option."""
-    if text is None:
-        return None
     try:
         return [float(one) for one in text.split(",")]
     except ValueError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,14 +30,33 @@ class NamedByNumbers:
 
     Attributes
     ----------
-    names : ours, or `UNUSED`.
-    choices : for the torques: descriptions of blocks of columns, the likeliest first.
+    names : ours, or `UNUSED`; those of torques are missing.
+    torques : first columns of the blocks that may be torques, the likeliest first.
     reason : what tells them.
     """
 
     names: tuple[str, ...]
-    choices: tuple[str, ...]
+    torques: tuple[int, ...]
+    joints: int
     reason: str
+
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """The blocks in words, columns counted from 1."""
+        return tuple(f"torques in columns {s + 1} to {s + self.joints}" for s in self.torques)
+
+    def named(self, chosen: int, joints: Sequence[str]) -> tuple[str, ...]:
+        """Return the names with those of the torques.
+
+        Parameters
+        ----------
+        chosen : which of `torques`.
+        joints : their names.
+        """
+        found = list(self.names)
+        for j, joint in enumerate(joints):
+            found[self.torques[chosen] + j] = f"tau.{joint}"
+        return tuple(found)
 
 
 def named_by_numbers(
@@ -93,14 +113,15 @@ def named_by_numbers(
     names = [UNUSED] * x.shape[1]
     if clock is not None:
         names[clock] = "t"
-    for signal, start in (("q", q), ("v", v), ("tau", tau)):
+    for signal, start in (("q", q), ("v", v)):
         for j, joint in enumerate(robot.names):
             names[start + j] = f"{signal}.{joint}"
     # Blocks that overlap the best one are no choice of their own.
     others = [-s for _, s in scored[1:] if abs(-s - tau) >= n]
     return NamedByNumbers(
         names=tuple(names),
-        choices=tuple(f"columns {s + 1} to {s + n}" for s in [tau, *others[:2]]),
+        torques=(tau, *others[:2]),
+        joints=n,
         reason=f"columns {v + 1} to {v + n} are the derivative of {q + 1} to {q + n}, and the "
         "equations of motion explain these best",
     )

@@ -49,13 +49,17 @@ _SIGNALS: dict[Signal, frozenset[str]] = {
     "current": frozenset(["i", "current", "currents", "curr", "amps", "cur", "voltage", "vir"]),
     "temperature": frozenset(["temp", "temperature", "temperatures"]),
 }
-_SIGNAL_OF = {word: signal for signal, words in _SIGNALS.items() for word in words}
+_SIGNAL_OF: dict[str, Signal] = {
+    word: signal for signal, words in _SIGNALS.items() for word in words
+}
 _ORIGINS: dict[Origin, frozenset[str]] = {
     "measured": frozenset(["actual", "act", "measured", "meas", "msr", "real"]),
     "reference": frozenset(["ref", "reference", "des", "desired", "target", "goal", "setpoint"]),
     "command": frozenset(["cmd", "command", "commanded", "con", "ctrl", "control"]),
 }
-_ORIGIN_OF = {word: origin for origin, words in _ORIGINS.items() for word in words}
+_ORIGIN_OF: dict[str, Origin] = {
+    word: origin for origin, words in _ORIGINS.items() for word in words
+}
 _SCALES: dict[str, tuple[Signal, float]] = {
     "deg": ("q", math.pi / 180),
     "degree": ("q", math.pi / 180),

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 from dynident import files
 from dynident.effects import FRICTION_WIDTH
-from dynident.recording import Column, default_filter
+from dynident.recording import Column, FileLayout, default_filter
 from dynident.study import load
 from dynident.study_draft.decision import Decision
 from dynident.tables import Table
@@ -26,12 +26,14 @@ class DraftedRecording:
     Attributes
     ----------
     file, record : where it is; `record` is empty where the file holds one.
+    layout : names of its columns by position, and its rate, where the file says neither.
     use, period : as in a study.
     remark : rate, repetitions and idle stretches, in words.
     """
 
     file: Path
     record: str
+    layout: FileLayout
     use: Literal["train", "test"]
     period: float | None
     remark: str
@@ -134,7 +136,7 @@ class StudyDraft:
                 *rotor,
                 f"effects = {json.dumps(self.effects)}",
                 f'torque = "{self.torque}"  # {why}',
-                f"# friction_width = {FRICTION_WIDTH:g}  # rad/s; or of some joints: {{ j1 = 0.05 }}",
+                f"# friction_width = {FRICTION_WIDTH:g}  # rad/s; or of joints: {{ j1 = 0.05 }}",
                 f"# gravity = {json.dumps(self.gravity)}  # m/s^2 in the base's axes; a mounting on"
                 " a wall or a ceiling turns it",
             ]
@@ -180,6 +182,11 @@ class StudyDraft:
         lines.append(f"file = {_quoted(_relative(one.file, folder))}")
         if one.record:
             lines.append(f"record = {_quoted(one.record)}")
+        if one.layout.names and one.layout.names != "numbered":
+            names = ", ".join(_quoted(name) for name in one.layout.names)
+            lines.append(f"columns = [{names}]")
+        if one.layout.rate_hz is not None:
+            lines.append(f"rate_hz = {one.layout.rate_hz!r}")
         lines.append(f'use = "{one.use}"')
         if one.period is not None:
             lines.append(f"period = {one.period!r}")

@@ -9,9 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from dynident.data_files import find_all
 from dynident.errors import DynidentWarning, RecordingError
-from dynident.recording import Column, Recording, read, usable
+from dynident.recording import Column, FileLayout, Recording, read, usable
 from dynident.robot import Robot
+from dynident.study_draft.by_numbers import named_by_numbers
 from dynident.study_draft.decision import Ask, Decision, decided
 from dynident.study_draft.draft import DraftedRecording, StudyDraft
 from dynident.study_draft.gears import joint_side, require_ratios, turned
@@ -35,6 +37,7 @@ def draft_study(
     *,
     joints: Sequence[str] | None = None,
     gears: Sequence[float] | None = None,
+    rate_hz: float | None = None,
     ask: Ask | None = None,
 ) -> StudyDraft:
     """Draft a study of recordings that nobody has described yet.
@@ -46,10 +49,12 @@ def draft_study(
     Parameters
     ----------
     robot : description (URDF, SDF or MJCF).
-    data : files of measurements with the same columns, in the order of the study.
+    data : files of measurements with the same columns, or patterns of their names, in the order of
+        the study.
     joints : of the robot that were recorded, in order; by default all that move.
     gears : ratio of each joint's gear, where the files are of the motors' side; negative where the
         joint turns the other way.
+    rate_hz : of the samples, where the files have no clock.
     ask : called with each decision that the files leave open; by default the likeliest is taken.
 
     Returns
@@ -67,11 +72,12 @@ def draft_study(
         columns.
     """
     described = Robot.from_file(robot, joints)
-    logs = tuple(log for path in data for log in logs_of(path))
-    if not logs:
-        raise RecordingError("no file of measurements", remedy="name at least one")
-    same_columns(logs)
     notes = _Notes(ask)
+    layout = FileLayout(names="numbered", rate_hz=rate_hz)
+    logs = _opened(data, layout)
+    if logs[0].is_unnamed:
+        names = _by_numbers(logs[0], described, rate_hz, notes)
+        logs = _opened(data, FileLayout(names=names, rate_hz=rate_hz))
     matched = match(logs[0], described)
     chosen = _chosen(matched, notes)
     columns = matched.columns(described, chosen)
@@ -119,6 +125,24 @@ class _Notes:
         return one.chosen
 
 
+def _opened(data: Sequence[str | Path], layout: FileLayout) -> tuple[Log, ...]:
+    """Every record of every file."""
+    paths = [path for one in data for path in find_all(str(one), Path()).values()]
+    logs = tuple(log for path in paths for log in logs_of(path, layout))
+    if not logs:
+        raise RecordingError("no file of measurements", remedy="name at least one")
+    same_columns(logs)
+    return logs
+
+
+def _by_numbers(log: Log, robot: Robot, rate_hz: float | None, notes: _Notes) -> tuple[str, ...]:
+    """Names for columns that have none."""
+    own = [x for name, x in log.columns.items() if name != "t"]
+    found = named_by_numbers(np.column_stack(own), robot, rate_hz, log.where)
+    taken = notes.take("columns", found.choices, found.reason)
+    return found.named(taken, robot.names)
+
+
 def _chosen(matched: Matched, notes: _Notes) -> dict[str, int]:
     """Which group of columns stands for each signal."""
     chosen = {}
@@ -135,6 +159,9 @@ def _with_clock(
     columns: dict[str, Column], log: Log, matched: Matched, notes: _Notes
 ) -> dict[str, Column]:
     """The columns with the clock in seconds."""
+    if log.layout.rate_hz is not None:
+        notes.take("t", [f"samples at {log.layout.rate_hz:g} Hz"], "the rate was given")
+        return {ours: one for ours, one in columns.items() if ours != "t"}
     if matched.time is None:
         what = "no column is a clock that goes forward"
         remedy = "name it t, or write the study by hand"
@@ -154,7 +181,15 @@ def _read(logs: Sequence[Log], robot: Robot, columns: dict[str, Column]) -> tupl
         # The draft looks for other units itself, and says what it finds.
         warnings.simplefilter("ignore", DynidentWarning)
         return tuple(
-            read(log.file, robot.names, columns, robot.kinds, log.record or None) for log in logs
+            read(
+                log.file,
+                robot.names,
+                columns,
+                robot.kinds,
+                log.record or None,
+                layout=log.layout,
+            )
+            for log in logs
         )
 
 
@@ -241,6 +276,7 @@ def _drafted(
         DraftedRecording(
             file=log.file,
             record=log.record,
+            layout=log.layout,
             use="test" if use == "test" else "train",
             period=period,
             remark=_remark(one, period),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,9 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from dynident.errors import RecordingError
+from dynident.recording import ColumnTable, FileLayout, open_table
 from dynident.recording.formats.binary_files import COLUMNS, pick
-from dynident.recording.formats.column_names import ColumnTable
-from dynident.recording.formats.read import open_table
 
 MOST_COLUMNS = 2000
 """Columns of a file that are looked at."""
@@ -27,12 +27,14 @@ class Log:
     record : which of a file that holds several; empty where it holds one.
     columns : name -> (T,) numbers; `name[k]` for column k of a table. Text is left out.
     skipped : names of what is there and is no column of as many numbers as the others.
+    layout : with which it was opened.
     """
 
     file: Path
     record: str
     columns: Mapping[str, np.ndarray]
     skipped: tuple[str, ...]
+    layout: FileLayout
 
     @property
     def where(self) -> str:
@@ -40,17 +42,18 @@ class Log:
         return f"{self.file}, record {self.record}" if self.record else str(self.file)
 
     @property
-    def samples(self) -> int:
-        """Number of rows, T."""
-        return len(next(iter(self.columns.values())))
+    def is_unnamed(self) -> bool:
+        """Whether its columns have no names but their numbers."""
+        return all(re.fullmatch(r"column\d+|t", name) for name in self.columns)
 
 
-def logs_of(path: str | Path) -> tuple[Log, ...]:
+def logs_of(path: str | Path, layout: FileLayout) -> tuple[Log, ...]:
     """Open a file, every record of it.
 
     Parameters
     ----------
     path : of any format that a study can name.
+    layout : what the file does not say of itself.
 
     Returns
     -------
@@ -64,15 +67,15 @@ def logs_of(path: str | Path) -> tuple[Log, ...]:
         If it is no file of measurements, or holds no columns of numbers.
     """
     path = Path(path)
-    table = open_table(path)
+    table = open_table(path, layout=layout)
     if COLUMNS in table.names:
         records = [name for name in table.names if name != COLUMNS]
         if records and table.load([COLUMNS])[COLUMNS].dtype.kind == "U":
-            return tuple(_log(path, record, pick(table, record)) for record in records)
-    return (_log(path, "", table),)
+            return tuple(_log(path, record, pick(table, record), layout) for record in records)
+    return (_log(path, "", table, layout),)
 
 
-def _log(path: Path, record: str, table: ColumnTable) -> Log:
+def _log(path: Path, record: str, table: ColumnTable, layout: FileLayout) -> Log:
     found: dict[str, np.ndarray] = {}
     skipped: list[str] = []
     for name in table.names[:MOST_COLUMNS]:
@@ -90,7 +93,7 @@ def _log(path: Path, record: str, table: ColumnTable) -> Log:
     most = max(set(lengths), key=lambda n: (n > 1, sum(one == n for one in lengths), n))
     skipped += [name for name, x in found.items() if len(x) != most]
     kept = {name: x for name, x in found.items() if len(x) == most}
-    return Log(file=path, record=record, columns=kept, skipped=tuple(skipped))
+    return Log(file=path, record=record, columns=kept, skipped=tuple(skipped), layout=layout)
 
 
 def _numbers(table: ColumnTable, name: str) -> dict[str, np.ndarray] | None:
@@ -105,9 +108,9 @@ def _numbers(table: ColumnTable, name: str) -> dict[str, np.ndarray] | None:
         x = x.ravel()
     if x.ndim == 1:
         return {name: x.astype(float)}
-    if x.shape[1] > MOST_COLUMNS:
+    if len(x.T) > MOST_COLUMNS:
         return None
-    return {f"{name}[{k}]": x[:, k].astype(float) for k in range(x.shape[1])}
+    return {f"{name}[{k}]": column.astype(float) for k, column in enumerate(x.T)}
 
 
 def same_columns(logs: Sequence[Log]) -> None:
