@@ -57,7 +57,7 @@ def show(study: Path, to: Path) -> CommandAnswer:
     require_picture(to)
     require_places(study, to)
     loaded = load_study(study)
-    from dynident.reporting.recordings import record_facts, recordings_table, show_recordings
+    from dynident.reporting.record_facts import record_facts, recordings_table, show_recordings
 
     with progress("drawing"):
         facts = record_facts(loaded)

@@ -74,6 +74,10 @@ def named_by_numbers(
     rate_hz : of the samples, where the file has no clock.
     where : the file, for messages.
 
+    Returns
+    -------
+    Names, but for the torques, of which several blocks may be left to choose from.
+
     Raises
     ------
     RecordingError

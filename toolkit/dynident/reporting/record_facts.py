@@ -13,7 +13,7 @@ import numpy as np
 from dynident import files
 from dynident.recording import Recording, count_rows, default_filter, uniform
 from dynident.recording.repetition import shift_mismatch
-from dynident.reporting.pictures.recordings import by_record, recordings_figure
+from dynident.reporting.pictures.recordings_picture import by_record, recordings_figure
 from dynident.study import Study
 from dynident.tables import Table, percent
 
