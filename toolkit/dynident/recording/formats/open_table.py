@@ -10,11 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from dynident import files
-from dynident.errors import RecordingError
+from dynident.errors import FileError, RecordingError
 from dynident.recording.formats.binary_files import open_mat, open_npz, open_parquet, pick
 from dynident.recording.formats.column_table import ColumnTable, FileLayout
 from dynident.recording.formats.csv_file import open_csv
 from dynident.recording.formats.limits import ARRAYS, CUT, TEXT, SizeLimit
+from dynident.recording.formats.ros_bag import SUFFIXES as BAGS
+from dynident.recording.formats.ros_bag import is_bag, open_bag
 
 DEFAULT_LAYOUT = FileLayout()
 
@@ -33,7 +35,7 @@ _FORMATS = {
     ".mat": _Format(lambda data, file, _: open_mat(data, file), ARRAYS),
     ".parquet": _Format(lambda data, file, _: open_parquet(data, file), ARRAYS),
 }
-READABLE = tuple(_FORMATS)
+READABLE = (*_FORMATS, *BAGS)
 """Suffixes of the files that are read."""
 
 
@@ -62,24 +64,33 @@ def open_table(
         If it is not what its suffix says, or the layout does not fit it.
     """
     path = Path(path)
-    where = str(path)
-    form = _FORMATS.get(path.suffix.lower())
+    try:
+        table = open_bag(path, layout) if is_bag(path) else _opened(path, layout)
+    except MemoryError:
+        raise RecordingError("does not fit into memory", str(path), CUT) from None
+    if record is not None:
+        table = pick(table, record)
+    return table if layout.rate_hz is None else _with_clock(table, layout.rate_hz)
+
+
+def _opened(path: Path, layout: FileLayout) -> ColumnTable:
+    """The table of a file that is read as a whole."""
+    where, suffix = str(path), path.suffix.lower()
+    form = _FORMATS.get(suffix)
+    if form is None and path.is_dir():
+        what = "is a folder, and not one that ROS 2 records into: it holds no metadata.yaml"
+        raise FileError(what, where, "name a file in it")
     if form is None:
         raise unknown_suffix(path, READABLE)
-    if layout.names and path.suffix.lower() != ".csv" and layout.names != "numbered":
+    if layout.topic:
+        raise RecordingError(f"topic = {layout.topic!r} is of a bag", where, "leave it out")
+    if suffix != ".csv" and layout.names not in ((), "numbered"):
         what, remedy = "columns are named by position", "only text files without a header need that"
         raise RecordingError(what, where, remedy)
     data = files.read_bytes(path, form.limit.stored, CUT)
     if not data:
         raise RecordingError("is empty", where, "is the file complete?")
-    try:
-        table = form.open(data, where, layout)
-    except MemoryError:
-        raise RecordingError("does not fit into memory", where, CUT) from None
-    table = replace(table, sha256=hashlib.sha256(data).hexdigest())
-    if record is not None:
-        table = pick(table, record)
-    return table if layout.rate_hz is None else _with_clock(table, layout.rate_hz)
+    return replace(form.open(data, where, layout), sha256=hashlib.sha256(data).hexdigest())
 
 
 def _with_clock(table: ColumnTable, rate_hz: float) -> ColumnTable:

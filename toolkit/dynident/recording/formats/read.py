@@ -19,6 +19,7 @@ from dynident.recording.formats.column_names import (
 )
 from dynident.recording.formats.column_table import ColumnTable, FileLayout, left_of
 from dynident.recording.formats.column_values import load
+from dynident.recording.formats.joint_state_table import prefixed
 from dynident.recording.formats.limits import CUT
 from dynident.recording.formats.open_table import DEFAULT_LAYOUT, open_table
 from dynident.recording.plausibility import warn_of_units
@@ -78,7 +79,7 @@ def read(
     names = joints_in(table) if joints is None else _joint_names(joints, where)
     if kinds is not None and len(kinds) != len(names):
         raise RecordingError(f"{len(kinds)} kinds for {len(names)} joints", where)
-    located = resolve(table, names, _with_rate(table, columns, layout))
+    located = resolve(table, names, _with_prefix(table, names) | _with_rate(table, columns, layout))
     try:
         found = load(table, located)
     except MemoryError:
@@ -126,7 +127,7 @@ def _stacked(columns: list[np.ndarray]) -> np.ndarray:
 
 def _with_rate(
     table: ColumnTable, columns: Mapping[str, Column | str] | None, layout: FileLayout
-) -> Mapping[str, Column | str]:
+) -> dict[str, Column | str]:
     """The mapping of columns without that of the time, where a rate takes its place."""
     mapping = dict(columns or {})
     if layout.rate_hz is not None and "t" in mapping:
@@ -136,3 +137,17 @@ def _with_rate(
             what = f"rate_hz = {layout.rate_hz:g} is given, and '{name}' is the column of time"
             raise RecordingError(what, table.file, "leave out one of them")
     return mapping
+
+
+def _with_prefix(table: ColumnTable, joints: Sequence[str]) -> dict[str, Column | str]:
+    """Columns of joints that the file names with a prefix, or without the robot's."""
+    if table.joints == "exact":
+        return {}
+    split = [name.partition(".") for name in table.names]
+    theirs = prefixed([joint for _, _, joint in split if joint], joints, table.file)
+    return {
+        f"{signal}.{ours}": f"{signal}.{name}"
+        for ours, name in theirs.items()
+        for signal in (*REQUIRED, *OPTIONAL)
+        if f"{signal}.{name}" in table.there
+    }
