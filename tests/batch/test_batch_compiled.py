@@ -153,7 +153,7 @@ def test_a_broken_file_in_the_cache_is_made_anew(monkeypatch):
     robot = chain(2)
     want = answer(torque_of(robot), robot)
     source = c_source(tape_of(torque_equations(robot.joint_tree)))
-    place = compiler._place(source)
+    place = compiler._place(source, "-O1")
     place.parent.mkdir(parents=True, mode=0o700)
     place.write_bytes(b"half a library")
     place.chmod(0o600)
@@ -215,7 +215,7 @@ def test_a_library_is_for_its_processor_alone(text, change, tmp_path, monkeypatc
     ):
         compiler._CPU_INFO.write_text(said)
         assert compiler._tuning() == ("-march=native",)
-        places.append(compiler._place("source"))
+        places.append(compiler._place("source", "-O1"))
     assert places[0] == places[1] != places[2]
 
 

@@ -63,13 +63,15 @@ def test_other_parameters_need_no_other_diagram_and_move_as_on_a_fresh_one() -> 
     for name in ("rotor_inertia", "viscous_friction", "coulomb_friction", "asymmetric_friction"):
         model = model + name
     model = model + "stribeck_friction@elbow" + "payload"
-    loop = ClosedLoop()
+    loop = ClosedLoop(integrator="drake")
     for seed in range(6):
         body = iterate(model, seed, carries_payload=True)
         tasks = [task(body, seed), task(body, seed + 1, start=3.0 * seed)]
         scale = np.array([1.0, 0.5 + 0.1 * seed])
         found = loop.simulate(tasks, PD, lead_in=0.05, feedback_scale=scale)
-        fresh = ClosedLoop().simulate(tasks, PD, lead_in=0.05, feedback_scale=scale)
+        fresh = ClosedLoop(integrator="drake").simulate(
+            tasks, PD, lead_in=0.05, feedback_scale=scale
+        )
         for one, other in zip(found, fresh, strict=True):
             np.testing.assert_allclose(one.q, other.q, rtol=0, atol=1e-12)
             np.testing.assert_allclose(one.u, other.u, rtol=0, atol=1e-9)
@@ -77,7 +79,7 @@ def test_other_parameters_need_no_other_diagram_and_move_as_on_a_fresh_one() -> 
 
 
 def test_what_has_another_structure_is_built_once_each() -> None:
-    robot, loop = arm(), ClosedLoop()
+    robot, loop = arm(), ClosedLoop(integrator="drake")
     assert (loop.builds, loop.notes) == (0, ())
     plain = Mechanism.of(robot, TrueEffect.of("viscous_friction", robot, [0.5]))
     coupled, ripple = (
@@ -102,7 +104,7 @@ def test_many_motions_are_simulated_a_plant_at_a_time() -> None:
     body = Mechanism.of(arm())
     told: list[tuple[float, float]] = []
     tasks = [task(body, seed, 0.05, name=str(seed)) for seed in range(10)]
-    loop = ClosedLoop()
+    loop = ClosedLoop(integrator="drake")
     together = loop.simulate(tasks, PD, lead_in=0.0, progress=lambda *step: told.append(step))
     assert loop.builds == 2, "8 motions and 2"
     assert told[-1] == pytest.approx((0.1, 0.1))

@@ -1,6 +1,11 @@
 from .c_function import c_function as c_function
+from .c_source import scalar_source as scalar_source
+from .c_source import scalar_work_size as scalar_work_size
+from .choice import Choice as Choice
+from .choice import Price as Price
 from .evaluation import Evaluation as Evaluation
 from .evaluation import wish as wish
+from .joint_space import joint_space_tape as joint_space_tape
 from .joint_tree import JointTree as JointTree
 from .kernel import Kernel as Kernel
 from .kernel import evaluations as evaluations

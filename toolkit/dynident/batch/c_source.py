@@ -1,4 +1,4 @@
-"""A tape as C: the same operations in the same order on eight samples at a time.
+"""A tape as C: the same operations in the same order on eight samples at a time, or on one.
 
 No product is fused with a sum, so that the results are those of the replay, to the bit. The steps
 stand in functions of some hundred each, and every function goes through a chunk of samples: it
@@ -49,6 +49,20 @@ void {entry}(long samples, const double *const *x, const long *step, double *w, 
 """
 
 
+_SCALAR_HEAD = """\
+#define lanes double
+#define W(i) w[i]
+#define Y(i) y[i]
+#define PART(name) static void name(double *restrict w, double *restrict y)
+"""
+_SCALAR_TAIL = """\
+#undef lanes
+#undef W
+#undef Y
+#undef PART
+"""
+
+
 def c_source(tape: Tape) -> str:
     """Return a C function of what a tape computes.
 
@@ -73,6 +87,31 @@ def c_source(tape: Tape) -> str:
         calls="\n".join(f"        part{k}(w, y, s, m);" for k in range(len(parts))),
     )
     return "\n".join([_HEAD, *functions, driver])
+
+
+def scalar_source(tape: Tape, name: str) -> str:
+    """Return C of a static function of what a tape computes at one sample.
+
+    Its arguments are room for `scalar_work_size` numbers, which begins with the inputs and keeps
+    them, and the place to write all results to, one after the other.
+
+    Parameters
+    ----------
+    tape : to be written.
+    name : of the function.
+    """
+    parts = _Writer(tape).parts()
+    functions = [
+        "\n".join([f"PART({name}_part{k})", "{", *lines, "}\n"]) for k, lines in enumerate(parts)
+    ]
+    calls = " ".join(f"{name}_part{k}(w, y);" for k in range(len(parts)))
+    driver = f"static void {name}(double *w, double *y) {{ {calls} }}\n"
+    return "\n".join([_SCALAR_HEAD, *functions, driver, _SCALAR_TAIL])
+
+
+def scalar_work_size(tape: Tape) -> int:
+    """How many numbers of room a tape's C function of one sample needs."""
+    return tape.inputs + tape.slots + 1
 
 
 def work_size(tape: Tape) -> int:

@@ -18,9 +18,10 @@ import subprocess
 import tempfile
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-_OPTIONS = ("-O1", "-ffp-contract=off", "-fPIC", "-shared", "-w", "-x", "c")
+_OPTIONS = ("-ffp-contract=off", "-fPIC", "-shared", "-w", "-x", "c")
+_LIBRARIES = ("-lm",)
 _NATIVE = "-march=native"
 _CPU_INFO = Path("/proc/cpuinfo")
 # What tells a processor's instructions there, on x86 and on ARM; and what tells its make besides.
@@ -28,6 +29,10 @@ _INSTRUCTIONS = ("flags", "Features")
 _MAKE = ("model name", "CPU ")
 _PATIENCE = 120.0  # s, after which a compiler is given up
 _COMPILERS = ("cc", "gcc", "clang")
+
+
+Level = Literal["-O1", "-O2"]
+"""How hard the compiler tries: long functions without loops gain little by more than the first."""
 
 
 class NotCompiled(Exception):
@@ -47,27 +52,28 @@ def cache_folder() -> Path:
     return base / "dynident" / "batch"
 
 
-def is_kept(source: str) -> bool:
+def is_kept(source: str, level: Level) -> bool:
     """Whether the cache has a source's library; False also where there can be no cache."""
     try:
-        return _place(source).is_file()
+        return _place(source, level).is_file()
     except (OSError, RuntimeError):
         return False
 
 
-def _place(source: str) -> Path:
+def _place(source: str, level: Level) -> Path:
     """Where the library of a source is kept, on this machine."""
-    key = "\n".join((source, *_OPTIONS, compiler() or "", *_processor()))
+    key = "\n".join((source, level, *_OPTIONS, *_LIBRARIES, compiler() or "", *_processor()))
     return cache_folder() / f"{hashlib.sha256(key.encode()).hexdigest()[:32]}.so"
 
 
-def compiled(source: str, entry: str) -> Any:
+def compiled(source: str, entry: str, level: Level = "-O1") -> Any:
     """Return a function of a C source, compiled now unless the cache has it.
 
     Parameters
     ----------
     source : in C.
     entry : name of the function.
+    level : how hard the compiler tries.
 
     Returns
     -------
@@ -80,11 +86,11 @@ def compiled(source: str, entry: str) -> Any:
         may write it.
     """
     try:
-        place = _place(source)
+        place = _place(source, level)
         if place.is_file():
             with contextlib.suppress(OSError, AttributeError):  # a broken file is made anew
                 return _loaded(place, entry)
-        _compile(source, place)
+        _compile(source, place, level)
         return _loaded(place, entry)
     except subprocess.TimeoutExpired:
         raise NotCompiled(f"the compiler took more than {_PATIENCE:.0f} s") from None
@@ -113,7 +119,7 @@ def _refuse_what_others_write(path: Path) -> None:
         raise NotCompiled(f"{path} may be written by other users")
 
 
-def _compile(source: str, place: Path) -> None:
+def _compile(source: str, place: Path, level: Level) -> None:
     program = compiler()
     if program is None:
         raise NotCompiled("there is no C compiler")
@@ -122,9 +128,9 @@ def _compile(source: str, place: Path) -> None:
     handle, name = tempfile.mkstemp(suffix=".tmp", dir=place.parent)
     os.close(handle)
     try:
-        said = _run(program, name, source, *_tuning())
+        said = _run(program, name, source, level, *_tuning())
         if said is not None and _tuning():
-            said = _run(program, name, source)
+            said = _run(program, name, source, level)
         if said is not None:
             raise NotCompiled(f"the compiler failed: {said}")
         os.chmod(name, stat.S_IRWXU)  # a linker may have made the file anew, open to a group
@@ -136,7 +142,7 @@ def _compile(source: str, place: Path) -> None:
 
 def _run(program: str, name: str, source: str, *options: str) -> str | None:
     """Compile into a file; return None, or the first thing that the compiler says."""
-    command = [program, *_OPTIONS, *options, "-o", name, "-"]
+    command = [program, *_OPTIONS, *options, "-o", name, "-", *_LIBRARIES]
     done = subprocess.run(
         command, input=source, capture_output=True, text=True, timeout=_PATIENCE, check=False
     )

@@ -1,4 +1,4 @@
-"""How functions of many samples are evaluated: replayed by NumPy, or compiled to machine code."""
+"""How functions of many samples are evaluated: compiled to machine code, or in another way."""
 
 from __future__ import annotations
 
@@ -13,26 +13,27 @@ VARIABLE = "DYNIDENT_COMPILE"
 
 COMPILE_AFTER = 500_000
 """Samples after which a function is compiled. Measured, for 2 to 30 joints: a step takes 0.1 to
-0.16 ms to compile and 0.3 ns a sample to replay. Whoever pays as much for compiling as was spent
-before pays at most twice what was best."""
+0.16 ms to compile and 0.3 ns a sample to replay."""
 
 LOOK_AFTER = 10_000
 """Samples after which the cache is asked: to name what it may have, the source is written."""
 
 Wish = Literal["never", "auto", "always"]
+Way = Literal["replayed", "compiled", "Drake"]
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """How a function is evaluated, and why. Its results are the same to the bit either way.
+    """How a function is evaluated, and why.
 
     Attributes
     ----------
-    way : "replayed" by NumPy, or "compiled".
+    way : "compiled"; "replayed" by NumPy, with results that are the same to the bit; or, of a
+        closed loop, by "Drake".
     reason : in a few words.
     """
 
-    way: Literal["replayed", "compiled"]
+    way: Way
     reason: str
 
     def __str__(self) -> str:

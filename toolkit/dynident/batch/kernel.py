@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from dynident.batch.c_source import ENTRY, LANES, c_source, work_size
-from dynident.batch.compiler import NotCompiled, compiled, is_kept
-from dynident.batch.evaluation import COMPILE_AFTER, LOOK_AFTER, VARIABLE, Evaluation, wish
+from dynident.batch.choice import Choice, Price
+from dynident.batch.evaluation import COMPILE_AFTER, LOOK_AFTER, Evaluation
 from dynident.batch.joint_tree import JointTree
 from dynident.batch.memory import side_by_side
 from dynident.batch.newton_euler import SIGNALS, Equations, regressor_equations, torque_equations
@@ -28,21 +28,20 @@ class Kernel:
     ----------
     terms : what is computed.
     shape : of the result at a sample; where there is no term it is zero.
-
-    Attributes
-    ----------
-    evaluation : how it was evaluated in the last call, and why.
     """
 
     def __init__(self, terms: Equations, shape: tuple[int, ...]) -> None:
         self.shape = shape
-        self.evaluation = Evaluation("replayed", "not called yet")
         self._tape: Tape = tape_of(terms)
         self._nowhere = np.ones(shape, dtype=bool)
         self._nowhere[tuple(np.transpose(terms.places))] = False
         self._seen = 0
-        self._function: Any = None
-        self._failed = ""
+        self._choice = Choice(lambda: c_source(self._tape), ENTRY, "replayed")
+
+    @property
+    def evaluation(self) -> Evaluation:
+        """How it was evaluated in the last call, and why."""
+        return self._choice.evaluation
 
     def __call__(
         self,
@@ -82,57 +81,27 @@ class Kernel:
         rows[self._nowhere] = 0.0
         inputs = [*_signals(q, v, a), *map(float, parameters)]
         results = [rows[place] for place in self._tape.places]
+        price = Price(look_after=LOOK_AFTER, compile_after=COMPILE_AFTER)
         self._seen += samples
-        self._choose()
-        if self._function is None or samples < LANES:
+        function = self._choice.function(self._seen, price)
+        _used.setdefault(self.evaluation)
+        if function is None or samples < LANES:
             self._tape.replay(inputs, results)
         else:
-            self._run(samples, inputs, results)
+            self._run(function, samples, inputs, results)
         if out is None or direct:
             return result
         np.copyto(out, result)
         return out
 
-    def _choose(self) -> None:
-        """Compile, or load, if that is wanted and pays; say in `evaluation` what became of it."""
-        wanted = wish()
-        if wanted == "never":
-            self._function = None
-            self.evaluation = Evaluation("replayed", f"{VARIABLE}=never")
-        elif self._function is None and not self._failed:
-            reason = f"{VARIABLE}=always" if wanted == "always" else self._reason
-            if reason:
-                self.evaluation = self._compile(reason)
-            else:
-                few = f"fewer than {COMPILE_AFTER} samples"
-                self.evaluation = Evaluation("replayed", few)
-        _used.setdefault(self.evaluation)
-
-    @property
-    def _reason(self) -> str:
-        """Why a compiled function is to be had for little, or pays; empty if neither is so."""
-        if self._seen >= LOOK_AFTER and self._is_kept:
-            return "from the cache"
-        return f"from {COMPILE_AFTER} samples on" if self._seen >= COMPILE_AFTER else ""
-
-    @cached_property
-    def _is_kept(self) -> bool:
-        return is_kept(c_source(self._tape))
-
-    def _compile(self, reason: str) -> Evaluation:
-        try:
-            self._function = compiled(c_source(self._tape), ENTRY)
-        except NotCompiled as error:
-            self._failed = str(error)
-            return Evaluation("replayed", self._failed)
-        return Evaluation("compiled", reason)
-
-    def _run(self, samples: int, inputs: list[Any], results: list[np.ndarray]) -> None:
+    def _run(
+        self, function: Any, samples: int, inputs: list[Any], results: list[np.ndarray]
+    ) -> None:
         """Call the compiled function."""
         steps = (ctypes.c_long * len(inputs))(*(int(np.ndim(one) > 0) for one in inputs))
         held = [np.ascontiguousarray(one, dtype=float) for one in inputs]
         work = side_by_side(work_size(self._tape), ())
-        self._function(
+        function(
             ctypes.c_long(samples),
             _pointers(held),
             steps,

@@ -55,7 +55,7 @@ def regressor_equations(tree: JointTree, columns: tuple[int, ...]) -> Equations:
     -------
     Equations with places (row, position in `columns`).
     """
-    motion = _Motion(tree)
+    motion = Motion(tree)
     places: list[tuple[int, ...]] = []
     expressions = []
     turning: dict[int, Any] = {}
@@ -86,7 +86,7 @@ def torque_equations(tree: JointTree) -> Equations:
     Equations with places (joint,), of all joints.
     """
     theta = ca.SX.sym("theta", 10 * tree.n)
-    motion = _Motion(tree)
+    motion = Motion(tree)
     moments, forces = {}, {}
     for j in tree.order:
         moment, force = motion.unit_wrenches(j)
@@ -102,15 +102,15 @@ def torque_equations(tree: JointTree) -> Equations:
         force = motion.to_parent(j, forces[j])
         moment = moments[j]
         if tree.prismatic[j]:
-            moment = moment + _skew(axis) @ forces[j] * motion.q[j]
+            moment = moment + skew(axis) @ forces[j] * motion.q[j]
         forces[parent] = forces[parent] + force
-        moments[parent] = moments[parent] + motion.to_parent(j, moment) + _skew(motion.p[j]) @ force
+        moments[parent] = moments[parent] + motion.to_parent(j, moment) + skew(motion.p[j]) @ force
     places = tuple((j,) for j in range(tree.n))
     inputs = ca.vertcat(motion.inputs, theta)
     return Equations(inputs, places, ca.densify(ca.vertcat(*torque)))
 
 
-class _Motion:
+class Motion:
     """The motion of all bodies, symbolic."""
 
     def __init__(self, tree: JointTree) -> None:
@@ -118,14 +118,14 @@ class _Motion:
         signals = [ca.SX.sym(name, tree.n) for name in ("cos", "sin", "q", "v", "a")]
         self.inputs = ca.vertcat(*signals)
         self._cos, self._sin, self.q, self._v, self._a = signals
-        self.axis = [_numbers(tree.axes[j]) for j in range(tree.n)]
+        self.axis = [numbers(tree.axes[j]) for j in range(tree.n)]
         self.p: list[Any] = [None] * tree.n
         self._turns: list[tuple[Any, ...]] = [()] * tree.n
         # Of the world: at rest, accelerated against gravity.
         rest = ca.SX(3, 1)
         self._w, self._e = {-1: rest}, {-1: rest}
         self._u = {-1: ca.SX(3, 3)}
-        self._lift = {-1: _numbers([-g for g in tree.gravity])}
+        self._lift = {-1: numbers([-g for g in tree.gravity])}
         self._products: dict[int, tuple[Any, ...]] = {}
         for j in tree.order:
             self._place(j)
@@ -160,9 +160,9 @@ class _Motion:
         if parent == -1:
             return own
         turned = self.to_child(j, turning[parent])
-        moved = self.to_child(j, sliding[parent] - _skew(self.p[j]) @ turning[parent])
+        moved = self.to_child(j, sliding[parent] - skew(self.p[j]) @ turning[parent])
         if self.tree.prismatic[j]:
-            moved = moved - self.q[j] * (_skew(self.axis[j]) @ turned)
+            moved = moved - self.q[j] * (skew(self.axis[j]) @ turned)
         return ca.horzcat(turned, own[0]), ca.horzcat(moved, own[1])
 
     def unit_wrenches(self, j: int) -> tuple[Any, Any]:
@@ -177,16 +177,16 @@ class _Motion:
             ca.vertcat(yy - zz, -U[0, 1], U[0, 2]),
             ca.vertcat(yz, -xz, e[2]),
         )
-        moment = ca.horzcat(ca.SX(3, 1), -_skew(a), inertia)
+        moment = ca.horzcat(ca.SX(3, 1), -skew(a), inertia)
         force = ca.horzcat(a, U, ca.SX(3, 6))
         return moment, force
 
     def _place(self, j: int) -> None:
         """Write how the frame of a joint stands in its parent's."""
         R, p = self.tree.placement(j)
-        self.p[j] = _numbers(p)
+        self.p[j] = numbers(p)
         if self.tree.prismatic[j]:
-            self._turns[j] = (_numbers(R),)
+            self._turns[j] = (numbers(R),)
             return
         u = np.array(self.tree.axes[j])
         across, along = np.eye(3) - np.outer(u, u), np.outer(u, u)
@@ -194,10 +194,10 @@ class _Motion:
 
         def turned(by: np.ndarray) -> Any:
             cross = np.cross(u, np.eye(3)).T  # [u]x
-            return cos * _numbers(by @ across) + sin * _numbers(by @ cross) + _numbers(by @ along)
+            return cos * numbers(by @ across) + sin * numbers(by @ cross) + numbers(by @ along)
 
         # One after the other, or as one product: what takes fewer operations on a vector.
-        parts, whole = (_numbers(R), turned(np.eye(3))), (turned(R),)
+        parts, whole = (numbers(R), turned(np.eye(3))), (turned(R),)
         self._turns[j] = min(whole, parts, key=lambda factors: sum(map(_cost, factors)))
 
     def _move(self, j: int) -> None:
@@ -206,7 +206,7 @@ class _Motion:
         w, e = (self.to_child(j, x[parent]) for x in (self._w, self._e))
         lift = self.to_child(j, self._lift[parent] + self._u[parent] @ self.p[j])
         if not self.tree.prismatic[j]:
-            e = e + axis * self._a[j] + _skew(w) @ axis * self._v[j]
+            e = e + axis * self._a[j] + skew(w) @ axis * self._v[j]
             w = w + axis * self._v[j]
         w, e = ca.sparsify(w), ca.sparsify(e)
         x, y, z = w[0], w[1], w[2]
@@ -218,20 +218,20 @@ class _Motion:
         )
         if self.tree.prismatic[j]:
             # The origin slides along the axis, which turns.
-            lift = lift + U @ axis * self.q[j] + 2.0 * (_skew(w) @ axis * self._v[j])
+            lift = lift + U @ axis * self.q[j] + 2.0 * (skew(w) @ axis * self._v[j])
             lift = lift + axis * self._a[j]
         self._w[j], self._e[j], self._u[j] = w, e, ca.sparsify(U)
         self._lift[j], self._products[j] = ca.sparsify(lift), products
 
 
-def _numbers(values: Any) -> Any:
+def numbers(values: Any) -> Any:
     """A constant matrix; entries that only rounding keeps from zero are left out."""
     array = np.array(values, dtype=float)
     array[np.abs(array) < _ROUNDING * np.abs(array).max(initial=0.0)] = 0.0
     return ca.SX(ca.sparsify(ca.DM(array)))
 
 
-def _skew(x: Any) -> Any:
+def skew(x: Any) -> Any:
     """The matrix [x]x with [x]x y = x x y."""
     none = ca.SX(1, 1)
     return ca.vertcat(

@@ -1,9 +1,13 @@
-"""`ClosedLoop`: a simulator that keeps its diagrams, for robots whose parameters change.
+"""`ClosedLoop`: a simulator that keeps what it builds, for robots whose parameters change.
 
-The plant is a `MultibodyPlant`; effects are Drake systems beside it, in C++ where they can be. All
-motions run side by side, as robots that do not feel each other in one plant: what Python and Drake
-spend on a step is then spent once for all of them. Drake's error-controlled Runge-Kutta 3(2)
-integrates from sample to sample, so that no step crosses a change of the command. Stepping the
+Where the accelerations are formulas and it pays, each motion is made by a C function of the whole
+loop (`dynident.closed_loop.compiled`), many in as many threads as there are processors. All else is
+simulated by Drake, which is the reference for the former.
+
+There the plant is a `MultibodyPlant`; effects are Drake systems beside it, in C++ where they can
+be. All motions run side by side, as robots that do not feel each other in one plant: what Python
+and Drake spend on a step is then spent once for all of them. Drake's error-controlled Runge-Kutta
+3(2) integrates from sample to sample, so that no step crosses a change of the command. Stepping the
 simulator sample by sample is as fast as a hold and a logger inside the diagram, and cannot log a
 held value one sample late.
 """
@@ -11,19 +15,21 @@ held value one sample late.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
+from dynident.closed_loop.compiled.many_rollouts import CompiledLoops
 from dynident.closed_loop.controllers import Controller
+from dynident.closed_loop.motion_plan import Plan, Run, Stacked
 from dynident.closed_loop.plant.side_by_side import structure
 from dynident.closed_loop.rollout import LEAD_IN, Rollout, Task
-from dynident.closed_loop.sensors import Sensors, rounded
+from dynident.closed_loop.sensors import Sensors
+from dynident.closed_loop.stepped_motion import JointLoop
 from dynident.errors import SimulationError
 
 if TYPE_CHECKING:
     from dynident.closed_loop.plant.diagram import Plant
-    from dynident.closed_loop.plant.stepping import SteppedMotion
 
 ACCURACY = 1e-3
 """Drake's error per step.
@@ -39,9 +45,8 @@ SIDE_BY_SIDE = 8
 _POSES = 50
 _KEPT = 4
 """Diagrams kept; a fit that goes back and forth between structures needs few."""
-LARGEST = 1e6
-"""Largest position (rad, m), speed and acceleration of a reference."""
 
+Integrator = Literal["auto", "drake"]
 Progress = Callable[[float, float], None]
 """(seconds done, seconds to do)."""
 
@@ -49,31 +54,43 @@ Progress = Callable[[float, float], None]
 class ClosedLoop:
     """Simulates closed loops; nothing is built before the first simulation.
 
-    Diagrams are built once for a structure (the robots' joints, the number of motions, the kinds
-    of effects) and then only given other parameters through their Context.
+    Diagrams and C functions are built once for a structure (the robots' joints, the number of
+    motions, the kinds of effects) and then only given other parameters.
 
     Parameters
     ----------
     accuracy : of the integrator, see `ACCURACY`.
+    integrator : "auto": compiled where the motion's accelerations are formulas and compiling pays
+        or was done before, as the environment variable DYNIDENT_COMPILE allows; motions that the
+        compiled loop cannot make go to Drake. "drake": always Drake, the reference.
+
+    Raises
+    ------
+    SimulationError
+        If there is no such integrator, or the accuracy is not between 0 and 1.
     """
 
-    def __init__(self, *, accuracy: float = ACCURACY) -> None:
+    def __init__(self, *, accuracy: float = ACCURACY, integrator: Integrator = "auto") -> None:
         if not (0 < accuracy < 1):
             raise SimulationError(f"accuracy = {accuracy:g}", remedy="choose it between 0 and 1")
-        self._accuracy = accuracy
+        if integrator not in get_args(Integrator):
+            remedy = f"integrators: {', '.join(get_args(Integrator))}"
+            raise SimulationError(f"no integrator '{integrator}'", remedy=remedy)
+        self._accuracy, self._integrator = accuracy, integrator
         self._plants: dict[Hashable, Plant] = {}
+        self._compiled = CompiledLoops()
         self._notes: dict[str, None] = {}
         self._builds = 0
 
     @property
     def builds(self) -> int:
-        """Diagrams built so far."""
-        return self._builds
+        """Diagrams and compiled loops in use so far."""
+        return self._builds + self._compiled.builds
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What made the simulations so far slower than they need be."""
-        return tuple(self._notes)
+        return (*self._notes, *self._compiled.notes)
 
     def simulate(
         self,
@@ -85,7 +102,7 @@ class ClosedLoop:
         feedback_scale: np.ndarray | None = None,
         progress: Progress | None = None,
     ) -> tuple[Rollout, ...]:
-        """Simulate loops that follow their references, side by side, at most 8 in one plant.
+        """Simulate loops that follow their references, as many at once as are given.
 
         Each motion starts on its reference (an integral with the torque that it needs there),
         `lead_in` before the first sample that is kept, so that what is kept of a periodic
@@ -115,56 +132,44 @@ class ClosedLoop:
         sensors = sensors or Sensors()
         for task in tasks:
             task.require_fit(controller.n, tasks[0].mechanism.robot.n)
-        scale = _scale(feedback_scale, controller.n)
         rate = controller.simulated_rate()
-        before = _samples(lead_in, rate, "lead_in", 0)
-        kept = [_samples(task.duration, rate, "duration", 2) for task in tasks]
-        starts = range(0, len(tasks), SIDE_BY_SIDE)
-        groups = [slice(k, k + SIDE_BY_SIDE) for k in starts]
-        lengths = [(before + max(kept[group])) / rate for group in groups]
-        found: list[Rollout] = []
-        for number, group in enumerate(groups):
-            past = sum(lengths[:number])
-
-            def advance(done: float, past: float = past) -> None:
-                if progress is not None:
-                    progress(past + done, sum(lengths))
-
-            # Robots on their way to infinity are noticed by where they are, not by NumPy.
-            with np.errstate(all="ignore"):
-                found += self._simulate(
-                    tasks[group], kept[group], before, controller, sensors, scale, advance
-                )
-        return tuple(found)
-
-    def _simulate(
-        self,
-        tasks: Sequence[Task],
-        kept: Sequence[int],
-        before: int,
-        controller: Controller,
-        sensors: Sensors,
-        scale: np.ndarray,
-        advance: Callable[[float], None],
-    ) -> list[Rollout]:
-        from dynident.closed_loop.plant.drive import Drive, ReferenceSamples
-        from dynident.closed_loop.plant.stepping import JointLoop, Measurement, Stepper
-
-        n, rate = controller.n, controller.simulated_rate()
-        total = before + max(kept)
-        # The last command is held to one sample more.
-        time = (np.arange(total + 1) - before) / rate
-        references = [_reference(task, time[:-1]) for task in tasks]
-        reference = ReferenceSamples(*(np.hstack(one) for one in zip(*references, strict=True)))
-        noise = np.hstack(
-            [
-                sensors.each("position_std", n) * task.noise_sign * _normal(task.rng, (total, n))
-                for task in tasks
-            ]
+        run = Run(
+            controller=controller,
+            position_std=sensors.each("position_std", controller.n),
+            resolution=sensors.each("position_resolution", controller.n),
+            scale=_scale(feedback_scale, controller.n),
+            before=_samples(lead_in, rate, "lead_in", 0),
+            accuracy=self._accuracy,
         )
-        resolution = sensors.each("position_resolution", n)
+        plans = [Plan(task, _samples(task.duration, rate, "duration", 2), run) for task in tasks]
+        whole = sum(max(one.samples for one in group) for group in _groups(plans)) / rate
+        found: dict[Plan, Rollout] = {}
+
+        def advance(share: float) -> None:
+            if progress is not None:
+                progress(share * whole, whole)
+
+        # Robots on their way to infinity are noticed by where they are, not by NumPy.
+        with np.errstate(all="ignore"):
+            if self._integrator == "auto":
+                found |= self._compiled.rollouts(plans, advance)
+            left = [one for one in plans if one not in found]
+            for group in _groups(left):
+                begun, own = len(found) / len(plans), len(group) / len(plans)
+                rollouts = self._by_drake(group, lambda x, a=begun, b=own: advance(a + b * x))
+                found |= zip(group, rollouts, strict=True)
+        return tuple(found[one] for one in plans)
+
+    def _by_drake(self, plans: Sequence[Plan], advance: Callable[[float], None]) -> list[Rollout]:
+        """Return the rollouts of motions side by side; `advance` takes the share that is done."""
+        from dynident.closed_loop.plant.stepping import Stepper
+
+        run, tasks = plans[0].run, [one.task for one in plans]
+        stacked = Stacked.of(plans)
+        time = run.time(max(one.kept for one in plans))
+        total = len(time) - 1
         plant = self._plant(tasks)
-        plant.require_inertia(reference.q[:: max(1, total // _POSES)])
+        plant.require_inertia(stacked.reference.q[:: max(1, total // _POSES)])
         joints = [
             JointLoop(task.name, name, unit)
             for task in tasks
@@ -172,15 +177,17 @@ class ClosedLoop:
                 task.mechanism.robot.names, task.mechanism.robot.units, strict=True
             )
         ]
-        nominal = [task.nominal or task.mechanism.robot for task in tasks]
-        steady = _needed(tasks, references, time[:1]) if controller.ki else None
-        drive = Drive(controller, reference, nominal, scale, steady)
-        stepper = Stepper(plant, joints, rate, controller.delay_s, self._accuracy)
-        measurement = Measurement(noise, np.tile(resolution, len(tasks)))
-        motion = stepper.run(time, reference, drive, measurement, advance)
+        stepper = Stepper(plant, joints, run.rate, run.controller.delay_s, run.accuracy)
+        motion = stepper.run(
+            time,
+            stacked.reference,
+            stacked.drive,
+            stacked.measurement,
+            lambda seconds: advance(seconds * run.rate / total),
+        )
         return [
-            _rollout(motion, reference, slice(before, before + length), k, tasks, rate, resolution)
-            for k, length in enumerate(kept)
+            one.rollout(motion.of_memory(_memory(tasks, k)), stacked.reference, k)
+            for k, one in enumerate(plans)
         ]
 
     def _plant(self, tasks: Sequence[Task]) -> Plant:
@@ -235,41 +242,14 @@ def simulate(
     return loop.simulate(tasks, controller, sensors, lead_in=lead_in, progress=progress)
 
 
-def _rollout(
-    motion: SteppedMotion,
-    reference,
-    rows: slice,
-    k: int,
-    tasks: Sequence[Task],
-    rate: float,
-    resolution: np.ndarray,
-) -> Rollout:
-    task = tasks[k]
-    n = task.mechanism.robot.n
-    first_state = sum(one.mechanism.memory for one in tasks[:k])
-    memory = slice(first_state, first_state + task.mechanism.memory)
-    columns = slice(k * n, k * n + n)
-    own = (rows, columns)
-    first = rows.start
-    mean = motion.mean[max(first - 1, 0) : rows.stop, columns]
-    if not first:
-        mean = np.vstack([mean[:1], mean])
-    return Rollout(
-        t=np.arange(rows.stop - first) / rate,
-        q=motion.q[own],
-        v=motion.v[own],
-        q_measured=rounded(motion.measured[own], resolution),
-        q_ref=reference.q[own],
-        v_ref=reference.v[own],
-        u=motion.u[own],
-        u_before=motion.u[max(first - 1, 0), columns],
-        torque=(mean[:-1] + mean[1:]) / 2,
-        acting=motion.acting[own],
-        saturated=motion.saturated[own].mean(axis=0),
-        start=task.start,
-        mechanism=task.mechanism,
-        past=None if motion.past is None else motion.past.of(rows, columns, memory),
-    )
+def _groups(plans: Sequence[Plan]) -> list[Sequence[Plan]]:
+    return [plans[k : k + SIDE_BY_SIDE] for k in range(0, len(plans), SIDE_BY_SIDE)]
+
+
+def _memory(tasks: Sequence[Task], k: int) -> slice:
+    """Columns of one task's internal states."""
+    first = sum(one.mechanism.memory for one in tasks[:k])
+    return slice(first, first + tasks[k].mechanism.memory)
 
 
 def _scale(given: np.ndarray | None, n: int) -> np.ndarray:
@@ -280,33 +260,8 @@ def _scale(given: np.ndarray | None, n: int) -> np.ndarray:
     return scale
 
 
-def _reference(task: Task, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    found = task.trajectory.at(time)
-    for name, x in zip(("position", "velocity", "acceleration"), found, strict=True):
-        if not (np.abs(x) < LARGEST).all():  # false of NaN too
-            what = f"its {name} is not finite, or beyond {LARGEST:g}"
-            raise SimulationError(what, task.name or "reference", reason="reference")
-    return found
-
-
-def _needed(
-    tasks: Sequence[Task], references: Sequence[tuple[np.ndarray, ...]], time: np.ndarray
-) -> np.ndarray:
-    """Return the torques that the references need at their first sample, (K n,)."""
-    starts = (
-        (task, *(x[:1] for x in found)) for task, found in zip(tasks, references, strict=True)
-    )
-    return np.concatenate(
-        [task.mechanism.stiff_command(time + task.start, q, v, a)[0] for task, q, v, a in starts]
-    )
-
-
 def _samples(seconds: float, rate: float, name: str, least: int) -> int:
     if not (np.isfinite(seconds) and round(seconds * rate) >= least):
         remedy = f"choose {least / rate:g} s or more"
         raise SimulationError(f"{name} = {seconds:g} s at {rate:g} Hz", remedy=remedy)
     return round(seconds * rate)
-
-
-def _normal(rng: np.random.Generator | None, shape: tuple[int, int]) -> np.ndarray:
-    return np.zeros(shape) if rng is None else rng.standard_normal(shape)

@@ -27,6 +27,38 @@ class ReferenceSamples:
     a: np.ndarray
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DriveNumbers:
+    """What a controller computes with on its N = K n joints.
+
+    Attributes
+    ----------
+    kp, kd, ki : (N,) of the measured position, of speed, and of the error in a sample.
+    ahead : (T, N) all that the reference adds to the command, known beforehand.
+    q_ref : (T, N)
+    limit : (N,) of the command; infinite without one.
+    blend : share of a new difference in the speed; None without a low-pass.
+    before, speed : (N,) position and speed before the first sample.
+    integral : (N,) what it begins with.
+    """
+
+    kp: np.ndarray
+    kd: np.ndarray
+    ki: np.ndarray
+    ahead: np.ndarray
+    q_ref: np.ndarray
+    limit: np.ndarray
+    blend: float | None
+    before: np.ndarray
+    speed: np.ndarray
+    integral: np.ndarray
+
+    @property
+    def integrates(self) -> bool:
+        """Whether there is an integral."""
+        return bool(np.any(self.ki))
+
+
 class Drive:
     """The same controller on K robots of n joints side by side; vectors are (K n,).
 
@@ -45,6 +77,7 @@ class Drive:
     Attributes
     ----------
     limited : whether its torques have a limit.
+    numbers : what it computes with.
     """
 
     def __init__(
@@ -58,36 +91,40 @@ class Drive:
         n, rate, count = controller.n, controller.simulated_rate(), len(nominal)
         feedback, factor = controller.feedback(), np.ones(n) if scale is None else scale
         self._rate, self._n = rate, n
-        self._kp = np.tile(factor * feedback.position, count)
-        self._kd = np.tile(factor * feedback.speed, count)
-        self._ki = np.tile(factor * feedback.integral / rate, count)
-        self._integrates = bool(np.any(self._ki))
+        kp, kd = np.tile(factor * feedback.position, count), np.tile(factor * feedback.speed, count)
+        ki = np.tile(factor * feedback.integral / rate, count)
         self._robots = _distinct(nominal)
         self._through_model = controller.law.through_model
-        self._q_ref = reference.q
-        # All that the reference adds to the command is known beforehand.
-        self._ahead = self._kp * reference.q + feedback.follow * self._kd * reference.v
+        ahead = kp * reference.q + feedback.follow * kd * reference.v
         if self._through_model:
-            self._ahead += reference.a
+            ahead += reference.a
         elif controller.feedforward:
             for robot, rows in self._robots:
                 for row in rows:
                     own = slice(row * n, row * n + n)
                     motion = (x[:, own] for x in (reference.q, reference.v, reference.a))
-                    self._ahead[:, own] += robot.inverse_dynamics(*motion)
-        limit = controller.limit
-        self._limit = np.full(n * count, np.inf) if limit is None else np.tile(limit, count)
+                    ahead[:, own] += robot.inverse_dynamics(*motion)
+        limit, cutoff = controller.limit, controller.derivative_cutoff_hz
         self.limited = limit is not None
+        integral = np.zeros(n * count)
+        if steady is not None and np.any(ki):
+            integral = steady - (ahead[0] - kp * reference.q[0] - kd * reference.v[0])
+        self.numbers = DriveNumbers(
+            kp=kp,
+            kd=kd,
+            ki=ki,
+            ahead=ahead,
+            q_ref=reference.q,
+            limit=np.full(n * count, np.inf) if limit is None else np.tile(limit, count),
+            # Exact for a velocity that is constant from sample to sample.
+            blend=None if cutoff is None else -math.expm1(-2 * math.pi * cutoff / rate),
+            before=reference.q[0] - reference.v[0] / rate,
+            speed=reference.v[0],
+            integral=integral,
+        )
+        self._integrates = self.numbers.integrates
         self._saturated = np.zeros(n * count, dtype=bool)
-        cutoff = controller.derivative_cutoff_hz
-        # Exact for a velocity that is constant from sample to sample.
-        self._blend = None if cutoff is None else -math.expm1(-2 * math.pi * cutoff / rate)
-        self._q, self._v = reference.q[0] - reference.v[0] / rate, reference.v[0]
-        self._integral = np.zeros(n * count)
-        if steady is not None and self._integrates:
-            self._integral = steady - (
-                self._ahead[0] - self._kp * reference.q[0] - self._kd * reference.v[0]
-            )
+        self._q, self._v, self._integral = self.numbers.before, self.numbers.speed, integral
 
     @property
     def saturated(self) -> np.ndarray:
@@ -96,23 +133,24 @@ class Drive:
 
     def command(self, k: int, q: np.ndarray) -> np.ndarray:
         """Return the torque of sample k, (K n,) N m or N, from the measured position q."""
+        known = self.numbers
         speed = (q - self._q) * self._rate
         self._q = q
-        if self._blend is None:
+        if known.blend is None:
             self._v = speed
         else:
-            self._v = self._v + self._blend * (speed - self._v)
-        u = self._ahead[k] - self._kp * q - self._kd * self._v
+            self._v = self._v + known.blend * (speed - self._v)
+        u = known.ahead[k] - known.kp * q - known.kd * self._v
         integral = self._integral
         if self._integrates:
-            integral = integral + self._ki * (self._q_ref[k] - q)
+            integral = integral + known.ki * (known.q_ref[k] - q)
             u += integral
         if self._through_model:
             u = self._inverse_dynamics(q, u)
         if self.limited:
-            self._saturated = np.abs(u) >= self._limit
+            self._saturated = np.abs(u) >= known.limit
             integral = np.where(self._saturated, self._integral, integral)
-            u = np.minimum(np.maximum(u, -self._limit), self._limit)
+            u = np.minimum(np.maximum(u, -known.limit), known.limit)
         self._integral = integral
         return u
 

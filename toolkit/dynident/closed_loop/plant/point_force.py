@@ -47,16 +47,20 @@ class PointForce(Protocol):
 
 def point_force(bodies: Bodies) -> PointForce:
     """Return the force of effects, as fast as they allow."""
-    try:
-        if all(_agrees(one) for one in bodies.distinct):
-            return TracedForce(bodies)
-    except Exception:  # code that is not symbolic fails in as many ways as there are
-        pass
+    if all(can_be_traced(one) for one in bodies.distinct):
+        return TracedForce(bodies)
     return PlainForce(bodies)
 
 
+def can_be_traced(mechanism: Mechanism) -> bool:
+    """Whether its effects can be run on symbols, and their force is then their force."""
+    try:
+        return _agrees(mechanism)
+    except Exception:  # code that is not symbolic fails in as many ways as there are
+        return False
+
+
 def _agrees(mechanism: Mechanism) -> bool:
-    """Whether its force on symbols is the force."""
     n, rng = mechanism.robot.n, np.random.default_rng(0)
     scale = np.geomspace(1e-3, 10.0, _PROBES)[:, None]
     t = rng.uniform(0.0, 1000.0, _PROBES)
@@ -77,59 +81,72 @@ def _agrees(mechanism: Mechanism) -> bool:
     return bool(np.abs(found - expected).max() <= _AGREEMENT * np.abs(expected).max())
 
 
+def traced(bodies: Bodies, name: str = "force") -> Any:
+    """Return the force as a CasADi function.
+
+    Its one input is t, the state (2 N,), the memory (M,) and `parameters_of` bodies, one after the
+    other; its one output the force (N,) and the rates of the memory (M,).
+
+    Parameters
+    ----------
+    bodies : whose effects can be run on symbols.
+    name : of the function.
+    """
+    import casadi
+
+    mechanisms, place = bodies.mechanisms, bodies.place
+    n, size = mechanisms[0].robot.n, len(place)
+    t, x = casadi.SX.sym("t"), casadi.SX.sym("x", 2 * size)
+    memory = casadi.SX.sym("z", bodies.memory)
+    parameters = casadi.SX.sym("p", len(parameters_of(bodies)))
+    left, states = iter(casadi.vertsplit(parameters)), iter(casadi.vertsplit(memory))
+    starts = [next(left) for _ in mechanisms]
+    added: list = [None] * size
+    rates: list = []
+    for k, (mechanism, start) in enumerate(zip(mechanisms, starts, strict=True)):
+        own = place[k * n : k * n + n]
+        # One sample of a block, as the effects expect it.
+        q = np.array([[x[int(i)] for i in own]], dtype=object)
+        v = np.array([[x[int(i) + size] for i in own]], dtype=object)
+        block = mechanism.block(np.array([t + start], dtype=object), q, v)
+        force = [casadi.SX(0.0)] * n
+        for one in mechanism.effects:
+            given: Any = [next(left) for _ in one.values]
+            seen = block
+            if one.effect.memory:
+                z = [[next(states) for _ in range(one.effect.memory)]]
+                seen = replace(block, memory=np.array(z, dtype=object))
+                rates += [casadi.SX(r) for r in one.effect.simulated_rate(given, seen)[0]]
+            # A force is linear in the values: it is traced value by value.
+            for value, unit in zip(given, np.eye(len(given)).tolist(), strict=True):
+                per_unit = one.effect.simulated_force(unit, seen)[0]
+                force = [f + value * casadi.SX(x) for f, x in zip(force, per_unit, strict=True)]
+        for i, one in zip(own, force, strict=True):
+            added[i] = -one
+    inputs = casadi.vertcat(t, x, memory, parameters)
+    return casadi.Function(name, [inputs], [casadi.densify(casadi.vertcat(*added, *rates))])
+
+
 class TracedForce(PointForce):
     """The force as a CasADi function of t, state, starts and values."""
 
     def __init__(self, bodies: Bodies) -> None:
-        import casadi
-
-        mechanisms, place = bodies.mechanisms, bodies.place
-        n, size = mechanisms[0].robot.n, len(place)
-        t, x = casadi.SX.sym("t"), casadi.SX.sym("x", 2 * size)
-        memory = casadi.SX.sym("z", bodies.memory)
-        parameters = casadi.SX.sym("p", len(_parameters(bodies)))
-        left, states = iter(casadi.vertsplit(parameters)), iter(casadi.vertsplit(memory))
-        starts = [next(left) for _ in mechanisms]
-        added: list = [None] * size
-        rates: list = []
-        for k, (mechanism, start) in enumerate(zip(mechanisms, starts, strict=True)):
-            own = place[k * n : k * n + n]
-            # One sample of a block, as the effects expect it.
-            q = np.array([[x[int(i)] for i in own]], dtype=object)
-            v = np.array([[x[int(i) + size] for i in own]], dtype=object)
-            block = mechanism.block(np.array([t + start], dtype=object), q, v)
-            force = [casadi.SX(0.0)] * n
-            for one in mechanism.effects:
-                given: Any = [next(left) for _ in one.values]
-                seen = block
-                if one.effect.memory:
-                    z = [[next(states) for _ in range(one.effect.memory)]]
-                    seen = replace(block, memory=np.array(z, dtype=object))
-                    rates += [casadi.SX(r) for r in one.effect.simulated_rate(given, seen)[0]]
-                # A force is linear in the values: it is traced value by value.
-                for value, unit in zip(given, np.eye(len(given)).tolist(), strict=True):
-                    per_unit = one.effect.simulated_force(unit, seen)[0]
-                    force = [f + value * casadi.SX(x) for f, x in zip(force, per_unit, strict=True)]
-            for i, one in zip(own, force, strict=True):
-                added[i] = -one
-        inputs = casadi.vertcat(t, x, memory, parameters)
-        outputs = casadi.vertcat(*added, *rates)
-        function: Any = casadi.Function("force", [inputs], [outputs])
+        function, size = traced(bodies), len(bodies.place)
         # The memory that the function reads and writes is these two arrays for good; the buffer
         # must live as long as they are used.
-        self._inside, outside = np.zeros(inputs.numel()), np.zeros(outputs.numel())
+        self._inside, outside = np.zeros(function.numel_in(0)), np.zeros(function.numel_out(0))
         self._outside, self._rates = outside[:size], outside[size:]
         self._buffer, self._call = function.buffer()
         views: Any = (memoryview(self._inside), memoryview(outside))  # type: ignore[arg-type]
         self._buffer.set_arg(0, views[0])
         self._buffer.set_res(0, views[1])
         end = 1 + 2 * size
-        self._state, self._memory = self._inside[1:end], self._inside[end : end + len(rates)]
+        self._state, self._memory = self._inside[1:end], self._inside[end : end + bodies.memory]
         self.set(bodies)
 
     def set(self, bodies: Bodies) -> None:
         """Take other values and starts."""
-        self._inside[1 + len(self._state) + len(self._memory) :] = _parameters(bodies)
+        self._inside[1 + len(self._state) + len(self._memory) :] = parameters_of(bodies)
 
     def __call__(self, t: float, x: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Return the force."""
@@ -145,7 +162,8 @@ class TracedForce(PointForce):
         return self._rates
 
 
-def _parameters(bodies: Bodies) -> list[float]:
+def parameters_of(bodies: Bodies) -> list[float]:
+    """Return the starts of motions, then the values of all effects."""
     values = [x for body in bodies.mechanisms for one in body.effects for x in one.values]
     return [*bodies.starts, *values]
 

@@ -3,93 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-from dynident.closed_loop.mechanism import Past
 from dynident.closed_loop.plant.diagram import Plant
 from dynident.closed_loop.plant.drive import Drive, ReferenceSamples
+from dynident.closed_loop.stepped_motion import (
+    WINDOW,
+    Hold,
+    JointLoop,
+    Measurement,
+    SteppedMotion,
+    chattering,
+    rms,
+    runaway,
+)
 from dynident.errors import SimulationError
 
 _SMALLEST_STEP = 1e-4
 """Of a sample; a motion that needs smaller ones is on its way to infinity."""
-_WINDOW = 200
-"""Samples between looks at the whole motion."""
-_RUNAWAY = 100.0
-"""A state this many times beyond the reference's has left the earth."""
-_ROUNDING = 1e-6
-"""Of a sample; a delay this near to a whole number of samples is one."""
-
-
-@dataclass(frozen=True, eq=False)
-class Measurement:
-    """What the encoders add to the positions of N joints.
-
-    Attributes
-    ----------
-    noise : (T, N) rad or m.
-    resolution : (N,) rad or m; 0 for none.
-    """
-
-    noise: np.ndarray
-    resolution: np.ndarray
-
-    def of(self, k: int, q: np.ndarray) -> np.ndarray:
-        """Return positions q (N,) as they are measured at sample k."""
-        if self._noisy:
-            q = q + self.noise[k]
-        if self._coarse:
-            q = np.where(self.resolution == 0, q, np.rint(q / self._step) * self._step)
-        return q
-
-    @cached_property
-    def _noisy(self) -> bool:
-        return bool(np.any(self.noise))
-
-    @cached_property
-    def _coarse(self) -> bool:
-        return bool(np.any(self.resolution > 0))
-
-    @cached_property
-    def _step(self) -> np.ndarray:
-        return np.where(self.resolution == 0, 1.0, self.resolution)
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class SteppedMotion:
-    """What came of it, (T, N) each.
-
-    Attributes
-    ----------
-    q, v : true motion.
-    measured : position as the controller gets it.
-    u : command as the controller gives it.
-    acting, mean : command that acts just after a sample, and in the mean until the next one.
-    saturated : whether the command is at its limit.
-    past : what else the accelerations depend on; None where that is nothing.
-    """
-
-    q: np.ndarray
-    v: np.ndarray
-    measured: np.ndarray
-    u: np.ndarray
-    acting: np.ndarray
-    mean: np.ndarray
-    saturated: np.ndarray
-    past: Past | None = None
-
-
-@dataclass(frozen=True)
-class JointLoop:
-    """How messages call a joint: the motion's name, the joint's, and its unit."""
-
-    task: str
-    name: str
-    unit: str
 
 
 class Stepper:
@@ -108,10 +42,7 @@ class Stepper:
         self, plant: Plant, joints: Sequence[JointLoop], rate: float, delay: float, accuracy: float
     ) -> None:
         self._plant, self._joints, self._rate, self._accuracy = plant, joints, rate, accuracy
-        samples = delay * rate
-        self._late = int(np.floor(samples + _ROUNDING))
-        rest = samples - self._late
-        self._rest = rest if rest > _ROUNDING else 0.0
+        self._hold = Hold.of(delay, rate)
 
     def run(
         self,
@@ -142,7 +73,7 @@ class Stepper:
         place, order = plant.positions, np.argsort(plant.inputs)
         effect = (1.0 / plant.gain)[order]
         total, size = measurement.noise.shape
-        beyond = (_RUNAWAY * (1.0 + np.abs(reference.q).max() + np.abs(reference.v).max())) ** 2
+        beyond, pace = runaway(reference.q, reference.v), rms(reference.v)
 
         simulator, state, held = self._start(time[0], reference)
         # The object behind the input stays; asking for it is how Drake learns that it changes.
@@ -151,7 +82,7 @@ class Stepper:
         states = np.empty((total, state.size()))
         measured, commands = np.empty((total, size)), np.empty((total, size))
         saturated = np.zeros((total, size), dtype=bool)
-        late, rest = self._late, self._rest
+        late, rest = self._hold.late, self._hold.rest
         every = max(1, total // 200)
         for k in range(total):
             states[k] = x = state.CopyToVector()
@@ -174,11 +105,11 @@ class Stepper:
                 advance(time[k + 1])
             except (RuntimeError, np.linalg.LinAlgError) as error:
                 raise self._diverged(time[k], state.CopyToVector(), error) from None
-            if k % _WINDOW == _WINDOW - 1:
-                self._check_chatter(time[k], states[k + 1 - _WINDOW : k + 1], reference.v)
+            if k % WINDOW == WINDOW - 1:
+                self._check_chatter(time[k], states[k + 1 - WINDOW : k + 1], pace)
             if k % every == 0 or k + 1 == total:
                 progress((k + 1) / rate)
-        acting, mean = self._arrived(commands)
+        acting, mean = self._hold.arrived(commands)
         return SteppedMotion(
             q=states[:, place],
             v=states[:, plant.speeds],
@@ -205,21 +136,12 @@ class Stepper:
         simulator.Initialize()
         return simulator, context.get_continuous_state_vector(), held
 
-    def _arrived(self, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return `SteppedMotion.acting` and `SteppedMotion.mean` of the commands."""
-        rows = np.arange(len(commands)) - self._late
-        now, before = commands[np.maximum(rows, 0)], commands[np.maximum(rows - 1, 0)]
-        return before if self._rest else now, (1.0 - self._rest) * now + self._rest * before
-
     # --- what goes wrong -----------------------------------------------------------------------
 
-    def _check_chatter(self, time: float, states: np.ndarray, v_ref: np.ndarray) -> None:
+    def _check_chatter(self, time: float, states: np.ndarray, pace: np.ndarray) -> None:
         """Refuse a loop whose speed swings from sample to sample by more than it follows."""
-        v = states[:, self._plant.speeds]
-        swing, pace = _rms(np.diff(v, 2, axis=0)), _rms(v_ref)
-        # A joint that stands still swings by its encoder's noise alone.
-        worst = int(np.argmax(swing / np.maximum(pace, 0.1 * pace.max() + 1e-9)))
-        if swing[worst] > max(pace[worst], 0.1 * pace.max()) > 0:
+        worst = chattering(states[:, self._plant.speeds], pace)
+        if worst is not None:
             raise self._failure(worst, time, "the loop oscillates from sample to sample")
 
     def _diverged(
@@ -254,7 +176,3 @@ class Stepper:
         where = f"{one.task}, t = {time:.4g} s" if one.task else f"t = {time:.4g} s"
         remedy = "lower the controller's gains, or raise its rate_hz"
         return SimulationError(what, where, remedy, reason="unstable")
-
-
-def _rms(x: np.ndarray) -> np.ndarray:
-    return np.sqrt(np.mean(x**2, axis=0))
