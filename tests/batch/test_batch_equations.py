@@ -8,7 +8,7 @@ import pytest
 from random_trees import joint_names, random_tree, urdf
 
 from chains import chain
-from dynident.batch import regressor_kernel, tape, torque_kernel
+from dynident.batch import joint_space_tape, regressor_kernel, tape, torque_kernel
 from dynident.robot import Robot, structural_base
 
 pin: Any = pinocchio  # its bindings carry no types
@@ -52,6 +52,30 @@ def test_regressor_and_torque_are_pinocchios(seed, gravity):
     torque = torque_kernel(tree_of(robot))(q, v, a, parameters=robot.theta.tolist())
     size = (np.abs(want) @ np.abs(robot.theta)).max()
     assert np.abs(torque - want @ robot.theta).max() < 1e-14 * size
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_joint_space_inertia_and_bias_are_pinocchios(seed):
+    robot = robot_of(seed)
+    n, tape = robot.n, joint_space_tape(tree_of(robot))
+    q, v, _ = robot.random_motion(seed, 40)
+    still = np.zeros(n)
+    inputs = [*np.cos(q).T, *np.sin(q).T, *q.T, *v.T, *np.full((n, 40), np.nan), *robot.theta]
+    results = list(np.empty((n * (n + 1) // 2 + n, 40)))
+    tape.replay(inputs, results)
+    torque = torque_kernel(tree_of(robot))(q, v, 0 * v, parameters=robot.theta.tolist())
+    scale = np.abs(torque).max()
+    np.testing.assert_allclose(np.array(results[-n:]).T, torque, rtol=0, atol=1e-14 * scale)
+    model = robot.pinocchio()
+    data = model.createData()
+    index = np.array([model.joints[model.getJointId(name)].idx_v for name in robot.names])
+    for k in range(40):
+        x = still.copy()
+        x[index] = q[k]
+        upper = np.triu(pin.crba(model, data, x))
+        M = (upper + upper.T - np.diag(np.diag(upper)))[np.ix_(index, index)]
+        found = [row[k] for row in results[:-n]]
+        np.testing.assert_allclose(found, M[np.tril_indices(n)], rtol=0, atol=1e-13 * M.max())
 
 
 def test_axes_against_the_frames_and_tidy_frames_are_as_exact():

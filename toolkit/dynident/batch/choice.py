@@ -47,7 +47,9 @@ class Choice:
         self, source: Callable[[], str], entry: str, other: Way, level: Level = "-O1"
     ) -> None:
         self.evaluation = Evaluation(other, "not called yet")
-        self._write, self._entry, self._other, self._level = source, entry, other, level
+        self._write, self._entry = source, entry
+        self._other: Way = other
+        self._level: Level = level
         self._function: Any = None
         self.failed, self._why = "", ""
 

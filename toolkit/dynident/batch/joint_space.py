@@ -13,7 +13,7 @@ from typing import Any
 import lazy_loader
 
 from dynident.batch.joint_tree import JointTree
-from dynident.batch.newton_euler import SIGNALS, Equations, Motion, skew, torque_equations
+from dynident.batch.newton_euler import SIGNALS, Equations, TreeMotion, skew, torque_equations
 from dynident.batch.tape import Tape, tape_of
 
 ca: Any = lazy_loader.load("casadi")
@@ -42,7 +42,7 @@ def joint_space_equations(tree: JointTree) -> Equations:
     Equations with places (k,): first the lower triangle of M, row by row, then h.
     """
     n = tree.n
-    motion = Motion(tree)
+    motion = TreeMotion(tree)
     theta = ca.SX.sym("theta", 10 * n)
     inputs = ca.vertcat(motion.inputs, theta)
     triangle = _inertia(motion, theta)
@@ -54,7 +54,7 @@ def joint_space_equations(tree: JointTree) -> Equations:
     return Equations(inputs, tuple((k,) for k in range(len(rows) + n)), expressions)
 
 
-def _inertia(motion: Motion, theta: Any) -> list[list[Any]]:
+def _inertia(motion: TreeMotion, theta: Any) -> list[list[Any]]:
     """M as rows of entries; those of joints that do not carry each other are zero."""
     tree = motion.tree
     mass, first, second = {}, {}, {}
@@ -92,7 +92,7 @@ def _inertia(motion: Motion, theta: Any) -> list[list[Any]]:
     return entries
 
 
-def _wrench_to_parent(motion: Motion, j: int, force: Any, moment: Any) -> tuple[Any, Any]:
+def _wrench_to_parent(motion: TreeMotion, j: int, force: Any, moment: Any) -> tuple[Any, Any]:
     """A force and a moment about joint j's origin, as its parent's frame has them."""
     if motion.tree.prismatic[j]:
         moment = moment + skew(motion.axis[j]) @ force * motion.q[j]

@@ -55,7 +55,7 @@ def regressor_equations(tree: JointTree, columns: tuple[int, ...]) -> Equations:
     -------
     Equations with places (row, position in `columns`).
     """
-    motion = Motion(tree)
+    motion = TreeMotion(tree)
     places: list[tuple[int, ...]] = []
     expressions = []
     turning: dict[int, Any] = {}
@@ -86,7 +86,7 @@ def torque_equations(tree: JointTree) -> Equations:
     Equations with places (joint,), of all joints.
     """
     theta = ca.SX.sym("theta", 10 * tree.n)
-    motion = Motion(tree)
+    motion = TreeMotion(tree)
     moments, forces = {}, {}
     for j in tree.order:
         moment, force = motion.unit_wrenches(j)
@@ -110,7 +110,7 @@ def torque_equations(tree: JointTree) -> Equations:
     return Equations(inputs, places, ca.densify(ca.vertcat(*torque)))
 
 
-class Motion:
+class TreeMotion:
     """The motion of all bodies, symbolic."""
 
     def __init__(self, tree: JointTree) -> None:

@@ -1,4 +1,6 @@
-"""Closed loops in Drake, and virtual experiments. Drake is loaded when something is simulated.
+"""Closed loops, compiled or in Drake, and virtual experiments.
+
+Drake is loaded when it simulates something.
 
 In: a `Mechanism` (a robot with the effects that it truly has), a `Reference` and a `Controller`.
 Out: `simulate` gives `Rollout`s; `retrace` runs measured references again; an `Experiment` records
@@ -6,6 +8,7 @@ virtual measurements, which `write_experiment` writes with a study. A new kind o
 entry of `controllers.LAWS`.
 """
 
+from dynident.closed_loop.compiled.loop_function import loop_evaluations
 from dynident.closed_loop.controllers import Controller, ControllerFile
 from dynident.closed_loop.experiments.experiment import Experiment, ExperimentRun
 from dynident.closed_loop.experiments.experiment_file import load_experiment
@@ -36,6 +39,7 @@ __all__ = [
     "Task",
     "TrueEffect",
     "load_experiment",
+    "loop_evaluations",
     "retrace",
     "simulate",
     "write_experiment",

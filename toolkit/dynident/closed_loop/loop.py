@@ -21,7 +21,7 @@ import numpy as np
 
 from dynident.closed_loop.compiled.many_rollouts import CompiledLoops
 from dynident.closed_loop.controllers import Controller
-from dynident.closed_loop.motion_plan import Plan, Run, Stacked
+from dynident.closed_loop.motion_plan import Plan, PlanSettings, Stacked
 from dynident.closed_loop.plant.side_by_side import structure
 from dynident.closed_loop.rollout import LEAD_IN, Rollout, Task
 from dynident.closed_loop.sensors import Sensors
@@ -133,7 +133,7 @@ class ClosedLoop:
         for task in tasks:
             task.require_fit(controller.n, tasks[0].mechanism.robot.n)
         rate = controller.simulated_rate()
-        run = Run(
+        run = PlanSettings(
             controller=controller,
             position_std=sensors.each("position_std", controller.n),
             resolution=sensors.each("position_resolution", controller.n),

@@ -22,7 +22,7 @@ LARGEST = 1e6
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Run:
+class PlanSettings:
     """What all motions of a simulation share.
 
     Attributes
@@ -65,7 +65,7 @@ class Plan:
 
     task: Task
     kept: int
-    run: Run
+    run: PlanSettings
 
     @property
     def samples(self) -> int:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from dynident import files
 from dynident.batch import evaluations
+from dynident.closed_loop import loop_evaluations
 from dynident.diagnosis.details import Candidate, Step
 from dynident.diagnosis.result import Diagnosis
 from dynident.reporting.content import first_set
@@ -175,6 +176,8 @@ def versions(command: str) -> Table:
     ]
     if used := evaluations():
         made.append(("equations of motion", "; ".join(map(str, used))))
+    if used := loop_evaluations():
+        made.append(("closed loops", "; ".join(map(str, used))))
     packages = (f"{package} {_version(package)}" for package in _dependencies())
     made.append(("with", ", ".join(packages)))
     return Table("Made", ("what", "value"), tuple(made))

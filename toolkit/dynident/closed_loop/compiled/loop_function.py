@@ -16,7 +16,7 @@ from dynident.closed_loop.compiled.c_loop import COUNTED, ENTRY, READ, WRITTEN
 from dynident.closed_loop.compiled.loop_source import (
     STATUS,
     BodyStructure,
-    LoopSource,
+    LoopCode,
     loop_source,
     traced_part,
 )
@@ -108,7 +108,7 @@ class CompiledLoop:
         return ""
 
     @cached_property
-    def _source(self) -> LoopSource:
+    def _source(self) -> LoopCode:
         return loop_source(self._truth, self._nominal)
 
     def function(self, seen: int) -> Any | None:

@@ -49,7 +49,7 @@ def traced_part(mechanism: Mechanism, start: float = 0.0) -> Bodies:
 
 
 @dataclass(frozen=True, eq=False)
-class LoopSource:
+class LoopCode:
     """A loop in C.
 
     Attributes
@@ -62,7 +62,7 @@ class LoopSource:
     room: int
 
 
-def loop_source(truth: Mechanism, nominal: Mechanism) -> LoopSource:
+def loop_source(truth: Mechanism, nominal: Mechanism) -> LoopCode:
     """Write the loop of a mechanism with another one inside its controller.
 
     Parameters
@@ -91,7 +91,7 @@ def loop_source(truth: Mechanism, nominal: Mechanism) -> LoopSource:
     if same:
         parts.append("#define nominal_equations truth_equations")
         parts.append("#define nominal_others truth_others")
-    return LoopSource(
+    return LoopCode(
         "\n".join([*parts, LOOP]), rooms["truth"] + rooms.get("nominal", rooms["truth"])
     )
 

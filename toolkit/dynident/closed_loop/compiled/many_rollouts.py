@@ -60,7 +60,7 @@ class CompiledLoops:
         bodies: dict[tuple[int, float], BodyNumbers] = {}
         for first in range(0, len(wanted), _TOGETHER):
             some = wanted[first : first + _TOGETHER]
-            inputs = [_input(one, known, bodies) for one in some]
+            inputs = [loop_input(one, known, bodies) for one in some]
             functions = [able[one] for one in some]
             for plan, given, motion in zip(some, inputs, _made(functions, inputs), strict=True):
                 if isinstance(motion, str):
@@ -108,12 +108,19 @@ def _nominal(plan: Plan) -> Mechanism:
     return given if isinstance(given, Mechanism) else Mechanism(given)
 
 
-def _input(
+def loop_input(
     plan: Plan,
     known: dict[tuple[int, int], ReferenceSamples],
     bodies: dict[tuple[int, float], BodyNumbers],
 ) -> LoopInput:
-    """Return what a loop makes a motion of; references and bodies that are shared are made once."""
+    """Return what a loop makes a motion of.
+
+    Parameters
+    ----------
+    plan : the motion.
+    known, bodies : references and numbers of bodies that were made before, by what they are of;
+        they are added to.
+    """
     task, run = plan.task, plan.run
     key = id(task.trajectory), plan.samples
     if key not in known:
