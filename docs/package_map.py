@@ -18,7 +18,7 @@ FACADES = ("__init__.py", "__init__.pyi")
 FLOORS = (
     ("errors",),
     ("files", "tables"),
-    ("settings", "data_files", "places", "threads"),
+    ("progress", "settings", "data_files", "places", "threads"),
     ("criteria",),
     ("inertia", "moments", "batch"),
     ("recording",),

@@ -40,6 +40,8 @@ def run(capfd, tmp_path, monkeypatch) -> Run:
     """Run the command as the shell would, in a folder of its own."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("DYNIDENT_DATA", raising=False)
+    # On a slow machine lines of progress would come in between.
+    monkeypatch.setattr("dynident.progress.EVERY", 1e9)
 
     def call(*arguments: str | Path) -> Done:
         capfd.readouterr()

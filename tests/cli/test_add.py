@@ -125,3 +125,17 @@ def test_a_study_that_may_not_be_written_stays(study, monkeypatch, capfd):
     assert stop.value.code == 2 and said.out == ""
     assert said.err.startswith("error: ") and "No space left" in said.err
     assert path.read_text() == STUDY
+
+
+def test_several_effects_are_added_at_once(run, study):
+    path = study()
+    done = run("add", path, "coulomb_friction@elbow", "torque_offset", "--json")
+    assert done.status == 0
+    added = ["coulomb_friction@elbow", "torque_offset@shoulder", "torque_offset@elbow"]
+    assert done.json["added"] == added
+    assert [m["name"] for m in done.json["models"]] == [
+        "study",
+        "+ coulomb_friction@elbow + torque_offset",
+    ]
+    labels = [effect.label for effect in load(path).model.effects]
+    assert labels[-3:] == added

@@ -52,6 +52,47 @@ class Table:
         return capture.get()
 
 
+def mostly_noise(joints: Sequence[str], shares: Sequence[float | None]) -> tuple[str, ...]:
+    """Return a note on joints at whose torque a relative error means little; none as a rule.
+
+    Parameters
+    ----------
+    joints : names.
+    shares : noise over torque, root mean square, of each; None where the noise is not known.
+    """
+    pairs = zip(joints, shares, strict=True)
+    names = [name for name, share in pairs if share is not None and share > MOSTLY_NOISE]
+    if not names:
+        return ()
+    return (
+        f"At {', '.join(names)} noise makes more than {percent(MOSTLY_NOISE, 0)} of the little "
+        "torque there is: a relative error means little there.",
+    )
+
+
+MOSTLY_NOISE = 0.3
+"""Share of noise in a joint's torque from which on a relative error means little."""
+
+
+class Shown:
+    """What is shown as tables and sentences: in a terminal, a notebook, a file of text."""
+
+    def tables(self) -> tuple[Table | str, ...]:
+        """Everything that `show` prints, in its order."""
+        raise NotImplementedError
+
+    def show(self) -> None:
+        """Print the tables and sentences to the terminal."""
+        print_tables(*self.tables())
+
+    def _repr_html_(self) -> str:
+        """Show the same in a notebook."""
+        return "".join(
+            f"<p>{escape(part)}</p>" if isinstance(part, str) else part._repr_html_()
+            for part in self.tables()
+        )
+
+
 def print_tables(*tables: Table | str) -> None:
     """Print tables and sentences to standard output, one after another."""
     import sys

@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     arguments : by default those of the process.
     """
     with warnings.catch_warnings():
-        warnings.showwarning = _show_warning
+        warnings.showwarning = _Warnings().show
         warnings.simplefilter("always", DynidentWarning)
         try:
             # With standalone_mode, click would word and print the errors its own way.
@@ -67,5 +67,13 @@ def _fail(message: str) -> NoReturn:
     sys.exit(2)
 
 
-def _show_warning(message, category, filename, lineno, file=None, line=None) -> None:
-    click.echo(f"warning: {message}", err=True)
+class _Warnings:
+    """Warnings on standard error, each once: a file may be looked at several times."""
+
+    def __init__(self) -> None:
+        self._said: set[str] = set()
+
+    def show(self, message, category, filename, lineno, file=None, line=None) -> None:
+        if str(message) not in self._said:
+            self._said.add(str(message))
+            click.echo(f"warning: {message}", err=True)

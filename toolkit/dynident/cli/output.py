@@ -11,6 +11,8 @@ from typing import Any
 
 import click
 
+from dynident.progress import logged, to_standard_error
+
 
 def show(*parts: Any) -> None:
     """Print tables and sentences."""
@@ -59,9 +61,10 @@ def _plain(value: Any) -> Any:
 
 @contextmanager
 def progress(title: str) -> Iterator[Callable[..., None]]:
-    """Show a progress bar while standard error is a terminal, nothing otherwise."""
+    """Show a progress bar on a terminal, else a line every ten seconds on standard error."""
     if not sys.stderr.isatty():
-        yield lambda *_: None
+        to_standard_error()
+        yield logged(title)
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn

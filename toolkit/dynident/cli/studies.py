@@ -97,16 +97,16 @@ def compare(study: Path, additions: tuple[str, ...]) -> CommandAnswer:
     Example: dynident compare study.toml --with stribeck_friction@elbow
     """
     loaded = load_study(study)
-    comparison = comparison_of(loaded, additions)
+    comparison = comparison_of(loaded, tuple((label,) for label in additions))
     return CommandAnswer(content=comparison.to_dict, parts=comparison.tables)
 
 
 @commands.command()
 @STUDY
-@click.argument("effect", metavar="EFFECT[@JOINT[:SOURCE]]")
+@click.argument("labels", metavar="EFFECT[@JOINT[:SOURCE]]...", nargs=-1, required=True)
 @answered
-def add(study: Path, effect: str) -> CommandAnswer:
-    """Write an effect into the study file; print the error before and after.
+def add(study: Path, labels: tuple[str, ...]) -> CommandAnswer:
+    """Write effects into the study file; print the error before and after.
 
     Example: dynident add study.toml stribeck_friction@elbow
     """
@@ -114,16 +114,16 @@ def add(study: Path, effect: str) -> CommandAnswer:
     from dynident.study import add_effects
 
     loaded = load_study(study)
-    effects = effects_of(effect, loaded.robot)
-    fresh = tuple(one for one in effects if one not in loaded.model)
+    every = (one for label in labels for one in effects_of(label, loaded.robot))
+    fresh = tuple(dict.fromkeys(one for one in every if one not in loaded.model))
     if not fresh:
-        raise StudyError(f"has {effect} already", str(study), "nothing was changed")
+        raise StudyError(f"has {', '.join(labels)} already", str(study), "nothing was changed")
     if any(one.is_payload for one in fresh):
         recordings = (loaded.train + loaded.test).recordings
         if not any(r.payload for r in recordings):
             remedy = "set payload = true in the [[recordings]] that carry it"
             raise StudyError("no recording carries a payload", str(study), remedy)
-    comparison = comparison_of(loaded, (effect,))
+    comparison = comparison_of(loaded, (labels,))
     add_effects(study, fresh)
     return CommandAnswer(
         content=lambda: {"added": [one.label for one in fresh], **comparison.to_dict()},

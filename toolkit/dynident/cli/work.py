@@ -69,24 +69,20 @@ def diagnosis_of(study: Study, most: int | None = None) -> Diagnosis:
         )
 
 
-def comparison_of(study: Study, additions: tuple[str, ...]) -> Comparison:
-    """Compare the study's model with those that have an effect more."""
+def comparison_of(study: Study, additions: tuple[tuple[str, ...], ...]) -> Comparison:
+    """Compare the study's model with those that have some effects more, one model an addition."""
+    from dynident.effects import effects_of
     from dynident.evidence import compare_models
 
     models = {"study": study.model}
-    for label in additions:
+    for labels in additions:
         model = study.model
-        for effect in _missing(label, study):
-            model = model + effect
-        models[f"+ {label}"] = model
+        for label in labels:
+            for effect in effects_of(label, study.robot):
+                model = model if effect in model else model + effect
+        models["+ " + " + ".join(labels)] = model
     with progress("comparing"):
         return compare_models(models, study.train, study.test, study.controller, study.criteria)
-
-
-def _missing(label: str, study: Study):
-    from dynident.effects import effects_of
-
-    return [effect for effect in effects_of(label, study.robot) if effect not in study.model]
 
 
 def write_report(study: Study, diagnosis: Diagnosis, to: Path | None) -> None:

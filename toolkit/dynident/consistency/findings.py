@@ -10,7 +10,7 @@ from dynident.consistency.link import LinkCheck
 from dynident.consistency.rules import TITLES, RuleMargin
 from dynident.consistency.spread import IMPOSSIBLE_SPREAD
 from dynident.errors import ConsistencyError
-from dynident.tables import Table, json_row, number, percent, print_tables
+from dynident.tables import Shown, Table, json_row, number, percent
 
 _RELATIVE = (
     "relative: a mass to the robot's typical mass, a length to the link's extent l, a "
@@ -19,7 +19,7 @@ _RELATIVE = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Check:
+class Check(Shown):
     """Which links of a robot are impossible, by which rule and by how much.
 
     Attributes
@@ -109,10 +109,6 @@ class Check:
         parts += [f"{one.title}: {'; '.join(one.hints)}" for one in suspects]
         parts += [*hidden, *self.notes, self.sentence]
         return tuple(parts)
-
-    def show(self) -> None:
-        """Print the margins, worst first, and what is broken in words."""
-        print_tables(*self.tables())
 
     def link_table(self) -> Table:
         """The worst rule of every link and moving body."""

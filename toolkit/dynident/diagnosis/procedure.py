@@ -65,6 +65,7 @@ from dynident.evidence.runs import gather
 from dynident.evidence.simulated_motion import motion_of_loop
 from dynident.fitting.estimate import Estimate
 from dynident.model import Model
+from dynident.progress import logged
 from dynident.recording import Dataset, numbered
 from dynident.threads import single_threaded
 from dynident.wiring import check_wiring
@@ -79,7 +80,7 @@ def diagnose(
     controller: Controller | None = None,
     most: int | None = None,
     criteria: Criteria = DEFAULTS,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
     """Find where a model fails and which physical effects it lacks.
 
@@ -94,7 +95,8 @@ def diagnose(
     most : effects that are added at most, one at several joints counting once; None for
         `SearchCriteria.most_effects`.
     criteria : the numbers that decide the answer, see `dynident.criteria`.
-    progress : is called with what is being done, for a display.
+    progress : is called with what is being done, for a display; by default a line of the log every
+        ten seconds, see `dynident.progress`.
 
     Returns
     -------
@@ -110,6 +112,7 @@ def diagnose(
         per_joint = criteria.search.most_effects_per_joint * given.robot.n
         most = max(criteria.search.most_effects, per_joint)
     train, *others = numbered(train, *([] if test is None else [test]))
+    progress = progress or logged("diagnosing")
     progress("checking the wiring")
     held_out = others[0] if others else None
     faults = check_wiring(given, train, held_out, criteria.wiring)

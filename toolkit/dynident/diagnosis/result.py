@@ -22,7 +22,7 @@ from dynident.evidence.maps import ResidualMap
 from dynident.fitting.estimate import DataSource, Estimate
 from dynident.recording import RowCount
 from dynident.recording.dataset import NoiseSource
-from dynident.tables import Table, finite, number, p_value, percent, print_tables
+from dynident.tables import Shown, Table, finite, mostly_noise, number, p_value, percent
 from dynident.wiring import Fault
 
 Verdict = Literal["nothing_missing", "explained", "unexplained"]
@@ -45,7 +45,7 @@ _VERDICTS_WITHOUT_NOISE: dict[Verdict, str] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Diagnosis:
+class Diagnosis(Shown):
     """The answer of `diagnose`.
 
     Attributes
@@ -241,10 +241,6 @@ class Diagnosis:
             *self.caveats,
         )
 
-    def show(self) -> None:
-        """Print where the model fails, what is missing, and the verdict."""
-        print_tables(*self.tables())
-
     def joint_table(self) -> Table:
         """Errors per joint."""
         rows = tuple(
@@ -268,6 +264,7 @@ class Diagnosis:
             (
                 f"Noise floor: {self._noise_in_words()}.",
                 f"Both fitted for the diagnosis, by {self.fitted_by}.",
+                *mostly_noise([j.name for j in self.joints], [j.noise_share for j in self.joints]),
             ),
         )
 

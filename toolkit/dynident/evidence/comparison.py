@@ -18,7 +18,7 @@ from dynident.fitting.estimate import Estimate
 from dynident.fitting.row_objective import refine_shapes, shaped_effects
 from dynident.model import Model
 from dynident.recording import Dataset
-from dynident.tables import Table, finite, percent, print_tables
+from dynident.tables import Shown, Table, finite, mostly_noise, percent
 from dynident.threads import single_threaded
 from dynident.validation.replay import Judged, loop_of
 from dynident.validation.validation_result import Loop, loop_table
@@ -26,7 +26,7 @@ from dynident.wiring import Fault, check_wiring
 
 
 @dataclass(frozen=True, kw_only=True)
-class Comparison:
+class Comparison(Shown):
     """Errors of several estimates on the same recordings.
 
     Attributes
@@ -86,20 +86,27 @@ class Comparison:
         """Everything that `show` prints, in its order."""
         # Noise of the positions comes through a model's columns: the floor is the last one's.
         robot, last = self.models[0].robot, self.results[-1]
-        rows = []
-        for j, joint in enumerate(robot.names):
-            noise = None
-            if last.noise_std is not None and last.torque_rms[j] > 0:
-                noise = float(last.noise_std[j] / last.torque_rms[j])
-            errors = (percent(float(r.joint_errors[j])) for r in self.results)
-            rows.append((joint, *errors, percent(noise)))
+        shares: list[float | None] = [None] * robot.n
+        if last.noise_std is not None:
+            pairs = zip(last.noise_std, last.torque_rms, strict=True)
+            shares = [float(noise / rms) if rms > 0 else None for noise, rms in pairs]
+        rows = [
+            (joint, *(percent(float(r.joint_errors[j])) for r in self.results), percent(shares[j]))
+            for j, joint in enumerate(robot.names)
+        ]
         rows.append(("all", *(percent(r.error) for r in self.results), percent(last.floor)))
         notes = () if last.floor is not None else ("The noise floor is unknown.",)
-        notes = (*notes, *(f"Wiring: {fault.sentence}" for fault in self.wiring))
-        columns = ("joint", *self.names, "noise floor")
+        notes = (
+            *notes,
+            *mostly_noise(robot.names, shares),
+            *(f"Wiring: {fault.sentence}" for fault in self.wiring),
+        )
+        alone = len(self.names) == 1
+        named = ("torque error",) if alone else (f"error, {name}" for name in self.names)
+        columns = ("joint", *named, "noise floor")
         errors = Table("Relative torque error on held-out recordings", columns, tuple(rows), notes)
         loops = loop_table(self.names, self._loops, robot.names)
-        if loops and len(self.names) == 1:
+        if loops and alone:
             # One table: the simulated loop beside what the regression leaves.
             pairs = zip(errors.rows, loops.rows, strict=True)
             errors = replace(
@@ -112,14 +119,10 @@ class Comparison:
         seen = residual_maps(self.models[-1], last, last, self.criteria.maps)
         where = tuple((m.joint, m.against, m.sentence) for m in seen if m.sentence)
         first = (errors, loops) if loops else (errors,)
+        title = "Where the model fails" if alone else f"Where '{self.names[-1]}' fails"
         if not where:
-            return (*first, f"Where '{self.names[-1]}' fails: no simple shape stands out.")
-        title = f"Where '{self.names[-1]}' fails"
+            return (*first, f"{title}: no simple shape stands out.")
         return (*first, Table(title, ("joint", "against", "what is seen"), where))
-
-    def show(self) -> None:
-        """Print the errors side by side, and where the last estimate fails."""
-        print_tables(*self.tables())
 
 
 @single_threaded

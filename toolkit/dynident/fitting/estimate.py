@@ -19,7 +19,10 @@ from dynident.model import Model
 from dynident.nlp import Certificate
 from dynident.robot import BaseParameters, Robot
 from dynident.robot.patching import write
-from dynident.tables import Table, number, percent, print_tables
+from dynident.tables import Shown, Table, number, percent
+
+_MUCH_LEFT = 0.2
+"""Share of a joint's torque beyond which a fit says that something may be missing."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,7 @@ class DataSource:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Estimate:
+class Estimate(Shown):
     """Identified parameters of a model.
 
     Attributes
@@ -169,7 +172,16 @@ class Estimate:
         )
         columns = ("joint", "relative error", "residual std", "unit")
         title = f"Torque error on the data of the fit: {percent(self.error, 4)}"
-        return Table(title, columns, rows)
+        far = [
+            name
+            for name, error in zip(robot.names, self.joint_errors, strict=True)
+            if error > _MUCH_LEFT
+        ]
+        advice = (
+            f"At {', '.join(far)} the model leaves more than {percent(_MUCH_LEFT, 0)} of the "
+            "torque: `dynident explain` looks for what it lacks."
+        )
+        return Table(title, columns, rows, (advice,) if far else ())
 
     def tables(self) -> tuple[Table | str, ...]:
         """Everything that `show` prints, in its order."""
@@ -182,10 +194,6 @@ class Estimate:
     def summary(self) -> str:
         """The tables as text."""
         return "\n".join(str(part) for part in self.tables())
-
-    def show(self) -> None:
-        """Print parameters, errors and caveats."""
-        print_tables(*self.tables())
 
     def _parameter_notes(self) -> tuple[str, ...]:
         return (

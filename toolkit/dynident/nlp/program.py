@@ -24,7 +24,7 @@ from dynident.nlp.blocks import (
 )
 from dynident.nlp.ipopt import Attempt, interruptible, solve_scaled
 from dynident.nlp.scaled import ScaledProgram
-from dynident.tables import Table, number, print_tables
+from dynident.tables import Shown, Table, number
 from dynident.threads import single_threaded
 
 _AT_BOUND = 1e-6  # of a variable's scale: nearer to a bound it is printed as being there
@@ -36,22 +36,15 @@ _REMEDIES = {
 }
 
 
-class _Printed:
+class _Printed(Shown):
     """What is printed as tables."""
 
     def tables(self) -> tuple[Table, ...]:
         """All that it holds, as it is to be read."""
         raise NotImplementedError
 
-    def show(self) -> None:
-        """Print the tables to the terminal."""
-        print_tables(*self.tables())
-
     def __str__(self) -> str:
         return "\n".join(str(table) for table in self.tables())
-
-    def _repr_html_(self) -> str:
-        return "".join(table._repr_html_() for table in self.tables())
 
 
 @dataclass(frozen=True, eq=False)

@@ -61,7 +61,7 @@ def _oddities(recording: Recording, kinds: Sequence[str] | None):
         travel = float(np.ptp(recording.q[:, joint]))
         if kind == "revolute" and travel > WIDEST_TURN:
             turns = f"travels {travel:.4g} rad ({travel / (2 * np.pi):.3g} turns)"
-            yield name, f"{turns}: is the position in degrees?"
+            yield name, f"{turns}: is the position in degrees, or that of a motor before its gear?"
         if kind == "prismatic" and travel > LONGEST_STROKE:
             yield name, f"travels {travel:.4g} m: is the position in mm?"
     highest = [] if recording.temperature is None else recording.temperature.max(axis=0)

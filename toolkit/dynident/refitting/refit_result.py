@@ -15,7 +15,7 @@ from dynident.fitting import Projection
 from dynident.inertia import to_com
 from dynident.robot import Robot
 from dynident.robot.verify import Verification, write_verified
-from dynident.tables import Table, number, percent, print_tables
+from dynident.tables import Shown, Table, number, percent
 
 _FAR = 30.0
 """Radius of gyration over that of a body of the link's size, beyond which the mass is doubted."""
@@ -66,7 +66,7 @@ _OF_SHAPES = {"centre_of_mass", "spread"}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Refit:
+class Refit(Shown):
     """Given parameters, made consistent.
 
     Attributes
@@ -161,10 +161,6 @@ class Refit:
             *((effects,) if effects else ()),
             *((self.errors.table(),) if self.errors else ()),
         )
-
-    def show(self) -> None:
-        """Print what moved, the certificate, and the torque errors."""
-        print_tables(*self.tables())
 
     def to_dict(self) -> dict[str, Any]:
         """The refit as JSON holds it."""

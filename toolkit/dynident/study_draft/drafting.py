@@ -16,9 +16,9 @@ from dynident.robot import Robot
 from dynident.study_draft.by_numbers import named_by_numbers
 from dynident.study_draft.decision import Ask, Decision, decided
 from dynident.study_draft.draft import DraftedRecording, StudyDraft
-from dynident.study_draft.motor_side import joint_side, require_ratios, turned
 from dynident.study_draft.log import Log, logs_of, same_columns
 from dynident.study_draft.matching import Matched, match
+from dynident.study_draft.motor_side import joint_side, require_ratios, turned
 from dynident.study_draft.timing import clock_scale, period_of, uses_of
 from dynident.study_draft.torque_timing import looks_held
 from dynident.study_draft.wiring_guess import WiringGuess, guess_wiring

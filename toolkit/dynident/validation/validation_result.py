@@ -11,7 +11,7 @@ import numpy as np
 from dynident.criteria import DEFAULTS, LoopCriteria
 from dynident.fitting.estimate import DataSource
 from dynident.recording.dataset import NoiseSource
-from dynident.tables import Table, finite, number, percent, print_tables
+from dynident.tables import Shown, Table, finite, number, percent
 from dynident.validation.loop_errors import QUANTITIES, Errors, LoopErrors, LoopRun
 from dynident.validation.loop_verdict import ORIENTATION, Judgement, Verdict
 
@@ -47,7 +47,7 @@ class Skipped:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Validation:
+class Validation(Shown):
     """A model in the closed loop in which it was measured.
 
     Attributes
@@ -140,10 +140,6 @@ class Validation:
         if self.skipped or len(self.runs) > 1:
             found.append(self.recording_table())
         return (*found, *self.notes)
-
-    def show(self) -> None:
-        """Print the four errors, what to hold them against, and what they mean."""
-        print_tables(*self.tables())
 
     def error_table(self) -> Table:
         """The four errors of each joint."""

@@ -29,12 +29,12 @@ from dynident.model import Model
 from dynident.nlp import Certificate, Problem
 from dynident.robot import Robot
 from dynident.robot.patching import write
-from dynident.tables import Table, number, print_tables
+from dynident.tables import Shown, Table, number
 from dynident.threads import single_threaded
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Projection:
+class Projection(Shown):
     """The nearest estimate within a set.
 
     Attributes
@@ -119,10 +119,6 @@ class Projection:
     def tables(self) -> tuple[Table | str, ...]:
         """Everything that `show` prints, in its order."""
         return (self.changes(), self.certificate.table(), *self.notes)
-
-    def show(self) -> None:
-        """Print what moved and the certificate."""
-        print_tables(*self.tables())
 
     def to_dict(self) -> dict[str, Any]:
         """The projection as JSON holds it."""

@@ -1,0 +1,39 @@
+"""Results in notebooks: the same tables and sentences as in a terminal, never a dump of fields."""
+
+from __future__ import annotations
+
+import dynident as di
+from dynident.tables import MOSTLY_NOISE, Table, mostly_noise
+from study_files import recording, true_model
+
+
+def test_results_are_tables_in_a_notebook() -> None:
+    fit = di.fit(true_model(), recording(1))
+    compared = di.compare(fit, di.Dataset((recording(2),)))
+    for one in (fit, compared):
+        page = one._repr_html_()
+        tables = [part for part in one.tables() if isinstance(part, Table)]
+        assert page.count("<table") == len(tables) > 0
+        assert "Recording(" not in page and "shoulder" in page
+
+
+def test_sentences_are_escaped() -> None:
+    class Odd(di.Estimate):
+        def tables(self) -> tuple[Table | str, ...]:
+            return ("<b>1 < 2</b>",)
+
+    assert Odd.__new__(Odd)._repr_html_() == "<p>&lt;b&gt;1 &lt; 2&lt;/b&gt;</p>"
+
+
+def test_joints_of_noise_are_marked_and_no_others() -> None:
+    assert mostly_noise(["a", "b", "c"], [None, 0.9 * MOSTLY_NOISE, 0.01]) == ()
+    (note,) = mostly_noise(["a", "b", "c"], [None, 1.1 * MOSTLY_NOISE, 0.01])
+    assert "At b noise" in note
+
+
+def test_a_fit_that_leaves_much_says_what_to_do() -> None:
+    one = recording(1)
+    poor = di.fit(di.Model(true_model().robot), one)
+    assert max(poor.joint_errors) > 0.2
+    assert "dynident explain" in str(poor.error_table())
+    assert "dynident explain" not in str(di.fit(true_model(), one).error_table())
