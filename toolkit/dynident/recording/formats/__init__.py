@@ -1,1 +1,1 @@
-"""Files of recordings: CSV, NPZ, MAT and Parquet, read and written."""
+"""Files of recordings: CSV, NPZ, MAT, Parquet, HDF5 and bags of ROS, as far as they are bounded."""

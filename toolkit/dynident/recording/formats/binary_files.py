@@ -15,6 +15,7 @@ import numpy as np
 
 from dynident.errors import RecordingError
 from dynident.recording.formats.column_table import ColumnTable
+from dynident.recording.formats.hdf5_file import open_hdf5
 from dynident.recording.formats.limits import (
     ARRAYS,
     COMPLETE,
@@ -37,8 +38,8 @@ def open_npz(data: bytes, file: str) -> ColumnTable:
     Raises
     ------
     RecordingError
-        If it is no NPZ file. `Table.load` raises it for an array of Python objects (they would
-        have to be unpickled, which can run any code) and for a damaged one.
+        If it is no NPZ file. `ColumnTable.load` raises it for an array of Python objects (they
+        would have to be unpickled, which can run any code) and for a damaged one.
     """
     if not zipfile.is_zipfile(io.BytesIO(data)):
         raise RecordingError("is not an NPZ file", file, COMPLETE)
@@ -71,18 +72,18 @@ def open_npz(data: bytes, file: str) -> ColumnTable:
 
 
 def open_mat(data: bytes, file: str) -> ColumnTable:
-    """Return the table that the bytes of a MATLAB file (version 4 to 7.2) hold.
+    """Return the table that the bytes of a MATLAB file hold.
 
     Raises
     ------
     RecordingError
-        If it is none, or of version 7.3. `Table.load` raises it for a damaged variable.
+        If it is none, or of version 7.3 and h5py is not installed. `ColumnTable.load` raises it
+        for a damaged variable.
     """
     import scipy.io
 
     if data[:19] == b"MATLAB 7.3 MAT-file" or data[:8] == b"\x89HDF\r\n\x1a\n":
-        what = "is a MATLAB file of version 7.3 (HDF5)"
-        raise RecordingError(what, file, "save it in MATLAB with save(..., '-v7')")
+        return _open_mat_73(data, file)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -108,6 +109,17 @@ def open_mat(data: bytes, file: str) -> ColumnTable:
             raise damaged("the MATLAB file", file, error) from None
 
     return ColumnTable(file, tuple(names), load)
+
+
+def _open_mat_73(data: bytes, file: str) -> ColumnTable:
+    try:
+        return open_hdf5(data, file)
+    except RecordingError as error:
+        if "cannot be read" not in error.what:
+            raise
+        what = "cannot be read as a MATLAB file of version 7.3 (HDF5)"
+        remedy = "save it in MATLAB with save(..., '-v7'), or is it incomplete?"
+        raise RecordingError(what, file, remedy) from None
 
 
 def _unpacked_mat(data: bytes) -> int:
@@ -140,8 +152,8 @@ def open_parquet(data: bytes, file: str) -> ColumnTable:
     Raises
     ------
     RecordingError
-        If it is none, a name is in it twice, or pyarrow is not installed. `Table.load` raises it
-        for a damaged column.
+        If it is none, a name is in it twice, or pyarrow is not installed. `ColumnTable.load`
+        raises it for a damaged column.
     """
     parquet = pyarrow_parquet(file)
     try:

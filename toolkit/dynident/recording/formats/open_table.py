@@ -14,6 +14,7 @@ from dynident.errors import FileError, RecordingError
 from dynident.recording.formats.binary_files import open_mat, open_npz, open_parquet, pick
 from dynident.recording.formats.column_table import ColumnTable, FileLayout
 from dynident.recording.formats.csv_file import open_csv
+from dynident.recording.formats.hdf5_file import open_hdf5
 from dynident.recording.formats.limits import ARRAYS, CUT, TEXT, SizeLimit
 from dynident.recording.formats.ros_bag import SUFFIXES as BAGS
 from dynident.recording.formats.ros_bag import is_bag, open_bag
@@ -34,6 +35,8 @@ _FORMATS = {
     ".npz": _Format(lambda data, file, _: open_npz(data, file), ARRAYS),
     ".mat": _Format(lambda data, file, _: open_mat(data, file), ARRAYS),
     ".parquet": _Format(lambda data, file, _: open_parquet(data, file), ARRAYS),
+    ".h5": _Format(lambda data, file, _: open_hdf5(data, file), ARRAYS),
+    ".hdf5": _Format(lambda data, file, _: open_hdf5(data, file), ARRAYS),
 }
 READABLE = (*_FORMATS, *BAGS)
 """Suffixes of the files that are read."""

@@ -45,7 +45,9 @@ def read(
     path : file with `t` (s) and, for each joint, `q.<joint>` and `tau.<joint>`; optionally
         `v.<joint>`, `a.<joint>`, `q_ref.<joint>`, and `temperature.<joint>` (degrees Celsius) at
         any of the joints; SI units. In MAT files `q_<joint>`, without dots. Whatever else it
-        holds is ignored.
+        holds is not read, and said in the provenance. In a bag of ROS (.bag, .mcap, .db3, or the
+        folder of a recording of ROS 2), messages `sensor_msgs/JointState` hold them: joints go
+        by their names, with or without a prefix that all have.
     joints : names, the order of the columns; by default every joint of the file, in its order.
     columns : ours -> theirs, or a linear expression of theirs, for files with other names or
         units, as `{"tau.a": Column("vir", 35.15), "q.a": "x/32"}`; what it leaves out is ours.
