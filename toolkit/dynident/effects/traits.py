@@ -14,6 +14,8 @@ class Needs(Flag):
     BODIES : the current model's robot and rotor inertias.
     RECORDING : the whole recording at its full rate, not a part of it.
     PAYLOAD : whether the payload is on board; recordings with and without it differ.
+    NUMBER : the recording's number in its study; windows of one recording are otherwise evaluated
+        together, as one.
     OF_MODEL : the part of it that a model adds to the samples, see `Model.ready`.
     """
 
@@ -23,6 +25,7 @@ class Needs(Flag):
     BODIES = auto()
     RECORDING = auto()
     PAYLOAD = auto()
+    NUMBER = auto()
     OF_MODEL = REGRESSOR | TORQUE | BODIES
 
 
@@ -39,6 +42,8 @@ class EffectTraits:
         a linearisation point.
     time_varying : whether the columns depend on the time in the session: they do not repeat with
         the motion.
+    reverses : whether the columns change with the friction width of their joints; those that say no
+        are not evaluated again for another width.
     opposes_motion : whether it is a part of the joint's friction, which together takes power.
     at_every_joint : whether a robot that has it at one joint, as a rule, has it at all.
     """
@@ -47,6 +52,7 @@ class EffectTraits:
     linear_in_torque: ClassVar[bool] = False
     nonlinear: ClassVar[bool] = False
     time_varying: ClassVar[bool] = False
+    reverses: ClassVar[bool] = True
     opposes_motion: ClassVar[bool] = False
     at_every_joint: ClassVar[bool] = False
 

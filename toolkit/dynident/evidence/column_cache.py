@@ -1,18 +1,25 @@
 """Columns that were evaluated, by all that they depend on: nothing is ever invalidated.
 
-Three kinds of columns are kept, each as long as something can ask for it again. Those that follow
+Four kinds of columns are kept, each as long as something can ask for it again. Those that follow
 from the motion alone live as long as the motion. Those that depend on the fit belong to a
 linearisation, the model and the values at which they were taken; the latest one is kept, and with
 another one goes all that belongs to an older. Those of a first look live as long as that look.
+Of shapes that are tried once, a search from other beginnings tries many again: the latest are kept.
 """
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Hashable
 from typing import Any
 from weakref import WeakKeyDictionary
 
+import numpy as np
+
 from dynident.recording import Motion
+
+_LATEST = 2**26
+"""Bytes of columns of shapes that were tried last."""
 
 
 class FirstLook:
@@ -23,6 +30,27 @@ Kept = dict[Hashable, Any]
 """Columns, or what columns are made of, by what they depend on besides their scope."""
 
 
+class Tried:
+    """Columns of shapes that were tried last; the oldest make room for others."""
+
+    def __init__(self, most: int = _LATEST) -> None:
+        self._most, self._size = most, 0
+        self._columns: OrderedDict[Hashable, np.ndarray] = OrderedDict()
+
+    def get(self, key: Hashable) -> np.ndarray | None:
+        """Return what is kept under a key, or None."""
+        if key in self._columns:
+            self._columns.move_to_end(key)
+        return self._columns.get(key)
+
+    def put(self, key: Hashable, columns: np.ndarray) -> None:
+        """Keep columns under a new key."""
+        self._columns[key] = columns
+        self._size += columns.nbytes
+        while self._size > self._most:
+            self._size -= self._columns.popitem(last=False)[1].nbytes
+
+
 class ColumnCache:
     """What was evaluated of a robot along motions; shared by all evidence of one model."""
 
@@ -30,6 +58,7 @@ class ColumnCache:
         self._of_motions: WeakKeyDictionary[Motion, Kept] = WeakKeyDictionary()
         self._of_looks: WeakKeyDictionary[FirstLook, Kept] = WeakKeyDictionary()
         self._linearisation: Hashable = None
+        self.tried = Tried()
         self._linearised: Kept = {}
 
     def along(self, motion: Motion) -> Kept:

@@ -12,9 +12,10 @@ from functools import cached_property
 import numpy as np
 
 from dynident.criteria import DEFAULTS, Criteria
-from dynident.effects import Block, Effect
+from dynident.effects import Block, Effect, Needs
 from dynident.evidence.column_cache import ColumnCache, FirstLook, Kept
 from dynident.evidence.runs import Run, Signals
+from dynident.evidence.windows import Source, sources
 from dynident.fitting.sampling import Sampled
 from dynident.model import Model
 
@@ -129,7 +130,8 @@ class Evidence:
         runs = range(len(self.runs))
 
         def key(variant: Effect, run: int) -> Hashable:
-            return variant, tuple(one.motion for one in self._along(variant, run, model))
+            along = self._along(variant, run, model)
+            return variant, tuple((one.motion, one.kept.start, one.kept.stop) for one in along)
 
         new = [v for v in dict.fromkeys(variants) if any(key(v, r) not in seen for r in runs)]
         if new and len(variants) > 1 and new[0].is_dynamic_response:
@@ -140,7 +142,7 @@ class Evidence:
             seen.setdefault(key(variant, run), signals)
             # To be looked at closely next, with the same model.
             for one, columns in zip(self._along(variant, run, model), signals, strict=True):
-                latest[variant, _recorded(one)] = columns
+                latest[variant, self._recorded(one)] = columns
         return [[seen[key(variant, run)] for variant in variants] for run in runs]
 
     # --- of one replicate, by all that they depend on -------------------------------------------
@@ -156,34 +158,44 @@ class Evidence:
     def _of(self, effect: Effect, sampled: Sampled, model: Model, values: np.ndarray) -> np.ndarray:
         if not effect.depends_on_fit:
             return self._plain([effect], sampled, model)[0]
-        kept, key = self._at(model, values), (effect, _recorded(sampled))
+        kept, key = self._at(model, values), (effect, self._recorded(sampled))
         if key in kept:
             return kept[key]
         if effect.linear_in_torque:
             torque = self._filtered_torque(sampled, model, values)
             return effect.acting_columns(replace(self._rows(sampled, model), torque=torque))
-        found = sampled.filtered(effect.acting_columns(self._block(effect, sampled, model, values)))
-        if effect in model.effects:
-            kept[key] = found
-        return found
+        source = self._source(sampled, effect)
+        # Of a candidate, what the windows of one recording ask for one after the other.
+        place = ("whole", effect if effect in model.effects else None, source.key)
+        if place not in kept or kept[place][0] != effect:
+            block = self._block(effect, source, model, values)
+            kept[place] = effect, source.sampled.filtered(effect.acting_columns(block))
+        return kept[place][1][source.rows]
 
     def _plain(self, effects: Sequence[Effect], sampled: Sampled, model: Model) -> list[np.ndarray]:
         """Columns that follow from the motion alone, of one effect with any number of shapes."""
-        known = self.cache.along(sampled.motion)
+        source = self._source(sampled, effects[0])
+        known, tried = self._known(source), self.cache.tried
         keys = {_plain_key(effect, model): effect for effect in effects}
-        at_once = self._evaluated_at_once(sampled)
+        at_once = self._evaluated_at_once(source.sampled)
         if any(key not in known and effect in at_once for key, effect in keys.items()):
             # Many a friction width is tried without a look at the candidates.
             own = all(effect in model.effects for effect in effects)
-            self._pass_through(sampled, model, model.effects if own else at_once)
+            self._pass_through(source, model, model.effects if own else at_once)
         found = {key: known[key] for key in keys if key in known}
-        new = {key: effect for key, effect in keys.items() if key not in known}
+        for key in keys:
+            if key not in found and (latest := tried.get((source.key, key))) is not None:
+                found[key] = latest
+        new = {key: effect for key, effect in keys.items() if key not in found}
         if new:
-            found |= zip(new, self._evaluated(list(new.values()), sampled, model), strict=True)
+            evaluated = self._evaluated(list(new.values()), source.sampled, model)
+            found |= zip(new, evaluated, strict=True)
         for key, effect in new.items():
             if effect in self._kept or effect in model.effects:
                 known[key] = found[key]
-        return [found[_plain_key(effect, model)] for effect in effects]
+            else:
+                tried.put((source.key, key), found[key])
+        return [found[_plain_key(effect, model)][source.rows] for effect in effects]
 
     def _evaluated(
         self, effects: Sequence[Effect], sampled: Sampled, model: Model
@@ -200,10 +212,11 @@ class Evidence:
         return effect.acting_columns(self.model.ready(effect, block, None))
 
     def _rigid(self, sampled: Sampled, model: Model) -> np.ndarray:
-        known = self.cache.along(sampled.motion)
+        source = self._source(sampled)
+        known = self._known(source)
         if self.model.robot not in known:
-            self._pass_through(sampled, model, self._evaluated_at_once(sampled))
-        return known[self.model.robot]
+            self._pass_through(source, model, self._evaluated_at_once(source.sampled))
+        return known[self.model.robot][source.rows]
 
     def _evaluated_at_once(self, sampled: Sampled) -> dict[Effect, None]:
         """Effects that need nothing but samples, as far as they are asked for along a motion."""
@@ -213,12 +226,16 @@ class Evidence:
 
     @cached_property
     def _instantaneous(self) -> dict[Effect, None]:
-        return {effect: None for effect in self._kept if effect.is_instantaneous}
+        return {
+            effect: None
+            for effect in self._kept
+            if effect.is_instantaneous and Needs.NUMBER not in effect.needs
+        }
 
-    def _pass_through(self, sampled: Sampled, model: Model, effects: Iterable[Effect]) -> None:
+    def _pass_through(self, source: Source, model: Model, effects: Iterable[Effect]) -> None:
         """Evaluate the rigid body and many effects in one pass, as far as they are not known."""
-        known, base = self.cache.along(sampled.motion), self.model.base.independent
-        at_once = self._evaluated_at_once(sampled)
+        known, base = self._known(source), self.model.base.independent
+        at_once = self._evaluated_at_once(source.sampled)
         wanted = [e for e in effects if e in at_once and _plain_key(e, model) not in known]
         new = self.model.robot not in known
 
@@ -229,7 +246,7 @@ class Evidence:
             rigid = [] if loaded.rigid is None else [loaded.rigid[:, :, base]]
             return [*rigid, *(effect.acting_columns(loaded) for effect in wanted)]
 
-        found = sampled.decimate(model, evaluate)
+        found = source.sampled.decimate(model, evaluate)
         if len(found) > len(wanted):
             known[self.model.robot] = found.pop(0)
         known.update(zip([_plain_key(effect, model) for effect in wanted], found, strict=True))
@@ -239,20 +256,26 @@ class Evidence:
     ) -> dict[tuple[Effect, int], Signals]:
         """Responses of one effect with several shapes, walked through time at once."""
         first, new = variants[0], list(dict.fromkeys(variants))
-        places = [
-            (run, one) for run in range(len(self.runs)) for one in self._along(first, run, model)
+        asked = [
+            (run, self._source(one, first))
+            for run in range(len(self.runs))
+            for one in self._along(first, run, model)
         ]
-        samples = max(one.motion.samples for _, one in places)
+        places = list({source.key: source for _, source in asked}.values())
+        samples = max(source.sampled.motion.samples for source in places)
         step = max(1, _TOGETHER // (samples * len(new)))
+        of_source: dict[Hashable, list[np.ndarray]] = {}
+        for start in range(0, len(places), step):
+            some = places[start : start + step]
+            blocks = [self._block(first, source, model, values) for source in some]
+            for source, each in zip(some, first.family(new, blocks), strict=True):
+                of_source[source.key] = source.sampled.filtered_each(each)
         found: dict[tuple[Effect, int], Signals] = {
             (v, run): [] for v in new for run in range(len(self.runs))
         }
-        for start in range(0, len(places), step):
-            some = places[start : start + step]
-            blocks = [self._block(first, one, model, values) for _, one in some]
-            for (run, one), each in zip(some, first.family(new, blocks), strict=True):
-                for variant, columns in zip(new, one.filtered_each(each), strict=True):
-                    found[variant, run].append(columns)
+        for run, source in asked:
+            for variant, columns in zip(new, of_source[source.key], strict=True):
+                found[variant, run].append(columns[source.rows])
         return found
 
     # --- what they are made of ------------------------------------------------------------------
@@ -265,6 +288,25 @@ class Evidence:
     def _from_simulation(self) -> bool:
         return all(run.columns_from == "simulation" for run in self.runs)
 
+    @cached_property
+    def _sources(self) -> dict[Sampled, Source]:
+        return sources(one for run in self.runs for one in run.replicates)
+
+    def _source(self, sampled: Sampled, effect: Effect | None = None) -> Source:
+        """Where columns are evaluated: what needs a recording's number is its own alone."""
+        if effect is not None and Needs.NUMBER in effect.needs:
+            return Source(sampled, slice(None))
+        return self._sources[sampled]
+
+    def _recorded(self, sampled: Sampled) -> Hashable:
+        """A motion, which rows of it, and whether the payload was on board."""
+        return Source(sampled, slice(None)).key
+
+    def _known(self, source: Source) -> Kept:
+        """What follows from a motion alone, of the rows of a source."""
+        kept = source.sampled.kept
+        return self.cache.along(source.sampled.motion).setdefault((kept.start, kept.stop), {})
+
     def _along(self, effect: Effect, run: int, model: Model) -> tuple[Sampled, ...]:
         """Replicates along which an effect's columns are taken."""
         every = self.runs[run].replicates
@@ -276,9 +318,10 @@ class Evidence:
         widths = tuple(model.friction_widths)
         return self.cache.at((self.model.robot, widths, model.effects, values.tobytes()))
 
-    def _block(self, effect: Effect, sampled: Sampled, model: Model, values: np.ndarray) -> Block:
+    def _block(self, effect: Effect, source: Source, model: Model, values: np.ndarray) -> Block:
         """A whole replicate with what an effect needs of the model; shared by many."""
-        kept, recorded = self._at(model, values), _recorded(sampled)
+        sampled = source.sampled
+        kept, recorded = self._at(model, values), (source.key, Needs.NUMBER in effect.needs)
         key = (model.shares_block(effect), recorded)
         if key in kept:
             return kept[key]
@@ -320,7 +363,7 @@ class Evidence:
 
     def _filtered_torque(self, sampled: Sampled, model: Model, values: np.ndarray) -> np.ndarray:
         """Decimated rows of the torque that the model predicts, but for effects that scale it."""
-        kept, key = self._at(model, values), ("torque", _recorded(sampled))
+        kept, key = self._at(model, values), ("torque", self._recorded(sampled))
         if key not in kept:
             torque = self._rigid(sampled, model) @ values[: len(self.model.base.independent)]
             for effect in model.effects:
@@ -338,11 +381,8 @@ class Evidence:
 
 def _plain_key(effect: Effect, model: Model) -> Hashable:
     """What columns depend on that follow from the motion alone: dry friction where they act."""
+    if not effect.reverses:
+        return model.robot, effect
     names, widths = model.robot.names, model.friction_widths
     joints = [joint for joint in (effect.joint, effect.source) if joint is not None]
     return model.robot, effect, tuple(widths[names.index(joint)] for joint in joints or names)
-
-
-def _recorded(sampled: Sampled) -> Hashable:
-    """A motion, and whether the payload was on board."""
-    return sampled.motion, bool(sampled.recording.payload)

@@ -16,6 +16,7 @@ import numpy as np
 from dynident.criteria import DEFAULTS, NoiseCriteria
 from dynident.effects import Block
 from dynident.evidence.noise_model import NoiseModel
+from dynident.evidence.windows import shared_motion
 from dynident.fitting.sampling import Sampled, flagged, sample
 from dynident.model import Model
 from dynident.moments.replicates import Kind, replicate_moments
@@ -187,7 +188,7 @@ def gather(
     for recording, stream in zip(dataset.recordings, streams, strict=True):
         # Noise on top would hide the signs of a jittered clock: straighten it before.
         recording = uniform(recording)
-        first = sample(recording, dataset.filter)
+        first = shared_motion(sample(recording, dataset.filter), (r.replicates[0] for r in runs))
         usable = np.arange(criteria.order, len(first.t))
         if recording.period:
             where = recording.where

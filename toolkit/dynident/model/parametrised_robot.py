@@ -45,7 +45,7 @@ class ParametrisedRobot:
             raise EffectError(what, remedy="give one for all of them, or one for each")
         object.__setattr__(self, "effects", checked)
 
-    @property
+    @cached_property
     def friction_widths(self) -> np.ndarray:
         """Friction width of each joint, (n,) rad/s or m/s."""
         return np.broadcast_to(self.friction_width, self.robot.n)

@@ -93,9 +93,12 @@ def rank(
     Every effect at its best shape, best first, with the gate that it does not pass.
     """
     criteria, best, tests = evidence.criteria, [], 0
-    below_noise = joints_below_noise(evidence, fitted)
     noisy = all(run.kind == "single" and run.columns_from == "recording" for run in evidence.runs)
-    for effect in only or candidates(fitted.model):
+    asked = only or tuple(candidates(fitted.model))
+    below_noise: frozenset[str] = frozenset()
+    if any(effect.is_dynamic_response for effect in asked):
+        below_noise = joints_below_noise(evidence, fitted)
+    for effect in asked:
         driven = effect.is_dynamic_response
         if driven and (noisy or effect.joint in below_noise):
             best.append(Score(effect=effect, payload_recordings=None, not_identifiable=False))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.effects.effect import Block, JointEffect, Parameter, ShapeParameter, force_unit
+from dynident.effects.traits import Needs
 
 
 class Contact(JointEffect):
@@ -19,6 +20,8 @@ class Contact(JointEffect):
     sign_of = "a burst in one repetition only"
     shown_by = "repetition"
     experiment = "record {joint} once more, over several periods, with nothing in its way"
+    needs = Needs.NUMBER
+    reverses = False
     found_by = "repetition"
 
     def parameters(self, robot):

@@ -17,6 +17,7 @@ class JointSpring(JointEffect):
     confounded_with = ("torque_ripple", "torque_offset")
     shown_by = "position range"
     experiment = "move {joint} slowly over its whole range"
+    reverses = False
     contains = ("torque_offset",)
 
     def parameters(self, robot):

@@ -27,6 +27,7 @@ class Payload(Forceless):
     confounded_with = ("drive_gain",)
     shown_by = "payload"
     experiment = "repeat one recording with the payload and one without"
+    reverses = False
     needs = Needs.REGRESSOR | Needs.PAYLOAD
 
     def parameters(self, robot):

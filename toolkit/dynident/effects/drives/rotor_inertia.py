@@ -19,6 +19,7 @@ class RotorInertia(Forceless, JointEffect):
         "accelerate {joint} hard together with the other joints (at the first joint of an arm it "
         "cannot be told from the inertia of the links)"
     )
+    reverses = False
 
     def parameters(self, robot):
         unit = "kg" if motion_unit(robot, self.joint) == "m" else "kg m^2"

@@ -17,6 +17,7 @@ class TorqueDrift(JointEffect):
     confounded_with = ("torque_offset", "thermal_friction")
     shown_by = "session"
     experiment = "repeat one recording of {joint} early and late in a long session"
+    reverses = False
 
     def parameters(self, robot):
         return (Parameter("rate", f"{force_unit(robot, self.joint)}/s"),)

@@ -18,6 +18,7 @@ class TorqueOffset(JointEffect):
     confounded_with = ("asymmetric_friction", "joint_spring")
     shown_by = "position range"
     experiment = "move {joint} over a wide range in both directions, so that gravity changes"
+    reverses = False
 
     def parameters(self, robot):
         return (Parameter("offset", force_unit(robot, self.joint)),)

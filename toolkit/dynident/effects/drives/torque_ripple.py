@@ -26,6 +26,7 @@ class TorqueRipple(JointEffect):
     confounded_with = ("joint_spring",)
     shown_by = "slow"
     experiment = "sweep {joint} slowly over its whole range"
+    reverses = False
 
     def parameters(self, robot):
         unit = force_unit(robot, self.joint)

@@ -22,6 +22,7 @@ class AsymmetricFriction(JointEffect):
     confounded_with = ("torque_offset", "quadratic_drag")
     shown_by = "speed"
     experiment = "move {joint} at several constant speeds in both directions"
+    reverses = False
     contains = ("torque_offset",)
     stands_in_for = ("torque_offset",)
 

@@ -17,6 +17,7 @@ class QuadraticDrag(JointEffect):
     confounded_with = ("viscous_friction", "coulomb_friction")
     shown_by = "speed"
     experiment = "move {joint} from slow to its highest speed in both directions"
+    reverses = False
 
     def parameters(self, robot):
         force, motion = force_unit(robot, self.joint), motion_unit(robot, self.joint)

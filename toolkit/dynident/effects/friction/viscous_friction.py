@@ -19,6 +19,7 @@ class ViscousFriction(JointEffect):
     confounded_with = ("coulomb_friction", "quadratic_drag")
     shown_by = "speed"
     experiment = "move {joint} at several constant speeds in both directions"
+    reverses = False
 
     def parameters(self, robot):
         unit = f"{force_unit(robot, self.joint)} s/{motion_unit(robot, self.joint)}"
