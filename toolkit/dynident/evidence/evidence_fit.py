@@ -73,6 +73,13 @@ class EvidenceFit:
         return self.moments.pooled()
 
     @cached_property
+    def without_each_block(self) -> np.ndarray:
+        """Values of the fit to all blocks but one, for each, (B, p)."""
+        least = self.criteria.noise.reliable
+        blocks = range(len(self.moments.total))
+        return np.array([regress(self.moments.without(b), least).values for b in blocks])
+
+    @cached_property
     def error_total(self) -> float:
         """Squared residual, whitened, with its noise."""
         combination = np.append(-self.values, 1.0)
@@ -205,20 +212,20 @@ def model_columns(
     -------
     (T, p + 1) for each replicate of the run.
     """
-    recording = evidence.runs[run].recording
-    parts = [[rigid[:, joint] for rigid in evidence.rigid(run)]]
+    replicates, size = evidence.runs[run].replicates, model.size
+    payload = float(bool(evidence.runs[run].recording.payload))
+    found = [np.zeros((len(one.tau), size + 1)) for one in replicates]
+    for one, rigid, replicate in zip(found, evidence.rigid(run), replicates, strict=True):
+        one[:, : rigid.shape[2]] = rigid[:, joint]
+        one[:, size] = replicate.tau[:, joint]
     for effect in model.effects:
         joints = effect.acting_at(model.robot)
         if joint not in joints:
-            own = model.slices[effect.label]
-            parts.append([np.zeros((len(one), own.stop - own.start)) for one in parts[0]])
             continue
-        at = [c[:, joints.index(joint)] for c in evidence.of(effect, run, model, values)]
-        if effect.is_payload:
-            at = [c * float(bool(recording.payload)) for c in at]
-        parts.append(at)
-    torque = [replicate.tau[:, [joint]] for replicate in evidence.runs[run].replicates]
-    return [np.hstack(pieces) for pieces in zip(*parts, torque, strict=True)]
+        own, at = model.slices[effect.label], joints.index(joint)
+        for one, columns in zip(found, evidence.of(effect, run, model, values), strict=True):
+            one[:, own] = columns[:, at] * payload if effect.is_payload else columns[:, at]
+    return found
 
 
 def residuals(evidence: Evidence, model: Model, values: np.ndarray) -> list[np.ndarray]:

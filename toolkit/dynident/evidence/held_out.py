@@ -13,7 +13,6 @@ from dynident.evidence.evidence_fit import EvidenceFit, model_columns
 from dynident.evidence.noise_model import differences, inflation, systematic_square
 from dynident.fitting.estimate import Estimate
 from dynident.moments.replicates import Kind
-from dynident.moments.solution import regress
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,8 +132,7 @@ def on_blocks(evidence: Evidence, fitted: EvidenceFit) -> HeldOut:
         columns = np.stack([run.fold(c) for c in joints], axis=2)  # (P, S, n, p + 1)
         residual = np.empty(columns.shape[:3])
         for start, stop in zip(run.edges[:-1], run.edges[1:], strict=True):
-            reliable = evidence.criteria.noise.reliable
-            values = regress(fitted.moments.without(block), reliable).values
+            values = fitted.without_each_block[block]
             residual[:, start:stop] = columns[:, start:stop] @ np.append(-values, 1.0)
             block += 1
         measured = 1 if run.kind == "noise_augmented" else len(residual)

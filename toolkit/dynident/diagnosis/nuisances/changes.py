@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy
@@ -67,6 +68,26 @@ class Changes:
     kept: np.ndarray
     reach: float
 
+    @cached_property
+    def spectra(self) -> tuple[int, np.ndarray, np.ndarray]:
+        """What pulses of all widths are convolved with, transformed: see `scanned`.
+
+        Returns
+        -------
+        Samples of the transform; the transforms (1 + lags, ...) of the whitened series, filtered
+        backward, and of the scales' products at each lag; and the filter's own products (lags,).
+        """
+        rows, lags = len(self.change), range(min(len(self.colour), len(self.change)))
+        size = int(scipy.fft.next_fast_len(2 * rows, real=True))
+        white = np.asarray(scipy.signal.lfilter(self.colour, [1.0], self.change * self.still))
+        signals = np.zeros((1 + len(lags), rows))
+        back = np.asarray(scipy.signal.lfilter(self.colour, [1.0], white[::-1]))[::-1]
+        signals[0] = back * self.still
+        for lag in lags:
+            signals[1 + lag, : rows - lag] = self.still[: rows - lag] * self.still[lag:]
+        mixed = [self.colour[: len(self.colour) - lag] @ self.colour[lag:] for lag in lags]
+        return size, scipy.fft.rfft(signals, size, axis=1), np.array(mixed)
+
     def certainty(self, row: float, width: float) -> float:
         """Share of a pulse's z value that is left for two doubts.
 
@@ -125,27 +146,23 @@ class Changes:
 
 
 def scanned(one: Changes, width: float) -> np.ndarray:
-    """The z value of `Changes.match` at every row, (P S,), by convolutions."""
-    half = int(np.ceil(one.reach * width))
+    """The z value of `Changes.match` at every row, (P S,), by convolutions.
+
+    All of them circular, over twice the rows, so that nothing comes round: what does not depend on
+    the width is transformed once.
+    """
+    rows, (size, spectra, mixed) = len(one.change), one.spectra
+    half = min(int(np.ceil(one.reach * width)), rows - 1)
     pulse = np.exp(-((np.arange(-half, half + 1) / width) ** 2) / 2)
-    white = np.asarray(scipy.signal.lfilter(one.colour, [1.0], one.change * one.still))
-    back = np.asarray(scipy.signal.lfilter(one.colour, [1.0], white[::-1]))[::-1] * one.still
-    product = _convolved(back, pulse)
+    kernels = np.zeros((len(spectra), size))
+    kernels[0, np.arange(-half, half + 1)] = pulse
     # The whitened pulse's square: over the lags that the filter mixes.
-    power = np.zeros(len(back))
-    for lag in range(min(len(one.colour), len(pulse))):
-        both = float(one.colour[: len(one.colour) - lag] @ one.colour[lag:])
-        pairs = one.still[: len(back) - lag] * one.still[lag:]
-        kernel = pulse[: len(pulse) - lag] * pulse[lag:]
-        full = np.pad(scipy.signal.oaconvolve(pairs, kernel[::-1]), len(one.colour))
-        start = len(one.colour) + half - lag
-        power += (1.0 if lag == 0 else 2.0) * both * full[start : start + len(back)]
+    for lag, both in enumerate(mixed[: len(pulse)]):
+        product = (1.0 if lag == 0 else 2.0) * both * pulse[: len(pulse) - lag] * pulse[lag:]
+        kernels[1 + lag, np.arange(lag - half, half + 1)] = product[::-1]
+    turned = spectra * scipy.fft.rfft(kernels, axis=1)
+    product, power = scipy.fft.irfft([turned[0], turned[1:].sum(axis=0)], size, axis=1)[:, :rows]
     return product / np.sqrt(np.maximum(power, 1e-300))
-
-
-def _convolved(signal: np.ndarray, pulse: np.ndarray) -> np.ndarray:
-    half = len(pulse) // 2
-    return scipy.signal.oaconvolve(signal, pulse)[half : half + len(signal)]
 
 
 def changes_of(

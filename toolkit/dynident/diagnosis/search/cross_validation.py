@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from dynident.evidence.evidence_fit import EvidenceFit
@@ -30,19 +32,16 @@ def cross_validate(
         None,
         _joined(fitted.moments.signal, with_model.signal, with_self.signal),
     )
-    without = np.r_[0 : len(fitted.values), both.inputs]
     reliable = fitted.criteria.noise.reliable
-    return held_out_losses(both.among(without), reliable), held_out_losses(both, reliable)
+    blocks = range(len(both.total))
+    wider = [regress(both.without(block), reliable).values for block in blocks]
+    return _losses(fitted.moments, fitted.without_each_block), _losses(both, wider)
 
 
-def held_out_losses(summed: SecondMoments, least_reliability: float) -> np.ndarray:
-    """Squared residual of each block under the fit to all others, free of noise in the mean."""
-    found = []
-    for block in range(len(summed.signal)):
-        values = regress(summed.without(block), least_reliability).values
-        combination = np.append(-values, 1.0)
-        found.append(combination @ summed.signal[block] @ combination)
-    return np.array(found)
+def _losses(summed: SecondMoments, values: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
+    """Squared residual of each block with its values, free of noise in the mean."""
+    combinations = [np.append(-one, 1.0) for one in values]
+    return np.array([c @ m @ c for c, m in zip(combinations, summed.signal, strict=True)])
 
 
 def _joined(model: np.ndarray, cross: np.ndarray, own: np.ndarray) -> np.ndarray:
