@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 
-from dynident.moments.lagged import lagged_products
+from dynident.moments.lagged import LaggedColumns, lagged_products
 
 
 def test_blocks_do_not_matter_and_stretches_do() -> None:
@@ -27,3 +27,21 @@ def test_blocks_do_not_matter_and_stretches_do() -> None:
         np.testing.assert_allclose(
             found.residual[:, k], sum(e[t] * e[t + k] for t in pairs), atol=1e-12
         )
+
+
+def test_some_rows_say_what_all_do_whatever_the_blocks() -> None:
+    rng = np.random.default_rng(1)
+    t = np.arange(20000) / 50.0
+    X = np.stack([np.sin(t + p)[:, None] * np.cos(0.3 * t + p)[:, None] for p in range(3)], axis=2)
+    X = X + 0.1 * rng.normal(size=X.shape)
+    every, some, again = LaggedColumns(4), LaggedColumns(4, 0.25), LaggedColumns(4, 0.25)
+    for one, cuts in ((every, [0, 20000]), (some, [0, 20000]), (again, [0, 7, 3000, 3001, 20000])):
+        for a, b in itertools.pairwise(cuts):
+            one.add(a, X[a:b])
+    np.testing.assert_allclose(again.columns, some.columns, rtol=1e-12)
+    np.testing.assert_array_equal(again.pairs, some.pairs)
+    assert every.complete and not some.complete
+    np.testing.assert_array_equal(every.pairs, 20000 - np.arange(5))
+    assert 0.2 < some.pairs[0] / every.pairs[0] < 0.3
+    mean, like = (one.columns / one.pairs[:, None, None] for one in (every, some))
+    np.testing.assert_allclose(like, mean, atol=0.1 * np.abs(mean).max())

@@ -14,7 +14,8 @@ from dynident.fitting.linear_solution import LinearSolution, solve_factors
 from dynident.fitting.sampling import rows
 from dynident.fitting.uncertainty.expected_bias import held
 from dynident.fitting.uncertainty.input_bias import InputBias, input_bias
-from dynident.fitting.uncertainty.lack_of_fit import lack_of_fit, widened
+from dynident.fitting.uncertainty.lack_of_fit import lack_of_fit, scattered, widened
+from dynident.fitting.uncertainty.lagged_rows import lagged_columns, watched
 from dynident.fitting.uncertainty.row_errors import row_errors
 from dynident.model import Model
 from dynident.moments.factors import TriangularFactors, factorise
@@ -61,19 +62,24 @@ class LeastSquares:
         """
         if not dataset.recordings:
             raise FitError("no recording to fit", remedy='mark some recordings use = "train"')
-        factors = factorise(rows(model, dataset))
+        columns = None
+        if self.errors == "correlated" and not model.needs_values:
+            columns = lagged_columns(dataset)
+            factors = factorise(watched(model, dataset, None, columns))
+        else:
+            factors = factorise(rows(model, dataset))
         solution = solve_factors(model, factors, self.weighting)
         if model.needs_values:
             model, factors, solution = self._iterate(model, dataset, solution.values)
         estimate = estimate_of(self.name, self.weighting, model, dataset, factors, solution)
         if self.errors == "independent":
             return estimate
-        found = row_errors(model, dataset, solution.values, solution)
+        found = row_errors(model, dataset, solution.values, solution, columns)
         covariance, words, headline = found.covariance, found.words, ""
         judged = lack_of_fit(model, dataset, solution.values, solution)
         if judged is not None and judged.rejected:
-            covariance = widened(covariance, judged.covariance)
-            words, headline = judged.words, judged.headline
+            other, words = scattered(model, dataset, solution.values, solution)
+            covariance, headline = widened(covariance, other), judged.headline
         kept = list(solution.basis.independent)
         whole = np.zeros_like(solution.covariance)
         whole[np.ix_(kept, kept)] = covariance

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -19,10 +20,10 @@ from dynident.recording import (
     Filter,
     FilterBlock,
     Motion,
+    MotionInParts,
     ParallelFilter,
     Recording,
     default_filter,
-    differentiate,
     uniform,
     usable_rows,
 )
@@ -42,26 +43,68 @@ Evaluate = Callable[[Block], list[np.ndarray]]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Sampled:
-    """A recording ready for evaluation.
+    """A recording ready for evaluation; what is not asked for is not computed.
 
     Attributes
     ----------
     recording : on a uniform clock.
-    motion : at the full rate.
+    source : its motion at the full rate, part by part.
     parallel : the low-pass and decimation of columns and torque.
     kept : decimated rows that are used, see `usable_rows`.
-    t, q, v, a, tau : decimated rows, (T,) and (T, n).
     """
 
     recording: Recording
-    motion: Motion
+    source: MotionInParts | Motion
     parallel: ParallelFilter
     kept: slice
-    t: np.ndarray
-    q: np.ndarray
-    v: np.ndarray
-    a: np.ndarray
-    tau: np.ndarray
+
+    @property
+    def motion(self) -> Motion:
+        """The motion at the full rate, as a whole."""
+        return self.source.whole
+
+    @property
+    def count(self) -> int:
+        """How many decimated rows are used, T."""
+        return self.kept.stop - self.kept.start
+
+    @cached_property
+    def t(self) -> np.ndarray:
+        """Time stamps of the decimated rows, (T,) s."""
+        rows = self.parallel.rows(self.source.samples, self.kept)
+        return self.recording.t[self.source.first + rows]
+
+    @property
+    def q(self) -> np.ndarray:
+        """Positions in the decimated rows, (T, n) rad or m."""
+        return self._decimated[0]
+
+    @property
+    def v(self) -> np.ndarray:
+        """Their derivative in the decimated rows, (T, n)."""
+        return self._decimated[1]
+
+    @property
+    def a(self) -> np.ndarray:
+        """Their second derivative in the decimated rows, (T, n)."""
+        return self._decimated[2]
+
+    @cached_property
+    def tau(self) -> np.ndarray:
+        """Torque in the decimated rows, (T, n) N m or N."""
+        return self._each(lambda motion: [motion.tau])[0]
+
+    @cached_property
+    def _decimated(self) -> list[np.ndarray]:
+        return self._each(lambda motion: [motion.q, motion.v, motion.a])
+
+    def _each(self, signals: Callable[[Motion], list[np.ndarray]]) -> list[np.ndarray]:
+        """Decimated rows of signals of the motion, (T, n) each."""
+        parts = [
+            self.parallel.apply_each(signals(self.source.part(plan.raw)), plan)
+            for plan in self.parallel.blocks(self.source.samples, BLOCK, self.kept)
+        ]
+        return [np.concatenate(pieces) for pieces in zip(*parts, strict=True)]
 
     @property
     def rate_hz(self) -> float:
@@ -77,11 +120,44 @@ class Sampled:
         ----------
         values : (p,) parameters at which columns that depend on the fitted model are taken.
         """
+        for plan, block, known, _ in self._blocks(model, values):
+            yield self.parallel.apply_block(model.columns(block, values, known), plan)
+
+    def rows(
+        self, model: Model, values: np.ndarray | None = None
+    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """As `columns`, with the torque (T, n) of the same rows."""
+        for plan, block, known, torque in self._blocks(model, values):
+            columns = self.parallel.apply_block(model.columns(block, values, known), plan)
+            yield columns, self.parallel.apply_block(torque, plan)
+
+    def residuals(self, model: Model, values: np.ndarray) -> Iterator[tuple[np.ndarray, ...]]:
+        """What a model leaves of the torque and that torque, block by block, (T, n) each.
+
+        By inverse dynamics where the model permits: a torque costs less than its columns.
+
+        Parameters
+        ----------
+        values : (p,) the model's parameters.
+        """
+        for plan, block, known, torque in self._blocks(model, values):
+            if any(effect.needs_torque or effect.is_payload for effect in model.effects):
+                columns = self.parallel.apply_block(model.columns(block, values, known), plan)
+                measured = self.parallel.apply_block(torque, plan)
+                yield measured - columns @ values, measured
+                continue
+            left = torque - model.torque_without_loads(block, values, known)
+            yield tuple(self.parallel.apply_each([left, torque], plan))
+
+    def _blocks(
+        self, model: Model, values: np.ndarray | None
+    ) -> Iterator[tuple[FilterBlock, Block, dict[str, np.ndarray], np.ndarray]]:
+        """Yield plans with what they evaluate: samples, columns that are known, and the torque."""
         known = self.whole_columns(model, values)
         for plan in self._plans(model):
             here = {label: own[plan.raw] for label, own in known.items()}
-            columns = model.columns(self.block(model, plan.raw), values, here)
-            yield self.parallel.apply_block(columns, plan)
+            motion = self.source.part(plan.raw)
+            yield plan, self._block(model, motion, plan.raw), here, motion.tau
 
     def whole_columns(
         self, model: Model, values: np.ndarray | None = None
@@ -115,30 +191,34 @@ class Sampled:
         model : for the robot.
         raw : which samples.
         """
-        motion, recording = self.motion, self.recording
-        temperature = getattr(recording, "temperature", None)
+        if raw == slice(None):
+            return replace(
+                self._block(model, self.motion, slice(0, self.source.samples)),
+                period=self.recording.period,
+            )
+        return self._block(model, self.source.part(raw), raw)
+
+    def _block(self, model: Model, motion: Motion, raw: slice) -> Block:
+        """Some samples of the motion as effects see them."""
+        recording, temperature = self.recording, getattr(self.recording, "temperature", None)
         if temperature is not None:
-            temperature = temperature[motion.first : motion.first + motion.samples][raw]
-        block = model.block(
-            motion.t[raw] + recording.start,
-            motion.q[raw],
-            motion.v[raw],
-            motion.a[raw],
+            start, stop, _ = raw.indices(self.source.samples)
+            temperature = temperature[self.source.first + start : self.source.first + stop]
+        return model.block(
+            motion.t + recording.start,
+            motion.q,
+            motion.v,
+            motion.a,
             carries_payload=bool(recording.payload),
             number=getattr(recording, "number", 0),
             temperature=temperature,
         )
-        return replace(block, period=recording.period) if raw == slice(None) else block
 
     def _plans(self, model: Model) -> Iterator[FilterBlock]:
-        """Blocks whose rows lie in the recording's window."""
+        """Blocks whose rows are used."""
         fitting = _MEMORY // (8 * model.robot.n * model.size)
         size = min(BLOCK, max(_LEAST_BLOCK, fitting))
-        for plan in self.parallel.blocks(self.motion.samples, size):
-            low, high = max(plan.kept.start, self.kept.start), min(plan.kept.stop, self.kept.stop)
-            if high > low:
-                rows = slice(low - plan.kept.start, high - plan.kept.start)
-                yield FilterBlock(plan.raw, plan.rows[rows], slice(low, high))
+        return self.parallel.blocks(self.source.samples, size, self.kept)
 
 
 def sample(recording: Recording, settings: Filter | None) -> Sampled:
@@ -156,30 +236,19 @@ def sample(recording: Recording, settings: Filter | None) -> Sampled:
     """
     recording = uniform(recording)
     settings = settings or default_filter(recording.rate_hz)
-    motion = differentiate(recording, settings)
-    parallel = ParallelFilter(settings, motion.rate_hz, recording.period, recording.where)
-    times = parallel.times(motion.t)
-    kept = usable_rows(recording, parallel, motion.t, times)
+    source = MotionInParts(recording, settings)
+    rate = source.rate_hz
+    parallel = ParallelFilter(settings, rate, recording.period, recording.where)
+    kept = usable_rows(recording, parallel, source.first, source.samples)
     count = kept.stop - kept.start
     if count < LEAST_ROWS:
         what = f"only {count} rows are left after filtering and decimation"
         if settings.ends == "drop":
-            edge = max(settings.margins(motion.rate_hz)) / motion.rate_hz + parallel.transient
+            edge = max(settings.margins(rate)) / rate + parallel.transient
             what += f", which take {edge:.2g} s at each end"
         remedy = f"at least {LEAST_ROWS} are needed: record longer, or raise rate_hz or the "
         raise RecordingError(what, recording.where, remedy + "cut-offs in [filter]")
-    q, v, a, tau = (parallel.apply(x)[kept] for x in (motion.q, motion.v, motion.a, motion.tau))
-    return Sampled(
-        recording=recording,
-        motion=motion,
-        parallel=parallel,
-        kept=kept,
-        t=times[kept],
-        q=q,
-        v=v,
-        a=a,
-        tau=tau,
-    )
+    return Sampled(recording=recording, source=source, parallel=parallel, kept=kept)
 
 
 def flagged(sampled: Sampled, payload: bool | None) -> Sampled:
@@ -201,9 +270,4 @@ def rows(
     columns (T, n, p) and torque (T, n)
     """
     for recording in dataset.recordings:
-        sampled = sample(recording, dataset.filter)
-        start = 0
-        for columns in sampled.columns(model, values):
-            stop = start + len(columns)
-            yield columns, sampled.tau[start:stop]
-            start = stop
+        yield from sample(recording, dataset.filter).rows(model, values)

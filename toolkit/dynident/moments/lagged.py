@@ -6,10 +6,14 @@ joint and lag, sums of products of columns, and of residuals.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+
+_STRETCH = 64
+"""Rows that follow each other where not all are multiplied: several times the lags, and few, for
+rows far apart show more of a motion than as many that are neighbours."""
 
 RowBlock = tuple[bool, np.ndarray, np.ndarray, np.ndarray]
 """Whether a new stretch begins; columns (T, n, p); residual (T, n); mask of what counts (T, n)."""
@@ -53,34 +57,155 @@ def lagged_products(blocks: Iterable[RowBlock], lags: int) -> LaggedProducts:
     ValueError
         If there is no block.
     """
-    found: LaggedProducts | None = None
-    before = np.zeros((0, 0, 0))
+    joints: list[_Joint] = []
+    pairs = _Pairs(lags)
+    size = 0
     for begins, columns, residual, counts in blocks:
-        # Joint by joint, the residual beside the columns: one matrix product each. What does not
-        # count stays as rows of zeros, so that lags remain lags.
-        beside = np.stack([residual, np.ones_like(residual)], axis=2)
-        here = np.concatenate([columns, beside], axis=2) * counts[:, :, None]
-        here = here.transpose(1, 0, 2)
-        n, _, m = here.shape
-        if found is None:
-            found = LaggedProducts(
-                columns=np.zeros((n, lags + 1, m - 2, m - 2)),
-                residual=np.zeros((n, lags + 1)),
-                pairs=np.zeros((n, lags + 1)),
-            )
-        if begins:
-            before = here[:, :0]
-        rows, old = np.concatenate([before, here], axis=1), before.shape[1]
-        for k in range(lags + 1):
-            # Pairs that end in this block; those before it are counted already.
-            late = rows[:, max(old, k) :]
-            early = rows[:, max(old, k) - k : rows.shape[1] - k]
-            if not late.shape[1]:
-                continue
-            found.columns[:, k] += early[:, :, :-2].transpose(0, 2, 1) @ late[:, :, :-2]
-            found.residual[:, k] += np.einsum("jt,jt->j", early[:, :, -2], late[:, :, -2])
-            found.pairs[:, k] += np.einsum("jt,jt->j", early[:, :, -1], late[:, :, -1])
-        before = rows[:, max(0, rows.shape[1] - lags) :]
-    if found is None:
+        pairs.add(begins, residual, counts)
+        if not joints:
+            size = columns.shape[2]
+            joints = [_Joint(size, lags) for _ in range(columns.shape[1])]
+        every = np.array(counts.all(axis=0))
+        for j, joint in enumerate(joints):
+            # What does not count stays as rows of zeros, so that lags remain lags.
+            here = columns[:, j] if every[j] else columns[:, j] * counts[:, j, None]
+            joint.add(begins, here)
+    if not joints:
         raise ValueError("no rows")
-    return found
+    found = np.array([joint.sums for joint in joints])
+    return LaggedProducts(columns=found, residual=pairs.products, pairs=pairs.counts)
+
+
+def lagged_residuals(
+    blocks: Iterable[tuple[bool, np.ndarray, np.ndarray]], lags: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Sum the products of residuals alone.
+
+    Parameters
+    ----------
+    blocks : whether a new stretch begins; residual (T, n); mask of what counts (T, n).
+    lags : K, the longest lag in rows.
+
+    Returns
+    -------
+    residual, pairs : (n, K + 1) as of `LaggedProducts`.
+    """
+    pairs = _Pairs(lags)
+    for begins, residual, counts in blocks:
+        pairs.add(begins, residual, counts)
+    return pairs.products, pairs.counts
+
+
+class LaggedColumns:
+    """Products of columns with those of later rows, gathered while rows pass by.
+
+    Of very many rows some are enough: how errors of rows add up is a property of the motion. They
+    lie in stretches that are evenly apart.
+
+    Parameters
+    ----------
+    lags : K, the longest lag in rows.
+    share : of the rows that are multiplied.
+    """
+
+    def __init__(self, lags: int, share: float = 1.0) -> None:
+        self.lags, self.complete = lags, share >= 1.0
+        self._length = _STRETCH
+        self._spacing = max(_STRETCH, round(_STRETCH / share))
+        self._joints: list[_Joint] = []
+        self._pairs = np.zeros(lags + 1)
+
+    @property
+    def columns(self) -> np.ndarray:
+        """Sums of x(t) x(t + k)' of each joint, (n, K + 1, p, p)."""
+        return np.array([joint.sums for joint in self._joints])
+
+    @property
+    def pairs(self) -> np.ndarray:
+        """Number of pairs behind them, (K + 1,)."""
+        return self._pairs
+
+    def add(self, first: int, columns: np.ndarray) -> None:
+        """Add rows (T, n, p) of a recording, the first of which is its row number `first`."""
+        if not self._joints:
+            self._joints = [_Joint(columns.shape[2], self.lags) for _ in range(columns.shape[1])]
+        for begin, start, stop in self._stretches(first, first + len(columns)):
+            for j, joint in enumerate(self._joints):
+                joint.add(start == begin, columns[start - first : stop - first, j])
+            k = np.arange(self.lags + 1)
+            self._pairs += np.maximum(stop - begin - np.maximum(start - begin, k), 0)
+
+    def _stretches(self, first: int, last: int) -> Iterator[tuple[int, int, int]]:
+        """Where stretches begin, and from which to before which of some rows they have."""
+        if self.complete:
+            yield 0, first, last
+            return
+        offset = (self._spacing - self._length) // 2
+        for k in range(max(0, (first - offset) // self._spacing), last // self._spacing + 1):
+            begin = k * self._spacing + offset
+            start, stop = max(begin, first), min(begin + self._length, last)
+            if stop > start:
+                yield begin, start, stop
+
+
+class _Pairs:
+    """Products of residuals with later ones, and how many there are."""
+
+    def __init__(self, lags: int) -> None:
+        self._lags = lags
+        self._before = np.zeros((0, 2, 0))
+        self._sums = np.zeros((0, 0, 0))
+
+    @property
+    def products(self) -> np.ndarray:
+        """Sums of e(t) e(t + k), (n, K + 1)."""
+        return self._sums[0]
+
+    @property
+    def counts(self) -> np.ndarray:
+        """Number of pairs, (n, K + 1)."""
+        return self._sums[1]
+
+    def add(self, begins: bool, residual: np.ndarray, counts: np.ndarray) -> None:
+        """Add rows (T, n), and which of them count."""
+        here = np.stack([residual.T * counts.T, counts.T])
+        if not self._sums.size:
+            self._sums = np.zeros((2, residual.shape[1], self._lags + 1))
+            self._before = here[:, :, :0]
+        before = here[:, :, :0] if begins else self._before
+        rows, old = np.concatenate([before, here], axis=2), before.shape[2]
+        for k in range(self._lags + 1):
+            # Pairs that end in this block; those before it are counted already.
+            late = rows[:, :, max(old, k) :]
+            early = rows[:, :, max(old, k) - k : rows.shape[2] - k]
+            self._sums[:, :, k] += np.einsum("ijt,ijt->ij", early[:, :, : late.shape[2]], late)
+        self._before = rows[:, :, max(0, rows.shape[2] - self._lags) :]
+
+
+class _Joint:
+    """Products of a joint's columns with later rows, of columns that are not zero throughout."""
+
+    def __init__(self, size: int, lags: int) -> None:
+        self.sums = np.zeros((lags + 1, size, size))
+        self._lags = lags
+        self._before = np.zeros((0, size))
+
+    def add(self, begins: bool, columns: np.ndarray) -> None:
+        """Add rows (T, p)."""
+        before = self._before[:0] if begins else self._before
+        some = columns[0] != 0.0
+        for name in np.flatnonzero(~some):
+            some[name] = columns[:, name].any() or before[:, name].any()
+        used, old = np.flatnonzero(some), len(before)
+        # Column by column, as blocks have them.
+        rows = np.empty((len(used), old + len(columns)))
+        rows[:, :old] = before[:, used].T
+        for row, name in zip(rows[:, old:], used, strict=True):
+            row[:] = columns[:, name]
+        for k in range(self._lags + 1):
+            late = rows[:, max(old, k) :]
+            if late.shape[1]:
+                early = rows[:, max(old, k) - k : rows.shape[1] - k]
+                self.sums[k][np.ix_(used, used)] += early @ late.T
+        last = np.concatenate([before, columns[-self._lags :]]) if self._lags else columns[:0]
+        self._before = np.array(last[max(0, len(last) - self._lags) :])

@@ -4,8 +4,8 @@
 through `Column`; what a file does not say of itself through `FileLayout`), `open_table` opens any
 file with its columns under its own names, `Recording` checks what is read.
 `uniform` puts jittered time stamps on a uniform clock. `differentiate` turns positions into a
-`Motion`; `ParallelFilter` passes regressor columns and torque through one low-pass and decimation,
-in blocks if asked; both follow a `Filter`.
+`Motion`, `MotionInParts` as much of it as is asked for; `ParallelFilter` passes regressor columns
+and torque through one low-pass and decimation, in blocks if asked; both follow a `Filter`.
 `usable` and `usable_rows` decide which rows count, `within` and `moving` pick some of them;
 `periods` lays repetitions side by side; `require_motion` and `require_torque` refuse recordings
 that show nothing.
@@ -14,11 +14,9 @@ that show nothing.
 from dynident.recording.dataset import Dataset, Noise, numbered, without_ends
 from dynident.recording.filters import (
     Filter,
-    Motion,
     central_difference,
     default_filter,
     default_position_cutoff,
-    differentiate,
     lowpass,
 )
 from dynident.recording.formats.column_names import Column
@@ -27,6 +25,7 @@ from dynident.recording.formats.open_table import READABLE, open_table
 from dynident.recording.formats.read import SUFFIXES, read
 from dynident.recording.formats.write import write
 from dynident.recording.masks import moving, within
+from dynident.recording.motion import Motion, MotionInParts, differentiate
 from dynident.recording.parallel import FilterBlock, ParallelFilter, choose_factor
 from dynident.recording.periods import Periods, mismatch, periods, require_repetition
 from dynident.recording.plausibility import (
@@ -57,6 +56,7 @@ __all__ = [
     "FilterBlock",
     "LeftOut",
     "Motion",
+    "MotionInParts",
     "Noise",
     "ParallelFilter",
     "Periods",

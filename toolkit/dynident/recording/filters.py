@@ -1,4 +1,4 @@
-"""Zero-phase filters and derivatives: from a recording to the motion that a regressor needs."""
+"""The filter of a recording: its settings, zero-phase low-passes and central differences."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import numpy as np
 import scipy
 
 from dynident.errors import RecordingError
-from dynident.recording.recording import Recording
 from dynident.recording.zero_phase import zero_phase
 
+FORGOTTEN = 1e-12
+"""Share of a disturbance at the end of a part that is left where the part is used."""
 _LEAST_SHARE = 1e-6
 """Cut-off over sampling rate below which a filter's coefficients run out of digits."""
 
@@ -105,33 +106,6 @@ class Filter:
             least = max(2, math.ceil(3.0 / cutoff * rate_hz) if cutoff else 0)
         first, last = (max(round(edge * rate_hz), least) for edge in self.edge_s)
         return first, last
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Motion:
-    """Filtered positions and their derivatives, at the recording's own rate.
-
-    Attributes
-    ----------
-    t : (T,) s, the recording's clock.
-    q, v, a : (T, n) rad or m, and per s and s^2.
-    tau : (T, n) N m or N, at the instants of `t` (half a sample after held commands).
-    rate_hz : mean sampling rate.
-    first : index in the recording of the first row.
-    """
-
-    t: np.ndarray
-    q: np.ndarray
-    v: np.ndarray
-    a: np.ndarray
-    tau: np.ndarray
-    rate_hz: float
-    first: int = 0
-
-    @property
-    def samples(self) -> int:
-        """Number of rows, T."""
-        return len(self.t)
 
 
 def default_position_cutoff(rate_hz: float, cutoff_hz: float | None) -> float:
@@ -233,56 +207,20 @@ def central_difference(x: np.ndarray, rate_hz: float) -> np.ndarray:
     -------
     (T, ...), per s.
     """
-    return np.gradient(x, 1.0 / rate_hz, axis=0)
+    step, found = 1.0 / rate_hz, np.empty(x.shape)
+    np.subtract(x[2:], x[:-2], out=found[1:-1])
+    found[1:-1] /= 2.0 * step
+    found[0], found[-1] = (x[1] - x[0]) / step, (x[-1] - x[-2]) / step
+    return found
 
 
-def differentiate(recording: Recording, filter: Filter) -> Motion:
-    """Low-pass the positions, differentiate them twice, and drop the edges.
-
-    The recording is taken as uniformly sampled at its mean rate: see `uniform`. Recorded v and a
-    are not used, since columns and torque must have passed the same filters. A held command acts
-    from its sample to the next; central differences see the mean of both sides, so that row k is
-    (u[k-1] + u[k]) / 2; row 0, which has no predecessor, keeps u[0].
+def memory(sections: np.ndarray, share: float) -> int:
+    """Samples in which a disturbance fades to a share; half as much again for the two passes.
 
     Parameters
     ----------
-    recording : T samples of n joints.
-    filter : its `position_cutoff_hz`, `edge_s` and `ends` are used here.
-
-    Returns
-    -------
-    Motion
-        At the full rate, without the edges.
-
-    Raises
-    ------
-    RecordingError
-        If the cut-off does not suit the sampling rate, or too few samples remain.
+    sections : of a filter, as of `butterworth`.
+    share : below one.
     """
-    rate, where = recording.rate_hz, recording.where
-    q = recording.q
-    if filter.position_cutoff_hz is not None:
-        q = lowpass(q, rate, filter.position_cutoff_hz, where=where)
-    v = central_difference(q, rate)
-    a = central_difference(v, rate)
-    tau = recording.tau
-    if recording.torque == "held_command":
-        tau = np.concatenate([tau[:1], (tau[:-1] + tau[1:]) / 2])
-    first, last = filter.margins(rate)
-    kept = slice(first, recording.samples - last)
-    if recording.samples - last - first < 2:
-        raise RecordingError(
-            f"nothing is left of {recording.duration:.4g} s when {first / rate:.3g} and "
-            f"{last / rate:.3g} s are dropped at the ends",
-            where,
-            "record longer, raise position_cutoff_hz, or choose a smaller edge_s",
-        )
-    return Motion(
-        t=recording.t[kept],
-        q=q[kept],
-        v=v[kept],
-        a=a[kept],
-        tau=tau[kept],
-        rate_hz=rate,
-        first=first,
-    )
+    _, poles, _ = scipy.signal.sos2zpk(sections)
+    return math.ceil(1.5 * math.log(share) / math.log(np.abs(np.asarray(poles)).max()))

@@ -16,11 +16,9 @@ import scipy
 
 from dynident.batch import side_by_side
 from dynident.errors import RecordingError
-from dynident.recording.filters import Filter, butterworth
+from dynident.recording.filters import FORGOTTEN, Filter, butterworth, memory
 from dynident.recording.zero_phase import zero_phase
 
-_FORGOTTEN = 1e-12
-"""Share of a disturbance at a block's end that is left after the overlap."""
 _FEW = 8  # columns, of which it costs more to find the empty ones than to filter them
 _AT_ONCE = 64
 """Columns filtered at a time; bounds the temporary memory."""
@@ -109,20 +107,36 @@ class ParallelFilter:
     @cached_property
     def overlap(self) -> int:
         """Samples after which a block's end no longer shows (below 1e-9 of the largest value)."""
-        return sum(_memory(sections, _FORGOTTEN) for sections, _ in self.stages)
+        return sum(memory(sections, FORGOTTEN) for sections, _ in self.stages)
+
+    @cached_property
+    def _least(self) -> int:
+        """Samples that a block needs, so that it can be padded."""
+        return max((padding for _, padding in self.stages), default=0)
 
     @cached_property
     def transient(self) -> float:
         """Time in s from a record's end over which the filter sees beyond it (to 1 %)."""
-        return sum(_memory(sections, 1e-2) for sections, _ in self.stages) / self.rate_hz
+        return sum(memory(sections, 1e-2) for sections, _ in self.stages) / self.rate_hz
 
-    def rows(self, samples: int) -> np.ndarray:
-        """Which of so many samples are kept, increasing; the last one is."""
+    def count(self, samples: int) -> int:
+        """How many of so many samples are kept."""
+        above, below = self._ratio
+        return -(-below * (2 * samples - 1) // (2 * above)) if samples else 0
+
+    def rows(self, samples: int, some: slice = slice(None)) -> np.ndarray:
+        """Which of so many samples are kept, increasing; the last one is.
+
+        Parameters
+        ----------
+        samples : T.
+        some : of the kept rows; all by default.
+        """
         # In whole numbers: rounding must fall alike in every period.
         above, below = self._ratio
-        back = (2 * above * np.arange(samples * below // above + 2) + below) // (2 * below)
-        back = back[back < samples]
-        return (samples - 1 - back)[::-1]
+        count = self.count(samples)
+        back = count - 1 - np.arange(*some.indices(count))
+        return samples - 1 - (2 * above * back + below) // (2 * below)
 
     def times(self, t: np.ndarray) -> np.ndarray:
         """Time stamps of the kept rows."""
@@ -138,25 +152,34 @@ class ParallelFilter:
         """
         return self._filtered(np.asarray(x, dtype=float), self.rows(len(x)))
 
-    def blocks(self, samples: int, size: int = 32768) -> list[FilterBlock]:
+    def blocks(
+        self, samples: int, size: int = 32768, kept: slice = slice(None)
+    ) -> Iterator[FilterBlock]:
         """Plan a record of so many samples as blocks of about `size`, with overlap.
 
         `apply_block` on each `x[block.raw]` gives `apply(x)[block.kept]`, to 1e-9 of the largest
         value of x.
+
+        Parameters
+        ----------
+        samples : of the record.
+        size : of a block, without its overlap.
+        kept : which of the kept rows are wanted; all by default.
         """
-        rows = self.rows(samples)
-        count = max(1, round(samples / max(size, 2 * self.overlap)))
-        limits = [samples * i // count for i in range(count + 1)]
-        cuts = np.searchsorted(rows, limits)
-        found = []
-        for i in range(count):
-            raw = slice(
-                max(0, limits[i] - self.overlap), min(samples, limits[i + 1] + self.overlap)
+        start, stop, _ = kept.indices(self.count(samples))
+        blocks = max(1, round((stop - start) * self.step / max(size, 2 * self.overlap)))
+        for i in range(blocks if stop > start else 0):
+            some = slice(
+                start + (stop - start) * i // blocks, start + (stop - start) * (i + 1) // blocks
             )
-            kept = slice(int(cuts[i]), int(cuts[i + 1]))
-            if kept.stop > kept.start:
-                found.append(FilterBlock(raw, rows[kept] - raw.start, kept))
-        return found
+            rows = self.rows(samples, some)
+            low = max(0, int(rows[0]) - self.overlap)
+            # Padding takes as many samples as a stage needs, also where all else is forgotten.
+            high = min(samples, max(int(rows[-1]) + self.overlap, low + self._least) + 1)
+            low = max(0, min(low, high - self._least - 1))
+            if blocks == 1 and samples - (high - low) <= 2 * self.overlap:
+                low, high = 0, samples
+            yield FilterBlock(slice(low, high), rows - low, some)
 
     def apply_block(self, x: np.ndarray, block: FilterBlock) -> np.ndarray:
         """Filter and decimate one block, `x` being the record's samples `block.raw`."""
@@ -266,9 +289,3 @@ def choose_factor(rate_hz: float, target_rate: float, period: float | None = Non
     near = range(max(1, math.ceil(ratio / 1.2)), math.floor(ratio * 1.2) + 1)
     divisors = [factor for factor in near if samples % factor == 0]
     return min(divisors, key=lambda factor: abs(math.log(factor / ratio)), default=plain)
-
-
-def _memory(sections: np.ndarray, share: float) -> int:
-    """Samples in which a disturbance fades to a share; half as much again for the two passes."""
-    _, poles, _ = scipy.signal.sos2zpk(sections)
-    return math.ceil(1.5 * math.log(share) / math.log(np.abs(np.asarray(poles)).max()))

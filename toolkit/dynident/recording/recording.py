@@ -209,8 +209,18 @@ class Recording:
         RecordingError
             If fewer than 2 samples are left.
         """
-        kept = within(self.t, t0, t1, self.where)
-        return self.replace(t=self.t[kept], **self._mapped(lambda x: x[kept]))
+        kept = np.flatnonzero(within(self.t, t0, t1, self.where))
+        return self.part(slice(int(kept[0]), int(kept[-1]) + 1))
+
+    def part(self, rows: slice) -> Recording:
+        """Return some consecutive samples.
+
+        Raises
+        ------
+        RecordingError
+            If there are fewer than 2.
+        """
+        return self.replace(t=self.t[rows], **self._mapped(lambda x: x[rows]))
 
     def _mapped(self, change: Callable[[np.ndarray], np.ndarray]) -> dict[str, Any]:
         """Each signal changed alike, those that are absent left absent."""

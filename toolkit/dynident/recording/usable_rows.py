@@ -8,6 +8,7 @@ pose that is held in the middle of a recording was chosen, and stays.
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from dataclasses import asdict, dataclass, fields
 from itertools import pairwise
 from typing import Any
@@ -25,6 +26,7 @@ _MOVES = 1e-3  # of a joint's travel by which it must leave its place at an end
 _NOISE = 6.0  # standard deviations of the position's noise likewise
 _SETTLED = 5.0  # times the later differences of repetitions, above which a loop has not settled
 _FINE = 1e-4  # of a joint's travel by which repetitions may differ in any case
+_AT_ONCE = 65536  # samples that are looked at
 _QUIET = 0.1  # s that repetitions must agree for a transient to be over
 
 STANDS_STILL = "standing still"
@@ -71,17 +73,14 @@ def usable(recording: Recording) -> Recording:
     return recording.replace(window=(low, high), left_out=tuple(found))
 
 
-def usable_rows(
-    recording: Recording, parallel: ParallelFilter, t: np.ndarray, times: np.ndarray
-) -> slice:
+def usable_rows(recording: Recording, parallel: ParallelFilter, first: int, samples: int) -> slice:
     """Decide which decimated rows may be used.
 
     Parameters
     ----------
     recording : whose window holds.
     parallel : the filter of columns and torque.
-    t : (T,) s, samples that pass the filter.
-    times : (R,) s, of the decimated rows.
+    first, samples : the recording's samples that pass the filter, from which and how many.
 
     Returns
     -------
@@ -93,15 +92,50 @@ def usable_rows(
     RecordingError
         If the window holds no row at all.
     """
-    kept = np.ones(len(times), dtype=bool)
+    t = recording.t[first : first + samples]
+    rows = _RowTimes(parallel, t)
+    start, stop = 0, rows.count
     if recording.window is not None:
-        kept = within(times, *recording.window, recording.where)
+        low, high = recording.window
+        slack = rows.slack
+        start, stop = rows.before(low - slack), rows.before(high - slack)
+        if stop <= start:
+            within(parallel.times(t), low, high, recording.where)  # which says why
     if parallel.filter.ends == "drop":
-        slack = 1e-6 / parallel.rate_hz
-        margin = parallel.transient - slack
-        kept &= (times >= t[0] + margin) & (times <= t[-1] - margin)
-    inside = np.flatnonzero(kept)
-    return slice(int(inside[0]), int(inside[-1]) + 1) if len(inside) else slice(0, 0)
+        margin = parallel.transient - 1e-6 / parallel.rate_hz
+        start = max(start, rows.before(t[0] + margin))
+        stop = min(stop, rows.until(t[-1] - margin))
+    return slice(start, stop) if stop > start else slice(0, 0)
+
+
+class _RowTimes:
+    """Time stamps of decimated rows, found without listing them.
+
+    Parameters
+    ----------
+    parallel : that decimates.
+    t : (T,) s, samples that pass it.
+    """
+
+    def __init__(self, parallel: ParallelFilter, t: np.ndarray) -> None:
+        self._parallel, self._t = parallel, t
+        self.count = parallel.count(len(t))
+
+    @property
+    def slack(self) -> float:
+        """As `within` has it: rounding that has put a stamp just before a limit."""
+        return 1e-3 * (self._at(self.count - 1) - self._at(0)) / max(self.count - 1, 1)
+
+    def before(self, limit: float) -> int:
+        """How many rows are earlier than a time."""
+        return bisect_left(range(self.count), limit, key=self._at)
+
+    def until(self, limit: float) -> int:
+        """How many rows are not later than a time."""
+        return bisect_right(range(self.count), limit, key=self._at)
+
+    def _at(self, row: int) -> float:
+        return float(self._t[self._parallel.rows(len(self._t), slice(row, row + 1))[0]])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,19 +179,19 @@ def count_rows(recording: Recording, settings: Filter) -> RowCount:
     """
     parallel = ParallelFilter(settings, recording.rate_hz, recording.period, recording.where)
     first, last = settings.margins(recording.rate_hz)
-    t = recording.t[first : recording.samples - last]
-    kept = usable_rows(recording, parallel, t, parallel.times(t))
-    every = parallel.times(recording.t)
+    kept = usable_rows(recording, parallel, first, recording.samples - first - last)
+    every = _RowTimes(parallel, recording.t)
     reasons = {STANDS_STILL: 0, TRANSIENT: 0}
-    taken = np.zeros(len(every), dtype=bool)
+    taken: list[range] = []
     for one in recording.left_out or ():
-        inside = (every >= one.start) & (every <= one.stop) & ~taken
-        reasons[one.reason] += int(inside.sum())
-        taken |= inside
+        inside = range(every.before(one.start), every.until(one.stop))
+        reasons[one.reason] += _union([*taken, inside]) - _union(taken)
+        taken.append(inside)
     low, high = recording.window or (-np.inf, np.inf)
-    window = int(np.sum(((every < low) | (every >= high)) & ~taken))
+    outside = [range(every.before(low)), range(every.before(high), every.count)]
+    window = _union([*taken, *outside]) - _union(taken)
     used = kept.stop - kept.start
-    rest = len(every) - used - window - sum(reasons.values())
+    rest = every.count - used - window - sum(reasons.values())
     return RowCount(
         used=used,
         ends=max(rest, 0),
@@ -165,6 +199,15 @@ def count_rows(recording: Recording, settings: Filter) -> RowCount:
         transient=reasons[TRANSIENT],
         window=window,
     )
+
+
+def _union(ranges: list[range]) -> int:
+    """How many numbers are in at least one of some ranges."""
+    count, reached = 0, 0
+    for one in sorted(ranges, key=lambda one: one.start):
+        count += max(0, one.stop - max(one.start, reached))
+        reached = max(reached, one.stop)
+    return count
 
 
 def rows_in_words(recording: Recording, settings: Filter) -> str:
@@ -177,7 +220,7 @@ def rows_in_words(recording: Recording, settings: Filter) -> str:
     """
     parallel = ParallelFilter(settings, recording.rate_hz, recording.period, recording.where)
     count = count_rows(recording, settings)
-    words = [f"{count.used} of {len(parallel.rows(recording.samples))} rows used"]
+    words = [f"{count.used} of {parallel.count(recording.samples)} rows used"]
     if settings.ends == "drop":
         margins = settings.margins(recording.rate_hz)
         ends = [n / recording.rate_hz + parallel.transient for n in margins]
@@ -195,12 +238,22 @@ def rows_in_words(recording: Recording, settings: Filter) -> str:
 def _moves(recording: Recording) -> tuple[float, float]:
     """When a joint first leaves its place, and when the last one comes to rest, s."""
     q, t = recording.q, recording.t
-    least = np.maximum(_MOVES * np.ptp(q, axis=0), _NOISE * encoder_noise_std(q))
-    from_start = np.flatnonzero(np.any(np.abs(q - q[0]) > least, axis=1))
-    from_end = np.flatnonzero(np.any(np.abs(q - q[-1]) > least, axis=1))
-    if not len(from_start) or not len(from_end):
+    least = np.maximum(_MOVES * (q.max(axis=0) - q.min(axis=0)), _NOISE * encoder_noise_std(q))
+    start = _leaves(q, q[0], least)
+    if start is None:
         return float(t[0]), float(t[-1])  # nothing moves at all
-    return float(t[from_start[0]]), float(t[from_end[-1]])
+    stop = _leaves(q[::-1], q[-1], least)
+    assert stop is not None
+    return float(t[start]), float(t[len(t) - 1 - stop])
+
+
+def _leaves(q: np.ndarray, place: np.ndarray, least: np.ndarray) -> int | None:
+    """First row (T, n) in which a joint is farther from a place than so much."""
+    for start in range(0, len(q), _AT_ONCE):
+        far = np.flatnonzero(np.any(np.abs(q[start : start + _AT_ONCE] - place) > least, axis=1))
+        if len(far):
+            return start + int(far[0])
+    return None
 
 
 def _settled(recording: Recording) -> float:

@@ -15,32 +15,18 @@ Crainiceanu, "Measurement Error in Nonlinear Models" (2006), chapters 3 and 4.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from dynident.errors import RecordingError
 from dynident.fitting.linear_solution import LinearSolution
-from dynident.fitting.sampling import Sampled, sample
 from dynident.fitting.uncertainty.expected_bias import listed, reported
-from dynident.fitting.uncertainty.trembling import trembling
+from dynident.fitting.uncertainty.noisy_part import NoisyPart
 from dynident.model import Model
-from dynident.recording import (
-    Dataset,
-    Filter,
-    Motion,
-    Recording,
-    default_filter,
-    default_position_cutoff,
-    differentiate,
-    uniform,
-)
-from dynident.recording.white_noise import encoder_noise_std
+from dynident.recording import Dataset, default_filter
 from dynident.tables import number
 
-_POINTS = (0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5)
-"""Shares of a step at which a mean over it is taken (Gauss, two points)."""
 _MOST = 16384
 """Samples, of all recordings, along which the bias is looked for."""
 _BEYOND = 2.0
@@ -53,9 +39,6 @@ _LEAST = 0.1
 """Share of signal in a direction below which the correction is not carried on: there the bias is
 nine times what is left at least."""
 _NAMED = 4
-_FINEST = 1e-7
-"""Noise over a joint's travel that no encoder is below: what high differences show of smooth motion
-without noise is less."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -159,7 +142,7 @@ def input_bias(
     sums, stds = _NoiseProducts(model, values, solution), []
     try:
         for recording in dataset.recordings:
-            part = _NoisyPart.of(model, dataset, values, uniform(recording), most)
+            part = NoisyPart.of(model, dataset, values, recording, most)
             sums.add(part)
             stds.append(part.position_std)
     except RecordingError:
@@ -179,74 +162,6 @@ def input_bias(
     )
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class _NoisyPart:
-    """A recording with its motion as it was, as it is seen, and seen once more with noise.
-
-    Attributes
-    ----------
-    sampled : whose motion is the seen one.
-    true : two motions whose columns have those of the true motion for their mean, without
-        what averages out; none where all is seen.
-    noisy : with noise and with its mirror image: what is odd cancels.
-    position_std : (n,) rad or m.
-    share : of the recording's rows.
-    """
-
-    sampled: Sampled
-    true: tuple[Motion, ...]
-    noisy: tuple[Motion, Motion]
-    position_std: np.ndarray
-    share: float
-
-    @classmethod
-    def of(
-        cls,
-        model: Model,
-        dataset: Dataset,
-        values: np.ndarray,
-        recording: Recording,
-        most: int,
-    ) -> _NoisyPart:
-        """Make it of at most so many samples of a recording on a uniform clock."""
-        rate, settings = recording.rate_hz, dataset.filter or default_filter(recording.rate_hz)
-        cutoff = settings.position_cutoff_hz or default_position_cutoff(rate, settings.cutoff_hz)
-        # Without a low-pass the true motion is sought behind one, and noise is added without.
-        sampled = sample(recording, replace(settings, position_cutoff_hz=cutoff))
-        hidden = trembling(model, values, recording, cutoff)
-        std = encoder_noise_std(recording.q - hidden.q)
-        std = np.where(std > _FINEST * np.ptp(recording.q, axis=0), std, 0.0)
-        if dataset.noise is not None:
-            std = np.asarray(dataset.noise.position_std, dtype=float)
-        noise = std * np.random.default_rng(0).standard_normal(recording.q.shape)
-        seen, added = sampled.motion, _added(recording, noise, settings, sampled)
-        rows = slice(seen.first, seen.first + seen.samples)
-        if settings.position_cutoff_hz is None:
-            seen = _moved(seen, _added(recording, hidden.q, settings, sampled), 1.0)
-            true = ()
-        else:
-            # Along straight lines from sample to sample. What is odd cancels: it is no bias.
-            one, other = (hidden.between(share)[rows] for share in _POINTS)
-            true = (replace(seen, v=seen.v + one), replace(seen, v=seen.v - other))
-        count = sampled.kept.stop - sampled.kept.start
-        fewer = min(count, max(1, round(most / sampled.parallel.step)))
-        start = sampled.kept.start + (count - fewer) // 2
-        return cls(
-            sampled=replace(sampled, motion=seen, kept=slice(start, start + fewer)),
-            true=true,
-            noisy=(_moved(seen, added, 1.0), _moved(seen, added, -1.0)),
-            position_std=std,
-            share=fewer / count,
-        )
-
-    def columns(self, model: Model, values: np.ndarray) -> Iterator[tuple[np.ndarray, ...]]:
-        """Yield columns (T, n, p): seen, true, and of both draws."""
-        motions = (self.sampled.motion, *self.noisy, *self.true)
-        every = (replace(self.sampled, motion=one).columns(model, values) for one in motions)
-        for seen, one, other, *true in zip(*every, strict=True):
-            yield seen, (np.mean(true, axis=0) if true else seen), one, other
-
-
 class _NoiseProducts:
     """Weighted products W'D of noisy columns and what they are off, over all rows.
 
@@ -258,18 +173,29 @@ class _NoiseProducts:
         rank = len(solution.basis.independent)
         self.noise, self.hidden = np.zeros((rank, rank)), np.zeros((rank, rank))
 
-    def add(self, part: _NoisyPart) -> None:
+    def add(self, part: NoisyPart) -> None:
         """Add the rows of a recording, for both draws."""
-        for seen, true, *drawn in part.columns(self._model, self._values):
-            one, other, *noisy = (self._turned(x) for x in (seen, true, *drawn))
-            for W in noisy:
-                self.noise += W.T @ (W - one) / (2 * part.share)
-                self.hidden += W.T @ (one - other) / (2 * part.share)
+        for seen, true, one, other in part.columns(self._model, self._values):
+            sharp = true is seen
+            # Joint by joint: of most columns a joint has none.
+            for j, weight in enumerate(self._solution.weights):
+                W0, W1, W2 = (self._turned(x[:, j], weight) for x in (seen, one, other))
+                self.noise += (W1.T @ (W1 - W0) + W2.T @ (W2 - W0)) / (2 * part.share)
+                if not sharp:
+                    X = self._turned(true[:, j], weight)
+                    self.hidden += (W1 + W2).T @ (W0 - X) / (2 * part.share)
 
-    def _turned(self, columns: np.ndarray) -> np.ndarray:
-        kept = columns[:, :, list(self._solution.basis.independent)]
-        weighted = kept * self._solution.weights[:, None]
-        return weighted.reshape(-1, kept.shape[2]) @ self._solution.inverse
+    def _turned(self, columns: np.ndarray, weight: float) -> np.ndarray:
+        """Rows (T, p) of a joint in the directions of the fit, (T, r)."""
+        some = [
+            (place, name)
+            for place, name in enumerate(self._solution.basis.independent)
+            if columns[0, name] != 0.0 or columns[:, name].any()
+        ]
+        if not some:
+            return np.zeros((len(columns), len(self._solution.inverse)))
+        places, names = (list(one) for one in zip(*some, strict=True))
+        return columns[:, names] @ (weight * self._solution.inverse[places])
 
     def bias(self, products: np.ndarray) -> np.ndarray:
         """Error (r,) of an estimate that is (1 - W'D) times the truth."""
@@ -278,20 +204,3 @@ class _NoiseProducts:
         left, size, right = np.linalg.svd(np.eye(len(products)) - products)
         true = right.T @ ((left.T @ found) / np.maximum(size, _LEAST))
         return turn @ (found - true)
-
-
-def _added(recording: Recording, q: np.ndarray, settings: Filter, sampled: Sampled) -> Motion:
-    """What positions (T, n) do to a motion behind a filter, on the rows of a sampled recording."""
-    motion, rate = sampled.motion, sampled.motion.rate_hz
-    after = recording.samples - motion.first - motion.samples
-    edges = replace(settings, edge_s=(motion.first / rate, after / rate))
-    return differentiate(recording.replace(q=q), edges)
-
-
-def _moved(motion: Motion, other: Motion, factor: float) -> Motion:
-    return replace(
-        motion,
-        q=motion.q + factor * other.q,
-        v=motion.v + factor * other.v,
-        a=motion.a + factor * other.a,
-    )

@@ -38,8 +38,6 @@ class LackOfFit:
     systematic : (n,) root mean square of what repetitions have in common, N m or N.
     noise : (n,) standard deviation of what they have not.
     excess : (n,) mean square of the former in standard deviations under the noise alone.
-    blocks : of time, between which the scores scatter.
-    covariance : (r, r) of the independent parameters, from that scatter.
     """
 
     joints: tuple[str, ...]
@@ -47,8 +45,6 @@ class LackOfFit:
     systematic: np.ndarray
     noise: np.ndarray
     excess: np.ndarray
-    blocks: int
-    covariance: np.ndarray
 
     @property
     def rejected(self) -> bool:
@@ -72,15 +68,6 @@ class LackOfFit:
             "sigma says."
         )
 
-    @property
-    def words(self) -> str:
-        """What the standard deviations then hold."""
-        return (
-            f"sigma holds the lack of fit as {self.blocks} blocks of time tell it (cluster "
-            "sandwich), and at least the noise. A bias that is the same in every block is not in "
-            "it."
-        )
-
 
 def lack_of_fit(
     model: Model, dataset: Dataset, values: np.ndarray, solution: LinearSolution
@@ -99,19 +86,11 @@ def lack_of_fit(
     """
     if not any(recording.period for recording in dataset.recordings):
         return None
-    kept, weights = list(solution.basis.independent), solution.weights**2
-    scores, found = BlockScores(len(kept)), []
+    found = []
     for recording in dataset.recordings:
-        sampled = sample(recording, dataset.filter)
-        blocks, first, start = time_blocks(sampled, len(dataset.recordings)), scores.count, 0
-        left = np.empty_like(sampled.tau)
-        for columns in sampled.columns(model, values):
-            rows = slice(start, start + len(columns))
-            left[rows] = sampled.tau[rows] - columns @ values
-            part = np.einsum("tjr,tj->tr", columns[:, :, kept], left[rows] * weights)
-            scores.add(blocks[rows], part, first)
-            start = rows.stop
         if recording.period:
+            sampled = sample(recording, dataset.filter)
+            left = np.concatenate([one for one, _ in sampled.residuals(model, values)])
             # Less than two periods tell nothing, and are no mistake here.
             with suppress(RecordingError):
                 folded = periods(len(left), sampled.rate_hz, recording.period, recording.where)
@@ -119,16 +98,46 @@ def lack_of_fit(
     if not found:
         return None
     systematic, noise, spread, rows = (np.sum(one, axis=0) for one in zip(*found, strict=True))
-    meat = solution.inverse.T @ scores.meat @ solution.inverse
     return LackOfFit(
         joints=model.robot.names,
         units=model.robot.torque_units,
         systematic=np.sqrt(np.maximum(systematic / rows, 0.0)),
         noise=np.sqrt(noise / rows),
         excess=systematic / np.sqrt(np.maximum(spread, np.finfo(float).tiny)),
-        blocks=scores.count,
-        covariance=solution.inverse @ meat @ solution.inverse.T,
     )
+
+
+def scattered(
+    model: Model, dataset: Dataset, values: np.ndarray, solution: LinearSolution
+) -> tuple[np.ndarray, str]:
+    """Return the covariance of a rejected model's estimate, and what it holds in words.
+
+    In one more pass over the columns.
+
+    Parameters
+    ----------
+    model, dataset, values, solution : as for `lack_of_fit`.
+
+    Returns
+    -------
+    (r, r) of the independent parameters, from the scatter of scores between blocks of time.
+    """
+    kept, weights = list(solution.basis.independent), solution.weights**2
+    scores = BlockScores(len(kept))
+    for recording in dataset.recordings:
+        sampled = sample(recording, dataset.filter)
+        blocks, first, start = time_blocks(sampled, len(dataset.recordings)), scores.count, 0
+        for columns, torque in sampled.rows(model, values):
+            left = (torque - columns @ values) * weights
+            part = np.einsum("tjr,tj->tr", columns[:, :, kept], left)
+            scores.add(blocks[start : start + len(part)], part, first)
+            start += len(part)
+    meat = solution.inverse.T @ scores.meat @ solution.inverse
+    words = (
+        f"sigma holds the lack of fit as {scores.count} blocks of time tell it (cluster "
+        "sandwich), and at least the noise. A bias that is the same in every block is not in it."
+    )
+    return solution.inverse @ meat @ solution.inverse.T, words
 
 
 def _apart(folded: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:

@@ -11,26 +11,33 @@ errors. That a fit takes freedom from its residual is accounted for exactly (`_s
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import nnls
 
 from dynident.fitting.linear_solution import LinearSolution, solve_factors
-from dynident.fitting.sampling import Sampled, rows, sample
+from dynident.fitting.sampling import rows, sample
+from dynident.fitting.uncertainty.lagged_rows import (
+    LAGS,
+    lagged_columns,
+    of_all_rows,
+    watched,
+)
 from dynident.fitting.uncertainty.noise_shapes import noise_shapes
 from dynident.model import Model
 from dynident.moments.factors import TriangularFactors, factorise
-from dynident.moments.lagged import LaggedProducts, RowBlock, lagged_products
+from dynident.moments.lagged import (
+    LaggedColumns,
+    LaggedProducts,
+    RowBlock,
+    lagged_products,
+    lagged_residuals,
+)
 from dynident.recording import Dataset
 from dynident.tables import number
 
-_LAGS = 12
-"""Rows up to which errors count as correlated: the low-pass of the default filter forgets to 2 %
-in 8, and 8 to 20 give the same coverage (measured)."""
-_GAP = 1.5
-"""Steps between rows above which a new stretch begins."""
 _EXACT = 1e-10
 """Residual relative to the torque below which it is rounding, of no colour."""
 _LEAST = 1e-2
@@ -71,7 +78,7 @@ def row_errors(
     dataset: Dataset,
     values: np.ndarray,
     solution: LinearSolution,
-    counting: Sequence[np.ndarray] | None = None,
+    columns: LaggedColumns | None = None,
 ) -> RowErrors:
     """Measure the errors of a fit in one more pass over its rows.
 
@@ -81,22 +88,76 @@ def row_errors(
     dataset : what was fitted.
     values : (p,) the estimate, and where columns that depend on it are taken.
     solution : its weights and independent columns.
-    counting : mask (T, n) for each recording of the decimated rows that were fitted, joint by
-        joint; None for all.
+    columns : lagged products of all columns, from `lagged_columns` and `watched`, where the rows
+        have passed by already; else they are gathered here.
 
     Returns
     -------
     Their covariance, and that of the estimate.
     """
     samples = [sample(recording, dataset.filter) for recording in dataset.recordings]
-    lags = min(_LAGS, *(len(one.t) // 10 for one in samples))
+    if columns is None:
+        columns = lagged_columns(dataset)
+        for _ in watched(model, dataset, values, columns):
+            pass
+    squares = np.zeros(model.robot.n)
+
+    def residuals() -> Iterator[tuple[bool, np.ndarray, np.ndarray]]:
+        for sampled in samples:
+            begins = True
+            for left, torque in sampled.residuals(model, values):
+                squares[:] += np.sum(torque**2, axis=0)
+                yield begins, left, np.ones(left.shape, dtype=bool)
+                begins = False
+
+    residual, pairs = lagged_residuals(residuals(), columns.lags)
+    shapes = noise_shapes(samples[0], columns.lags)
     kept = list(solution.basis.independent)
-    masks = _masks(samples, counting)
-    products = lagged_products(_blocks(model, zip(samples, masks, strict=True), values, kept), lags)
-    squares = np.sum(
-        [np.sum((one.tau * mask) ** 2, axis=0) for one, mask in zip(samples, masks, strict=True)],
-        axis=0,
-    )
+    products = columns.columns[:, :, kept][:, :, :, kept]
+    if not columns.complete:
+        products = of_all_rows(products, columns.pairs, pairs, solution)
+        if products is None:  # what is left out shows more than its share
+            columns = LaggedColumns(columns.lags)
+            for _ in watched(model, dataset, values, columns):
+                pass
+            products = columns.columns[:, :, kept][:, :, :, kept]
+    found = LaggedProducts(columns=products, residual=residual, pairs=pairs)
+    return errors_of(found, shapes, solution, squares)
+
+
+def masked_row_errors(
+    model: Model,
+    dataset: Dataset,
+    values: np.ndarray,
+    solution: LinearSolution,
+    counting: Sequence[np.ndarray],
+) -> RowErrors:
+    """As `row_errors`, of rows of which not all were fitted.
+
+    Parameters
+    ----------
+    model, dataset, values, solution : as there.
+    counting : mask (T, n) for each recording of the decimated rows that were fitted, joint by
+        joint.
+
+    Returns
+    -------
+    Their covariance, and that of the estimate.
+    """
+    samples = [sample(recording, dataset.filter) for recording in dataset.recordings]
+    lags = min(LAGS, *(one.count // 10 for one in samples))
+    kept, squares = list(solution.basis.independent), np.zeros(model.robot.n)
+
+    def blocks() -> Iterator[RowBlock]:
+        for sampled, counts in zip(samples, counting, strict=True):
+            start = 0
+            for columns, torque in sampled.rows(model, values):
+                mask = counts[start : start + len(torque)]
+                squares[:] += np.sum((torque * mask) ** 2, axis=0)
+                yield start == 0, columns[:, :, kept], torque - columns @ values, mask
+                start += len(torque)
+
+    products = lagged_products(blocks(), lags)
     return errors_of(products, noise_shapes(samples[0], lags), solution, squares)
 
 
@@ -112,7 +173,7 @@ def row_covariance(
     ----------
     model, dataset : what was fitted to what.
     values : (p,) what came out, by whichever way.
-    counting : as of `row_errors`.
+    counting : as of `masked_row_errors`; None for all rows.
 
     Returns
     -------
@@ -124,7 +185,10 @@ def row_covariance(
         As `solve_factors`.
     """
     solution = solve_factors(model, _factors(model, dataset, values, counting))
-    found = row_errors(model, dataset, values, solution, counting)
+    if counting is None:
+        found = row_errors(model, dataset, values, solution)
+    else:
+        found = masked_row_errors(model, dataset, values, solution, counting)
     kept = list(solution.basis.independent)
     covariance = np.zeros_like(solution.covariance)
     covariance[np.ix_(kept, kept)] = found.covariance
@@ -212,13 +276,6 @@ def _seen(white: np.ndarray, both: np.ndarray, pairs: np.ndarray) -> np.ndarray:
     return found
 
 
-def _masks(samples: list[Sampled], counting: Sequence[np.ndarray] | None) -> list[np.ndarray]:
-    """Rows that count, (T, n) of each recording."""
-    if counting is None:
-        return [np.ones(one.tau.shape, dtype=bool) for one in samples]
-    return list(counting)
-
-
 def _factors(
     model: Model, dataset: Dataset, values: np.ndarray, counting: Sequence[np.ndarray] | None
 ) -> TriangularFactors:
@@ -235,24 +292,3 @@ def _factors(
             start += len(torque)
 
     return replace(factorise(weighted()), counts=counts.sum(axis=0))
-
-
-def _blocks(
-    model: Model,
-    sampled_with_counts: Iterable[tuple[Sampled, np.ndarray]],
-    values: np.ndarray,
-    kept: list[int],
-) -> Iterator[RowBlock]:
-    """Independent columns and residuals, with a mark where a stretch of rows begins."""
-    for sampled, counts in sampled_with_counts:
-        start, step = 0, _GAP / sampled.rate_hz
-        for columns in sampled.columns(model, values):
-            stop = start + len(columns)
-            residual = sampled.tau[start:stop] - columns @ values
-            gaps = np.flatnonzero(np.diff(sampled.t[start:stop]) > step) + 1
-            begins = start == 0 or sampled.t[start] - sampled.t[start - 1] > step
-            for first, last in zip([0, *gaps], [*gaps, len(columns)], strict=True):
-                part = slice(first, last)
-                mask = counts[start:stop][part]
-                yield bool(begins or first), columns[part][:, :, kept], residual[part], mask
-            start = stop
