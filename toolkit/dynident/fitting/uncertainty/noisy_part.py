@@ -62,7 +62,19 @@ class NoisyPart:
         recording: Recording,
         most: int,
     ) -> NoisyPart:
-        """Make it of at most so many samples of a recording, from its middle."""
+        """Make it of a recording, or of the middle of a long one.
+
+        Parameters
+        ----------
+        model, values : (p,) the fit.
+        dataset : its filter and its stated noise count.
+        recording : one of it.
+        most : samples of which it is made, at most.
+
+        Returns
+        -------
+        With the share of the recording that it is.
+        """
         rate, settings = recording.rate_hz, dataset.filter or default_filter(recording.rate_hz)
         cutoff = settings.position_cutoff_hz or default_position_cutoff(rate, settings.cutoff_hz)
         # Without a low-pass the true motion is sought behind one, and noise is added without.
