@@ -165,6 +165,10 @@ class ParallelFilter:
         samples : of the record.
         size : of a block, without its overlap.
         kept : which of the kept rows are wanted; all by default.
+
+        Returns
+        -------
+        The blocks in the order of time.
         """
         start, stop, _ = kept.indices(self.count(samples))
         blocks = max(1, round((stop - start) * self.step / max(size, 2 * self.overlap)))

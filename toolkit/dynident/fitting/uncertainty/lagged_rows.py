@@ -73,6 +73,10 @@ def of_all_rows(
     pairs : (K + 1,) behind them.
     every : (n, K + 1) pairs of all rows.
     solution : least squares over all rows.
+
+    Returns
+    -------
+    (n, K + 1, r, r)
     """
     columns = some * (every / np.maximum(pairs, 1.0))[:, :, None, None]
     turn, weights = solution.inverse, solution.weights**2
