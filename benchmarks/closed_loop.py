@@ -288,7 +288,10 @@ def reparametrised(one: Loop, repeats: int) -> Iterator[Line]:
     build, plant = cpu(lambda: Plant([mechanism]), repeats)
     heavier = replace(mechanism, robot=mechanism.robot.with_theta(1.1 * mechanism.robot.theta))
     give, _ = cpu(lambda: [plant.set([one], [0.0]) for one in (heavier, mechanism)], repeats)
-    for who, spent in (("dynident, the standing one set", give / 2), ("built anew", build)):
+    for who, spent in (
+        ("dynident, the standing one set", give / 2),
+        ("dynident, built anew", build),
+    ):
         yield Line(case="diagram of another robot", who=who, figures={"all, ms": 1e3 * spent})
 
 
@@ -309,7 +312,8 @@ BENCHMARK = Benchmark(
     title="A simulated closed loop",
     work="The arm of `problems/iiwa` along its validation motion: PD law, held commands, rotor "
     "inertias, viscous and Coulomb friction (tanh). Errors are against the same loop at accuracy "
-    "1e-9: the largest of the positions, and the root mean square of the commands over theirs.",
+    "1e-9: the largest of the positions, and the root mean square of the commands over theirs. For "
+    "`mj_step` the dry friction is an applied force, held for a step.",
     compared="CPU per simulated s, ms",
     lines=lines,
 )

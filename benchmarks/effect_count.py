@@ -34,7 +34,7 @@ def lines(size: Size) -> Iterator[Line]:
         if count:
             model += EFFECTS[count - 1]
         first, _ = cpu(lambda m=model: fit(m, data))
-        spent, _ = cpu(lambda m=model: fit(m, data), 1 if size == "tiny" else 3)
+        spent, _ = cpu(lambda m=model: fit(m, data))
         figures = {
             "CPU, s": spent,
             "first, s": first,

@@ -11,11 +11,12 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from arms import FULL_RATE, RATE_HZ, arm, recording
-from dynident.fitting import LeastSquares, fit
+from dynident.fitting import fit
 from dynident.fitting.sampling import sample
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
@@ -25,6 +26,7 @@ from side_by_side.measuring import added_mib
 
 FILTERS = {"every row": FULL_RATE, "default filter": None}
 DENSE = "regressor stacked, NumPy lstsq"
+LIMIT = 300.0  # s of one size
 LONGEST_DENSE = 300_000  # samples: 0.8 GB of regressor
 SIZES: dict[Size, tuple[int, ...]] = {
     "tiny": (2_000,),
@@ -46,12 +48,11 @@ def measured(samples: int, who: str, rows: str) -> dict[str, float]:
     model = Model(arm())
     small = recording(model, model.given_values(), 1, 2_000)
     data = recording(model, model.given_values(), 0, samples)
-    method = LeastSquares("none") if rows == "every row" else None
 
     def run(one: Recording) -> object:
         if who == DENSE:
             return dense(model, one)
-        return fit(model, Dataset((one,), FILTERS[rows]), method)
+        return fit(model, Dataset((one,), FILTERS[rows]))
 
     run(small)  # all is imported, and functions are made
     start = time.process_time()
@@ -64,6 +65,20 @@ def measured(samples: int, who: str, rows: str) -> dict[str, float]:
     }
 
 
+def alone(line: Line, said: list[str]) -> Line:
+    """Fill in a line by a process of its own, with what `measured` takes."""
+    command = [sys.executable, __file__, *said]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=LIMIT)
+    except subprocess.TimeoutExpired:
+        return replace(line, missing=f"stopped after {LIMIT:g} s")
+    except subprocess.CalledProcessError as error:
+        # A process that the system ends for want of memory says nothing.
+        last = error.stderr.strip().splitlines() or [f"exit status {error.returncode}"]
+        return replace(line, missing=last[-1])
+    return replace(line, figures=json.loads(done.stdout.splitlines()[-1]))
+
+
 def lines(size: Size) -> Iterator[Line]:
     for rows in FILTERS:
         for samples in SIZES[size]:
@@ -71,14 +86,7 @@ def lines(size: Size) -> Iterator[Line]:
             for who in ("dynident.fit", *peers):
                 case = f"{samples} samples, {rows}"
                 name = f"{who}, {rows}" if who != DENSE else who
-                command = [sys.executable, __file__, str(samples), who, rows]
-                done = subprocess.run(command, capture_output=True, text=True, check=False)
-                if done.returncode:
-                    last = (done.stderr.strip().splitlines() or [str(done.returncode)])[-1]
-                    yield Line(case=case, who=name, missing=last)
-                else:
-                    figures = json.loads(done.stdout.splitlines()[-1])
-                    yield Line(case=case, who=name, figures=figures, at=samples)
+                yield alone(Line(case=case, who=name, at=samples), [str(samples), who, rows])
 
 
 BENCHMARK = Benchmark(
