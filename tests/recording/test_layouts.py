@@ -31,6 +31,14 @@ def test_columns_are_named_by_position(tmp_path, separator, times):
     assert recording.row(0).endswith("log.csv, row 1 (line 1)")
 
 
+@pytest.mark.parametrize("header", ["", "t q.a other tau.a"])
+def test_tables_that_numpy_writes(tmp_path, header):
+    np.savetxt(tmp_path / "log.csv", ROWS, header=header)
+    recording = read(tmp_path / "log.csv", ["a"], layout=FileLayout() if header else NAMED)
+    np.testing.assert_array_equal(recording.q[:, 0], ROWS[:, 1])
+    np.testing.assert_array_equal(recording.tau[:, 0], ROWS[:, 3])
+
+
 def test_a_rate_takes_the_place_of_the_time(tmp_path):
     np.savez(tmp_path / "log.npz", q=np.column_stack([T, T]), tau=np.ones((6, 2)))
     columns = {"q.a": "q[1]", "tau.a": "tau[0]", "t": "time"}

@@ -104,6 +104,24 @@ class _ColumnEntry(SettingsTable):
 
 
 class _StudyFile(SettingsTable):
+    """A study.
+
+    Attributes
+    ----------
+    robot : its description (URDF, SDF, MJCF), a path from the folder of the study.
+    joints : names, the order of columns; by default every joint that moves.
+    effects : that the robot is said to have, `name` or `name@joint`.
+    torque : "measured", or "held_command" where a command acts from its sample to the next.
+    friction_width : speed (rad/s or m/s) within which dry friction turns over; one, or by joint.
+    gravity : m/s^2, in the axes of the description's base.
+    recordings : files of data, see `_RecordingEntry`.
+    filter : how positions are differentiated, and what is filtered alike; see `Filter`.
+    noise : standard deviations of a raw sample, where nothing repeats; see `Noise`.
+    controller : of the closed loop; see `Controller`.
+    columns : ours -> the files' names of columns, or linear expressions of them.
+    criteria : numbers that decide a diagnosis, otherwise than by default; see `Criteria`.
+    """
+
     robot: str
     joints: list[str] | None = None
     effects: list[str] = Field(default_factory=list)

@@ -96,6 +96,8 @@ def _without_blanks(data: bytes) -> bytes:
     first = data.partition(b"\n")[0].strip()
     if b" " not in first or any(mark in first for mark in (b",", b";", b"\t", b'"')):
         return data
+    # NumPy marks the line of a header by a sign and a blank.
+    data = data.removeprefix(b"# ")
     return re.sub(rb" +", b",", re.sub(rb"^ +| +$", b"", data, flags=re.MULTILINE))
 
 
