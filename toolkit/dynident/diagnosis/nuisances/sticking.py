@@ -70,7 +70,7 @@ def sticking_joints(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
         return ()  # a published recipe uses every row
     criteria, nuisances = evidence.criteria.sticking, evidence.criteria.nuisances
     model, given = fitted.model, evidence.model
-    noise = np.max([speed_noise(run.replicates[0]) for run in evidence.runs], axis=0)
+    noise = np.max([_speed_noise(evidence, run.replicates[0]) for run in evidence.runs], axis=0)
     bound = nuisances.at_bound * nuisances.narrowest_width * np.array(given.friction_widths)
     resolved = np.maximum(criteria.resolved * noise, bound)
     return tuple(
@@ -78,7 +78,7 @@ def sticking_joints(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
         for j, joint in enumerate(model.robot.names)
         if f"coulomb_friction@{joint}" in model.slices
         and (model.friction_widths[j] <= resolved[j] or _stands(evidence, j, criteria))
-        and _share(evidence, j, criteria) <= criteria.most
+        and _share(evidence, j) <= criteria.most
     )
 
 
@@ -89,12 +89,12 @@ def without_reversals(evidence: Evidence, joints: tuple[str, ...]) -> Evidence:
     """
     criteria, names = evidence.criteria.sticking, evidence.model.robot.names
     columns = [names.index(joint) for joint in joints]
-    columns = [j for j in columns if _share(evidence, j, criteria) <= criteria.most]
+    columns = [j for j in columns if _share(evidence, j) <= criteria.most]
     runs = []
     for run in evidence.runs:
         uncertain = np.zeros(run.replicates[0].v.shape, dtype=bool)
         for j in columns:
-            uncertain[:, j] = _near_stops(run, j, criteria)
+            uncertain[:, j] = _near_stops(evidence, run, j)
         runs.append(replace(run, uncertain=uncertain))
     return evidence.with_runs(tuple(runs))
 
@@ -120,25 +120,29 @@ def sticking_notes(evidence: Evidence) -> tuple[str, ...]:
     )
 
 
-def _share(evidence: Evidence, j: int, criteria: StickingCriteria) -> float:
+def _share(evidence: Evidence, j: int) -> float:
     """Share of a joint's rows that leaving out its reversals takes."""
-    runs = [replace(run, uncertain=None) for run in evidence.runs]
     near = [
-        np.any(_near_stops(run, j, criteria)[run.index], axis=0)
-        for run in runs
+        np.any(_near_stops(evidence, run, j)[run.index], axis=0)
+        for run in evidence.runs
         if run.index.shape[1]
     ]
     return float(np.mean(np.concatenate(near))) if near else 1.0
 
 
-def _near_stops(run: Run, j: int, criteria: StickingCriteria) -> np.ndarray:
-    """Rows of a joint around its reversals, (T,) mask."""
-    sampled = run.replicates[0]
-    v = sampled.motion.v[:, j]
-    # Around a reversal the speed is off by what the position's low-pass rounds.
-    rounded = criteria.rounded * float(np.sqrt(np.mean(v[_used(sampled)] ** 2)))
-    reach = max(criteria.noise * speed_noise(sampled)[j], rounded)
-    return np.abs(sampled.filtered((np.abs(v) < reach).astype(float))) > criteria.spread
+def _near_stops(evidence: Evidence, run: Run, j: int) -> np.ndarray:
+    """Rows of a joint around its reversals, (T,) mask; asked for with every model."""
+    sampled, criteria = run.replicates[0], evidence.criteria.sticking
+    known, kept = evidence.cache.along(sampled.motion), sampled.kept
+    key = ("near stops", j, kept.start, kept.stop)
+    if key not in known:
+        v = sampled.motion.v[:, j]
+        # Around a reversal the speed is off by what the position's low-pass rounds.
+        rounded = criteria.rounded * float(np.sqrt(np.mean(v[_used(sampled)] ** 2)))
+        reach = max(criteria.noise * _speed_noise(evidence, sampled)[j], rounded)
+        near = sampled.filtered((np.abs(v) < reach).astype(float))
+        known[key] = np.abs(near) > criteria.spread
+    return known[key]
 
 
 def _used(sampled: Sampled) -> slice:
@@ -153,7 +157,8 @@ def _stands(evidence: Evidence, j: int, criteria: StickingCriteria) -> bool:
         stop
         for sampled in (run.replicates[0] for run in evidence.runs)
         for stop in _stops(
-            sampled.motion.v[_used(sampled), j], criteria.noise * speed_noise(sampled)[j]
+            sampled.motion.v[_used(sampled), j],
+            criteria.noise * _speed_noise(evidence, sampled)[j],
         )
     ]
     longer = sum(within > criteria.longer * around for within, around in stops)
@@ -171,6 +176,13 @@ def _stops(v: np.ndarray, reach: float) -> Iterator[tuple[int, int]]:
         within = int(np.count_nonzero(narrow[start:stop]))
         if within and start > 0 and stop < len(v):
             yield within, int(stop - start) - within
+
+
+def _speed_noise(evidence: Evidence, sampled: Sampled) -> np.ndarray:
+    known = evidence.cache.along(sampled.motion)
+    if "speed noise" not in known:
+        known["speed noise"] = speed_noise(sampled)
+    return known["speed noise"]
 
 
 def speed_noise(sampled: Sampled) -> np.ndarray:
