@@ -73,6 +73,17 @@ class Run:
             return np.ones(self.index.shape[1], dtype=bool)
         return np.asarray(~self.uncertain[:, joint][self.index].any(axis=0))
 
+    def known(self, signals: np.ndarray, joint: int) -> np.ndarray:
+        """Signals (T, k) of a joint, zero in rows whose dry friction nothing tells.
+
+        Whitening looks back: they would be seen in the rows after them. Alike in all repetitions.
+        """
+        if self.uncertain is None:
+            return signals
+        told = ~self.uncertain[:, joint]
+        told[self.index[:, ~self.certain(joint)]] = False
+        return signals * told[:, None]
+
     @property
     def kept(self) -> np.ndarray:
         """Rows of the recording that are judged, (T,) mask."""
@@ -142,10 +153,10 @@ class Run:
         """
         if self.columns_from == "simulation":
             speed = self.replicates[-1].v[:, joint]
-            found = noise.whiten(signals[-1], speed)[self.index[:1]]
+            found = noise.whiten(self.known(signals[-1], joint), speed)[self.index[:1]]
         else:
             speed = self.replicates[0].v[:, joint]
-            found = self.fold([noise.whiten(one, speed) for one in signals])
+            found = self.fold([noise.whiten(self.known(one, joint), speed) for one in signals])
         return found if self.uncertain is None else found * self.certain(joint)[:, None]
 
     def moments(self, left: np.ndarray, right: np.ndarray) -> SecondMoments:

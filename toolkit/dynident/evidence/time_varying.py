@@ -106,5 +106,6 @@ def _at_this_time(
         rows = np.arange(len(columns))
         after = np.clip(rows + there[0] - here[0], 0, len(columns) - 1)
         ratio = np.where(sound[after], factor / np.where(sound[after], factor[after], 1.0), 1.0)
-        found.append(noise.whiten(columns[after] * ratio[:, None], speed)[here])
+        moved = recorded.known(columns[after] * ratio[:, None], joint)
+        found.append(noise.whiten(moved, speed)[here])
     return np.stack(found)
