@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dynident.diagnosis.nuisances.friction_width import friction_width_notes
 from dynident.diagnosis.nuisances.quantisation import rounding_power
 from dynident.effects import effects_of
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.held_out import HeldOut, on_recordings, with_noise_of
 from dynident.evidence.maps import residual_maps
+from dynident.evidence.noise_model import NoiseModel
 from dynident.evidence.runs import Run, gather
 from dynident.fitting.uncertainty.row_errors import row_covariance
 from dynident.model import Model
@@ -149,3 +151,35 @@ def test_a_recording_or_a_joint_without_rows_that_count(model: Model) -> None:
     seen = on_recordings(none, fitted)
     for found in (seen.noise_std, seen.ratio, seen.least_ratio, seen.residual_rms):
         assert found is not None and found[1] == 0.0 and found[0] >= 0.0
+
+
+@pytest.mark.parametrize("period", [8.0, None])
+def test_whitening_carries_nothing_out_of_rows_that_do_not_count(
+    model: Model, period: float | None
+) -> None:
+    """A filter that looks back would see them in the rows after them."""
+    colour = np.array([1.0, -0.7, 0.4, -0.2, 0.1])
+    noise = NoiseModel(1.0, np.zeros(1), np.ones(1), colour)
+    run = evidence(model, 0.0, period).runs[0]
+    rng = np.random.default_rng(0)
+    signals = rng.standard_normal((len(run.replicates[0].t), 3))
+    off_rows = (~run.certain_rows[:, 1])[:, None]
+    assert np.any(off_rows) and not np.all(off_rows)
+    found = [run.whitened([signals + wrong * off_rows], 1, noise) for wrong in (0.0, WRONG)]
+    assert np.array_equal(*found)
+    plain = [run.whitened([signals + wrong * off_rows], 0, noise) for wrong in (0.0, WRONG)]
+    assert not np.allclose(*plain)
+    # Far from these rows all is as it is elsewhere.
+    whole = replace(run, uncertain=None).whitened([signals], 1, noise)
+    assert np.mean(np.all(found[0] == whole, axis=-1)) > 0.5
+
+
+def test_of_a_joint_that_sticks_no_width_is_said_to_be_found() -> None:
+    robot = arm()
+    names = ("viscous_friction", "coulomb_friction")
+    model = Model(robot, tuple(e for name in names for e in effects_of(name, robot)), 0.05)
+    of = evidence(model, 0.0)
+    wider = model.with_friction_width("elbow", 0.2).with_friction_width("shoulder", 0.2)
+    shoulder, elbow = friction_width_notes(of, fit_evidence(of, wider))
+    assert "over which dry friction reverses" in shoulder
+    assert "by the rows that count" in elbow and "no finding" in elbow

@@ -20,6 +20,7 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.special import chdtri
 
 from dynident.criteria import DEFAULTS
+from dynident.diagnosis.nuisances.sticking import left_out_at
 from dynident.diagnosis.search.ranking import rank
 from dynident.diagnosis.search.scoring import candidate_moments
 from dynident.effects import Block, Effect, JointEffect, Parameter, ShapeParameter, catalogue
@@ -225,7 +226,7 @@ def _at(name: str, joint: str) -> Effect:
 def friction_width_notes(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
     """Joints whose dry friction has another width than the given model's, in plain words."""
     model, given, notes = fitted.model, evidence.model.friction_widths, []
-    own = evidence.criteria.nuisances
+    own, sticking = evidence.criteria.nuisances, left_out_at(evidence)
     for joint, unit, stated in zip(model.robot.names, model.robot.units, given, strict=True):
         profile = WidthProfile(evidence, fitted, joint)
         if f"coulomb_friction@{joint}" not in model.slices or profile.width == stated:
@@ -243,6 +244,13 @@ def friction_width_notes(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, 
         else:
             known = f"is hardly seen ({number(profile.width, 2)} {unit}/s fits best)"
         wider = "; noise that the drive feeds into the joint widens it"
+        if joint in sticking:
+            notes.append(
+                f"Friction width at {joint} {known} by the rows that count, its stops left out: "
+                "that is how its friction looks in motion, and no finding of how sharply it "
+                f"reverses. The study says {number(stated, 2)}."
+            )
+            continue
         notes.append(
             f"Friction width at {joint}, over which dry friction reverses, {known}. The study says "
             f"{number(stated, 2)}{wider if profile.width > stated else ''}."
