@@ -93,6 +93,10 @@ def _log(path: Path, record: str, table: ColumnTable, layout: FileLayout) -> Log
     most = max(set(lengths), key=lambda n: (n > 1, sum(one == n for one in lengths), n))
     skipped += [name for name, x in found.items() if len(x) != most]
     kept = {name: x for name, x in found.items() if len(x) == most}
+    if table.joints == "prefixed" and "t" not in kept:
+        # Several drivers on one topic of a bag: the clock is that of messages of these joints.
+        kept = {"t": table.load(["t", *kept])["t"], **kept}
+        skipped.remove("t")
     return Log(file=path, record=record, columns=kept, skipped=tuple(skipped), layout=layout)
 
 
