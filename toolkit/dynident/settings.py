@@ -10,9 +10,9 @@ import difflib
 import re
 import tomllib
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from dynident import files
 from dynident.errors import StudyError
@@ -24,7 +24,25 @@ class SettingsTable(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
+LONGEST_TIME = 1e9
+"""s: no recording, period or session lasts longer, and none begins earlier before another."""
+FASTEST = 1e7
+"""Hz: nothing in a robot is sampled, filtered or controlled faster."""
+SLOWEST = 1e-6
+"""Hz: nothing is slower."""
+Time = Annotated[float, Field(ge=-LONGEST_TIME, le=LONGEST_TIME)]
+"""A time in s, of either sign."""
+Duration = Annotated[float, Field(gt=0, le=LONGEST_TIME)]
+"""A time in s, above zero."""
+Rate = Annotated[float, Field(ge=SLOWEST, le=FASTEST)]
+"""Samples or cycles a second."""
+DEEPEST = 50
+"""Levels of tables within tables that a file of settings has at most."""
+
 T = TypeVar("T", bound=SettingsTable)
+_LEVEL = r"(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')\s*+\.\s*+"
+_DEEP = re.compile(rf"(?:{_LEVEL}){{{DEEPEST}}}")
+"""A dotted key of very many levels, which takes a parser memory by their square."""
 _TRIED = re.compile(r"str|float|int|bool|list\[\w+\]|_\w+")
 
 
@@ -36,16 +54,22 @@ def read_toml(path: str | Path, schema: type[T]) -> T:
     FileError
         If the file cannot be read.
     StudyError
-        If it is not TOML, or a key is unknown, missing or of the wrong kind; the first such key is
+        If it is not TOML, is nested beyond `DEEPEST`, or a key is unknown, missing or of the wrong kind; the first such key is
         named, with the nearest valid one.
     """
     path = Path(path)
+    text = files.read_text(path)
+    deep = StudyError("has tables nested too deeply", str(path), "is it the right file?")
+    if _DEEP.search(text):
+        raise deep
     try:
-        return schema.model_validate(tomllib.loads(files.read_text(path)))
-    except tomllib.TOMLDecodeError as error:
-        raise StudyError(f"is not TOML: {error}", str(path)) from None
+        return schema.model_validate(tomllib.loads(text))
+    except RecursionError:
+        raise deep from None
     except ValidationError as error:
         raise _complaint(error, path, schema) from None
+    except ValueError as error:  # of TOML, and of whole numbers of thousands of digits
+        raise StudyError(f"is not TOML: {error}", str(path)) from None
 
 
 def nearest(word: str, valid: tuple[str, ...] | list[str], kind: str) -> str:

@@ -55,6 +55,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         except (KeyboardInterrupt, click.Abort):
             click.echo("interrupted; nothing was left half written", err=True)
             sys.exit(130)
+        except MemoryError:
+            _fail("out of memory: use fewer or shorter recordings, or a lower rate")
         except ReaderGone:
             # Whoever read us has gone: nothing to say, and nobody to say it to.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

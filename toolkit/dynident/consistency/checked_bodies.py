@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -103,6 +104,7 @@ def of_links(
         float(np.quantile(masses, 0.5, method="lower")) if masses else 1.0,
         float(np.median(known)) if known else 0.0,
     )
+    onward = _onward(robot) if robot is not None else {}
     subjects = []
     for link in links:
         if link.source == "absent":
@@ -121,7 +123,7 @@ def of_links(
             hull=hull,
             whole=not shapes.not_read,
             broken_numbers=broken.get(link.name, ()) if link.source != "set" else (),
-            onward=_onward(link, robot) if robot is not None else None,
+            onward=onward.get(link.name),
         )
         carrier = robot.bodies[link.joint] if robot is not None and link.joint >= 0 else ""
         subjects.append(
@@ -178,13 +180,27 @@ def _reaches(robot: Robot) -> dict[int, float]:
     return reaches
 
 
-def _onward(link: Link, robot: Robot) -> Array | None:
-    """Return where the next joint is on a link that is a moving body by itself."""
-    alone = [one.name for one in robot.links if one.joint == link.joint] == [link.name]
-    ahead = [link.R.T @ (j.p - link.p) for j in robot.joints if j.parent == link.joint]
-    if not alone or not ahead or link.joint < 0:
-        return None
-    return max(ahead, key=lambda p: float(np.linalg.norm(p)))
+def _onward(robot: Robot) -> dict[str, Array]:
+    """Return where the next joint is on each link that is a moving body by itself."""
+    of_body, ahead = _by_body(robot), defaultdict(list)
+    for joint in robot.joints:
+        ahead[joint.parent].append(joint.p)
+    return {
+        link.name: max(
+            (link.R.T @ (p - link.p) for p in ahead[number]),
+            key=lambda p: float(np.linalg.norm(p)),
+        )
+        for number, (link, *others) in of_body.items()
+        if not others and ahead[number] and number >= 0
+    }
+
+
+def _by_body(robot: Robot) -> dict[int, list[Link]]:
+    """Return the links of each moving body, by its joint's number; -1 is the world."""
+    found: dict[int, list[Link]] = defaultdict(list)
+    for link in robot.links:
+        found[link.joint].append(link)
+    return found
 
 
 def _moving(
@@ -199,15 +215,16 @@ def _moving(
     extents: dict[str, float] = {}
     for one in links:
         extents[one.carrier] = max(extents.get(one.carrier, 0.0), one.body.length)
+    of_body, carries = _by_body(robot), _carries_something(robot)
     found = []
     for number, (name, joint, phi) in enumerate(
         zip(robot.bodies, robot.joints, theta, strict=True)
     ):
-        weightless = joint.name not in rotors and not np.any(theta[list(_carried(robot, number))])
+        weightless = joint.name not in rotors and not carries[number]
         parts = tuple(
             link.name
-            for link in robot.links
-            if link.joint == number and link.source != "absent" and np.any(link.phi)
+            for link in of_body[number]
+            if link.source != "absent" and np.any(link.phi)
         )
         if len(parts) < 2 and not weightless:
             continue
@@ -239,9 +256,12 @@ def _moving(
     return found
 
 
-def _carried(robot: Robot, number: int) -> list[int]:
-    """Return a joint and all that it carries."""
-    found = [number]
-    for one in found:
-        found += [i for i, joint in enumerate(robot.joints) if joint.parent == one]
+def _carries_something(robot: Robot) -> list[bool]:
+    """Return whether each joint has a body with any parameter on its own or beyond it."""
+    found = [False] * robot.n
+    for number in np.flatnonzero(robot.theta.reshape(-1, 10).any(axis=1)):
+        at = int(number)
+        while at >= 0 and not found[at]:
+            found[at] = True
+            at = robot.joints[at].parent
     return found

@@ -66,8 +66,14 @@ def refine_shapes(model: Model, dataset: Dataset) -> Shaped:
     Raises
     ------
     FitError
-        If the data cannot carry the model.
+        If the data cannot carry the model, or it has an event of one recording, whose time and
+        place are not sought here.
     """
+    for effect in shaped_effects(model):
+        if effect.found_by == "repetition":
+            what = "happened once, and a fit does not look for when"
+            remedy = "leave it out; `dynident explain` finds it in what repetitions do not share"
+            raise FitError(what, effect.label, remedy)
     samples = [sample(recording, dataset.filter) for recording in dataset.recordings]
     if not model.needs_values:
         rows = _RowObjective(model, samples, None)
