@@ -37,3 +37,10 @@ def test_a_fit_that_leaves_much_says_what_to_do() -> None:
     assert max(poor.joint_errors) > 0.2
     assert "dynident explain" in str(poor.error_table())
     assert "dynident explain" not in str(di.fit(true_model(), one).error_table())
+
+
+def test_names_never_command_a_terminal(capsys) -> None:
+    Table("a\x1b[31m", ("b\u202e",), (("c\x07",),), ("d\x9b",)).show()
+    said = capsys.readouterr().out
+    assert "a\\u001b[31m" in said and "c\\u0007" in said
+    assert not {"\x1b", "\u202e", "\x07", "\x9b"} & set(said)

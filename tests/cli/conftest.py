@@ -48,6 +48,7 @@ def run(capfd, tmp_path, monkeypatch) -> Run:
         with pytest.raises(SystemExit) as stop:
             main([os.fspath(one) for one in arguments])
         said = capfd.readouterr()
+        assert "error: unexpected" not in said.err, said.err
         return Done(int(stop.value.code or 0), said.out, said.err)
 
     return call

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dynident.cli import main
 from dynident.recording import write
 from study_files import CONTROLLER, STUDY, csv_text, edited, listing, recording
 from synthetic import ARM
@@ -189,6 +190,20 @@ STUDIES = {
     "no robot": (
         edited(('"arm.urdf"', '"leg.urdf"')),
         r"leg.urdf: no such file. check the path",
+    ),
+    "a period of ages": (
+        edited(("period = 8.0", "period = 1e300")),
+        r"recordings.0.period: .*less than or equal",
+    ),
+    "a filter slower than anything": (
+        STUDY + "\n[filter]\ncutoff_hz = 18.0\nrate_hz = 1e-300\n",
+        r"filter.rate_hz: .*greater than or equal",
+    ),
+    "a key of very many levels": ("a" + 20_000 * ".a" + " = 1\n" + STUDY, r"nested too deeply"),
+    "a deep inline table": (STUDY + "x = " + 3000 * "{a=" + "1" + 3000 * "}", r"nested too deeply"),
+    "a number of very many digits": (
+        edited(("period = 8.0", "period = " + 5000 * "9")),
+        r"is not TOML: .*digits",
     ),
     "no data": (edited(('"test.csv"', '"tests.csv"')), r"tests.csv: no such data file. put it"),
     "data of no format": (edited(('"test.csv"', '"study.toml"')), r"'.toml' names no format"),
@@ -456,3 +471,31 @@ def test_arguments(run, study, tmp_path, kind):
     arguments, message = ARGUMENTS[kind]
     study()
     refused(run, tmp_path, message, *arguments)
+
+
+def test_an_event_of_one_recording_is_nothing_to_fit(run, study, tmp_path):
+    text = edited(('"viscous_friction"', '"viscous_friction", "contact@elbow"'))
+    refused(run, tmp_path, r"contact@elbow: happened once", "fit", study(text))
+
+
+def test_what_a_terminal_would_obey_is_spelt_out(run, study, tmp_path):
+    text = edited(('"test.csv"', '"a\\u202e\\u001b[31mb\\u0007.csv"'))
+    said = refused(run, tmp_path, r"a.u202e.u001b\[31mb.u0007.csv", "compare", study(text))
+    assert not {"\u202e", "\x1b", "\x07"} & set(said)
+
+
+def test_what_nobody_foresaw_is_one_line_too(run, study, capfd, monkeypatch):
+    path = study()
+
+    def broken(*_: object) -> None:
+        raise ValueError("two\nlines")
+
+    monkeypatch.setattr("dynident.study.load", broken)
+    with pytest.raises(SystemExit) as stop:
+        main(["compare", str(path)])
+    assert stop.value.code == 2
+    said = capfd.readouterr().err
+    assert said.count("\n") == 1 and "unexpected ValueError: two lines" in said
+    monkeypatch.setenv("DYNIDENT_TRACEBACK", "1")
+    with pytest.raises(ValueError, match="two"):
+        main(["compare", str(path)])

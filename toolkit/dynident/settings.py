@@ -54,8 +54,8 @@ def read_toml(path: str | Path, schema: type[T]) -> T:
     FileError
         If the file cannot be read.
     StudyError
-        If it is not TOML, is nested beyond `DEEPEST`, or a key is unknown, missing or of the wrong kind; the first such key is
-        named, with the nearest valid one.
+        If it is not TOML, is nested beyond `DEEPEST`, or a key is unknown, missing or of the wrong
+        kind; the first such key is named, with the nearest valid one.
     """
     path = Path(path)
     text = files.read_text(path)

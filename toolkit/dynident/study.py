@@ -37,9 +37,7 @@ from dynident.recording import (
     warn_of_missing_torque,
 )
 from dynident.robot import Robot
-from dynident.settings import SettingsTable, read_toml
-
-Positive = Field(default=None, gt=0)
+from dynident.settings import Duration, Rate, SettingsTable, Time, read_toml
 
 
 class _RecordingEntry(SettingsTable):
@@ -65,21 +63,21 @@ class _RecordingEntry(SettingsTable):
     file: str | list[str]
     record: str | None = None
     columns: list[str] | None = None
-    rate_hz: float | None = Positive
+    rate_hz: Rate | None = None
     topic: str = ""
     use: Literal["train", "test"] = "train"
-    period: float | None = Positive
-    start: float = 0.0
-    window: tuple[float, float] | None = None
+    period: Duration | None = None
+    start: Time = 0.0
+    window: tuple[Time, Time] | None = None
     payload: bool | Literal["unknown"] | None = None
 
 
 class _FilterEntry(SettingsTable):
-    position_cutoff_hz: float | Literal["default", "none"] = "default"
-    cutoff_hz: float | None = Positive
-    rate_hz: float | None = Positive
+    position_cutoff_hz: Rate | Literal["default", "none"] = "default"
+    cutoff_hz: Rate | None = None
+    rate_hz: Rate | None = None
     decimation: Literal["pick", "chebyshev"] = "pick"
-    edge_s: tuple[float, float] = (0.0, 0.0)
+    edge_s: tuple[Time, Time] = (0.0, 0.0)
     ends: Literal["drop", "keep"] = "drop"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from html import escape
@@ -93,6 +94,13 @@ class Shown:
         )
 
 
+def printable(text: str) -> str:
+    """Return a text without what a terminal would obey: control and bidirectional characters."""
+    # Names of files, joints and columns come from anywhere; their letters may be of any script.
+    hidden = (c for c in set(text) if unicodedata.category(c) in ("Cc", "Cf", "Cs") and c != "\n")
+    return text.translate({ord(c): f"\\u{ord(c):04x}" for c in hidden})
+
+
 def print_tables(*tables: Table | str) -> None:
     """Print tables and sentences to standard output, one after another."""
     import sys
@@ -115,7 +123,7 @@ def print_tables(*tables: Table | str) -> None:
     )
     for table in tables:
         if isinstance(table, str):
-            console.print(table, markup=False)
+            console.print(printable(table), markup=False)
         else:
             _print(console, table)
 
@@ -153,19 +161,19 @@ def _print(console, table: Table) -> None:
     from rich.text import Text
 
     shown = RichTable(
-        title=Text(table.title, style="bold"), title_justify="left", box=box.SIMPLE_HEAD
+        title=Text(printable(table.title), style="bold"), title_justify="left", box=box.SIMPLE_HEAD
     )
     for index, column in enumerate(table.columns):
         cells: Sequence[str] = [row[index] for row in table.rows]
         numeric = bool(cells) and all(_is_number(cell) for cell in cells)
         # The first column names things that a user types: never shortened.
         justify = "right" if numeric else "left"
-        shown.add_column(Text(column), justify=justify, no_wrap=index == 0, overflow="fold")
+        shown.add_column(Text(printable(column)), justify=justify, no_wrap=index == 0, overflow="fold")
     for row in table.rows:
-        shown.add_row(*(Text(cell) for cell in row))
+        shown.add_row(*(Text(printable(cell)) for cell in row))
     console.print(shown)
     for note in table.notes:
-        console.print(Text(f"  {note}"))
+        console.print(Text(printable(f"  {note}")))
     if table.notes:
         console.print()
 

@@ -24,8 +24,13 @@ from dynident.cli import (  # which add their commands to the group
 from dynident.cli.group import commands
 from dynident.cli.output import ReaderGone
 from dynident.errors import DynidentError, DynidentWarning
+from dynident.tables import printable
 
 __all__ = ["commands", "fits", "loops", "main", "robots", "starting", "studies"]
+
+
+TRACEBACK = "DYNIDENT_TRACEBACK"
+"""Environment variable: what nobody has foreseen ends in Python's traceback, not in one line."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -61,11 +66,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
             # Whoever read us has gone: nothing to say, and nobody to say it to.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             sys.exit(0)
+        except Exception as error:
+            if os.environ.get(TRACEBACK):
+                raise
+            where = f"{TRACEBACK}=1 shows where; please report it with the input"
+            _fail(f"unexpected {type(error).__name__}: {error}. {where}")
 
 
 def _fail(message: str) -> NoReturn:
     """Say on one line why the input is unusable, and end."""
-    click.echo(f"error: {' '.join(message.splitlines())}", err=True)
+    click.echo(f"error: {printable(' '.join(message.splitlines()))}", err=True)
     sys.exit(2)
 
 
@@ -78,4 +88,4 @@ class _Warnings:
     def show(self, message, category, filename, lineno, file=None, line=None) -> None:
         if str(message) not in self._said:
             self._said.add(str(message))
-            click.echo(f"warning: {message}", err=True)
+            click.echo(f"warning: {printable(str(message))}", err=True)

@@ -12,6 +12,7 @@ from typing import Any
 import click
 
 from dynident.progress import logged, to_standard_error
+from dynident.tables import printable
 
 
 def show(*parts: Any) -> None:
@@ -31,7 +32,7 @@ def say(*lines: str) -> None:
     """Print lines as they are, whatever the width of the terminal."""
     with _reader():
         for line in lines:
-            click.echo(line)
+            click.echo(printable(line))
 
 
 class ReaderGone(Exception):

@@ -12,13 +12,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
 from dynident.errors import DynidentError, SimulationError, StudyError
 from dynident.robot import Robot
-from dynident.settings import SettingsTable
+from dynident.settings import Rate, SettingsTable, Time
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,15 +214,15 @@ class ControllerFile(SettingsTable):
     """The table [controller] of a study or an experiment file."""
 
     kind: str
-    rate_hz: float | None = Field(default=None, gt=0)
+    rate_hz: Rate | None = None
     kp: float | list[float]
     kd: float | list[float] | None = None
     kv: float | list[float] | None = None
     ki: float | list[float] | None = None
     velocity_reference: bool = True
-    derivative_cutoff_hz: float | None = Field(default=None, gt=0)
+    derivative_cutoff_hz: Rate | None = None
     limit: float | list[float] | None = None
-    delay_s: float = Field(default=0.0, ge=0)
+    delay_s: Annotated[Time, Field(ge=0)] = 0.0
     feedforward: bool = False
     drive_gain: float | list[float] | None = None
 

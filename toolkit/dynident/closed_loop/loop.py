@@ -43,6 +43,8 @@ at the worst joint. 1e-4 costs a quarter to a half more and leaves a tenth to a 
 SIDE_BY_SIDE = 8
 """Motions simulated in one plant; beyond that their reversals shorten each other's steps."""
 _POSES = 50
+MOST_SAMPLES = 1e7
+"""Samples of one motion: nearly three hours at 1 kHz."""
 _KEPT = 4
 """Diagrams kept; a fit that goes back and forth between structures needs few."""
 
@@ -264,4 +266,7 @@ def _samples(seconds: float, rate: float, name: str, least: int) -> int:
     if not (np.isfinite(seconds) and round(seconds * rate) >= least):
         remedy = f"choose {least / rate:g} s or more"
         raise SimulationError(f"{name} = {seconds:g} s at {rate:g} Hz", remedy=remedy)
+    if seconds * rate > MOST_SAMPLES:
+        what = f"{name} = {seconds:g} s at {rate:g} Hz are more than {MOST_SAMPLES:.0e} samples"
+        raise SimulationError(what, remedy="simulate a shorter time, or at a lower rate")
     return round(seconds * rate)

@@ -222,9 +222,7 @@ def _moving(
     ):
         weightless = joint.name not in rotors and not carries[number]
         parts = tuple(
-            link.name
-            for link in of_body[number]
-            if link.source != "absent" and np.any(link.phi)
+            link.name for link in of_body[number] if link.source != "absent" and np.any(link.phi)
         )
         if len(parts) < 2 and not weightless:
             continue

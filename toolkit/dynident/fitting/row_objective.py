@@ -15,6 +15,7 @@ import numpy as np
 from scipy.linalg import qr
 
 from dynident.effects import Block, Effect
+from dynident.errors import FitError
 from dynident.fitting.least_squares import LeastSquares
 from dynident.fitting.linear_solution import solve_factors
 from dynident.fitting.sampling import Sampled, sample

@@ -12,6 +12,7 @@ import numpy as np
 
 from dynident.errors import RecordingError
 from dynident.recording.masks import within
+from dynident.settings import LONGEST_TIME
 
 USES = ("train", "test")
 TORQUES = ("measured", "held_command")
@@ -310,6 +311,9 @@ class Recording:
             # Two samples a period is the least that can show any motion at all.
             step = self.duration / (self.samples - 1)
             object.__setattr__(self, "period", positive("period", "s", self.period, 2 * step))
+            if self.period > LONGEST_TIME:
+                what, remedy = f"period = {self.period:g} s", "is it given in s?"
+                raise RecordingError(what, self.where, remedy)
         if not math.isfinite(_number(self.start)):
             raise RecordingError(f"start = {self.start!r}", self.where, "give a time in s")
         if self.window is not None:

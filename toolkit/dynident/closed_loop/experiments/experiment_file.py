@@ -16,7 +16,7 @@ from dynident.closed_loop.true_effects import TrueEffect
 from dynident.effects import FRICTION_WIDTH
 from dynident.errors import DynidentError, StudyError
 from dynident.robot import Robot
-from dynident.settings import SettingsTable, read_toml
+from dynident.settings import Duration, SettingsTable, Time, read_toml
 
 
 class _EffectEntry(SettingsTable):
@@ -46,9 +46,9 @@ class _TrajectoryEntry(SettingsTable):
 class _ExperimentRecordingEntry(SettingsTable):
     file: str
     use: Literal["train", "test"] = "train"
-    duration: float = Field(gt=0)
-    period: float = Field(gt=0)
-    start: float = 0.0
+    duration: Duration
+    period: Duration
+    start: Time = 0.0
     payload: bool = False
     trajectory: _TrajectoryEntry = _TrajectoryEntry()
 
