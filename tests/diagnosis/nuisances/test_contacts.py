@@ -53,7 +53,15 @@ def data(seed: int, kind: str = "", repetitions: int = 4) -> list[Repeated]:
             lacking = 3.0 * np.sign(speed) + 2.0 * np.sin(2 * np.pi * t / (STEP * INSTANTS))
             residual = lacking + noise(rng, kind, speed)
             found.append(
-                Repeated(run=run, number=run + 1, joint=joint, t=t, residual=residual, speed=speed)
+                Repeated(
+                    run=run,
+                    number=run + 1,
+                    joint=joint,
+                    t=t,
+                    residual=residual,
+                    speed=speed,
+                    certain=np.ones(INSTANTS, dtype=bool),
+                )
             )
     return found
 
@@ -91,6 +99,29 @@ def test_of_two_repetitions_it_is_the_one_with_the_larger_residual(p: int, heigh
     assert (pulse.repetition, pulse.joint) == (p, "shoulder")
     assert pulse.time == pytest.approx(time, abs=0.1)
     assert np.sign(pulse.amplitude) == np.sign(height)
+
+
+def uncertain(series: list[Repeated], k: int, start: int, stop: int) -> list[Repeated]:
+    """The same, but some instants of one do not count."""
+    certain = np.ones(INSTANTS, dtype=bool)
+    certain[start:stop] = False
+    return [replace(s, certain=certain) if n == k else s for n, s in enumerate(series)]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_where_a_joint_sticks_there_is_no_contact_and_elsewhere_there_is(seed: int) -> None:
+    """What dry friction does at rest is not the same in every repetition."""
+    series = data(seed)
+    stuck = pushed(series, 3, 2, 50.0 + STEP * (2 * INSTANTS + 75), 0.15, 12.0)
+    assert len(pulses_in(stuck, DEFAULTS)) == 1
+    assert pulses_in(uncertain(stuck, 3, 40, 110), DEFAULTS) == ()
+    time = 50.0 + STEP * (2 * INSTANTS + 190)
+    both = uncertain(pushed(stuck, 3, 2, time, 0.15, 6.0), 3, 40, 110)
+    (pulse,) = pulses_in(both, DEFAULTS)
+    assert (pulse.joint, pulse.repetition) == ("elbow", 2)
+    assert pulse.time == pytest.approx(time, abs=0.2)
+    scattered = [replace(s, certain=np.arange(INSTANTS) % 10 < 5) for s in stuck]
+    assert pulses_in(scattered, DEFAULTS) == (), "too short to show what the noise is"
 
 
 def test_bursts_come_in_the_order_of_their_significance() -> None:

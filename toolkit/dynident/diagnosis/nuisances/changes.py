@@ -32,6 +32,7 @@ class Repeated:
     t : (P, S) s, in the session.
     residual : (P, S) N m or N.
     speed : (P, S) rad/s or m/s.
+    certain : (S,) instants that count: where the joint sticks, repetitions differ without a push.
     """
 
     run: int
@@ -40,6 +41,7 @@ class Repeated:
     t: np.ndarray
     residual: np.ndarray
     speed: np.ndarray
+    certain: np.ndarray
 
     @property
     def step(self) -> float:
@@ -55,7 +57,7 @@ class Changes:
     ----------
     of : the series.
     change : (P S,) what each repetition does not share with the others.
-    still : (P S,) one over the noise's local standard deviation.
+    still : (P S,) one over the noise's local standard deviation; zero where no instant counts.
     colour : (order + 1,) whitening filter.
     kept : (S,) instants to which the slow changes were fitted.
     reach : widths on either side beyond which a pulse is nothing.
@@ -180,9 +182,12 @@ def changes_of(
 
     Returns
     -------
-    One for each series.
+    One for each series; none where no stretch of instants that count is long enough.
     """
     own_criteria, order = criteria.contacts, criteria.noise.order
+    left_out = [out | ~s.certain for s, out in zip(series, left_out, strict=True)]
+    certain = [np.tile(s.certain, len(s.t)) for s in series]
+    every = np.concatenate(certain)
     kept = [~np.tile(out, len(s.t)) for s, out in zip(series, left_out, strict=True)]
     changes = [_changes(s, ~out, own_criteria) for s, out in zip(series, left_out, strict=True)]
     still = [np.ones(len(change)) for change in changes]
@@ -190,8 +195,10 @@ def changes_of(
     for measure in (np.abs, _slowness):
         speeds = [measure(one.speed).ravel() for one in series]
         sizes = [np.abs(c * i) for c, i in zip(changes, still, strict=True)]
-        # All rows: those left out may be the only ones that turn round, say.
-        at, scales = _scales(np.concatenate(sizes), np.concatenate(speeds), own_criteria)
+        # All that count: those left out may be the only ones that turn round, say.
+        at, scales = _scales(
+            np.concatenate(sizes)[every], np.concatenate(speeds)[every], own_criteria
+        )
         still = [i / np.interp(s, at, scales) for i, s in zip(still, speeds, strict=True)]
     stretches = []
     for change, own, keep in zip(changes, still, kept, strict=True):
@@ -199,6 +206,9 @@ def changes_of(
         borders = np.flatnonzero(np.diff(keep)) + 1
         parts = zip(np.split(clipped, borders), np.split(keep, borders), strict=True)
         stretches += [part for part, inside in parts if inside[0] and len(part) > 2 * order]
+    still = [own * counts for own, counts in zip(still, certain, strict=True)]
+    if not stretches:
+        return []  # a joint that sticks, of which no stretch is long enough to show its noise
     # The scale is in `still` already: of this model only the colour is used.
     size = float(np.sqrt(np.mean(np.concatenate(stretches) ** 2)))
     no_speed = [np.zeros(len(part)) for part in stretches]

@@ -73,6 +73,8 @@ def find_contacts(evidence: Evidence, fitted: EvidenceFit) -> tuple[DisturbanceP
             continue
         first, recording = run.replicates[0], run.recording
         for j, joint in enumerate(recording.joints):
+            if not run.certain(j).any():
+                continue
             found.append(
                 Repeated(
                     run=r,
@@ -81,6 +83,7 @@ def find_contacts(evidence: Evidence, fitted: EvidenceFit) -> tuple[DisturbanceP
                     t=first.t[run.index] + recording.start,
                     residual=residual[:, :, j],
                     speed=first.v[:, j][run.index],
+                    certain=run.certain(j),
                 )
             )
     return pulses_in(found, evidence.criteria)
@@ -243,6 +246,9 @@ def _tried(prepared: Sequence[Changes], width: float, criteria: ContactCriteria)
         if rows_wide > criteria.widest_share * instants:
             continue
         rows = np.arange(0, repetitions * instants, max(1, int(criteria.stride * rows_wide)))
+        rows = rows[one.of.certain[rows % instants]]
+        if len(np.unique(rows // instants)) < repetitions:
+            continue
         z = np.abs(scanned(one, rows_wide)[rows])
         # Where a whole repetition is unlike the others, no place in it stands out.
         of, reach = rows // instants, criteria.peak_reach
