@@ -166,9 +166,9 @@ def test_whitening_carries_nothing_out_of_rows_that_do_not_count(
     off_rows = (~run.certain_rows[:, 1])[:, None]
     assert np.any(off_rows) and not np.all(off_rows)
     found = [run.whitened([signals + wrong * off_rows], 1, noise) for wrong in (0.0, WRONG)]
-    assert np.array_equal(*found)
+    assert np.array_equal(found[0], found[1])
     plain = [run.whitened([signals + wrong * off_rows], 0, noise) for wrong in (0.0, WRONG)]
-    assert not np.allclose(*plain)
+    assert not np.allclose(plain[0], plain[1])
     # Far from these rows all is as it is elsewhere.
     whole = replace(run, uncertain=None).whitened([signals], 1, noise)
     assert np.mean(np.all(found[0] == whole, axis=-1)) > 0.5
