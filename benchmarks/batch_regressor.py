@@ -30,6 +30,7 @@ ARMS = ("panda/panda.urdf", "iiwa/iiwa.urdf")
 REPEATS = 5
 LONGEST_PINOCCHIO = 200_000  # joints times samples of the loop
 LONGEST_COMPILED = 30
+LONGEST_ALL = 15  # joints; of longer ones the base alone
 MEMORY = 2**27  # bytes of the regressor of a block
 SAMPLES, LEAST = 16384, 2048
 
@@ -105,7 +106,7 @@ def lines(size: Size) -> Iterator[Line]:
             most = LEAST if size == "tiny" else SAMPLES
             samples = min(most, max(LEAST, MEMORY // (80 * robot.n**2)))
             motion = robot.random_motion(0, samples)
-            for what in ("base", "all", "torque"):
+            for what in ("base", "all", "torque") if robot.n <= LONGEST_ALL else ("base",):
                 yield from times(name, robot, motion, what)
     if before is not None:
         os.environ["DYNIDENT_COMPILE"] = before

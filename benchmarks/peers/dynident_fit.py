@@ -10,7 +10,7 @@ from answering import answer
 import dynident as di
 
 
-def solve(work: Any, _: dict[str, str]) -> np.ndarray:
+def solve(work: Any, settings: dict[str, str]) -> np.ndarray:
     robot = di.Robot.from_text(str(work["urdf"]))
     model = di.Model(robot) + "rotor_inertia" + "viscous_friction"
     torque: Any = str(work["torque"])
@@ -18,8 +18,10 @@ def solve(work: Any, _: dict[str, str]) -> np.ndarray:
         work["t_raw"], work["q_raw"], work["tau_raw"], robot.names, torque=torque
     )
     cutoff = float(work["cutoff_hz"])
-    settings = di.Filter(position_cutoff_hz=cutoff, edge_s=tuple(work["edge_s"]), ends="keep")
-    found = di.fit(model, di.Dataset((recording,), settings))
+    filtered = di.Filter(position_cutoff_hz=cutoff, edge_s=tuple(work["edge_s"]), ends="keep")
+    errors: Any = settings.get("errors", "correlated")
+    method = di.LeastSquares(errors=errors)
+    found = di.fit(model, di.Dataset((recording,), filtered), method)
     n = robot.n
     theta = np.zeros(12 * n)
     theta[list(model.base.independent)] = found.values[: model.base.rank]
