@@ -168,7 +168,9 @@ def _print(console, table: Table) -> None:
         numeric = bool(cells) and all(_is_number(cell) for cell in cells)
         # The first column names things that a user types: never shortened.
         justify = "right" if numeric else "left"
-        shown.add_column(Text(printable(column)), justify=justify, no_wrap=index == 0, overflow="fold")
+        shown.add_column(
+            Text(printable(column)), justify=justify, no_wrap=index == 0, overflow="fold"
+        )
     for row in table.rows:
         shown.add_row(*(Text(printable(cell)) for cell in row))
     console.print(shown)

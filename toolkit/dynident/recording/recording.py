@@ -75,6 +75,7 @@ class Recording:
     window : (t0, t1) s on the clock of `t`, or None: what to use of it once the whole is filtered.
     use : "train" or "test".
     payload : whether the payload under study was on board; None where there is none.
+    load : name of the load that it carried, of those that the study describes; empty for none.
     torque : "measured", or "held_command" where the torque of sample k acts until sample k + 1.
     number : its place among the recordings of a study, from 1; 0 where that does not matter.
     name : for tables; the file's name without its suffix by default.
@@ -104,6 +105,7 @@ class Recording:
     window: tuple[float, float] | None = None
     use: Literal["train", "test"] = "train"
     payload: bool | None = None
+    load: str = ""
     torque: Literal["measured", "held_command"] = "measured"
     number: int = 0
     name: str = ""

@@ -1,0 +1,184 @@
+"""What the gains of drives were found to be, up to which scale, and what loads weigh by them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from dynident.fitting.drive_gains.identified_load import IdentifiedLoad
+from dynident.fitting.estimate import DataSource
+from dynident.tables import Shown, Table, finite, number, percent
+
+Finding = Literal["given", "identified", "up to a common scale", "not told apart"]
+_Z = 1.959964  # of a 95 % interval
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DriveGains(Shown):
+    """Torque per unit of each joint's drive.
+
+    Attributes
+    ----------
+    joints : (n,) names.
+    unit : of the recorded torques, "A" or "%"; "N m" where nothing had to be found.
+    units : (n,) of the gains.
+    gains : (n,) N m (or N) per unit.
+    given : (n,) bool, which were given.
+    groups : joints, by name, whose gains are known relative to one another only.
+    covariance : (n + p + l, n + p + l) of the logarithms of the gains, the model's parameters and
+        the unknown ones of loads; an open scale has no variance, see `GainCovariance`.
+    values : (p,) the model's parameters at these gains.
+    residual_std : (n,) in the recorded unit.
+    loads : as they were identified; those that are wholly known too.
+    rows, effective_rows : equations, and independent ones that would say as much.
+    sources : the recordings.
+    """
+
+    joints: tuple[str, ...]
+    unit: str
+    units: tuple[str, ...]
+    gains: np.ndarray
+    given: np.ndarray
+    groups: tuple[tuple[str, ...], ...]
+    covariance: np.ndarray
+    values: np.ndarray
+    residual_std: np.ndarray
+    loads: tuple[IdentifiedLoad, ...] = ()
+    rows: int = 0
+    effective_rows: float = 0.0
+    sources: tuple[DataSource, ...] = ()
+
+    @property
+    def relative_sigma(self) -> np.ndarray:
+        """Standard deviation of log(gain), (n,); within an open group, of the ratio to its mean."""
+        return np.sqrt(np.clip(np.diag(self.covariance)[: len(self.joints)], 0.0, None))
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """Standard deviation of each gain, (n,); NaN where it is given, or not told apart."""
+        sigma = np.abs(self.gains) * self.relative_sigma
+        known = [one in ("identified", "up to a common scale") for one in self.findings]
+        return np.where(known, sigma, np.nan)
+
+    @property
+    def intervals(self) -> np.ndarray:
+        """95 % intervals of the gains, (n, 2), NaN where only ratios are known."""
+        spread = np.exp(_Z * self.relative_sigma)
+        found = np.sort(np.stack([self.gains / spread, self.gains * spread], axis=1), axis=1)
+        return np.where([[one == "identified"] for one in self.findings], found, np.nan)
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What is known of each gain."""
+        group_of = {name: group for group in self.groups for name in group}
+        found: list[Finding] = []
+        for name, given in zip(self.joints, self.given, strict=True):
+            group = group_of.get(name)
+            if given:
+                found.append("given")
+            elif group is None:
+                found.append("identified")
+            else:
+                found.append("up to a common scale" if len(group) > 1 else "not told apart")
+        return tuple(found)
+
+    @property
+    def is_scaled(self) -> bool:
+        """Whether a scale is open."""
+        return bool(self.groups)
+
+    @property
+    def sentence(self) -> str:
+        """In one sentence: what is known in N m, and what up to a scale."""
+        if not self.groups:
+            return "Gains, torques and inertias are known in N m and kg."
+        if self.groups == (self.joints,):
+            return (
+                "Gains, torques and inertias are known up to the common scale of the drives: "
+                "nothing in the recordings fixes it."
+            )
+        alone = [", ".join(group) for group in self.groups if len(group) == 1]
+        parts = [f"of {', '.join(one)} up to a common scale" for one in self.groups if len(one) > 1]
+        if alone:
+            parts.append(
+                f"of {', '.join(alone)} not at all, for no other joint shares its inertias"
+            )
+        rest = [n for n, one in zip(self.joints, self.findings, strict=True) if one in _FIXED]
+        if rest:
+            parts.insert(0, f"of {', '.join(rest)} in N m per unit")
+        return f"The gains are known {'; '.join(parts)}."
+
+    @property
+    def remedy(self) -> str:
+        """What would fix an open scale; empty where none is open."""
+        if not self.groups:
+            return ""
+        return (
+            "The values shown are those at which the description's torque fits best. A known load "
+            "in some recordings, or the gain of one joint in [drive_gains], fixes the scale."
+        )
+
+    def table(self) -> Table:
+        """A row for each joint."""
+        rows = tuple(
+            (name, number(gain), number(sigma, 2), unit, finding)
+            for name, gain, sigma, unit, finding in zip(
+                self.joints, self.gains, self.sigma, self.units, self.findings, strict=True
+            )
+        )
+        notes = [self.sentence, *filter(None, [self.remedy])]
+        if any(len(group) > 1 for group in self.groups):
+            notes.append("sigma of such a gain is that of its ratio to the mean of its group.")
+        if np.any(self.gains < 0):
+            names = [n for n, gain in zip(self.joints, self.gains, strict=True) if gain < 0]
+            what = "the recorded sign is opposite to the joint's"
+            notes.append(f"A negative gain ({', '.join(names)}): {what}.")
+        columns = ("joint", "gain", "sigma", "unit", "found")
+        return Table("Gains of the drives", columns, rows, tuple(notes))
+
+    def tables(self) -> tuple[Table | str, ...]:
+        """The gains, then the loads."""
+        gains = () if self.unit == "N m" else (self.table(),)
+        return (*gains, *(load.table() for load in self.loads))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Gains and loads as JSON has them."""
+        shown = zip(
+            self.joints,
+            self.gains,
+            self.sigma,
+            self.units,
+            self.findings,
+            self.intervals,
+            strict=True,
+        )
+        return {
+            "unit": self.unit,
+            "joints": [
+                {
+                    "name": name,
+                    "gain": float(gain),
+                    "sigma": finite(sigma),
+                    "interval": None if np.isnan(interval).any() else interval.tolist(),
+                    "unit": unit,
+                    "finding": finding,
+                }
+                for name, gain, sigma, unit, finding, interval in shown
+            ],
+            "common_scales": [list(group) for group in self.groups],
+            "sentence": self.sentence,
+            "loads": [load.to_dict() for load in self.loads],
+        }
+
+    def words(self) -> str:
+        """For the provenance of a converted recording."""
+        said = ", ".join(
+            f"{name} {number(gain)} {unit} ({finding}"
+            + (f", sigma {percent(sigma / abs(gain))})" if np.isfinite(sigma) else ")")
+            for name, gain, sigma, unit, finding in zip(
+                self.joints, self.gains, self.sigma, self.units, self.findings, strict=True
+            )
+        )
+        return f"torque from {self.unit} by {said}"

@@ -1,0 +1,156 @@
+"""A load as it was identified: what it weighs, how sure that is, and whether it can exist."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dynident.fitting.drive_gains.loads import SYMMETRIC, Load
+from dynident.inertia import PARAMETERS, inertia_matrix, margins, pseudo_inertia, to_com
+from dynident.tables import Table, number
+
+_STEP = 1e-6  # relative, of central differences
+_DIAGONAL = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+QUANTITIES = ("mass", "x", "y", "z", *SYMMETRIC)
+UNITS = ("kg", "m", "m", "m", *(("kg m^2",) * 6))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class IdentifiedLoad:
+    """The ten parameters of a load, and their errors.
+
+    Attributes
+    ----------
+    load : what was known of it.
+    phi : (10,) in the frame of its link, see `dynident.inertia.PARAMETERS`; NaN where the data do
+        not tell a parameter apart.
+    covariance : (10, 10) of phi, that of the gains in it; zero for what was given.
+    scale : the joints whose common scale phi is known up to; empty where the scale is fixed.
+    """
+
+    load: Load
+    phi: np.ndarray
+    covariance: np.ndarray
+    scale: tuple[str, ...] = ()
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all ten parameters are known."""
+        return bool(np.all(np.isfinite(self.phi)))
+
+    @property
+    def values(self) -> np.ndarray:
+        """Mass (kg), centre (m), and inertia about it (kg m^2), (10,) as `QUANTITIES`."""
+        return _quantities(self.phi)
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """Their standard deviations, (10,), by first derivatives; NaN where there is no value."""
+        change = np.zeros((10, 10))
+        steps = _STEP * np.maximum(np.abs(np.nan_to_num(self.phi)), 1e-3)
+        for k, step in enumerate(steps):
+            shift = step * np.eye(10)[k]
+            difference = _quantities(self.phi + shift) - _quantities(self.phi - shift)
+            change[:, k] = difference / (2 * step)
+        sigma = np.full(10, np.nan)
+        for row in range(10):
+            used = np.isfinite(change[row]) & (change[row] != 0.0)
+            if np.isfinite(self.values[row]):
+                one = change[row, used]
+                sigma[row] = np.sqrt(max(one @ self.covariance[np.ix_(used, used)] @ one, 0.0))
+        return sigma
+
+    @property
+    def least_eigenvalue(self) -> tuple[float, float]:
+        """Smallest eigenvalue of the pseudo-inertia, lengths in units of the body's own, and sigma.
+
+        Both are of the pseudo-inertia over the mass, with the radius of gyration about the origin
+        for the unit of length; NaN where a parameter is not known.
+        """
+        if not self.is_whole or self.phi[0] == 0.0:
+            return np.nan, np.nan
+        # A unit of length, so that kg m^2, kg m and kg can be compared.
+        length = np.sqrt(max(abs(np.trace(inertia_matrix(self.phi))) / abs(self.phi[0]), 1e-12))
+        unit = np.diag([1 / length] * 3 + [1.0]) / np.sqrt(abs(self.phi[0]))
+        values, vectors = np.linalg.eigh(unit @ pseudo_inertia(self.phi) @ unit)
+        v = unit @ vectors[:, 0]
+        slope = np.array([v @ pseudo_inertia(one) @ v for one in np.eye(10)])
+        return float(values[0]), float(np.sqrt(max(slope @ self.covariance @ slope, 0.0)))
+
+    @property
+    def verdict(self) -> str:
+        """Whether a rigid body can have these parameters, by the whole pseudo-inertia."""
+        if not self.is_whole:
+            missing = [n for n, x in zip(PARAMETERS, self.phi, strict=True) if not np.isfinite(x)]
+            return f"not judged: the data do not tell {', '.join(missing)} apart"
+        value, sigma = self.least_eigenvalue
+        found = margins(self.phi)
+        if found.consistent:
+            return "possible: its pseudo-inertia is positive definite"
+        rules = {
+            "mass": "the mass is negative",
+            "inertia_com_min_eig": "a principal moment about the centre of mass is negative",
+            "triangle": "one principal moment exceeds the sum of the others",
+        }
+        why = "; ".join(rules[one] for one in found.broken)
+        if value + 2 * sigma >= 0:
+            return f"not possible as it is ({why}), but a possible body is within the errors"
+        return f"not possible: {why}, by more than the errors explain"
+
+    def table(self) -> Table:
+        """Mass, centre and inertia, and the verdict."""
+        load = self.load
+        given = [load.mass is not None] + [load.centre is not None] * 3
+        given += [load.inertia is not None] * 6
+        rows = []
+        for name, unit, value, sigma, known in zip(
+            QUANTITIES, UNITS, self.values, self.sigma, given, strict=True
+        ):
+            how = "given" if known else "identified" if np.isfinite(value) else "not told apart"
+            rows.append((name, number(value), number(np.nan if known else sigma, 2), unit, how))
+        notes = [f"A body with these parameters is {self.verdict}."] if self.is_whole else []
+        if not self.is_whole:
+            notes.append(f"Whether a body can have these parameters is {self.verdict}.")
+        if self.scale and not load.is_known:
+            notes.append(
+                "Mass and inertia are known up to the common scale of the drives of "
+                f"{', '.join(self.scale)}; the centre is not touched by it."
+            )
+        where = f"in the frame of '{load.link}'" if load.link else "in the last link's frame"
+        title = f"Load '{load.name}': centre {where}, inertia about the centre"
+        return Table(
+            title, ("quantity", "value", "sigma", "unit", "found"), tuple(rows), tuple(notes)
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The load as JSON has it."""
+        values = [float(x) if np.isfinite(x) else None for x in self.values]
+        sigma = [float(x) if np.isfinite(x) else None for x in self.sigma]
+        return {
+            "name": self.load.name,
+            "mass": values[0],
+            "centre": values[1:4],
+            "inertia": values[4:],
+            "sigma": {"mass": sigma[0], "centre": sigma[1:4], "inertia": sigma[4:]},
+            "given": [
+                k for k in ("mass", "centre", "inertia") if getattr(self.load, k) is not None
+            ],
+            "verdict": self.verdict,
+            "consistent": bool(margins(self.phi).consistent) if self.is_whole else None,
+            "common_scale_of": list(self.scale),
+        }
+
+
+def _quantities(phi: np.ndarray) -> np.ndarray:
+    """Mass, centre and inertia about the centre, (10,); NaN where they rest on a NaN."""
+    found = np.full(10, np.nan)
+    found[0] = phi[0]
+    if not np.all(np.isfinite(phi[:4])) or phi[0] == 0.0:
+        return found
+    found[1:4] = phi[1:4] / phi[0]
+    # Every entry of the shifted inertia rests on one parameter, and on mass and moments.
+    inertia = to_com(phi).inertia_com
+    found[4:] = [inertia[place] for place in _DIAGONAL]
+    return found
