@@ -50,9 +50,9 @@ def write_bag(
     -------
     The file; that of ROS 2 lies in a folder with its description beside it.
     """
-    from rosbags.rosbag1 import Writer as Writer1
-    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
-    from rosbags.rosbag2 import Writer as Writer2
+    from rosbags.rosbag1 import Writer as Writer1  # pyright: ignore[reportMissingImports]
+    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin  # pyright: ignore[reportMissingImports]
+    from rosbags.rosbag2 import Writer as Writer2  # pyright: ignore[reportMissingImports]
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS1_NOETIC if kind == "bag" else Stores.LATEST)

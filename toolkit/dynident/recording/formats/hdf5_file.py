@@ -71,7 +71,7 @@ def open_hdf5(data: bytes, file: str) -> ColumnTable:
 
 def _h5py(file: str) -> Any:
     try:
-        import h5py
+        import h5py  # pyright: ignore[reportMissingImports]
     except ImportError:
         what, remedy = "HDF5 files need h5py", "pip install 'dynident[hdf5]'"
         if file.lower().endswith(".mat"):
