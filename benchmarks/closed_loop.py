@@ -2,13 +2,17 @@
 
 The seven-joint arm of problems/iiwa follows its validation motion under its PD law: viscous
 friction, Coulomb friction as tanh(v / w), rotor inertias, ideal sensors. All start on the
-reference, and hold each command to the next sample. Then what another robot costs in a diagram that
-stands against building one, and the instrumental variable estimate of problems/scara.
+reference, and hold each command to the next sample. Then many rollouts in one call, what another
+robot costs in a diagram that stands against building one, and the instrumental variable estimate of
+problems/scara.
 """
 
 from __future__ import annotations
 
+import os
+import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +27,8 @@ from pydrake.systems.framework import BasicVector, DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import Adder, LogVectorOutput
 
 import dynident as di
-from dynident.closed_loop import ClosedLoop, Task
+from dynident.closed_loop import ClosedLoop, Sensors, Task
+from dynident.closed_loop.loop import Integrator
 from dynident.closed_loop.plant.diagram import Plant
 from dynident.threads import single_threaded
 from side_by_side.line import Benchmark, Line, Size
@@ -89,8 +94,8 @@ def loop(rate_hz: float, seconds: float) -> Loop:
 Result = tuple[np.ndarray, np.ndarray]  # positions and commands at the samples, (T, n)
 
 
-def ours(one: Loop, accuracy: float) -> Callable[[], Result]:
-    closed = ClosedLoop(accuracy=accuracy)
+def ours(one: Loop, accuracy: float, integrator: Integrator) -> Callable[[], Result]:
+    closed = ClosedLoop(accuracy=accuracy, integrator=integrator)
 
     def run() -> Result:
         (rollout,) = closed.simulate([one.task], one.controller, lead_in=0.0)
@@ -249,8 +254,10 @@ def mujoco_by_hand(one: Loop, steps: int, integrator: str) -> Callable[[], Resul
 @single_threaded
 def lines(size: Size) -> Iterator[Line]:
     seconds, repeats = {"tiny": (0.2, 1), "quick": (2.0, 1), "full": (10.0, 5)}[size]
-    for rate in RATES_HZ[:1] if size == "tiny" else RATES_HZ:
-        yield from loops(loop(rate, seconds), repeats)
+    with compiled():
+        for rate in RATES_HZ[:1] if size == "tiny" else RATES_HZ:
+            yield from loops(loop(rate, seconds), repeats)
+        yield from many(loop(RATES_HZ[0], seconds), {"tiny": 2, "quick": 20, "full": 1000}[size])
     yield from reparametrised(loop(RATES_HZ[0], seconds), repeats)
     if size != "tiny":
         yield from scara(min(repeats, 3))
@@ -258,10 +265,11 @@ def lines(size: Size) -> Iterator[Line]:
 
 def loops(one: Loop, repeats: int) -> Iterator[Line]:
     """Everyone's loop, with its errors against one of high accuracy."""
-    exact, u_exact = ours(one, EXACT)()
+    exact, u_exact = ours(one, EXACT, "drake")()
     substeps = max(1, round(one.step / 1e-3))
     contestants = {
-        f"dynident, accuracy {ACCURACY:g}": ours(one, ACCURACY),
+        f"dynident, compiled, accuracy {ACCURACY:g}": ours(one, ACCURACY, "auto"),
+        f"dynident in Drake, accuracy {ACCURACY:g}": ours(one, ACCURACY, "drake"),
         "Drake by hand, same integrator and accuracy": drake_by_hand(one, ACCURACY),
         "RK4 over pinocchio.aba, 1 step a sample": pinocchio_by_hand(one, 1),
         "RK4 over pinocchio.aba, 2 steps a sample": pinocchio_by_hand(one, 2),
@@ -279,6 +287,44 @@ def loops(one: Loop, repeats: int) -> Iterator[Line]:
             "error of q, rad": float(np.abs(q - exact).max()),
             "of the command, %": 100 * float(off),
         }
+        yield Line(case=case, who=who, figures=figures)
+
+
+@contextmanager
+def compiled() -> Iterator[None]:
+    """Have functions compiled whether it pays or not; where there is no compiler, Drake runs."""
+    before = os.environ.get("DYNIDENT_COMPILE")
+    os.environ["DYNIDENT_COMPILE"] = "always"
+    try:
+        yield
+    finally:
+        del os.environ["DYNIDENT_COMPILE"]
+        if before is not None:
+            os.environ["DYNIDENT_COMPILE"] = before
+
+
+def many(one: Loop, count: int) -> Iterator[Line]:
+    """Robots and encoder noise at random, as a bootstrap has them."""
+    mechanism, sensors = one.task.mechanism, Sensors(position_std=1e-5)
+    few = max(1, count // 25)  # Drake's
+    ways: tuple[tuple[str, Integrator, int], ...] = (
+        ("dynident, compiled", "auto", count),
+        (f"dynident in Drake, from {few} of them", "drake", few),
+    )
+    for who, integrator, number in ways:
+        rng = np.random.default_rng(0)
+        tasks = []
+        for k in range(number):
+            theta = mechanism.robot.theta * (1.0 + 0.01 * rng.standard_normal())
+            body = replace(mechanism, robot=mechanism.robot.with_theta(theta))
+            tasks.append(replace(one.task, mechanism=body, rng=np.random.default_rng(k)))
+        closed = ClosedLoop(integrator=integrator)
+        begun = time.perf_counter()
+        spent, _ = cpu(lambda c=closed, t=tasks: c.simulate(t, one.controller, sensors))
+        share = count / number
+        figures = {"all, ms": 1e3 * share * spent}
+        figures["elapsed, s"] = share * (time.perf_counter() - begun)
+        case = f"{count} rollouts of {one.task.duration:g} s at {1 / one.step:g} Hz"
         yield Line(case=case, who=who, figures=figures)
 
 

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from dynident.closed_loop.controllers import Controller
-from dynident.closed_loop.loop import SIDE_BY_SIDE, simulate
+from dynident.closed_loop.loop import simulate
 from dynident.closed_loop.mechanism import Mechanism
 from dynident.closed_loop.rollout import LEAD_IN, Rollout, Task
 from dynident.closed_loop.sensors import Sensors, delayed, rounded
@@ -157,22 +157,15 @@ class Experiment:
             )
             for index, run in enumerate(self.runs)
         ]
-        groups = [tasks[k : k + SIDE_BY_SIDE] for k in range(0, len(tasks), SIDE_BY_SIDE)]
-        lengths = [self.lead_in + max(task.duration for task in group) for group in groups]
-        found: list[Rollout] = []
-        before = 0.0
-        for group, length in zip(groups, lengths, strict=True):
-            names = group[0].name + (f" to {group[-1].name}" if len(group) > 1 else "")
+        names = tasks[0].name + (f" to {tasks[-1].name}" if len(tasks) > 1 else "")
 
-            def advance(done: float, _: float, before=before, names=names) -> None:
-                if progress is not None:
-                    progress(names, before + done, sum(lengths))
+        def advance(done: float, whole: float) -> None:
+            if progress is not None:
+                progress(names, done, whole)
 
-            found += simulate(
-                group, self.controller, self.sensors, lead_in=self.lead_in, progress=advance
-            )
-            before += length
-        return tuple(found)
+        return simulate(
+            tasks, self.controller, self.sensors, lead_in=self.lead_in, progress=advance
+        )
 
     def run(self, progress: Progress | None = None) -> tuple[Recording, ...]:
         """Simulate the runs and record them.
