@@ -21,7 +21,7 @@ from dynident.closed_loop import (
     TrueEffect,
     loop_evaluations,
 )
-from dynident.closed_loop.compiled.loop_function import compiled_loop
+from dynident.closed_loop.compiled.loop_function import CompiledLoop, compiled_loop
 from dynident.closed_loop.compiled.many_rollouts import loop_input
 from dynident.closed_loop.motion_plan import Plan, PlanSettings, Stacked
 from dynident.errors import SimulationError
@@ -87,7 +87,7 @@ def task(body: Mechanism, seed: int = 1, duration: float = 0.4, **settings: Any)
     return Task(body, Fourier.random(body.robot, 2.0, seed), duration, **settings)
 
 
-def run_of(controller: Controller, sensors: Sensors, accuracy: float = 1e-3) -> PlanSettings:
+def settings_of(controller: Controller, sensors: Sensors, accuracy: float = 1e-3) -> PlanSettings:
     noise = sensors.each("position_std", 2), sensors.each("position_resolution", 2)
     return PlanSettings(
         controller=controller,
@@ -159,7 +159,7 @@ def test_it_is_drakes_on_the_same_steps(kind: str, robot: Robot, effects: dict[s
     rng = np.random.default_rng(7)
     one = task(body, nominal=inside, start=3.0, rng=rng)
     sensors = Sensors(position_std=1e-6, position_resolution=(0.0, 1e-5))
-    plan = Plan(one, 40, run_of(CONTROLLERS[kind], sensors))
+    plan = Plan(one, 40, settings_of(CONTROLLERS[kind], sensors))
     expected, u_expected = by_drake_on_steps(plan, 2)
     through = CONTROLLERS[kind].law.through_model
     loop = compiled_loop(body, inside if through else body)
@@ -210,6 +210,33 @@ def test_a_tighter_accuracy_is_nearer(always):
         off.append(np.abs(found.q - exact.q).max())
     assert off[0] < 1e-4
     assert off[0] > 3 * off[1] > 9 * off[2]
+
+
+@needs_compiler
+def test_stiff_friction_takes_more_steps_or_goes_to_drake(always, monkeypatch):
+    """h Fc / (w J) is about 20 at a step a sample, where the rule diverges from 2.8 on."""
+    robot = arm()
+    body = mechanism(robot, FRICTION, friction_width=2e-3)
+    slow = replace(PD, kp=(80.0, 20.0), kd=(6.0, 1.2))
+    turning = task(body, duration=0.9)
+    (exact,) = ClosedLoop(accuracy=1e-6, integrator="drake").simulate([turning], slow, lead_in=0.0)
+    loop = ClosedLoop()
+    (found,) = loop.simulate([turning], slow, lead_in=0.0)
+    assert loop.notes == ()
+    assert np.any(np.diff(np.sign(found.v), axis=0)), "it reverses"
+    np.testing.assert_allclose(found.q, exact.q, rtol=0, atol=1e-6)
+    plan = Plan(turning, 450, settings_of(slow, Sensors()))
+    made = compiled_loop(body, body)
+    assert not isinstance(made, str)
+    given = loop_input(plan, {}, {})
+    refused = made.run(made.function(0), replace(given, steps=(0, 0)))
+    assert refused == "it is too stiff for the steps of the compiled loop"
+    monkeypatch.setattr(CompiledLoop, "run", lambda *_: refused)
+    (drakes,) = ClosedLoop(integrator="drake").simulate([turning], slow, lead_in=0.0)
+    other = ClosedLoop()
+    (again,) = other.simulate([replace(turning, name="run1")], slow, lead_in=0.0)
+    assert same(again, drakes)
+    assert other.notes == (f"Drake simulates 'run1': {refused}.",)
 
 
 # --- many at once -----------------------------------------------------------------------------
@@ -297,6 +324,11 @@ def test_the_environment_and_the_work_decide(monkeypatch, tmp_path):
     (short,) = ClosedLoop(integrator="drake").simulate([task(body, duration=0.1)], PD, lead_in=0.0)
     monkeypatch.setenv("DYNIDENT_COMPILE", "always")
     (compiled,) = ClosedLoop().simulate([task(body)], PD)
+    monkeypatch.setenv("DYNIDENT_COMPILE", "auto")
+    (warm,) = ClosedLoop(repeats=2).simulate([task(body)], PD)
+    (cool,) = ClosedLoop().simulate([task(body)], PD)
+    assert same(warm, compiled), "2400 samples are enough where there is a function"
+    assert same(cool, drakes)
     assert same(never, drakes)
     assert same(few, short)
     assert not same(compiled, drakes)

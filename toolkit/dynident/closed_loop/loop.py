@@ -64,7 +64,9 @@ class ClosedLoop:
     accuracy : of the integrator, see `ACCURACY`.
     integrator : "auto": compiled where the motion's accelerations are formulas and compiling pays
         or was done before, as the environment variable DYNIDENT_COMPILE allows; motions that the
-        compiled loop cannot make go to Drake. "drake": always Drake, the reference.
+        compiled loop cannot make go to Drake. Which of the two it is changes a motion by as much
+        as their errors. "drake": always Drake, the reference.
+    repeats : about as many simulations like each one are to come: more make compiling pay.
 
     Raises
     ------
@@ -72,7 +74,9 @@ class ClosedLoop:
         If there is no such integrator, or the accuracy is not between 0 and 1.
     """
 
-    def __init__(self, *, accuracy: float = ACCURACY, integrator: Integrator = "auto") -> None:
+    def __init__(
+        self, *, accuracy: float = ACCURACY, integrator: Integrator = "auto", repeats: int = 1
+    ) -> None:
         if not (0 < accuracy < 1):
             raise SimulationError(f"accuracy = {accuracy:g}", remedy="choose it between 0 and 1")
         if integrator not in get_args(Integrator):
@@ -80,7 +84,7 @@ class ClosedLoop:
             raise SimulationError(f"no integrator '{integrator}'", remedy=remedy)
         self._accuracy, self._integrator = accuracy, integrator
         self._plants: dict[Hashable, Plant] = {}
-        self._compiled = CompiledLoops()
+        self._compiled = CompiledLoops(repeats)
         self._notes: dict[str, None] = {}
         self._builds = 0
 

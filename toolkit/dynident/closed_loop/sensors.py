@@ -75,6 +75,8 @@ def delayed(tau: np.ndarray, t: np.ndarray, delay: np.ndarray, period: float) ->
 
 def rounded(x: np.ndarray, resolution: np.ndarray) -> np.ndarray:
     """Return x (..., n) in whole steps of a resolution (n,); a resolution of 0 leaves it alone."""
+    if not np.any(resolution > 0):
+        return x
     step = np.where(resolution > 0, resolution, 1.0)
     # The last rounding removes the tail that the product leaves in the decimals (0.1 * 3).
     return np.where(resolution > 0, np.round(np.round(x / step) * step, 12), x)

@@ -22,16 +22,19 @@ _TOGETHER = 64
 class CompiledLoops:
     """The compiled loops that a simulator has used.
 
+    Parameters
+    ----------
+    repeats : see `dynident.closed_loop.ClosedLoop`.
+
     Attributes
     ----------
     notes : why motions could not be made.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, repeats: int) -> None:
         self.notes: dict[str, None] = {}
         self._used: set[CompiledLoop] = set()
-        # Not those of others: a fresh simulator does with the same motions what another one did.
-        self._seen: dict[CompiledLoop, int] = {}
+        self._repeats = repeats
 
     @property
     def builds(self) -> int:
@@ -76,18 +79,18 @@ class CompiledLoops:
         loops: dict[Plan, CompiledLoop] = {}
         by_id: dict[tuple[int, int], CompiledLoop | str] = {}
         for one in plans:
-            truth, nominal = one.task.mechanism, _nominal(one)
-            key = id(truth), id(nominal if one.run.controller.law.through_model else truth)
+            # Of what the tasks hold: its identity lasts.
+            key = id(one.task.mechanism), id(one.nominal)
             if key not in by_id:
-                by_id[key] = compiled_loop(truth, nominal)
+                by_id[key] = compiled_loop(one.task.mechanism, _nominal(one))
             loop = by_id[key]
             if not isinstance(loop, str):
                 loops[one] = loop
         functions = {}
         for loop in dict.fromkeys(loops.values()):
             samples = sum(one.samples for one, own in loops.items() if own is loop)
-            self._seen[loop] = self._seen.get(loop, 0) + samples
-            functions[loop] = loop.function(self._seen[loop])
+            # Not what was done before: the same call makes the same motions again.
+            functions[loop] = loop.function(self._repeats * samples)
             if functions[loop] is not None:
                 self._used.add(loop)
             elif loop.choice.failed:
@@ -127,17 +130,17 @@ def loop_input(
         known[key] = plan.reference(plan.samples)
     stacked = Stacked.along([plan], [known[key]])
 
-    def numbers(mechanism: Mechanism, start: float) -> BodyNumbers:
-        own = id(mechanism), start
+    def numbers(owner: object, mechanism: Mechanism, start: float) -> BodyNumbers:
+        own = id(owner), start
         if own not in bodies:
             bodies[own] = body_numbers(mechanism, start)
         return bodies[own]
 
-    truth, through_model = numbers(task.mechanism, task.start), run.controller.law.through_model
+    truth, through_model = task.mechanism, run.controller.law.through_model
+    acting = numbers(truth, truth, task.start)
     return LoopInput(
-        truth=truth,
-        # Made anew for each plan where it is a robot: its identity would not last.
-        nominal=body_numbers(_nominal(plan)) if through_model else truth,
+        truth=acting,
+        nominal=numbers(plan.nominal, _nominal(plan), 0.0) if through_model else acting,
         through_model=through_model,
         drive=stacked.drive.numbers,
         reference=known[key],

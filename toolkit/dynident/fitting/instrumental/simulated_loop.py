@@ -29,6 +29,8 @@ _TRANSIENT = 5.0
 left at critical damping."""
 _MASSLESS = 0.02
 """Share of the expected inertia below which a start is not worth a simulation."""
+_ITERATIONS = 5
+"""Simulations that an estimate is expected to take."""
 _DOUBT = 1.1
 """Distance of the simulated from the measured motion over that of the reference from it."""
 
@@ -138,7 +140,7 @@ class LoopSource:
         self.transient = float(_TRANSIENT / frequencies.min())
         cut = tuple(_without_transient(one, self.transient) for one in dataset.recordings)
         self.measured = replace(dataset, recordings=cut)
-        self._loop = ClosedLoop()
+        self._loop = ClosedLoop(repeats=_ITERATIONS)
         self._last: tuple[Retraced, ...] = ()
         self.last_run: SimulatedRun | None = None
 

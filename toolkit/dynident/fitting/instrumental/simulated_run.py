@@ -57,7 +57,7 @@ class SimulatedRun:
         SimulationError
             If the loop does not bear that noise.
         """
-        loop, found = ClosedLoop(), []
+        loop, found = ClosedLoop(repeats=2 * pairs), []
         for draw in range(pairs):
             for sign in (1.0, -1.0):
                 noise = EncoderNoise(std=position_std, seed=(seed, draw), sign=sign)
