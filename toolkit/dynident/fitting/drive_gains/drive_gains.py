@@ -12,6 +12,7 @@ from dynident.fitting.estimate import DataSource
 from dynident.tables import Shown, Table, finite, number, percent
 
 Finding = Literal["given", "identified", "up to a common scale", "not told apart"]
+_FIXED = ("given", "identified")
 _Z = 1.959964  # of a 95 % interval
 
 
