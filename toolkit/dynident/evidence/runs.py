@@ -212,7 +212,7 @@ def gather(
             # Where columns come from elsewhere, the copies tell the size of the noise only.
             count = criteria.copies if simulated is None else criteria.copies_beside_simulation
             copies = (noisy(recording, dataset.noise, stream) for _ in range(count))
-            replicates = (first, *(sample(copy, dataset.filter) for copy in copies))
+            replicates = (first, *(shared_motion(sample(copy, dataset.filter)) for copy in copies))
             index, kind = np.tile(usable, (len(replicates), 1)), "noise_augmented"
         else:
             replicates, index, kind = (first,), usable[None, :], "single"
@@ -229,9 +229,11 @@ def gather(
 def simulated_versions(runs: Sequence[Run], simulated: Dataset) -> tuple[Sampled, ...]:
     """Simulated motions, filtered and cut as the recordings of these runs are."""
     return tuple(
-        sample(
-            one.replace(window=run.recording.window, payload=run.recording.payload),
-            simulated.filter,
+        shared_motion(
+            sample(
+                one.replace(window=run.recording.window, payload=run.recording.payload),
+                simulated.filter,
+            )
         )
         for run, one in zip(runs, simulated.recordings, strict=True)
     )

@@ -58,14 +58,17 @@ def sources(every: Iterable[Sampled]) -> dict[Sampled, Source]:
     return found
 
 
-def shared_motion(one: Sampled, others: Iterable[Sampled]) -> Sampled:
-    """Return a recording with the motion of another one of which it is a window, if it is.
+def shared_motion(one: Sampled, others: Iterable[Sampled] = ()) -> Sampled:
+    """Return a recording with its whole motion, that of another one of which it is a window.
+
+    Columns are evaluated along it again and again: it is kept, where a fit takes it part by part.
 
     Parameters
     ----------
     one : the recording.
-    others : earlier ones.
+    others : earlier ones, with theirs.
     """
+    one = replace(one, source=one.motion)
     for other in others:
         if (
             other.motion is not one.motion
@@ -75,7 +78,7 @@ def shared_motion(one: Sampled, others: Iterable[Sampled]) -> Sampled:
             and other.recording.temperature is one.recording.temperature
             and _equal(other.motion, one.motion)
         ):
-            return replace(one, motion=other.motion)
+            return replace(one, source=other.source)
     return one
 
 
