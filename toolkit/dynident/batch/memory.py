@@ -50,7 +50,9 @@ def _taken(size: int) -> np.ndarray:
             return memory
         if memory is not None:
             _free[key] = memory
-    return np.empty(size, dtype=np.uint8)  # which asks for huge pages, where there are any
+    # A little more than is asked for, so that the next block, a little longer, fits as well; what is
+    # not written to takes no memory. NumPy asks for huge pages, where there are any.
+    return np.empty(size + size // 4, dtype=np.uint8)
 
 
 def _give_back(memory: np.ndarray) -> None:

@@ -28,7 +28,7 @@ from dynident.recording import (
     usable_rows,
 )
 
-BLOCK = 16384
+BLOCK = 8192
 """Samples at the full rate that are evaluated at a time, at most."""
 
 _MEMORY = 2**27  # bytes of the columns of so many samples: more than 12 joints get fewer
@@ -51,12 +51,14 @@ class Sampled:
     source : its motion at the full rate, part by part.
     parallel : the low-pass and decimation of columns and torque.
     kept : decimated rows that are used, see `usable_rows`.
+    at_once : samples at the full rate that are evaluated at a time, at most.
     """
 
     recording: Recording
     source: MotionInParts | Motion
     parallel: ParallelFilter
     kept: slice
+    at_once: int = BLOCK
 
     @property
     def motion(self) -> Motion:
@@ -128,8 +130,11 @@ class Sampled:
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """As `columns`, with the torque (T, n) of the same rows."""
         for plan, block, known, torque in self._blocks(model, values):
-            columns = self.parallel.apply_block(model.columns(block, values, known), plan)
-            yield columns, self.parallel.apply_block(torque, plan)
+            # No name is left on the columns: their memory is used for the next ones.
+            yield (
+                self.parallel.apply_block(model.columns(block, values, known), plan),
+                self.parallel.apply_block(torque, plan),
+            )
 
     def residuals(self, model: Model, values: np.ndarray) -> Iterator[tuple[np.ndarray, ...]]:
         """What a model leaves of the torque and that torque, block by block, (T, n) each.
@@ -217,7 +222,7 @@ class Sampled:
     def _plans(self, model: Model) -> Iterator[FilterBlock]:
         """Blocks whose rows are used."""
         fitting = _MEMORY // (8 * model.robot.n * model.size)
-        size = min(BLOCK, max(_LEAST_BLOCK, fitting))
+        size = min(self.at_once, max(_LEAST_BLOCK, fitting))
         return self.parallel.blocks(self.source.samples, size, self.kept)
 
 

@@ -113,6 +113,7 @@ def factorise(
         for j, one in enumerate(folded):
             one.add(columns[:, j], torque[:, j])
         counts += rows
+        del columns  # whose memory may be used for the next block
     if not folded:
         raise ValueError("no rows")
     return TriangularFactors(np.stack([one.triangle(size) for one in folded]), counts, instruments)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from dataclasses import replace as _replace
+from mmap import mmap
 from typing import Any, Literal
 
 import numpy as np
@@ -18,6 +19,7 @@ USES = ("train", "test")
 TORQUES = ("measured", "held_command")
 LARGEST = 1e100
 """Magnitude beyond which a number can be no measurement, and squares overflow."""
+_AT_ONCE = 1 << 18  # time stamps that are looked at
 SIGNALS = ("q", "tau", "v", "a", "q_ref", "temperature")
 """What a sample holds at each joint."""
 
@@ -62,7 +64,8 @@ class Recording:
 
     Attributes
     ----------
-    t : (T,) s, strictly increasing.
+    t : (T,) s, strictly increasing. This and all signals may be files that are mapped into memory
+        to be read, of any length: they are looked at part by part, and so do fits by least squares.
     q : (T, n) rad, or m for prismatic joints.
     tau : (T, n) N m, or N for prismatic joints.
     joints : n names, the order of the columns.
@@ -159,7 +162,7 @@ class Recording:
     def jitter(self) -> float:
         """Largest departure of a time step from the mean one, relative to the mean one."""
         mean = self.duration / (self.samples - 1)
-        return float(np.max(np.abs(np.diff(self.t) - mean)) / mean)
+        return max(float(np.max(np.abs(np.diff(t) - mean))) for t in _parts(self.t)) / mean
 
     @property
     def where(self) -> str:
@@ -233,14 +236,17 @@ class Recording:
     # --- checks --------------------------------------------------------------------------------
 
     def _numbers(self, column: str, value: Any) -> np.ndarray:
-        """Value as a read-only array of doubles; an array that is one already is shared."""
+        """Value as a read-only array of doubles; one that is one already, or a file's, is shared.
+
+        Of a file that is mapped into memory (`np.load(..., mmap_mode="r")`) no copy is made.
+        """
         if (
             isinstance(value, np.ndarray)
             and value.dtype == np.float64
             and not value.flags.writeable
-            and value.base is None
+            and (value.base is None or isinstance(_owner(value), mmap))
         ):
-            return value
+            return value.view(np.ndarray) if isinstance(value, np.memmap) else value
         try:
             if np.iscomplexobj(value):
                 raise ValueError
@@ -289,9 +295,9 @@ class Recording:
         )
 
     def _check_time(self) -> None:
-        late = np.flatnonzero(np.diff(self.t) <= 0)
-        if not len(late):
+        if all(np.all(np.diff(t) > 0) for t in _parts(self.t)):
             return
+        late = np.flatnonzero(np.diff(self.t) <= 0)
         row = int(late[0]) + 1
         before, here = float(self.t[row - 1]), float(self.t[row])
         if before == here:
@@ -336,6 +342,20 @@ class Recording:
                 )
         if self.payload not in (None, True, False):
             raise RecordingError(f"payload = {self.payload!r}", self.where, "write true or false")
+
+
+def _owner(array: np.ndarray) -> object:
+    """What holds the memory of an array."""
+    base: Any = array
+    while isinstance(base, np.ndarray) and base.base is not None:
+        base = base.base
+    return base
+
+
+def _parts(t: np.ndarray) -> Iterator[np.ndarray]:
+    """Time stamps (T,) part by part, each beginning with the last one of the part before."""
+    for start in range(0, max(1, len(t) - 1), _AT_ONCE):
+        yield t[start : start + _AT_ONCE + 1]
 
 
 def _number(value: Any) -> float:

@@ -58,6 +58,7 @@ def watched(
             columns.add(first, block)
             first += len(torque)
             yield block, torque
+            del block  # whose memory is used for the next one
 
 
 def of_all_rows(

@@ -32,7 +32,7 @@ def noise_shapes(sampled: Sampled, lags: int) -> np.ndarray:
     sampled : a recording with its filters.
     lags : longest lag, in decimated rows.
     """
-    parallel, rate = sampled.parallel, sampled.motion.rate_hz
+    parallel, rate = sampled.parallel, sampled.source.rate_hz
     limit = rate / 2
     while True:
         f = (np.arange(_GRID) + 0.5) / _GRID * limit
@@ -63,7 +63,7 @@ def filter_power(sampled: Sampled, f: np.ndarray) -> tuple[np.ndarray, np.ndarra
     -------
     (F,) each; that of positions has the low-pass before differentiation in it
     """
-    rate, power = sampled.motion.rate_hz, np.ones(len(f))
+    rate, power = sampled.source.rate_hz, np.ones(len(f))
     for sections, _ in sampled.parallel.stages:
         power *= _response(sections, f, rate) ** 4  # forward and backward
     cutoff = sampled.parallel.filter.position_cutoff_hz

@@ -79,6 +79,6 @@ def _fed_back(torque: np.ndarray, readings: np.ndarray) -> np.ndarray:
     for lag in range(min(_READINGS, count)):
         shifted[lag:, lag] = readings[: count - lag]
     inputs = shifted.reshape(count, -1)
-    scale = np.linalg.norm(inputs, axis=0)
-    inputs = inputs / np.where(scale > 0, scale, 1.0)
+    scale = np.sqrt(np.einsum("ij,ij->j", inputs, inputs))
+    inputs /= np.where(scale > 0, scale, 1.0)
     return inputs @ np.linalg.lstsq(inputs, torque, rcond=None)[0]
