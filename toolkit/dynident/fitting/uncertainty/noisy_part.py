@@ -28,7 +28,7 @@ from dynident.recording.white_noise import encoder_noise_std
 _POINTS = (0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5)
 """Shares of a step at which a mean over it is taken (Gauss, two points)."""
 _PASSES = 4  # of the positions' low-pass and of sums in time, that `trembling` takes one by one
-_AT_ONCE = 4096  # samples of which the columns of five motions are held at a time
+_AT_ONCE = 2048  # samples of which the columns of five motions are held at a time
 _FINEST = 1e-7
 """Noise over a joint's travel that no encoder is below: what high differences show of smooth motion
 without noise is less."""
