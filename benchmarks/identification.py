@@ -196,7 +196,8 @@ BENCHMARK = Benchmark(
     "row to row, which takes another pass, or as textbooks have it. mujoco.sysid fits the "
     "positions in windows of half a second, at most 15 rounds from a description whose masses are "
     "30 % too large and effects 40 % too small; the others need no start. Parameter error: of base "
-    "parameters, each by the torque that it makes; held-out error: of the torque along another motion, both against the truth. "
+    "parameters, each by the torque that it makes; held-out error: of the torque along another "
+    "motion, both against the truth. "
     "From the start: imports and the first answer. Memory is that of the whole process, libraries "
     "included.",
     compared="warm, s",

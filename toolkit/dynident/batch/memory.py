@@ -50,7 +50,7 @@ def _taken(size: int) -> np.ndarray:
             return memory
         if memory is not None:
             _free[key] = memory
-    # A little more than is asked for, so that the next block, a little longer, fits as well; what is
+    # A little more than is asked for, so that the next block, a little longer, fits too; what is
     # not written to takes no memory. NumPy asks for huge pages, where there are any.
     return np.empty(size + size // 4, dtype=np.uint8)
 
