@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -78,8 +79,9 @@ def logs_of(path: str | Path, layout: FileLayout) -> tuple[Log, ...]:
 def _log(path: Path, record: str, table: ColumnTable, layout: FileLayout) -> Log:
     found: dict[str, np.ndarray] = {}
     skipped: list[str] = []
+    arrays = _arrays(table, table.names[:MOST_COLUMNS])
     for name in table.names[:MOST_COLUMNS]:
-        columns = _numbers(table, name)
+        columns = _numbers(name, arrays.get(name))
         if columns is None:
             skipped.append(name)
         else:
@@ -100,13 +102,21 @@ def _log(path: Path, record: str, table: ColumnTable, layout: FileLayout) -> Log
     return Log(file=path, record=record, columns=kept, skipped=tuple(skipped), layout=layout)
 
 
-def _numbers(table: ColumnTable, name: str) -> dict[str, np.ndarray] | None:
-    """Columns of numbers under a name; None where it holds text or numbers of no use."""
+def _arrays(table: ColumnTable, names: Sequence[str]) -> dict[str, np.ndarray]:
+    """What a table holds under some names: at once if it can, else those that can be read."""
     try:
-        x = table.load([name])[name]
-    except RecordingError:
-        return None
-    if x.dtype.kind not in "fiu" or x.ndim not in (1, 2) or not x.size:
+        return table.load(names)
+    except RecordingError:  # one is text, say, or the messages of a bag do not share it
+        found = {}
+        for name in names:
+            with suppress(RecordingError):
+                found[name] = table.load([name])[name]
+        return found
+
+
+def _numbers(name: str, x: np.ndarray | None) -> dict[str, np.ndarray] | None:
+    """Columns of numbers under a name; None where it holds text or numbers of no use."""
+    if x is None or x.dtype.kind not in "fiu" or x.ndim not in (1, 2) or not x.size:
         return None
     if x.ndim == 2 and 1 in x.shape:
         x = x.ravel()
