@@ -5,7 +5,6 @@ Standing still at either end needs no line in a study: `recording.usable` leaves
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Sequence
 
@@ -18,7 +17,7 @@ from dynident.recording.repetition import repeats_after, shift_mismatch
 _CLOCKS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (1e-9, "ns"))
 _FASTEST = 2e4  # Hz that a robot is sampled at
 _REPEATS = 0.05  # of the motion that two repetitions may differ by
-_WHOLE = 0.3  # samples by which a period may miss a whole number of them
+_WHOLE = 0.3  # samples by which a period is known
 _EVERY = 4  # of so many recordings one is held out
 _TRAIN, _TEST = ("train", "fit", "ident", "exc"), ("test", "val", "check")
 
@@ -56,10 +55,10 @@ def period_of(recording: Recording) -> float | None:
     lag = repeats_after(q, recording.samples // 2 + 1)
     if lag is None or shift_mismatch(q, lag) > _REPEATS:
         return None
-    if abs(lag - round(lag)) < _WHOLE:
-        lag = float(round(lag))
     period = lag / recording.rate_hz
-    return float(f"{period:.{max(3, math.ceil(math.log10(lag)) + 2)}g}")
+    # References are made of round times: of the times that the samples cannot tell, the roundest.
+    round_ones = (float(f"{period:.{digits}g}") for digits in range(1, 9))
+    return next((x for x in round_ones if abs(x - period) * recording.rate_hz < _WHOLE), period)
 
 
 def uses_of(names: Sequence[str]) -> tuple[tuple[str, ...], str]:
