@@ -10,7 +10,7 @@ import difflib
 import re
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -107,14 +107,17 @@ def _complaint(error: ValidationError, path: Path, schema: type[BaseModel]) -> S
 
 def _keys_at(schema: Any, where: tuple[Any, ...]) -> list[str]:
     """Return the valid keys of the table at a place in a file."""
+    is_name = False  # of a table in a table of tables, which may be anything
     for part in where:
-        if isinstance(part, int):
+        if isinstance(part, int) or is_name:
+            is_name = False
             continue
         field = schema.model_fields.get(part)
-        inner = [] if field is None else [t for t in _types(field.annotation) if _is_table(t)]
+        annotation = None if field is None else field.annotation
+        inner = [t for t in _types(annotation) if _is_table(t)]
         if not inner:
             return []
-        schema = inner[0]
+        schema, is_name = inner[0], get_origin(annotation) is dict
     return list(schema.model_fields)
 
 

@@ -22,6 +22,16 @@ from dynident.criteria import DEFAULTS, Criteria
 from dynident.data_files import find_all
 from dynident.effects import FRICTION_WIDTH, Effect, effects_of
 from dynident.errors import DynidentError, EffectError, RobotError, StudyError
+from dynident.fitting.drive_gains import (
+    DriveGains,
+    GainProblem,
+    Load,
+    LoadEntry,
+    PayloadEntry,
+    fit_drive_gains,
+    in_newton_metres,
+    loads_of,
+)
 from dynident.model import Model
 from dynident.recording import (
     Column,
@@ -57,7 +67,9 @@ class _RecordingEntry(SettingsTable):
     period : s after which the excitation repeats.
     start : s, when the recording began in the session, for what warms up.
     window : [t0, t1] in s of the file's clock: what is used of it once the whole is filtered.
-    payload : whether the load under study was on board; "unknown" asks for it.
+    payload : whether the load under study was on board, true or false; "unknown" asks for it. Or
+        the name of one of several loads, see `LoadEntry`, or what is known of a load without one:
+        `payload = { mass = 2.8, centre = [0.0, 0.02, 0.05] }`.
     """
 
     file: str | list[str]
@@ -69,7 +81,7 @@ class _RecordingEntry(SettingsTable):
     period: Duration | None = None
     start: Time = 0.0
     window: tuple[Time, Time] | None = None
-    payload: bool | Literal["unknown"] | None = None
+    payload: PayloadEntry = None
 
 
 class _FilterEntry(SettingsTable):
@@ -110,11 +122,16 @@ class _StudyFile(SettingsTable):
     joints : names, the order of columns; by default every joint that moves.
     effects : that the robot is said to have, `name` or `name@joint`.
     torque : "measured", or "held_command" where a command acts from its sample to the next.
+    torque_unit : "N m" (and N, of prismatic joints), or the unit of the drives, "A" or "%": then
+        each joint's gain is identified, and torques are converted before anything else is done.
+    drive_gains : joint -> its gain where that is known, N m (or N) per unit; one fixes the scale.
+    loads : name -> a load that recordings carry, see `LoadEntry`; a known one fixes the scale.
     friction_width : speed (rad/s or m/s) within which dry friction turns over; one, or by joint.
     gravity : m/s^2, in the axes of the description's base.
     recordings : files of data, see `_RecordingEntry`.
     filter : how positions are differentiated, and what is filtered alike; see `Filter`.
-    noise : standard deviations of a raw sample, where nothing repeats; see `Noise`.
+    noise : standard deviations of a raw sample, where nothing repeats, in rad or m, and in the
+        unit of the torques; see `Noise`.
     controller : of the closed loop; see `Controller`.
     columns : ours -> the files' names of columns, or linear expressions of them.
     criteria : numbers that decide a diagnosis, otherwise than by default; see `Criteria`.
@@ -124,6 +141,9 @@ class _StudyFile(SettingsTable):
     joints: list[str] | None = None
     effects: list[str] = Field(default_factory=list)
     torque: Literal["measured", "held_command"] = "measured"
+    torque_unit: Literal["N m", "A", "%"] = "N m"
+    drive_gains: dict[str, float] = Field(default_factory=dict)
+    loads: dict[str, LoadEntry] = Field(default_factory=dict)
     friction_width: float | dict[str, float] = FRICTION_WIDTH
     gravity: tuple[float, float, float] | None = None
     recordings: list[_RecordingEntry]
@@ -162,7 +182,10 @@ class Study:
     path : the file.
     model : the robot and the effects that it is said to have.
     train, test : recordings to fit and recordings to judge by; `test` is empty where the study
-        names none, and the diagnosis then holds out blocks of time.
+        names none, and the diagnosis then holds out blocks of time. Their torques are in N m, and
+        those of the robot alone where loads have names.
+    drives : gains by which torques were converted, and loads that were identified; None where the
+        recordings are in N m and no load has a name.
     controller : of the closed loop, where the study states one.
     criteria : the numbers that decide a diagnosis, with those that the study wants otherwise: a
         table for each group, as `[criteria.gates] level = 0.005`; see `dynident.criteria`.
@@ -172,6 +195,7 @@ class Study:
     model: Model
     train: Dataset
     test: Dataset
+    drives: DriveGains | None = None
     controller: Controller | None = None
     criteria: Criteria = DEFAULTS
 
@@ -201,7 +225,7 @@ def load(path: str | Path) -> Study:
         model = Model(robot, effects, _widths(said.friction_width, robot))
     except DynidentError as error:
         raise StudyError(str(error), f"{path}: effects") from None
-    recordings = _recordings(said, path, robot)
+    recordings, loads = _recordings(said, path, robot)
     with _in(path, "filter"):
         settings = _filter(said.filter, recordings) if said.filter else None
     with _in(path, "criteria"):
@@ -226,11 +250,19 @@ def load(path: str | Path) -> Study:
     controller = None
     if said.controller:
         controller = said.controller.controller(robot, f"{path}: controller")
+    drives = None
+    if said.torque_unit != "N m" or said.drive_gains or loads:
+        known = said.drive_gains
+        if said.torque_unit == "N m":
+            known = dict.fromkeys(robot.names, 1.0)
+        drives = _drives(said, path, GainProblem(model, sets["train"], known, loads))
+        sets = {use: in_newton_metres(one, drives, robot) for use, one in sets.items()}
     return Study(
         path=path,
         model=model,
         train=sets["train"],
         test=sets["test"],
+        drives=drives,
         controller=controller,
         criteria=criteria,
     )
@@ -339,14 +371,32 @@ def _widths(said: float | dict[str, float], robot: Robot) -> float | tuple[float
     return tuple(said.get(name, FRICTION_WIDTH) for name in robot.names)
 
 
-def _recordings(said: _StudyFile, path: Path, robot: Robot) -> list[Recording]:
+def _drives(said: _StudyFile, path: Path, problem: GainProblem) -> DriveGains:
+    """Gains and loads that the training recordings tell."""
+    if said.torque_unit == "N m" and said.drive_gains:
+        what, remedy = "gains of drives, and torques in N m", 'state torque_unit = "A" or "%"'
+        raise StudyError(what, f"{path}: drive_gains", remedy)
+    trained = {recording.load for recording in problem.dataset.recordings}
+    for load in problem.loads:
+        if load.name not in trained and not load.is_known:
+            what = f"no training recording carries the load '{load.name}', which is not known"
+            remedy = "state all of it, or train with a recording that carries it"
+            raise StudyError(what, str(path), remedy)
+    return fit_drive_gains(problem, said.torque_unit)
+
+
+def _recordings(
+    said: _StudyFile, path: Path, robot: Robot
+) -> tuple[list[Recording], tuple[Load, ...]]:
+    """Every recording, and the loads that they name."""
     with _in(path, "columns"):
         columns = {
             ours: Column(theirs, 1.0) if isinstance(theirs, str) else Column(**theirs.model_dump())
             for ours, theirs in said.columns.items()
         }
-    payloads = {entry.payload for entry in said.recordings}
-    if "unknown" in payloads and payloads & {True, False}:
+    names, loads = loads_of((one.payload for one in said.recordings), said.loads, str(path))
+    payloads = [one.payload for one in said.recordings if not loads]
+    if "unknown" in payloads and any(isinstance(one, bool) for one in payloads):
         remedy = 'state true or false for every recording, or "unknown" for all of them'
         raise StudyError("a payload is known and unknown", f"{path}: recordings", remedy)
     known: dict[tuple[Path, str | None, FileLayout], Recording] = {}
@@ -371,12 +421,13 @@ def _recordings(said: _StudyFile, path: Path, robot: Robot) -> list[Recording]:
                     period=entry.period,
                     start=entry.start,
                     window=entry.window,
-                    payload=None if entry.payload == "unknown" else entry.payload,
+                    payload=entry.payload if isinstance(entry.payload, bool) else None,
+                    load=names[place],
                     torque=said.torque,
                     number=len(found) + 1,
                 )
             )
-    return found
+    return found, loads
 
 
 def _files(entry: _RecordingEntry, folder: Path, where: str) -> dict[str, Path]:

@@ -13,7 +13,7 @@ import click
 from dynident.cli.group import CommandAnswer, answered, collected, commands
 from dynident.cli.methods import Chosen, method_options
 from dynident.cli.output import progress
-from dynident.cli.work import STUDY, load_study, require_picture, require_places
+from dynident.cli.work import STUDY, load_study, require_picture, require_places, with_drives
 from dynident.errors import DynidentWarning
 
 if TYPE_CHECKING:
@@ -142,6 +142,7 @@ def fit(study: Path, chosen: Chosen, kind: _Kind, more: _More, to: _Files) -> Co
     Example: dynident fit study.toml --out estimate.json --robot identified.urdf
     """
     from dynident.fitting import fit as fit_model
+    from dynident.fitting.drive_gains import with_gain_errors
     from dynident.wiring import check_wiring
 
     kind.require(chosen)
@@ -154,14 +155,17 @@ def fit(study: Path, chosen: Chosen, kind: _Kind, more: _More, to: _Files) -> Co
     with progress("fitting") as show_progress:
         method = kind.method(chosen, loaded, show_progress)
         estimate = fit_model(loaded.model, loaded.train, method)
+        if loaded.drives is not None:
+            estimate = with_gain_errors(estimate, loaded.drives)
         wiring = check_wiring(loaded.model, loaded.train, loaded.test, loaded.criteria.wiring)
         said = (f"Wiring: {fault.sentence}" for fault in wiring)
         estimate = replace(estimate, notes=(*said, *estimate.notes))
         tables, content = more.of(estimate, chosen, loaded)
     to.write(estimate)
-    return CommandAnswer(
+    answer = CommandAnswer(
         content=lambda: (
             estimate.to_dict() | {"wiring": [fault.to_dict() for fault in wiring]} | content
         ),
         parts=lambda: (*estimate.tables(), *tables),
     )
+    return with_drives(loaded, answer)

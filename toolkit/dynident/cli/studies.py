@@ -16,6 +16,7 @@ from dynident.cli.work import (
     load_study,
     require_picture,
     require_places,
+    with_drives,
     write_report,
 )
 from dynident.errors import FileError, StudyError
@@ -37,10 +38,11 @@ def explain(study: Path, most: int | None, report: Path | None) -> CommandAnswer
     loaded = load_study(study)
     diagnosis = diagnosis_of(loaded, most)
     write_report(loaded, diagnosis, report)
-    return CommandAnswer(
+    answer = CommandAnswer(
         content=diagnosis.to_dict,
         parts=lambda: (*diagnosis.tables(), diagnosis.after.parameter_table()),
     )
+    return with_drives(loaded, answer)
 
 
 @commands.command()
@@ -77,8 +79,10 @@ def diagnose(study: Path, most: int | None) -> CommandAnswer:
 
     Example: dynident diagnose study.toml --json
     """
-    diagnosis = diagnosis_of(load_study(study), most)
-    return CommandAnswer(content=diagnosis.to_dict, parts=diagnosis.tables)
+    loaded = load_study(study)
+    diagnosis = diagnosis_of(loaded, most)
+    answer = CommandAnswer(content=diagnosis.to_dict, parts=diagnosis.tables)
+    return with_drives(loaded, answer)
 
 
 @commands.command()
@@ -98,7 +102,7 @@ def compare(study: Path, additions: tuple[str, ...]) -> CommandAnswer:
     """
     loaded = load_study(study)
     comparison = comparison_of(loaded, tuple((label,) for label in additions))
-    return CommandAnswer(content=comparison.to_dict, parts=comparison.tables)
+    return with_drives(loaded, CommandAnswer(content=comparison.to_dict, parts=comparison.tables))
 
 
 @commands.command()

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from dynident import files
+from dynident.cli.group import CommandAnswer
 from dynident.cli.output import progress
 from dynident.errors import FileError
 
@@ -44,6 +46,18 @@ def load_study(path: Path) -> Study:
 
     with progress("reading"):
         return load(path)
+
+
+def with_drives(study: Study, answer: CommandAnswer) -> CommandAnswer:
+    """Put the gains of the drives, and loads, before what was found by them."""
+    drives = study.drives
+    if drives is None:
+        return answer
+    return replace(
+        answer,
+        content=lambda: {"drives": drives.to_dict(), **answer.content()},
+        parts=lambda: (*drives.tables(), *answer.parts()),
+    )
 
 
 MOST = click.option(

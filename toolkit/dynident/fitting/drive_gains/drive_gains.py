@@ -140,9 +140,9 @@ class DriveGains(Shown):
         return Table("Gains of the drives", columns, rows, tuple(notes))
 
     def tables(self) -> tuple[Table | str, ...]:
-        """The gains, then the loads."""
+        """The gains, then the loads of which anything was identified."""
         gains = () if self.unit == "N m" else (self.table(),)
-        return (*gains, *(load.table() for load in self.loads))
+        return (*gains, *(load.table() for load in self.loads if not load.load.is_known))
 
     def to_dict(self) -> dict[str, Any]:
         """Gains and loads as JSON has them."""
@@ -173,6 +173,7 @@ class DriveGains(Shown):
             "loads": [load.to_dict() for load in self.loads],
         }
 
+    @property
     def words(self) -> str:
         """For the provenance of a converted recording."""
         said = ", ".join(

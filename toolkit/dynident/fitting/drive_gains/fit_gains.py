@@ -124,6 +124,7 @@ def _identified(
         load=load,
         phi=moved,
         covariance=back @ covariance @ back.T,
+        acting=parts.given + parts.unknown @ solution.values[part],
         scale=tuple(open_scale),
     )
 

@@ -27,12 +27,15 @@ class IdentifiedLoad:
     phi : (10,) in the frame of its link, see `dynident.inertia.PARAMETERS`; NaN where the data do
         not tell a parameter apart.
     covariance : (10, 10) of phi, that of the gains in it; zero for what was given.
+    acting : (10,) in the last joint's frame, with what is not told apart at some value: together
+        they make the load's torque.
     scale : the joints whose common scale phi is known up to; empty where the scale is fixed.
     """
 
     load: Load
     phi: np.ndarray
     covariance: np.ndarray
+    acting: np.ndarray
     scale: tuple[str, ...] = ()
 
     @property

@@ -1,0 +1,192 @@
+"""Studies whose torques are in the unit of the drives, and whose recordings name their loads."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from dynident.cli import commands
+from dynident.errors import StudyError
+from dynident.fitting import fit
+from dynident.inertia import from_com
+from dynident.model import Model
+from dynident.recording import Recording, write
+from dynident.study import Study, load
+from study_files import edited
+from synthetic import ARM, arm, smooth_motion
+
+GAINS = np.array([12.0, 5.0])
+STD = np.array([0.02, 0.02])
+TOOL = (1.5, [0.1, -0.02, 0.0], 0.004)  # kg, m, kg m^2 about z
+CRATE = (0.8, [0.05, 0.06, 0.0], 0.002)
+STUDY = """\
+robot = "arm.urdf"
+effects = ["viscous_friction"]
+torque_unit = "A"
+
+[noise]
+position_std = 1e-6
+torque_std = [0.02, 0.02]
+
+[loads.tool]
+mass = 1.5
+centre = [0.1, -0.02, 0.0]
+inertia = [0, 0, 0, 0, 0, 0.004]
+
+[loads.crate]
+
+[[recordings]]
+file = "empty.csv"
+
+[[recordings]]
+file = "tool.csv"
+payload = "tool"
+
+[[recordings]]
+file = "crate.csv"
+payload = "crate"
+
+[[recordings]]
+file = "test.csv"
+use = "test"
+payload = "tool"
+"""
+
+
+def phi(body: tuple[float, list[float], float]) -> np.ndarray:
+    return from_com(body[0], body[1], np.diag([0.0, 0.0, body[2]]))
+
+
+@cache
+def recorded(seed: int, body: str) -> tuple[Recording, np.ndarray]:
+    """Currents of the arm with a load, and the torques (T, 2) of the arm alone in N m."""
+    model = Model(arm()) + "viscous_friction"
+    values = model.given_values()
+    values[model.base.rank :] = [1.0, 0.5]
+    t, q, v, a = smooth_motion(2, seed, 100.0, 12.0, 12.0)
+    alone = model.torque(model.block(t, q, v, a), values)
+    carrying = model + "payload"
+    load = {"": np.zeros(10), "tool": phi(TOOL), "crate": phi(CRATE)}[body]
+    block = carrying.block(t, q, v, a, carries_payload=True)
+    current = carrying.torque(block, np.append(values, load)) / GAINS
+    noise = STD * np.random.default_rng(seed).normal(size=current.shape)
+    return Recording(t, q, current + noise, model.robot.names), alone
+
+
+BODIES = {"empty": "", "tool": "tool", "crate": "crate", "test": "tool"}
+
+
+def written(folder: Path, text: str = STUDY) -> Path:
+    (folder / "arm.urdf").write_text(ARM)
+    for seed, (name, body) in enumerate(BODIES.items()):
+        write(recorded(seed, body)[0], folder / f"{name}.csv")
+    (folder / "study.toml").write_text(text)
+    return folder / "study.toml"
+
+
+@pytest.fixture
+def study(tmp_path: Path):
+    def make(text: str = STUDY) -> Study:
+        return load(written(tmp_path, text))
+
+    return make
+
+
+def test_torques_of_a_study_are_those_of_the_robot_alone_in_newton_metres(study) -> None:
+    made = study()
+    assert made.drives is not None
+    np.testing.assert_allclose(made.drives.gains, GAINS, rtol=0.02)
+    assert set(made.drives.findings) == {"identified"}
+    crate = made.drives.loads[1]
+    assert crate.values[0] == pytest.approx(CRATE[0], rel=0.02)
+    every = (*made.train.recordings, *made.test.recordings)
+    for seed, (one, body) in enumerate(zip(every, BODIES.values(), strict=True)):
+        alone = recorded(seed, body)[1][50:-50]
+        left = one.tau[50:-50] - alone
+        bound = 2 * STD * GAINS + 0.03 * np.sqrt(np.mean(alone**2, axis=0))
+        assert np.all(np.sqrt(np.mean(left**2, axis=0)) < bound)
+        assert one.payload is None and not one.load
+        assert "torque from A by shoulder" in one.provenance.filter
+        assert ("less the torque of the load" in one.provenance.filter) == bool(body)
+    assert made.train.noise is not None
+    np.testing.assert_allclose(made.train.noise.torque_std, STD * made.drives.gains)
+
+
+def test_a_fit_prints_the_gains_first_and_has_their_errors(tmp_path: Path) -> None:
+    path = written(tmp_path)
+    done = CliRunner().invoke(commands, ["fit", str(path)])
+    assert done.exit_code == 0
+    assert done.stdout.index("Gains of the drives") < done.stdout.index("Parameters")
+    assert "Load 'crate'" in done.stdout and "Load 'tool'" not in done.stdout
+    done = CliRunner().invoke(commands, ["fit", str(path), "--json"])
+    said = json.loads(done.stdout)
+    assert [one["name"] for one in said["drives"]["joints"]] == ["shoulder", "elbow"]
+    made = load(path)
+    plain = fit(made.model, made.train).sigma
+    wide = np.array([one["sigma"] for one in said["parameters"]])
+    assert np.all(wide >= plain * (1 - 1e-9)) and np.any(wide > 1.1 * plain)
+
+
+@pytest.mark.parametrize("command", ["compare", "diagnose"])
+def test_commands_say_up_to_which_scale_things_are_known(tmp_path: Path, command: str) -> None:
+    text = STUDY.split("[[recordings]]")[0] + '[[recordings]]\nfile = "empty.csv"\n'
+    path = written(tmp_path, edited(("[loads.crate]", ""), text=text))
+    done = CliRunner().invoke(commands, [command, str(path)])
+    assert done.exit_code == 0, done.output
+    assert "known up to the common scale of the drives" in " ".join(done.stdout.split())
+
+
+def test_a_gain_that_is_known_fixes_the_scale(study) -> None:
+    text = edited(
+        ('torque_unit = "A"', 'torque_unit = "A"\ndrive_gains = { elbow = 5.0 }'),
+        ("mass = 1.5\ncentre = [0.1, -0.02, 0.0]\ninertia = [0, 0, 0, 0, 0, 0.004]\n", ""),
+        text=STUDY,
+    )
+    drives = study(text).drives
+    assert drives.findings == ("identified", "given")
+    assert drives.gains[0] == pytest.approx(GAINS[0], rel=0.02)
+    assert [load.values[0] for load in drives.loads] == pytest.approx([1.5, 0.8], rel=0.03)
+
+
+def test_loads_may_be_stated_where_they_are_carried(study) -> None:
+    inline = "payload = { mass = 1.5, centre = [0.1, -0.02, 0.0] }"
+    made = study(edited(('payload = "tool"', inline), text=STUDY))
+    assert len(made.drives.loads) == 2
+    np.testing.assert_allclose(made.drives.gains, GAINS, rtol=0.02)
+
+
+def test_loads_are_weighed_in_newton_metres_too(tmp_path: Path) -> None:
+    path = written(tmp_path, edited(('torque_unit = "A"', 'torque_unit = "N m"'), text=STUDY))
+    for seed, (name, body) in enumerate(BODIES.items()):
+        one = recorded(seed, body)[0]
+        write(one.replace(tau=one.tau * GAINS), tmp_path / f"{name}.csv")
+    made = load(path)
+    assert made.drives is not None
+    assert made.drives.loads[1].values[0] == pytest.approx(CRATE[0], rel=0.02)
+    assert "Gains" not in str(made.drives.tables()[0])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "what"),
+    [
+        ('payload = "crate"', 'payload = "crates"', "did you mean 'crate'"),
+        ('payload = "crate"', "payload = true", "name every load"),
+        ("[loads.crate]", "[loads.unknown]", "choose another name"),
+        ("mass = 1.5\n", "mass = -1.5\n", "loads.tool.mass"),
+        ("centre = [0.1, -0.02, 0.0]\n", "", "state its centre"),
+        ("centre = [0.1, -0.02, 0.0]", "center = [0.1, -0.02, 0.0]", "did you mean 'centre'"),
+        ("[loads.crate]", '[loads.crate]\nlink = "upper"', "moves no link 'upper'"),
+        ('torque_unit = "A"', 'torque_unit = "Nm"', "torque_unit"),
+        ('torque_unit = "A"', "drive_gains = { elbow = 2.0 }", 'state torque_unit = "A"'),
+        ('torque_unit = "A"', 'torque_unit = "A"\ndrive_gains = { wrist = 2.0 }', "no joint"),
+        ('use = "test"\npayload = "tool"', 'use = "test"\npayload = { mass = 2.0 }', "train with"),
+    ],
+)
+def test_what_cannot_be_is_refused_with_the_remedy(study, old: str, new: str, what: str) -> None:
+    with pytest.raises(StudyError, match=what):
+        study(edited((old, new), text=STUDY))
