@@ -220,3 +220,12 @@ def test_the_recorded_motor_gain_effect_is_refused() -> None:
     model, _, found = recordings()
     with pytest.raises(StudyError, match="drive_gain"):
         GainProblem(model + "drive_gain@j0", Dataset((found[""],)))
+
+
+def test_a_description_that_is_all_wrong_does_not_decide_signs_or_sizes() -> None:
+    model, _, found = recordings()
+    upside_down = replace(model, robot=model.robot.with_theta(-0.1 * model.robot.theta))
+    pair = (found[""], found["tool"].replace(load="tool"))
+    load = known(TOOL, centre=None, inertia=None)
+    result = fit_drive_gains(GainProblem(upside_down, Dataset(pair), loads=(load,)))
+    np.testing.assert_allclose(result.gains, GAINS, rtol=0.02)

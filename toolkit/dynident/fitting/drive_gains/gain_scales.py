@@ -62,9 +62,9 @@ def gain_scales(
     weighted = WeightedFactors(problem, factors, solution.weights)
     kappa = 1.0 / solution.gains
     found = weighted.linear(kappa)[0]
-    size = np.linalg.norm(weighted.gain_columns(kappa, found), axis=1)[free]
+    size = np.linalg.norm(weighted.gain_columns(found, kappa), axis=0)[free]
     size = np.maximum(size, np.finfo(float).tiny)
-    projected = weighted.projected(kappa)[1][:, free] / size
+    projected = weighted.projected(kappa, kappa)[1][:, free] / size
     _, shares, V = np.linalg.svd(projected, full_matrices=False)
     count = int(np.count_nonzero(shares <= UNSEEN))
     unseen = np.zeros((count, n))

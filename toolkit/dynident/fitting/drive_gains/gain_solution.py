@@ -21,6 +21,7 @@ from dynident.robot import BaseParameters, base_parameters
 
 _ROUNDS = 10  # of the joints' weights, until they settle
 _SETTLED = 1e-6
+_MOST = 300  # evaluations of a search
 _EXACT = 1e-9
 """Residual relative to the current below which it is rounding: no joint is weighted more."""
 
@@ -88,17 +89,32 @@ class WeightedFactors:
         """Torque of linear parameters (r,) and known loads in the rows of the factors, (n, m)."""
         return self.R[:, :, self.kept] @ found + self.R[:, :, -2]
 
-    def gain_columns(self, kappa: np.ndarray, found: np.ndarray) -> np.ndarray:
-        """Return what a unit of log(gain) adds to the residual of the joints, (n, n m)."""
-        n, m, _ = self.R.shape
-        columns = np.zeros((n, n, m))
-        columns[np.arange(n), np.arange(n)] = self.torques(found) * kappa[:, None]
-        return columns.reshape(n, n * m)
+    def gain_columns(self, found: np.ndarray, factor: np.ndarray) -> np.ndarray:
+        """Return what the torques of the joints, times a factor each, add to the rows, (n m, n).
 
-    def projected(self, kappa: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the residual (n m,) and its Jacobian (n m, n) by log(gain), the rest solved."""
+        Parameters
+        ----------
+        found : (r,) linear parameters.
+        factor : (n,); `kappa` for the change of the residual by log(gain).
+        """
+        n, m, _ = self.R.shape
+        columns = np.zeros((n, m, n))
+        columns[np.arange(n), :, np.arange(n)] = self.torques(found) * factor[:, None]
+        return columns.reshape(n * m, n)
+
+    def projected(self, kappa: np.ndarray, factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Solve for the linear parameters, and see what changes of gains show beside them.
+
+        Parameters
+        ----------
+        kappa, factor : as of `linear` and `gain_columns`.
+
+        Returns
+        -------
+        the residual (n m,), and its Jacobian (n m, n) in the unit of the factors
+        """
         found, residual, Q, _ = self.linear(kappa)
-        columns = self.gain_columns(kappa, found).T
+        columns = self.gain_columns(found, factor)
         return residual.ravel(), columns - Q @ (Q.T @ columns)
 
 
@@ -126,24 +142,27 @@ def solve_gains(problem: GainProblem, factors: TriangularFactors) -> GainSolutio
     if not np.all(size > 0):
         name = problem.model.robot.names[int(np.argmin(size))]
         raise FitError("the current is zero throughout", name, "is it the right column?")
-    start = _start(problem, factors)
     # At first what each joint's own columns leave, whatever the other joints say.
     share = problem.size / problem.model.robot.n
     freedom = np.sqrt(np.maximum(factors.counts - share, 1.0))
     std = np.maximum(np.abs(factors.R[:, -1, -1]), _EXACT * size) / freedom
-    logs = np.zeros(len(start))
+    weighted = WeightedFactors(problem, factors, 1.0 / std)
+    described = _described(problem, factors)
+    starts = [described, _linear_gains(weighted, described)]
+    kappa, cost = min((_search(weighted, 1.0 / one) for one in starts), key=lambda one: one[1])
     for _ in range(_ROUNDS):
-        weighted = WeightedFactors(problem, factors, 1.0 / std)
-        logs = _search(weighted, start, logs)
-        kappa = np.exp(-logs) / start
-        found, residual, _, _ = weighted.linear(kappa)
-        left = np.linalg.norm(residual, axis=1) / weighted.weights
+        left = np.linalg.norm(weighted.linear(kappa)[1], axis=1) / weighted.weights
         before, std = std, np.maximum(left, _EXACT * size) / freedom
         if np.max(np.abs(np.log(std / before))) < _SETTLED:
             break
+        weighted = WeightedFactors(problem, factors, 1.0 / std)
+        kappa, cost = _search(weighted, kappa)
+    if not np.isfinite(cost):
+        what = "the search for the drive gains does not converge"
+        raise FitError(what, remedy="give the gain of a joint or two in [drive_gains]")
     return GainSolution(
-        gains=start * np.exp(logs),
-        values=weighted.basis.lift(found, problem.given_values()),
+        gains=np.array(1.0 / kappa),
+        values=weighted.basis.lift(weighted.linear(kappa)[0], problem.given_values()),
         basis=weighted.basis,
         weights=weighted.weights,
         residual_std=std,
@@ -172,39 +191,36 @@ def at_gains(
     )
 
 
-def _search(weighted: WeightedFactors, start: np.ndarray, logs: np.ndarray) -> np.ndarray:
-    """Return logarithms of gain over start, (n,), of least squares."""
+def _search(weighted: WeightedFactors, start: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return kappa (n,) of least squares, and the cost; infinite if the search does not converge.
+
+    The search is in kappa over that of the start, through zero if need be: the sign of a start may
+    be wrong.
+    """
     free = np.flatnonzero(weighted.problem.free)
-    if not len(free):
-        return logs
+    count = max(float(np.linalg.norm(weighted.R[:, :, -1])), 1.0)  # residuals of order one
 
     def kappa(x: np.ndarray) -> np.ndarray:
-        every = np.zeros(len(start))
+        every = np.ones(len(start))
         every[free] = x
-        return np.exp(-every) / start
+        return every * start
 
-    count = max(np.linalg.norm(weighted.R[:, :, -1]), 1.0)  # residuals of order one
-    found: Any = least_squares(
-        lambda x: weighted.projected(kappa(x))[0] / count,
-        logs[free],
-        jac=lambda x: weighted.projected(kappa(x))[1][:, free] / count,  # type: ignore[arg-type]
-        method="trf",
-        xtol=1e-10,
-        ftol=1e-14,
-        gtol=1e-14,
-        max_nfev=200,
-    )
-    if not found.success or not np.all(np.isfinite(found.x)):
-        raise FitError(
-            f"the search for the drive gains did not converge: {found.message}",
-            remedy="give the gain of a joint or two in [drive_gains]",
-        )
-    every = np.zeros(len(start))
-    every[free] = found.x
-    return every
+    def residual(x: np.ndarray) -> np.ndarray:
+        return weighted.linear(kappa(x))[1].ravel() / count
+
+    def jacobian(x: np.ndarray) -> np.ndarray:
+        return weighted.projected(kappa(x), -start)[1][:, free] / count
+
+    x = np.ones(len(free))
+    if not len(free):
+        return start, float(np.sum(residual(x) ** 2))
+    search: Any = least_squares
+    found = search(residual, x, jacobian, xtol=1e-10, ftol=1e-14, gtol=1e-14, max_nfev=_MOST)
+    converged = found.success and np.all(np.isfinite(1.0 / found.x))
+    return kappa(found.x), float(found.cost) if converged else np.inf
 
 
-def _start(problem: GainProblem, factors: TriangularFactors) -> np.ndarray:
+def _described(problem: GainProblem, factors: TriangularFactors) -> np.ndarray:
     """Return gains (n,) at which the description's torque, and effects, fit the currents best."""
     model = problem.model
     rank, given = model.base.rank, problem.given_values()
@@ -220,6 +236,40 @@ def _start(problem: GainProblem, factors: TriangularFactors) -> np.ndarray:
         scale = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
         kappa = np.linalg.lstsq(columns / scale, R[:, -1], rcond=1e-8)[0][0] / scale[0]
         plain = np.linalg.norm(R[:, -1]) / scale[0]
-        # The sign is the data's; a size that effects have eaten up is not.
+        # What effects have eaten up is no size.
         gains[j] = np.copysign(1.0 / max(abs(kappa), 0.1 * plain), kappa)
+    return gains
+
+
+def _linear_gains(weighted: WeightedFactors, near: np.ndarray) -> np.ndarray:
+    """Return gains (n,) of torque = gain * current, linear in all that is unknown.
+
+    The noise of the currents makes them too small; their signs need no description. Where no load
+    and no gain is known, the vector of gains and parameters that leaves least, at the size and sign
+    of other gains.
+
+    Parameters
+    ----------
+    weighted : the problem.
+    near : (n,) other gains, which weight the joints' torques, and are taken where one comes out 0.
+    """
+    problem = weighted.problem
+    n, m, _ = weighted.R.shape
+    free = np.flatnonzero(problem.free)
+    R = weighted.R / near[:, None, None]
+    currents = np.zeros((n, m, n))
+    currents[np.arange(n), :, np.arange(n)] = R[:, :, -1]
+    fixed = currents[:, :, ~problem.free] @ near[~problem.free]
+    columns = np.concatenate([currents[:, :, free], -R[:, :, weighted.kept]], axis=2)
+    columns, target = columns.reshape(n * m, -1), (R[:, :, -2] - fixed).ravel()
+    scale = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
+    if np.any(target):
+        found = np.linalg.lstsq(columns / scale, target, rcond=RANK_TOLERANCE)[0] / scale
+    else:
+        found = np.linalg.svd(columns / scale, full_matrices=False)[2][-1] / scale
+        found = found * float(near[free] @ found[: len(free)])
+        size = np.linalg.norm(found[: len(free)])
+        found = found * (np.linalg.norm(near[free]) / size if size > 0 else 0.0)
+    gains = np.array(near)
+    gains[free] = np.where(found[: len(free)] != 0.0, found[: len(free)], near[free])
     return gains
