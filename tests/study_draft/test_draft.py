@@ -198,3 +198,21 @@ def test_patterns_stand_for_files_in_the_order_of_their_numbers(arm: Path) -> No
         written(arm.parent / f"run{k}.csv", as_logged(recording(1)))
     draft = draft_study(arm, [str(arm.parent / "run*.csv")])
     assert [one.file.name for one in draft.recordings] == ["run1.csv", "run2.csv", "run10.csv"]
+
+
+def test_currents_are_a_study_in_amperes_whose_gains_are_identified(arm: Path) -> None:
+    one, gains = recording(1), np.array([25.0, -6.0])
+    current = one.tau / gains
+    columns = {"timestamp": one.t, "actual_q_0": one.q[:, 0], "actual_q_1": one.q[:, 1]}
+    columns |= {"actual_current_0": current[:, 0], "actual_current_1": current[:, 1]}
+    study, decisions = read_back(arm, columns)
+    assert "A, the drives' own" in [one.words for one in decisions]
+    assert study.drives is not None and "common scale" in study.drives.sentence
+    # The description is right, and fixes the scale where nothing else does.
+    np.testing.assert_allclose(study.drives.gains, gains, rtol=0.02)
+    assert np.corrcoef(study.train.recordings[0].tau[:, 1], one.tau[:, 1])[0, 1] > 0.999
+    text = (arm.parent / "study.toml").read_text()
+    for line in ('# drive_gains = { "shoulder" = 10.0 }', "# [loads.tool]"):
+        assert line in text
+    shown = tomllib.loads(text)
+    assert shown["torque_unit"] == "A" and shown["columns"]["tau.elbow"] == "actual_current_1"

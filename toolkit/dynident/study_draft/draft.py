@@ -50,6 +50,7 @@ class StudyDraft:
     columns : ours -> theirs, also where both are called the same.
     recordings : entries of the study.
     torque : "measured" or "held_command".
+    torque_unit : "A" where drives report currents.
     effects : that the model starts with.
     rate_hz : of the slowest recording.
     gravity : (3) m/s^2, of the description.
@@ -62,6 +63,7 @@ class StudyDraft:
     columns: dict[str, Column]
     recordings: tuple[DraftedRecording, ...]
     torque: Literal["measured", "held_command"]
+    torque_unit: Literal["N m", "A"] = "N m"
     effects: tuple[str, ...]
     rate_hz: float
     gravity: tuple[float, ...]
@@ -136,11 +138,24 @@ class StudyDraft:
                 *rotor,
                 f"effects = {json.dumps(self.effects)}",
                 f'torque = "{self.torque}"  # {why}',
+                *self._drives(),
                 f"# friction_width = {FRICTION_WIDTH:g}  # rad/s; or of joints: {{ j1 = 0.05 }}",
                 f"# gravity = {json.dumps(self.gravity)}  # m/s^2 in the base's axes; a mounting on"
                 " a wall or a ceiling turns it",
             ]
         )
+
+    def _drives(self) -> list[str]:
+        """Keys of torques in amperes, and what fixes their scale."""
+        if self.torque_unit == "N m":
+            return []
+        first = next(name for name in self.columns if name.startswith("tau."))
+        gains = f"{{ {_quoted(first.partition('.')[2])} = 10.0 }}"
+        return [
+            'torque_unit = "A"  # motor currents: each joint has a gain, which is identified',
+            "# A known load (see the end) or a known gain fixes the common scale of the gains:",
+            f"# drive_gains = {gains}  # N m/A",
+        ]
 
     def _columns(self) -> str:
         lines = ["", "# Ours = the file's name of it, or a linear expression of its columns."]
@@ -199,6 +214,10 @@ class StudyDraft:
             "# start = 0.0            # s, when it began in the session: motors warm up",
             "# window = [0.0, 10.0]   # s, what to use of it",
             "# payload = true         # a load is carried; false: none; leave out: not known",
+            '# payload = "tool"       # one of several, or one of which something is known:',
+            "# [loads.tool]",
+            "# mass = 2.8                   # kg; what is left out is identified",
+            "# centre = [0.0, 0.02, 0.05]   # m, of mass, in the last link's frame",
         ]
         if not any(one.period for one in self.recordings):
             n = len([name for name in self.columns if name.startswith("q.")])
@@ -208,7 +227,7 @@ class StudyDraft:
                 "# Nothing repeats, so that the noise is unknown: state it if you know it.",
                 "# [noise]",
                 f"# position_std = {json.dumps([1e-5] * n)}  # rad or m",
-                f"# torque_std = [{listed}]  # N m or N",
+                f"# torque_std = [{listed}]  # {'N m or N' if self.torque_unit == 'N m' else 'A'}",
             ]
         if self.has_reference:
             lines += [

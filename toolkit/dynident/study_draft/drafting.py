@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -90,8 +91,9 @@ def draft_study(
     columns = _without_strangers(columns, recordings, notes)
     columns = _with_zeros(columns, recordings, described, notes)
     recordings = _read(logs, described, columns)
-    wiring = guess_wiring(described, recordings, columns)
-    columns = _wired(columns, wiring, matched, logs[0].where, notes)
+    unit = _unit(matched, notes)
+    wiring = guess_wiring(described, recordings, columns, unit)
+    columns = _wired(columns, wiring, logs[0].where, notes)
     recordings = _read(logs, described, columns)
     origin = matched.groups["tau"][chosen.get("tau", 0)].origin
     held = _is_held(described, recordings, origin == "command", notes)
@@ -101,6 +103,7 @@ def draft_study(
         columns=columns,
         recordings=_drafted(logs, recordings, notes),
         torque="held_command" if held else "measured",
+        torque_unit=unit,
         effects=(*_FRICTION, "rotor_inertia")
         if wiring.gears or ratios or matched.drive
         else _FRICTION,
@@ -224,8 +227,17 @@ def _with_zeros(
     return turned(columns, robot, guess.quarters)
 
 
+def _unit(matched: Matched, notes: _Notes) -> Literal["N m", "A"]:
+    """The unit of what stands for torques."""
+    if not matched.drive:
+        return "N m"
+    why = "the file has currents and no torques: the gain of each joint is identified with the rest"
+    choices = ["A, the drives' own", "N m, although the columns are called currents"]
+    return "A" if notes.take("torque_unit", choices, why) == 0 else "N m"
+
+
 def _wired(
-    columns: dict[str, Column], wiring: WiringGuess, matched: Matched, where: str, notes: _Notes
+    columns: dict[str, Column], wiring: WiringGuess, where: str, notes: _Notes
 ) -> dict[str, Column]:
     """The columns in units, gears and signs as whoever is asked takes them."""
     if wiring.unknown_gears:
@@ -240,8 +252,6 @@ def _wired(
         return columns
     what = "; ".join(what for what, _ in wiring.findings)
     why = "; ".join(dict.fromkeys(evidence for _, evidence in wiring.findings))
-    if matched.drive:
-        why += "; the file has currents, so this is a guess of the drives' gains and gears"
     taken = notes.take("units and signs", [what, "as recorded"], why)
     return wiring.columns if taken == 0 else columns
 

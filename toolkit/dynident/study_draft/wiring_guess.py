@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from dynident.criteria import DEFAULTS
 from dynident.errors import DynidentError
@@ -13,6 +14,9 @@ from dynident.wiring.assignment import Assignment
 from dynident.wiring.fault_words import faults_of
 from dynident.wiring.hypothesis_search import search
 from dynident.wiring.wiring_rows import rows_of
+
+_OF_GAINS = ("torque_sign", "torque_signs", "torque_unit", "torque_scale", "motor_side_torque")
+"""Faults that a gain of the drive makes up for."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +41,10 @@ class WiringGuess:
 
 
 def guess_wiring(
-    robot: Robot, recordings: tuple[Recording, ...], columns: dict[str, Column]
+    robot: Robot,
+    recordings: tuple[Recording, ...],
+    columns: dict[str, Column],
+    torque_unit: Literal["N m", "A"] = "N m",
 ) -> WiringGuess:
     """Compare recordings with the equations of motion of the robot as it is described.
 
@@ -46,6 +53,8 @@ def guess_wiring(
     robot : with its limits and described inertias.
     recordings : read with `columns`.
     columns : ours -> theirs, every `q` and `tau` among them.
+    torque_unit : "A" where they are currents: sizes and signs of them are gains to be identified,
+        and no fault.
 
     Returns
     -------
@@ -59,16 +68,23 @@ def guess_wiring(
         return WiringGuess(findings=(), columns=columns, note=error.what)
     if not result.accepted:
         return WiringGuess(findings=(), columns=columns)
+    ignored = _OF_GAINS if torque_unit == "A" else ()
     several = {
         robot.names[j]
         for one in (accepted.hypothesis for accepted in result.accepted)
-        if one.kind.startswith("motor_side") and len(one.joints) > 1
+        if one.kind.startswith("motor_side") and one.kind not in ignored and len(one.joints) > 1
         for j in one.joints
     }
-    faults = faults_of(model, result, recordings[0])
+    faults = [
+        fault for fault in faults_of(model, result, recordings[0]) if fault.kind not in ignored
+    ]
+    mended = _mended(robot, columns, result.assignment)
+    if torque_unit == "A":
+        plain = {column.name: column for ours, column in columns.items() if ours[:4] == "tau."}
+        mended |= {ours: plain[one.name] for ours, one in mended.items() if ours[:4] == "tau."}
     return WiringGuess(
         findings=tuple((fault.what, fault.evidence) for fault in faults),
-        columns=_mended(robot, columns, result.assignment),
+        columns=mended,
         unknown_gears=tuple(name for name in robot.names if name in several),
         gears=any("side" in fault.kind for fault in faults),
     )
