@@ -190,3 +190,21 @@ def test_loads_are_weighed_in_newton_metres_too(tmp_path: Path) -> None:
 def test_what_cannot_be_is_refused_with_the_remedy(study, old: str, new: str, what: str) -> None:
     with pytest.raises(StudyError, match=what):
         study(edited((old, new), text=STUDY))
+
+
+def test_payload_weighs_the_loads_that_are_not_known(tmp_path: Path) -> None:
+    path = written(tmp_path)
+    done = CliRunner().invoke(commands, ["payload", str(path), "--json"])
+    assert done.exit_code == 0, done.output
+    crate = json.loads(done.stdout)["loads"][1]
+    assert crate["mass"] == pytest.approx(CRATE[0], rel=0.02)
+    # A motion in a plane shows one moment of inertia, and no centre across the plane.
+    assert crate["consistent"] is None and "not judged" in crate["verdict"]
+    nothing = edited(
+        ("[loads.crate]\n", ""),
+        ('file = "crate.csv"\npayload = "crate"', 'file = "crate.csv"\nuse = "test"'),
+        text=STUDY,
+    )
+    path.write_text(nothing)
+    done = CliRunner().invoke(commands, ["payload", str(path)])
+    assert done.exit_code != 0 and "[loads.crate]" in str(done.exception)

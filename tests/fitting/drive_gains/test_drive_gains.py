@@ -229,3 +229,15 @@ def test_a_description_that_is_all_wrong_does_not_decide_signs_or_sizes() -> Non
     load = known(TOOL, centre=None, inertia=None)
     result = fit_drive_gains(GainProblem(upside_down, Dataset(pair), loads=(load,)))
     np.testing.assert_allclose(result.gains, GAINS, rtol=0.02)
+
+
+def test_what_the_model_lacks_is_said_and_widens_the_errors() -> None:
+    model, _, found = recordings()
+    pair = (found[""], found["tool"].replace(load="tool"))
+    load = (known(TOOL),)
+    whole = fit_drive_gains(GainProblem(model, Dataset(pair), loads=load))
+    assert whole.doubts == ()
+    lacking = fit_drive_gains(GainProblem(replace(model, effects=()), Dataset(pair), loads=load))
+    assert "lacks something" in lacking.doubts[0]
+    off = np.abs(np.log(lacking.gains / GAINS)) / lacking.relative_sigma
+    assert np.all(lacking.relative_sigma > 2 * whole.relative_sigma) and off.max() < 10

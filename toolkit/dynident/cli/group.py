@@ -18,6 +18,7 @@ _ORDER = (
     "explain",
     "diagnose",
     "fit",
+    "payload",
     "compare",
     "add",
     "simulate",

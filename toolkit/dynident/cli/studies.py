@@ -107,6 +107,30 @@ def compare(study: Path, additions: tuple[str, ...]) -> CommandAnswer:
 
 @commands.command()
 @STUDY
+@answered
+def payload(study: Path) -> CommandAnswer:
+    """Weigh the loads that recordings name: mass, centre, inertia, and if they are possible.
+
+    A load has a name in the study, [loads.crate], and recordings that carry it say so, payload =
+    "crate"; at least one recording is without it. What the table of the load leaves out is
+    identified. Of currents (torque_unit = "A") the gains of the drives come with it.
+
+    Exit status 1 if no rigid body can have the parameters of a load.
+
+    Example: dynident payload study.toml
+    """
+    loaded = load_study(study)
+    drives = loaded.drives
+    found = () if drives is None else tuple(one for one in drives.loads if not one.load.is_known)
+    if drives is None or not found:
+        remedy = 'add [loads.crate], and payload = "crate" to the [[recordings]] that carry it'
+        raise StudyError("no recording names a load that is to be weighed", str(study), remedy)
+    broken = any(one.is_whole and not one.is_consistent for one in found)
+    return CommandAnswer(content=drives.to_dict, parts=drives.tables, status=int(broken))
+
+
+@commands.command()
+@STUDY
 @click.argument("labels", metavar="EFFECT[@JOINT[:SOURCE]]...", nargs=-1, required=True)
 @answered
 def add(study: Path, labels: tuple[str, ...]) -> CommandAnswer:

@@ -13,6 +13,7 @@ from dynident.tables import Shown, Table, finite, number, percent
 
 Finding = Literal["given", "identified", "up to a common scale", "not told apart"]
 _FIXED = ("given", "identified")
+_MUCH_LEFT = 0.2  # of a joint's current
 _Z = 1.959964  # of a 95 % interval
 
 
@@ -33,6 +34,9 @@ class DriveGains(Shown):
     values : (p,) the model's parameters at these gains.
     residual_std : (n,) in the recorded unit.
     loads : as they were identified; those that are wholly known too.
+    joint_errors : (n,) norm of what the model leaves of the current, over that of the current.
+    lacking : whether sigma rests on the scatter between blocks of time, for noise does not explain
+        what the model leaves.
     rows, effective_rows : equations, and independent ones that would say as much.
     sources : the recordings.
     """
@@ -46,6 +50,8 @@ class DriveGains(Shown):
     covariance: np.ndarray
     values: np.ndarray
     residual_std: np.ndarray
+    joint_errors: np.ndarray
+    lacking: bool = False
     loads: tuple[IdentifiedLoad, ...] = ()
     rows: int = 0
     effective_rows: float = 0.0
@@ -121,6 +127,22 @@ class DriveGains(Shown):
             "in some recordings, or the gain of one joint in [drive_gains], fixes the scale."
         )
 
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Sentences on what the model leaves of the currents; none where it leaves noise."""
+        left = zip(self.joints, self.joint_errors, strict=True)
+        much = [f"{name} ({percent(x, 0)})" for name, x in left if x > _MUCH_LEFT]
+        found = []
+        if self.lacking:
+            found.append(
+                "Stretches of the motion differ by more than noise explains: the model lacks "
+                "something, sigma is that scatter, and gains may be further off. `explain` looks "
+                "for what is missing."
+            )
+        if much:
+            found.append(f"The model leaves much of the current at {', '.join(much)}.")
+        return tuple(found)
+
     def table(self) -> Table:
         """A row for each joint."""
         rows = tuple(
@@ -132,6 +154,7 @@ class DriveGains(Shown):
         notes = [self.sentence, *filter(None, [self.remedy])]
         if any(len(group) > 1 for group in self.groups):
             notes.append("sigma of such a gain is that of its ratio to the mean of its group.")
+        notes += self.doubts
         if np.any(self.gains < 0):
             names = [n for n, gain in zip(self.joints, self.gains, strict=True) if gain < 0]
             what = "the recorded sign is opposite to the joint's"
@@ -170,6 +193,7 @@ class DriveGains(Shown):
             ],
             "common_scales": [list(group) for group in self.groups],
             "sentence": self.sentence,
+            "doubts": list(self.doubts),
             "loads": [load.to_dict() for load in self.loads],
         }
 

@@ -89,6 +89,8 @@ def _assembled(
         covariance=found.matrix,
         values=solution.values[:p],
         residual_std=solution.residual_std,
+        joint_errors=solution.residual_std * np.sqrt(factors.counts) / factors.torque_norms,
+        lacking=found.lacking,
         loads=tuple(
             _identified(problem, solution, found, load, open_scale) for load in problem.loads
         ),

@@ -8,18 +8,23 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import qr, solve_triangular
+from scipy.stats import chi2
 
 from dynident.fitting.drive_gains.gain_rows import GainProblem
 from dynident.fitting.drive_gains.gain_scales import GainScales
 from dynident.fitting.drive_gains.gain_solution import GainSolution
 from dynident.fitting.linear_solution import LinearSolution
 from dynident.fitting.sampling import Sampled
+from dynident.fitting.uncertainty.cluster_sandwich import BlockScores, time_blocks
 from dynident.fitting.uncertainty.lagged_rows import LAGS
 from dynident.fitting.uncertainty.noise_shapes import noise_shapes
 from dynident.fitting.uncertainty.row_errors import RowErrors, errors_of
 from dynident.moments.factors import RANK_TOLERANCE, TriangularFactors
 from dynident.moments.lagged import RowBlock, lagged_products
 from dynident.robot import base_parameters
+
+_LEVEL = 1e-3
+"""Chance that scatter between blocks of time which is noise alone counts as more."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -32,10 +37,13 @@ class GainCovariance:
         geometric mean of their group, and parameters to the same. Rows of what is given, or
         not identified on its own, are zero.
     errors : of the rows, in the recorded unit.
+    lacking : whether some variances are those of the scatter between blocks of time, which noise
+        does not explain: the model lacks something.
     """
 
     matrix: np.ndarray
     errors: RowErrors
+    lacking: bool = False
 
 
 def gain_covariance(
@@ -57,10 +65,16 @@ def gain_covariance(
     samples = list(problem.samples())
     lags = min(LAGS, *(one.count // 10 for one in samples))
 
+    scores = BlockScores(len(columns))
+
     def blocks() -> Iterator[RowBlock]:
         for sampled in samples:
-            begins = True
+            begins, start, first = True, 0, scores.count
+            places = time_blocks(sampled, len(samples))
             for found, left in _derivatives(problem, solution, sampled, columns):
+                own = np.einsum("tjr,tj->tr", found, left * solution.weights**2)
+                scores.add(places[start : start + len(left)], own, first)
+                start += len(left)
                 yield begins, found, left, np.ones(left.shape, dtype=bool)
                 begins = False
 
@@ -81,9 +95,23 @@ def gain_covariance(
         lagged_products(blocks(), lags), noise_shapes(samples[0], lags), linear, squares
     )
     matrix = np.zeros((n + problem.size, n + problem.size))
-    matrix[np.ix_(columns, columns)] = errors.covariance
+    wider = _wider(errors.covariance, linear.covariance, scores)
+    matrix[np.ix_(columns, columns)] = errors.covariance * np.outer(wider, wider)
     gauge = _gauge(problem, factors, solution, scales)
-    return GainCovariance(matrix=gauge @ matrix @ gauge.T, errors=errors)
+    return GainCovariance(
+        matrix=gauge @ matrix @ gauge.T, errors=errors, lacking=bool(np.any(wider > 1.0))
+    )
+
+
+def _wider(noise: np.ndarray, bread: np.ndarray, scores: BlockScores) -> np.ndarray:
+    """Factors (r,) of the standard deviations of noise where blocks of time scatter by far more.
+
+    What the model lacks is no noise of any colour; it shows as estimates that differ from one
+    stretch of the motion to the next.
+    """
+    scatter = np.diag(bread @ scores.meat @ bread) / np.diag(noise)
+    freedom = scores.count - 1
+    return np.where(scatter > chi2.isf(_LEVEL, freedom) / freedom, np.sqrt(scatter), 1.0)
 
 
 def _derivatives(

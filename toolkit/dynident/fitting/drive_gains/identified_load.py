@@ -83,21 +83,25 @@ class IdentifiedLoad:
         return float(values[0]), float(np.sqrt(max(slope @ self.covariance @ slope, 0.0)))
 
     @property
+    def is_consistent(self) -> bool:
+        """Whether a rigid body can have these parameters; False where they are not all known."""
+        return self.is_whole and margins(self.phi).consistent
+
+    @property
     def verdict(self) -> str:
         """Whether a rigid body can have these parameters, by the whole pseudo-inertia."""
         if not self.is_whole:
             missing = [n for n, x in zip(PARAMETERS, self.phi, strict=True) if not np.isfinite(x)]
             return f"not judged: the data do not tell {', '.join(missing)} apart"
         value, sigma = self.least_eigenvalue
-        found = margins(self.phi)
-        if found.consistent:
+        if self.is_consistent:
             return "possible: its pseudo-inertia is positive definite"
         rules = {
             "mass": "the mass is negative",
             "inertia_com_min_eig": "a principal moment about the centre of mass is negative",
             "triangle": "one principal moment exceeds the sum of the others",
         }
-        why = "; ".join(rules[one] for one in found.broken)
+        why = "; ".join(rules[one] for one in margins(self.phi).broken)
         if value + 2 * sigma >= 0:
             return f"not possible as it is ({why}), but a possible body is within the errors"
         return f"not possible: {why}, by more than the errors explain"
@@ -141,7 +145,7 @@ class IdentifiedLoad:
                 k for k in ("mass", "centre", "inertia") if getattr(self.load, k) is not None
             ],
             "verdict": self.verdict,
-            "consistent": bool(margins(self.phi).consistent) if self.is_whole else None,
+            "consistent": self.is_consistent if self.is_whole else None,
             "common_scale_of": list(self.scale),
         }
 
