@@ -123,6 +123,8 @@ def test_the_open_scale_is_the_descriptions() -> None:
     scaled = replace(heavy, robot=heavy.robot.with_theta(heavy.robot.theta * 1.5))
     larger = fit_drive_gains(GainProblem(scaled, Dataset((one,))))
     np.testing.assert_allclose(larger.gains, 1.5 * GAINS, rtol=2e-3)
+    mirrored = fit_drive_gains(GainProblem(heavy, Dataset((one.replace(tau=-one.tau),))))
+    np.testing.assert_allclose(mirrored.gains, -GAINS, rtol=2e-3)
 
 
 def test_gains_follow_the_unit_of_the_currents() -> None:

@@ -25,6 +25,9 @@ from dynident.robot import base_parameters
 
 _LEVEL = 1e-3
 """Chance that scatter between blocks of time which is noise alone counts as more."""
+_WIDEST = 10.0
+"""Factor of sigma beyond which the scatter is that of a direction that the data hardly know, where
+few blocks measure nothing. Taste."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -111,7 +114,9 @@ def _wider(noise: np.ndarray, bread: np.ndarray, scores: BlockScores) -> np.ndar
     """
     scatter = np.diag(bread @ scores.meat @ bread) / np.diag(noise)
     freedom = scores.count - 1
-    return np.where(scatter > chi2.isf(_LEVEL, freedom) / freedom, np.sqrt(scatter), 1.0)
+    return np.where(
+        scatter > chi2.isf(_LEVEL, freedom) / freedom, np.minimum(np.sqrt(scatter), _WIDEST), 1.0
+    )
 
 
 def _derivatives(

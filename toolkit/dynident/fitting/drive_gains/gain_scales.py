@@ -116,6 +116,7 @@ def as_described(
         ours, described = R @ solution.values[:rank], R @ given
         square = float(np.sum(ours**2))
         scale = float(np.sum(ours * described)) / square if square > 0 else 0.0
-        if scale > 0 and np.isfinite(scale):
+        # A robot of negative masses draws the same currents: the sign is a scale like any other.
+        if scale != 0 and np.isfinite(scale):
             gains[list(group)] *= scale
     return at_gains(problem, factors, solution, gains)

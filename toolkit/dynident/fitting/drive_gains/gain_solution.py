@@ -148,8 +148,10 @@ def solve_gains(problem: GainProblem, factors: TriangularFactors) -> GainSolutio
     std = np.maximum(np.abs(factors.R[:, -1, -1]), _EXACT * size) / freedom
     weighted = WeightedFactors(problem, factors, 1.0 / std)
     described = _described(problem, factors)
-    starts = [described, _linear_gains(weighted, described)]
-    kappa, cost = min((_search(weighted, 1.0 / one) for one in starts), key=lambda one: one[1])
+    kappa, cost = _search(weighted, 1.0 / described)
+    other, less = _search(weighted, 1.0 / _linear_gains(weighted, described))
+    if less < cost * (1 - _SETTLED):  # what rounding alone decides, the description does
+        kappa, cost = other, less
     for _ in range(_ROUNDS):
         left = np.linalg.norm(weighted.linear(kappa)[1], axis=1) / weighted.weights
         before, std = std, np.maximum(left, _EXACT * size) / freedom
