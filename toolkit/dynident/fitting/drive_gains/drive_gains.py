@@ -14,6 +14,7 @@ from dynident.tables import Shown, Table, finite, number, percent
 Finding = Literal["given", "identified", "up to a common scale", "not told apart"]
 _FIXED = ("given", "identified")
 _MUCH_LEFT = 0.2  # of a joint's current
+_WEAK = 0.3  # relative standard deviation of a gain
 _Z = 1.959964  # of a 95 % interval
 
 
@@ -138,6 +139,13 @@ class DriveGains(Shown):
                 "Stretches of the motion differ by more than noise explains: the model lacks "
                 "something, sigma is that scatter, and gains may be further off. `explain` looks "
                 "for what is missing."
+            )
+        spread = zip(self.joints, self.relative_sigma, strict=True)
+        weak = [f"{name} ({percent(x, 0)})" for name, x in spread if x > _WEAK]
+        if weak:
+            found.append(
+                f"sigma of the gain at {', '.join(weak)} is so large that it is hardly known, and "
+                "neither are torques in N m there: give it in [drive_gains]."
             )
         if much:
             found.append(f"The model leaves much of the current at {', '.join(much)}.")
