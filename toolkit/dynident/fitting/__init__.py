@@ -16,6 +16,7 @@ from dynident.fitting.essential import EssentialParameters, essential_parameters
 from dynident.fitting.estimate import DataSource, Estimate
 from dynident.fitting.estimate_file import load_estimate
 from dynident.fitting.fit_model import Method, fit
+from dynident.fitting.fleet import Fleet, RobotComparison, compare_robots, fit_fleet
 from dynident.fitting.given import given_estimate
 from dynident.fitting.history import Convergence
 from dynident.fitting.instrumental import IV, Filtered, SimulatedLoop, SwappedPeriods
@@ -36,6 +37,7 @@ __all__ = [
     "EssentialParameters",
     "Estimate",
     "Filtered",
+    "Fleet",
     "GivenParameters",
     "InputNoise",
     "LeastSquares",
@@ -45,12 +47,15 @@ __all__ = [
     "Prior",
     "Projection",
     "Regression",
+    "RobotComparison",
     "Sampled",
     "SimulatedLoop",
     "SwappedPeriods",
+    "compare_robots",
     "encoder_noise",
     "essential_parameters",
     "fit",
+    "fit_fleet",
     "given_estimate",
     "input_noise",
     "load_estimate",
