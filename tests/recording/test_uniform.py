@@ -90,3 +90,21 @@ def test_long_gaps_are_refused():
     recording = Recording(t, t, t, ("a",), name="run")
     with pytest.raises(RecordingError, match=r"run, row 500: 0.101 s without samples.*in two"):
         uniform(recording)
+
+
+def test_a_recording_is_resampled_once_and_shared_by_its_windows():
+    recording = jittered()
+    with pytest.warns(DynidentWarning, match="run: .*jittered"):
+        even = uniform(recording)
+    with pytest.warns(DynidentWarning, match="run: .*jittered"):  # whoever asks is told
+        assert uniform(recording) is even
+    with pytest.warns(DynidentWarning, match="other: .*jittered"):
+        window = uniform(recording.replace(window=(1.0, 2.0), name="other"))
+    assert window.q is even.q and window.t is even.t
+    assert (window.window, window.name) == ((1.0, 2.0), "other")
+    assert window.provenance.filter == even.provenance.filter
+    with pytest.warns(DynidentWarning, match="jittered"):
+        shaken = uniform(recording.replace(q=recording.q + 0.1))
+    np.testing.assert_allclose(shaken.q, even.q + 0.1, atol=1e-12)
+    with pytest.warns(DynidentWarning, match="jittered"):
+        assert uniform(recording.replace(period=0.7)).rate_hz != even.rate_hz

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -19,6 +20,18 @@ _LONGEST_STALE = 5
 """Repeated rows in a run up to which they are a stale reading, not a robot at rest."""
 
 
+@dataclass(frozen=True, eq=False)
+class _Even:
+    """A recording on a uniform clock, and the warning that goes with it."""
+
+    recording: Recording
+    words: str
+
+
+_EVEN: WeakKeyDictionary[Recording, _Even] = WeakKeyDictionary()
+"""Resampled recordings by the jittered ones, for as long as these are in use."""
+
+
 def uniform(recording: Recording) -> Recording:
     """Return the recording on a uniform clock.
 
@@ -28,6 +41,10 @@ def uniform(recording: Recording) -> Recording:
     the same reading logged twice, under a time stamp that is not its own. Longer runs are a robot
     at rest, and stay. Held commands are averaged over each new step instead, which keeps them
     held commands.
+
+    A recording is resampled once, and so are its copies with another window: all of its samples
+    stay in memory from then on, while it is in use. Files that are mapped into memory should
+    therefore have a uniform clock.
 
     Parameters
     ----------
@@ -49,11 +66,46 @@ def uniform(recording: Recording) -> Recording:
         If it was resampled, naming the jitter and how many rows were dropped. The spread of true
         sampling instants about their stamps becomes noise that no filter undoes.
     """
+    even = _EVEN.get(recording) or _shared(recording)
+    if even is None:
+        step = _step(recording)
+        if step is None and recording.jitter <= TOLERANCE:
+            return recording
+        even = _resampled(recording, step)
+    _EVEN[recording] = even
+    warnings.warn(f"{recording.where}: {even.words}", DynidentWarning, stacklevel=2)
+    return even.recording
+
+
+def _shared(recording: Recording) -> _Even | None:
+    """What has been made of the same samples under another window, say."""
+    for other, even in list(_EVEN.items()):
+        if all(getattr(other, name) is getattr(recording, name) for name in ("t", *SIGNALS)) and (
+            other.period,
+            other.torque,
+        ) == (recording.period, recording.torque):
+            done = even.recording
+            same = {name: getattr(done, name) for name in ("t", *SIGNALS)}
+            filter = _history(recording, done.rate_hz)
+            source = replace(recording.provenance, filter=filter)
+            return _Even(recording.replace(provenance=source, **same), even.words)
+    return None
+
+
+def _history(recording: Recording, rate_hz: float) -> str:
+    """What was done to a recording that is now at a uniform rate."""
+    before = recording.provenance.filter
+    return f"{before}, {_done(rate_hz)}" if before else _done(rate_hz)
+
+
+def _done(rate_hz: float) -> str:
+    return f"resampled to {rate_hz:.6g} Hz"
+
+
+def _resampled(recording: Recording, step: float | None) -> _Even:
+    """Put a recording on a clock of this step in s; None for its mean one."""
     jitter = recording.jitter
     jittered = jitter > TOLERANCE
-    step = _step(recording)
-    if not jittered and step is None:
-        return recording
     fresh = _fresh(recording) if jittered else np.ones(recording.samples, dtype=bool)
     t = recording.t[fresh]
     _refuse_gaps(recording, np.flatnonzero(fresh))
@@ -62,7 +114,7 @@ def uniform(recording: Recording) -> Recording:
     signals = {
         signal: None
         if (x := getattr(recording, signal)) is None
-        else _interpolated(t, x[fresh], grid)
+        else _interpolated(t, x, fresh, grid)
         for signal in SIGNALS
     }
     if recording.torque == "held_command":
@@ -75,18 +127,21 @@ def uniform(recording: Recording) -> Recording:
             why += f", and {dropped} rows ({share:.2g} %) repeat the reading before"
     else:
         why = f"the period of {recording.period:g} s is no whole number of samples"
-    done = f"resampled to {1 / step:.6g} Hz"
-    warnings.warn(f"{recording.where}: {why}; {done}", DynidentWarning, stacklevel=2)
-    source = recording.provenance
-    history = f"{source.filter}, {done}" if source.filter else done
-    return recording.replace(t=grid, provenance=replace(source, filter=history), **signals)
+    for x in (grid, *signals.values()):
+        if x is not None:
+            x.setflags(write=False)  # then it is not copied
+    source = replace(recording.provenance, filter=_history(recording, 1 / step))
+    even = recording.replace(t=grid, provenance=source, **signals)
+    return _Even(even, f"{why}; {_done(1 / step)}")
 
 
-def _interpolated(t: np.ndarray, x: np.ndarray, grid: np.ndarray) -> np.ndarray:
-    """Splines of x (T, n) at other times; columns that are not recorded stay so."""
+def _interpolated(t: np.ndarray, x: np.ndarray, fresh: np.ndarray, grid: np.ndarray) -> np.ndarray:
+    """Splines of the fresh rows of x (T, n) at other times; columns not recorded stay so."""
     found = np.full((len(grid), x.shape[1]), np.nan)
-    recorded = np.isfinite(x).all(axis=0)
-    found[:, recorded] = CubicSpline(t, x[:, recorded])(grid)
+    for k in range(x.shape[1]):  # one by one: a spline takes many times its samples' memory
+        column = x[fresh, k]
+        if np.isfinite(column).all():
+            found[:, k] = CubicSpline(t, column)(grid)
     return found
 
 
@@ -106,8 +161,10 @@ def _step(recording: Recording) -> float | None:
 def _fresh(recording: Recording) -> np.ndarray:
     """Rows that are no repetition of the reading before."""
     signals = [x for name in ("q", "v", "a", "tau") if (x := getattr(recording, name)) is not None]
-    readings = np.hstack(signals)
-    same = np.concatenate([[False], (readings[1:] == readings[:-1]).all(axis=1)])
+    same = np.ones(recording.samples, dtype=bool)
+    same[0] = False
+    for x in signals:
+        same[1:] &= (x[1:] == x[:-1]).all(axis=1)
     edges = np.diff(np.concatenate([[0], same.astype(int), [0]]))
     for start, stop in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
         if stop - start > _LONGEST_STALE:
