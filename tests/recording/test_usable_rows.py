@@ -1,5 +1,7 @@
 """Which rows count: ends that filters make up, standstill, a loop that still settles."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -104,3 +106,21 @@ def test_the_provenance_says_how_many_rows_and_why():
     twice = (count + count).to_dict()
     assert twice["used"] == 2 * rows and twice["dropped"]["ends"] == 2 * count.ends
     assert "ends kept" in sources_of(Dataset((made(still),), Filter(ends="keep")))[0].filter
+
+
+def test_repetitions_are_compared_in_parts():
+    t = np.arange(200_000) / 1000
+    noise = 1e-5 * np.random.default_rng(3).standard_normal((len(t), 3))
+    q = swing(t)[:, None] + 0.05 * (np.exp(-t / 0.15) * np.cos(40 * t))[:, None] + noise
+    long = Recording(t, q, q, ("a", "b", "c"), period=100.0)
+    tracemalloc.start()
+    found = usable(long)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < long.q.nbytes / 2
+    # As a comparison of the whole finds it.
+    apart = np.abs(long.q[100_000:] - long.q[:100_000])
+    least = 5 * np.sqrt(np.mean(apart[50_000:] ** 2, axis=0))
+    least = np.maximum(least, 1e-4 * np.ptp(long.q, axis=0))
+    last = np.flatnonzero(np.any(apart > least, axis=1))[-1]
+    assert found.window == (long.t[last], np.inf)

@@ -9,6 +9,7 @@ pose that is held in the middle of a recording was chosen, and stays.
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, fields
 from itertools import pairwise
 from typing import Any
@@ -27,6 +28,7 @@ _NOISE = 6.0  # standard deviations of the position's noise likewise
 _SETTLED = 5.0  # times the later differences of repetitions, above which a loop has not settled
 _FINE = 1e-4  # of a joint's travel by which repetitions may differ in any case
 _AT_ONCE = 65536  # samples that are looked at
+_COMPARED = 8192  # samples that are compared with those of the next period at a time
 _QUIET = 0.1  # s that repetitions must agree for a transient to be over
 
 STANDS_STILL = "standing still"
@@ -262,16 +264,16 @@ def _settled(recording: Recording) -> float:
     period = recording.period
     if period is None or recording.duration < 1.5 * period:
         return start
-    t = recording.t[recording.t <= recording.t[-1] - period]
-    first = recording.q[: len(t)]
-    again = np.stack([np.interp(t + period, recording.t, column) for column in recording.q.T], 1)
-    apart = np.abs(again - first)
+    count = int(np.searchsorted(recording.t, recording.t[-1] - period, side="right"))
+    t = recording.t[:count]
     # The first period against the second; what differs later is noise, or a drift.
-    head = t < start + period
-    later = apart[~head] if np.count_nonzero(~head) > len(t) // 4 else apart[len(apart) // 2 :]
-    usual = np.sqrt(np.mean(later**2, axis=0))
+    head = int(np.searchsorted(t, start + period))
+    later = slice(head, count) if count - head > count // 4 else slice(count // 2, count)
+    squares = sum(np.sum(apart**2, axis=0) for apart in _apart(recording, later))
+    usual = np.sqrt(squares / (later.stop - later.start))
     least = np.maximum(_SETTLED * usual, _FINE * np.ptp(recording.q, axis=0))
-    far = np.flatnonzero(np.any(apart[head] > least, axis=1))
+    parts = [np.any(apart > least, axis=1) for apart in _apart(recording, slice(0, head))]
+    far = np.flatnonzero(np.concatenate(parts))
     if not len(far) or t[far[0]] - start > _QUIET:
         return start
     over = far[-1]
@@ -282,3 +284,16 @@ def _settled(recording: Recording) -> float:
     settled = float(t[over])
     # Half a period and more is no transient: it does not repeat, which others say.
     return settled if settled - start < period / 2 else start
+
+
+def _apart(recording: Recording, rows: slice) -> Iterator[np.ndarray]:
+    """How far the positions of some rows are from those a period later, (T, n) part by part."""
+    t, q = recording.t, recording.q
+    for start in range(rows.start, rows.stop, _COMPARED):
+        stop = min(start + _COMPARED, rows.stop)
+        later = t[start:stop] + recording.period
+        low = max(0, int(np.searchsorted(t, later[0], side="right")) - 1)
+        high = int(np.searchsorted(t, later[-1])) + 1
+        there = t[low:high]
+        again = [np.interp(later, there, column) for column in q[low:high].T]
+        yield np.abs(np.stack(again, axis=1) - q[start:stop])
