@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from dataclasses import replace as _replace
+from itertools import pairwise
 from mmap import mmap
 from typing import Any, Literal
 
@@ -66,6 +67,7 @@ class Recording:
     ----------
     t : (T,) s, strictly increasing. This and all signals may be files that are mapped into memory
         to be read, of any length: they are looked at part by part, and so do fits by least squares.
+        They should have a uniform clock: a jittered one is resampled as a whole, into memory.
     q : (T, n) rad, or m for prismatic joints.
     tau : (T, n) N m, or N for prismatic joints.
     joints : n names, the order of the columns.
@@ -194,6 +196,9 @@ class Recording:
     def select(self, joints: Sequence[str]) -> Recording:
         """Return the recording of these joints only, in this order.
 
+        Columns of files that are mapped into memory stay there where they are evenly apart and in
+        the recording's order; others are copied.
+
         Raises
         ------
         RecordingError
@@ -205,7 +210,7 @@ class Recording:
                 f"no joint '{missing[0]}'", self.where, f"joints: {', '.join(self.joints)}"
             )
         picked = [self.joints.index(joint) for joint in joints]
-        return self.replace(joints=tuple(joints), **self._mapped(lambda x: x[:, picked]))
+        return self.replace(joints=tuple(joints), **self._mapped(lambda x: _columns(x, picked)))
 
     def cut(self, t0: float | None = None, t1: float | None = None) -> Recording:
         """Return the samples with t0 <= t < t1 (s, as in `t`); None leaves that side open.
@@ -342,6 +347,16 @@ class Recording:
                 )
         if self.payload not in (None, True, False):
             raise RecordingError(f"payload = {self.payload!r}", self.where, "write true or false")
+
+
+def _columns(x: np.ndarray, picked: list[int]) -> np.ndarray:
+    """Columns of x (T, n); a view where they are evenly apart, else read-only."""
+    steps = {two - one for one, two in pairwise(picked)} or {1}
+    if picked and len(steps) == 1 and min(steps) > 0:
+        return x[:, picked[0] : picked[-1] + 1 : steps.pop()]
+    found = np.take(x, picked, axis=1)
+    found.setflags(write=False)  # then it is not copied again
+    return found
 
 
 def _owner(array: np.ndarray) -> object:
