@@ -129,6 +129,9 @@ class MotionInParts:
     def part(self, rows: slice) -> Motion:
         """Compute some consecutive rows; those of the whole, to rounding.
 
+        The second difference magnifies rounding with the square of the sampling rate: at 10 kHz
+        accelerations agree to about 1e-7 of the largest, at 1 kHz to 1e-9.
+
         Parameters
         ----------
         rows : from which to before which, counted from `first`.
