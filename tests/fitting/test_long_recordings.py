@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import tracemalloc
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
-from dynident.fitting import fit, sample
+from dynident.errors import FitError
+from dynident.fitting import Estimate, fit, sample
 from dynident.fitting.sampling import BLOCK
 from dynident.model import Model
 from dynident.recording import Dataset, Filter, Recording, differentiate
@@ -84,3 +86,25 @@ def test_a_longer_recording_takes_no_more_memory(model: Model, long: Recording) 
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < 1.2 * peaks[0]
+
+
+def test_memory_that_does_not_suffice_is_told_in_one_line(model: Model, long: Recording) -> None:
+    class Greedy:
+        name: ClassVar[str] = "greedy"
+
+        def fit(self, model: Model, dataset: Dataset) -> Estimate:
+            raise MemoryError
+
+    with pytest.raises(FitError, match=r"out of memory\. use fewer or shorter recordings"):
+        fit(model, long, Greedy())
+
+
+def test_joints_of_a_mapped_file_stay_in_it(long: Recording, tmp_path: Path) -> None:
+    q = np.column_stack([long.q, 2 * long.q])
+    np.save(tmp_path / "q.npy", q)
+    mapped = np.load(tmp_path / "q.npy", mmap_mode="r")
+    recording = Recording(long.t, mapped, mapped, ("a", "b", "c", "d"))
+    for joints, shared in (("bd", True), ("c", True), ("da", False), ("abd", False)):
+        chosen = recording.select(tuple(joints))
+        np.testing.assert_array_equal(chosen.q, q[:, ["abcd".index(one) for one in joints]])
+        assert np.shares_memory(chosen.q, mapped) == shared

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import ClassVar, Protocol
 
+from dynident.errors import FitError
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import LeastSquares
 from dynident.fitting.row_objective import refine_shapes, shaped_effects
@@ -60,12 +61,20 @@ def fit(model: Model, data: Dataset | Recording, method: Method | None = None) -
     Raises
     ------
     FitError
-        If the data cannot carry the model.
+        If the data cannot carry the model, or memory does not suffice.
     RecordingError
         If a recording does not suit its filter.
     """
-    dataset = Dataset((data,)) if isinstance(data, Recording) else data
-    method = method or LeastSquares()
+    try:
+        dataset = Dataset((data,)) if isinstance(data, Recording) else data
+        return _fitted(model, dataset, method or LeastSquares())
+    except MemoryError:
+        where = data.where if isinstance(data, Recording) else None
+        remedy = "use fewer or shorter recordings, or a lower rate"
+        raise FitError("out of memory", where, remedy) from None
+
+
+def _fitted(model: Model, dataset: Dataset, method: Method) -> Estimate:
     if not shaped_effects(model):
         return method.fit(model, dataset)
     shaped = refine_shapes(model, dataset)

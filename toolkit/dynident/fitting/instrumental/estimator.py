@@ -37,6 +37,8 @@ class IV:
     recording. V, the same columns along a motion without that noise, corrects this. Where V comes
     from the simulated loop of the last estimate, the two are iterated to a fixed point.
 
+    Unlike least squares, this takes recordings as a whole: memory grows with their length.
+
     Parameters
     ----------
     instruments : a `Controller`, for the simulated loop with its defaults; a `SimulatedLoop`;
