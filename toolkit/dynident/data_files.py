@@ -42,7 +42,7 @@ def find_data(file: str, folder: Path) -> Path:
     tried = [place / file for place in _places(folder)]
     for path in tried:
         # Whatever is no file and no folder is refused, with the reason, by who opens it.
-        if path.exists():
+        if _is_there(path):
             return path
     downloaded = _download(Path(file).name)
     if downloaded is not None:
@@ -51,6 +51,14 @@ def find_data(file: str, folder: Path) -> Path:
     if "EMPS" in file:
         remedy += "; or `pip install nonlinear-benchmarks`, which downloads this benchmark"
     raise FileError("no such data file", str(tried[0]), remedy)
+
+
+def _is_there(path: Path) -> bool:
+    """Whether a path leads to anything; a name that no system takes leads nowhere."""
+    try:
+        return path.exists()
+    except OSError:
+        return False
 
 
 def find_all(pattern: str, folder: Path) -> dict[str, Path]:
@@ -77,7 +85,7 @@ def find_all(pattern: str, folder: Path) -> dict[str, Path]:
         what = f"more than {_MOST_LEVELS} folders of the pattern have wildcards in their names"
         raise FileError(what, pattern, "name the upper ones")
     places = _places(folder)
-    if not glob.has_magic(pattern) or any((place / pattern).exists() for place in places):
+    if not glob.has_magic(pattern) or any(_is_there(place / pattern) for place in places):
         return {pattern: find_data(pattern, folder)}
     for place in places:
         found: list[str] = []

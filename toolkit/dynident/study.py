@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import tomlkit
@@ -48,6 +48,10 @@ from dynident.recording import (
 )
 from dynident.robot import Robot
 from dynident.settings import Duration, Rate, SettingsTable, Time, read_toml
+
+_NARROWEST, _WIDEST = 1e-9, 1e3
+"""rad/s or m/s over which dry friction changes its sign."""
+_Gravity = Annotated[float, Field(ge=-100, le=100)]
 
 
 class _RecordingEntry(SettingsTable):
@@ -145,7 +149,7 @@ class _StudyFile(SettingsTable):
     drive_gains: dict[str, float] = Field(default_factory=dict)
     loads: dict[str, LoadEntry] = Field(default_factory=dict)
     friction_width: float | dict[str, float] = FRICTION_WIDTH
-    gravity: tuple[float, float, float] | None = None
+    gravity: tuple[_Gravity, _Gravity, _Gravity] | None = None
     recordings: list[_RecordingEntry]
     filter: _FilterEntry | None = None
     noise: _NoiseEntry | None = None
@@ -157,8 +161,12 @@ class _StudyFile(SettingsTable):
     @classmethod
     def _positive(cls, width: float | dict[str, float]) -> float | dict[str, float]:
         """Refuse a width that is no width."""
-        if not all(one > 0 for one in (width.values() if isinstance(width, dict) else (width,))):
-            raise PydanticCustomError("width", "input should be greater than 0")  # pyright: ignore
+        for one in width.values() if isinstance(width, dict) else (width,):
+            if not one > 0:
+                raise PydanticCustomError("width", "input should be greater than 0")  # pyright: ignore
+            if not _NARROWEST <= one <= _WIDEST:
+                what = f"input should be from {_NARROWEST:g} to {_WIDEST:g} rad/s or m/s"
+                raise PydanticCustomError("width", what)  # pyright: ignore
         return width
 
     @field_validator("columns", mode="before")

@@ -13,6 +13,7 @@ from dynident import files
 from dynident.cli.group import CommandAnswer, answered, collected, commands
 from dynident.cli.output import progress
 from dynident.errors import FileError
+from dynident.tables import printable
 
 if TYPE_CHECKING:
     from dynident.study_draft import Decision
@@ -61,9 +62,12 @@ def init(robot: Path, data: tuple[str, ...], out: Path, told: _Told) -> CommandA
     if out.exists():
         raise FileError("is there already", str(out), "name another file with --out, or remove it")
     ask = _ask if sys.stdin.isatty() and sys.stderr.isatty() else None
-    with progress("reading"):
+    if ask is not None:  # a bar would be drawn over the questions
         draft = draft_study(robot, data, ask=ask, **told.read())
-        draft.write(out)
+    else:
+        with progress("reading"):
+            draft = draft_study(robot, data, **told.read())
+    draft.write(out)
     return CommandAnswer(
         content=lambda: {"out": str(out), **draft.to_dict()},
         parts=lambda: (
@@ -85,8 +89,9 @@ def _numbers(text: str) -> list[float]:
 
 def _ask(decision: Decision) -> int:
     """Have a choice taken at the terminal."""
-    click.echo(f"\n{decision.subject}: likeliest 1, because {decision.reason}", err=True)
+    said = f"{decision.subject}: likeliest 1, because {decision.reason}"
+    click.echo(f"\n{printable(said)}", err=True)
     for number, choice in enumerate(decision.choices, start=1):
-        click.echo(f"  {number}  {choice}", err=True)
+        click.echo(f"  {number}  {printable(choice)}", err=True)
     kind = click.IntRange(1, len(decision.choices))
     return click.prompt("which", type=kind, default=1, err=True) - 1

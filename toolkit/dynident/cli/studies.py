@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from dynident import files
 from dynident.cli.group import CommandAnswer, answered, commands
 from dynident.cli.output import progress
 from dynident.cli.work import (
@@ -141,6 +142,7 @@ def add(study: Path, labels: tuple[str, ...]) -> CommandAnswer:
     from dynident.effects import effects_of
     from dynident.study import add_effects
 
+    files.require_place(study)
     loaded = load_study(study)
     every = (one for label in labels for one in effects_of(label, loaded.robot))
     fresh = tuple(dict.fromkeys(one for one in every if one not in loaded.model))

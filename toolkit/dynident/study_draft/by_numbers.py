@@ -84,7 +84,10 @@ def named_by_numbers(
         If there is no clock and no rate, or no block of columns is a position and its speed.
     """
     x, n = x[:_SAMPLES], robot.n
-    clock = next((k for k in range(x.shape[1]) if _is_clock(x[:, k])), None)
+    clocks = [k for k in range(x.shape[1]) if _is_clock(x[:, k])]
+    # Beside a clock, what goes up by one is the number of the sample.
+    clocks.sort(key=lambda k: bool(np.all(np.diff(x[:, k]) == 1.0)))
+    clock = clocks[0] if clocks and rate_hz is None else None
     if clock is None and rate_hz is None:
         remedy = "give the samples' rate: --rate 125"
         raise RecordingError("none of its columns is a clock", where, remedy)
@@ -95,7 +98,7 @@ def named_by_numbers(
     starts = [
         s
         for s in range(x.shape[1] - n + 1)
-        if (clock is None or not s <= clock < s + n) and np.ptp(x[:, s : s + n], axis=0).any()
+        if not any(s <= k < s + n for k in clocks) and np.ptp(x[:, s : s + n], axis=0).any()
     ]
     pairs = [(q, v) for q in starts for v in starts if abs(q - v) >= n and _is_rate(x, t, q, v, n)]
     if not pairs:

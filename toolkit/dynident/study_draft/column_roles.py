@@ -11,71 +11,46 @@ from typing import Literal
 Signal = Literal["t", "q", "v", "a", "tau", "current", "temperature"]
 Origin = Literal["plain", "measured", "reference", "command"]
 
+
+def _set(words: str) -> frozenset[str]:
+    return frozenset(words.split())
+
+
 _SIGNALS: dict[Signal, frozenset[str]] = {
-    "t": frozenset(["t", "time", "times", "timestamp", "timestamps", "stamp", "clock"]),
-    "q": frozenset(
-        [
-            "q",
-            "qm",
-            "qs",
-            "pos",
-            "position",
-            "positions",
-            "angle",
-            "angles",
-            "theta",
-            "phi",
-            "encoder",
-        ]
-    ),
-    "v": frozenset(
-        ["v", "dq", "qd", "qdot", "vel", "velocity", "velocities", "speed", "speeds", "omega"]
-    ),
-    "a": frozenset(["a", "ddq", "qdd", "qddot", "acc", "accel", "acceleration", "accelerations"]),
-    "tau": frozenset(
-        [
-            "tau",
-            "torque",
-            "torques",
-            "effort",
-            "efforts",
-            "trq",
-            "moment",
-            "force",
-            "forces",
-            "tauj",
-        ]
-    ),
-    "current": frozenset(["i", "current", "currents", "curr", "amps", "cur", "voltage", "vir"]),
-    "temperature": frozenset(["temp", "temperature", "temperatures"]),
+    "t": _set("t time times timestamp timestamps stamp clock"),
+    "q": _set("q qm qs pos position positions angle angles theta phi encoder"),
+    "v": _set("v dq qd qdot vel velocity velocities speed speeds omega"),
+    "a": _set("a ddq qdd qddot acc accel acceleration accelerations"),
+    "tau": _set("tau tauj torque torques effort efforts trq moment force forces"),
+    "current": _set("i current currents curr cur amps voltage vir"),
+    "temperature": _set("temp temperature temperatures"),
 }
 _SIGNAL_OF: dict[str, Signal] = {
     word: signal for signal, words in _SIGNALS.items() for word in words
 }
 _ORIGINS: dict[Origin, frozenset[str]] = {
-    "measured": frozenset(["actual", "act", "measured", "meas", "msr", "real"]),
-    "reference": frozenset(["ref", "reference", "des", "desired", "target", "goal", "setpoint"]),
-    "command": frozenset(["cmd", "command", "commanded", "con", "ctrl", "control"]),
+    "measured": _set("actual act measured meas msr real fbk feedback ist pv"),
+    "reference": _set(
+        "ref reference des desired target goal setpoint set sp soll demand dmd planned nominal"
+    ),
+    "command": _set("cmd command commanded con ctrl control"),
 }
 _ORIGIN_OF: dict[str, Origin] = {
     word: origin for origin, words in _ORIGINS.items() for word in words
 }
+_OTHER = _set(
+    "tcp tool ee cartesian pose wrench ext external ff gravity friction limit max min err error lag"
+)
+"""Words of what is no signal of a joint, or is worked out by a controller: left alone."""
 _SCALES: dict[str, tuple[Signal, float]] = {
-    "deg": ("q", math.pi / 180),
-    "degree": ("q", math.pi / 180),
-    "degrees": ("q", math.pi / 180),
-    "mnm": ("tau", 1e-3),
-    "nmm": ("tau", 1e-3),
-    "ms": ("t", 1e-3),
-    "msec": ("t", 1e-3),
-    "us": ("t", 1e-6),
-    "usec": ("t", 1e-6),
-    "ns": ("t", 1e-9),
-    "nsec": ("t", 1e-9),
-    "nanosec": ("t", 1e-9),
+    **dict.fromkeys(_set("deg degree degrees"), ("q", math.pi / 180)),
+    **dict.fromkeys(_set("mnm nmm"), ("tau", 1e-3)),
+    **dict.fromkeys(_set("ms msec msecs milliseconds"), ("t", 1e-3)),
+    **dict.fromkeys(_set("us usec usecs microseconds"), ("t", 1e-6)),
+    **dict.fromkeys(_set("ns nsec nsecs nanosec nanosecs nanoseconds"), ("t", 1e-9)),
 }
 """Words for units, of which signal, and what makes ours of them; degrees are of speeds too."""
-_UNITS = frozenset(["rad", "nm", "s", "sec", "secs", "second", "seconds", "m", "n"])
+_UNITS = _set("rad nm s sec secs second seconds m n")
 _ANGULAR: tuple[Signal, ...] = ("q", "v", "a")
 _WORDS = re.compile(r"mNm|Nmm|Nm|[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 
@@ -88,6 +63,7 @@ class ColumnRole:
     ----------
     column : its name.
     signal : which.
+    word : of the name that says so.
     origin : whether it is what was measured, a reference or a command, where the name says so.
     joint : number of the joint in the robot that the name holds; None where it holds none.
     number : last number in the name, which may count joints from 0 or from 1; None without one.
@@ -97,6 +73,7 @@ class ColumnRole:
 
     column: str
     signal: Signal
+    word: str
     origin: Origin
     joint: int | None
     number: int | None
@@ -114,46 +91,59 @@ def role_of(column: str, joints: Sequence[str]) -> ColumnRole | None:
 
     Returns
     -------
-    None where no word of it names a signal.
+    None where no word of it names a signal of a joint, or time.
     """
-    words = _words(column)
-    words, joint = _without_joint(words, joints)
-    signal: Signal | None = None
-    origin: Origin = "plain"
-    number: int | None = None
-    scales: list[tuple[Signal, float]] = []
-    stem: list[str] = []
-    for at, word in enumerate(words):
-        if word.isdigit():
-            number = int(word)
-        elif word in _SCALES:
-            scales.append(_SCALES[word])
-        elif word in _ORIGIN_OF and origin == "plain":
-            origin = _ORIGIN_OF[word]
-        elif word == "d" and at == len(words) - 1 and signal is not None:
-            origin = "reference"  # tau_J_d, q_d: desired
-        elif word in _SIGNAL_OF and (signal is None or _sharper(_SIGNAL_OF[word], signal)):
-            signal = _SIGNAL_OF[word]
-        elif word not in _UNITS:
-            stem.append(word)
-    if signal is None:
+    if (own := _in_our_words(column, joints)) is not None:
+        return own
+    words, joint = _without_joint(_words(column), joints)
+    if _OTHER & set(words):
         return None
+    told = max((word for word in words if word in _SIGNAL_OF), key=_strength, default=None)
+    if told is None:
+        return None
+    signal = _SIGNAL_OF[told]
+    rest = [word for word in words if word != told]
+    letters = [word for word in words if not word.isdigit()]
+    origin: Origin = next((_ORIGIN_OF[word] for word in rest if word in _ORIGIN_OF), "plain")
+    if origin == "plain" and letters[-1] == "d" and len(letters) > 1:
+        origin = "reference"  # tau_J_d, q_d: desired
+    scales = [_SCALES[word] for word in rest if word in _SCALES]
+    known = {*_SCALES, *_UNITS, *_ORIGIN_OF, "d"}
     return ColumnRole(
         column=column,
         signal=signal,
+        word=told,
         origin=origin,
         joint=joint,
-        number=number,
-        stem=tuple(stem),
+        number=next((int(word) for word in reversed(rest) if word.isdigit()), None),
+        stem=tuple(word for word in rest if word not in known and not word.isdigit()),
         scale=math.prod(
             (x for of, x in scales if of == signal or (of == "q" and signal in _ANGULAR)), start=1.0
         ),
     )
 
 
-def _sharper(new: Signal, old: Signal) -> bool:
-    """Whether the second signal in a name is what it holds: `torque current`, `t position`."""
-    return old == "t" or (old == "tau" and new in ("current", "temperature"))
+def _in_our_words(column: str, joints: Sequence[str]) -> ColumnRole | None:
+    """The role of a column that has our own name, whatever the joint is called."""
+    for signal in ("q", "v", "a", "tau", "temperature", "q_ref"):
+        for number, joint in enumerate(joints):
+            if column == f"{signal}.{joint}":
+                return ColumnRole(
+                    column=column,
+                    signal="q" if signal == "q_ref" else signal,
+                    word=signal,
+                    origin="reference" if signal == "q_ref" else "plain",
+                    joint=number,
+                    number=None,
+                    stem=(),
+                )
+    return None
+
+
+def _strength(word: str) -> tuple[bool, bool, bool]:
+    """How surely a word of a name says what the column holds: `tau_current`, `A1_torque`."""
+    signal = _SIGNAL_OF[word]
+    return len(word) > 1, signal != "t", signal in ("current", "temperature")
 
 
 def _words(name: str) -> list[str]:
@@ -165,14 +155,13 @@ def _without_joint(words: list[str], joints: Sequence[str]) -> tuple[list[str], 
     found: tuple[int, int, int] | None = None
     for number, joint in enumerate(joints):
         own = _words(joint)
+        # A joint called "q" or "1" is no name that a column can be told by.
+        if not own or (len(own) == 1 and (own[0] in _SIGNAL_OF or own[0].isdigit())):
+            continue
         for start in range(len(words) - len(own) + 1):
-            same = words[start : start + len(own)] == own
-            # A joint called "q" or "1" is no name that a column can be told by.
-            if same and len(own) and (len(own) > 1 or own[0] not in _SIGNAL_OF):
-                if own[0].isdigit() and len(own) == 1:
-                    continue
-                if found is None or len(own) > found[1]:
-                    found = start, len(own), number
+            longer = found is None or len(own) > found[1]
+            if longer and words[start : start + len(own)] == own:
+                found = start, len(own), number
     if found is None:
         return words, None
     start, length, number = found

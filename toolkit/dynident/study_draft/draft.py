@@ -50,10 +50,11 @@ class StudyDraft:
     columns : ours -> theirs, also where both are called the same.
     recordings : entries of the study.
     torque : "measured" or "held_command".
-    torque_unit : "A" where drives report currents.
+    torque_unit : "N m", or "A" of drives.
     effects : that the model starts with.
     rate_hz : of the slowest recording.
-    gravity : (3) m/s^2, of the description.
+    gravity : (3) m/s^2, in the base's axes.
+    is_mounted_otherwise : whether that is not the description's.
     has_reference : whether the files hold positions that were asked for.
     decisions : what was decided, and why.
     """
@@ -63,10 +64,11 @@ class StudyDraft:
     columns: dict[str, Column]
     recordings: tuple[DraftedRecording, ...]
     torque: Literal["measured", "held_command"]
-    torque_unit: Literal["N m", "A"] = "N m"
+    torque_unit: Literal["N m", "A"]
     effects: tuple[str, ...]
     rate_hz: float
     gravity: tuple[float, ...]
+    is_mounted_otherwise: bool
     has_reference: bool
     decisions: tuple[Decision, ...]
 
@@ -140,8 +142,8 @@ class StudyDraft:
                 f'torque = "{self.torque}"  # {why}',
                 *self._drives(),
                 f"# friction_width = {FRICTION_WIDTH:g}  # rad/s; or of joints: {{ j1 = 0.05 }}",
-                f"# gravity = {json.dumps(self.gravity)}  # m/s^2 in the base's axes; a mounting on"
-                " a wall or a ceiling turns it",
+                f"{'' if self.is_mounted_otherwise else '# '}gravity = {json.dumps(self.gravity)}"
+                "  # m/s^2 in the base's axes",
             ]
         )
 
@@ -259,7 +261,8 @@ def _comment(text: str, width: int = 98) -> list[str]:
 def _relative(path: Path, folder: Path) -> str:
     """A path as the study names it: relative where it lies below or beside, else whole."""
     try:
-        found = os.path.relpath(path, folder)
+        # Resolved: ".." of a folder that is a link leads elsewhere.
+        found = os.path.relpath(path.resolve(), folder.resolve())
     except ValueError:  # another drive of Windows
         return path.absolute().as_posix()
     steps = Path(found).parts.count("..")

@@ -12,18 +12,18 @@ import numpy as np
 
 from dynident.data_files import find_all
 from dynident.errors import DynidentWarning, RecordingError
-from dynident.recording import Column, FileLayout, Recording, read, usable
+from dynident.recording import Column, FileLayout, Recording, read
 from dynident.robot import Robot
+from dynident.study_draft.amendments import Reading, amended
 from dynident.study_draft.by_numbers import named_by_numbers
 from dynident.study_draft.decision import Ask, Decision, decided
-from dynident.study_draft.draft import DraftedRecording, StudyDraft
+from dynident.study_draft.draft import StudyDraft
+from dynident.study_draft.entries import drafted_recordings
 from dynident.study_draft.log import Log, logs_of, same_columns
-from dynident.study_draft.matching import Matched, match
-from dynident.study_draft.motor_side import joint_side, require_ratios, turned
-from dynident.study_draft.timing import clock_scale, period_of, uses_of
-from dynident.study_draft.torque_timing import looks_held
-from dynident.study_draft.wiring_guess import WiringGuess, guess_wiring
-from dynident.study_draft.zeros import guess_zeros
+from dynident.study_draft.matching import Group, Matched, match
+from dynident.study_draft.motor_side import joint_side, require_ratios
+from dynident.study_draft.timing import clock_from_speeds, clock_scale
+from dynident.study_draft.torque_timing import samples_late
 from dynident.threads import single_threaded
 
 _FRICTION = ("viscous_friction", "coulomb_friction", "torque_offset")
@@ -87,28 +87,26 @@ def draft_study(
     if ratios is not None:
         columns = joint_side(columns, described, ratios)
         notes.take("gears", ["on the motors' side"], "the ratios were given")
-    recordings = _read(logs, described, columns)
-    columns = _without_strangers(columns, recordings, notes)
-    columns = _with_zeros(columns, recordings, described, notes)
-    recordings = _read(logs, described, columns)
-    unit = _unit(matched, notes)
-    wiring = guess_wiring(described, recordings, columns, unit)
-    columns = _wired(columns, wiring, logs[0].where, notes)
-    recordings = _read(logs, described, columns)
-    origin = matched.groups["tau"][chosen.get("tau", 0)].origin
-    held = _is_held(described, recordings, origin == "command", notes)
+    torque = matched.groups["tau"][chosen["tau"]]
+    unit = _unit(torque, notes)
+    reading = Reading(robot=described, columns=columns, in_drive_units=unit == "A")
+    reading = replace(reading, columns=_without_strangers(reading, logs, notes))
+    reading = amended(reading, lambda one: _read(logs, one), notes.take)
+    recordings = _read(logs, reading)
+    held = _is_held(reading.robot, recordings, torque.origin == "command", notes)
+    behind_gears = reading.geared or ratios is not None or torque.is_current
+    mounted = not np.array_equal(reading.robot.gravity, described.gravity)
     return StudyDraft(
         robot=Path(robot),
         joints=None if joints is None else tuple(joints),
-        columns=columns,
-        recordings=_drafted(logs, recordings, notes),
+        columns=reading.columns,
+        recordings=drafted_recordings(logs, recordings, notes.take),
         torque="held_command" if held else "measured",
         torque_unit=unit,
-        effects=(*_FRICTION, "rotor_inertia")
-        if wiring.gears or ratios or matched.drive
-        else _FRICTION,
+        effects=(*_FRICTION, "rotor_inertia") if behind_gears else _FRICTION,
         rate_hz=min(one.rate_hz for one in recordings),
-        gravity=tuple(float(x) for x in described.gravity),
+        gravity=tuple(float(x) for x in reading.robot.gravity),
+        is_mounted_otherwise=mounted,
         has_reference=recordings[0].q_ref is not None,
         decisions=tuple(notes.decisions),
     )
@@ -131,7 +129,9 @@ class _Notes:
 def _opened(data: Sequence[str | Path], layout: FileLayout) -> tuple[Log, ...]:
     """Every record of every file."""
     paths = [path for one in data for path in find_all(str(one), Path()).values()]
-    logs = tuple(log for path in paths for log in logs_of(path, layout))
+    # A file that is named twice would judge itself.
+    distinct = dict.fromkeys(path.resolve() for path in paths)
+    logs = tuple(log for path in distinct for log in logs_of(path, layout))
     if not logs:
         raise RecordingError("no file of measurements", remedy="name at least one")
     same_columns(logs)
@@ -152,8 +152,11 @@ def _chosen(matched: Matched, notes: _Notes) -> dict[str, int]:
     for signal, groups in matched.groups.items():
         titles = [group.title for group in groups]
         reason = groups[0].reason
-        if len(groups) > 1:
-            reason += ", and its name is the plainest for what was measured"
+        if groups[0].origin in ("reference", "command") and signal != "q_ref":
+            reason += f"; they are called a {groups[0].origin}, and nothing measured is there"
+        elif len(groups) > 1:
+            alike = groups[0].origin == groups[1].origin
+            reason += "; they come first" if alike else "; their name says that they were measured"
         chosen[signal] = notes.take(signal, titles, reason)
     return chosen
 
@@ -173,13 +176,27 @@ def _with_clock(
     if column.scale != 1.0 or column.name not in log.columns:
         notes.take("t", [column.name], f"{why}; its name says the unit")
         return columns
-    scale, unit = clock_scale(log.columns[column.name])
-    step = float(np.median(np.diff(log.columns[column.name])))
-    notes.take("t", [f"{column.name}, in {unit}"], f"{why}, by {step:.4g} from sample to sample")
+    stamps = log.columns[column.name]
+    q, v = (
+        [log.columns[one.name] for ours, one in columns.items() if ours.startswith(f"{signal}.")]
+        for signal in ("q", "v")
+    )
+    seconds = clock_from_speeds(stamps, q, v)
+    step = float(np.median(np.diff(stamps)))
+    if seconds is not None:
+        scale, unit = seconds
+        notes.take("t", [f"{column.name}, in {unit}"], f"{why}, and so the speeds have it")
+        return {**columns, "t": Column(column.name, scale)}
+    scale, unit = clock_scale(stamps)
+    reason = f"{why}, by {step:.4g} from sample to sample"
+    if np.all(np.diff(stamps) == 1.0):
+        reason += "; if it counts samples, write rate_hz in its place"
+    notes.take("t", [f"{column.name}, in {unit}"], reason)
     return {**columns, "t": Column(column.name, scale)}
 
 
-def _read(logs: Sequence[Log], robot: Robot, columns: dict[str, Column]) -> tuple[Recording, ...]:
+def _read(logs: Sequence[Log], reading: Reading) -> tuple[Recording, ...]:
+    robot = reading.robot
     with warnings.catch_warnings():
         # The draft looks for other units itself, and says what it finds.
         warnings.simplefilter("ignore", DynidentWarning)
@@ -187,7 +204,7 @@ def _read(logs: Sequence[Log], robot: Robot, columns: dict[str, Column]) -> tupl
             read(
                 log.file,
                 robot.names,
-                columns,
+                reading.columns,
                 robot.kinds,
                 log.record or None,
                 layout=log.layout,
@@ -196,13 +213,13 @@ def _read(logs: Sequence[Log], robot: Robot, columns: dict[str, Column]) -> tupl
         )
 
 
-def _without_strangers(
-    columns: dict[str, Column], recordings: Sequence[Recording], notes: _Notes
-) -> dict[str, Column]:
+def _without_strangers(reading: Reading, logs: Sequence[Log], notes: _Notes) -> dict[str, Column]:
     """The columns without references that nothing follows, whose name promised more."""
-    first = recordings[0]
-    if first.q_ref is None:
+    columns = reading.columns
+    if f"q_ref.{reading.robot.names[0]}" not in columns:
         return columns
+    first = _read(logs[:1], reading)[0]
+    assert first.q_ref is not None
     q, asked = (x - x.mean(axis=0) for x in (first.q, first.q_ref))
     sizes = np.linalg.norm(q, axis=0) * np.linalg.norm(asked, axis=0)
     if np.all(np.sum(q * asked, axis=0) >= _FOLLOWS * sizes):
@@ -211,49 +228,13 @@ def _without_strangers(
     return {ours: one for ours, one in columns.items() if not ours.startswith("q_ref.")}
 
 
-def _with_zeros(
-    columns: dict[str, Column], recordings: tuple[Recording, ...], robot: Robot, notes: _Notes
-) -> dict[str, Column]:
-    """The columns with the zeros of joints where the description has them."""
-    guess = guess_zeros(robot, recordings)
-    if not guess.evidence:
-        return columns
-    moved = [
-        f"{q} by {90 * k:+d} deg" for q, k in zip(robot.names, guess.quarters, strict=True) if k
-    ]
-    choices = [f"moved: {', '.join(moved)}", "as recorded"]
-    if notes.take("zeros", choices, guess.evidence) == 1:
-        return columns
-    return turned(columns, robot, guess.quarters)
-
-
-def _unit(matched: Matched, notes: _Notes) -> Literal["N m", "A"]:
+def _unit(torque: Group, notes: _Notes) -> Literal["N m", "A"]:
     """The unit of what stands for torques."""
-    if not matched.drive:
+    if not torque.is_current:
         return "N m"
-    why = "the file has currents and no torques: the gain of each joint is identified with the rest"
+    why = "the columns are called currents: the gain of each joint is identified with the rest"
     choices = ["A, the drives' own", "N m, although the columns are called currents"]
     return "A" if notes.take("torque_unit", choices, why) == 0 else "N m"
-
-
-def _wired(
-    columns: dict[str, Column], wiring: WiringGuess, where: str, notes: _Notes
-) -> dict[str, Column]:
-    """The columns in units, gears and signs as whoever is asked takes them."""
-    if wiring.unknown_gears:
-        what = (
-            f"positions of {', '.join(wiring.unknown_gears)} are on the motor side of gears, whose "
-            "ratios the data do not tell"
-        )
-        raise RecordingError(what, where, "give them: --gears 32,-48,1 for three joints, say")
-    if wiring.note:
-        notes.take("units", ["as recorded"], f"they could not be compared: {wiring.note}")
-    if not wiring.findings:
-        return columns
-    what = "; ".join(what for what, _ in wiring.findings)
-    why = "; ".join(dict.fromkeys(evidence for _, evidence in wiring.findings))
-    taken = notes.take("units and signs", [what, "as recorded"], why)
-    return wiring.columns if taken == 0 else columns
 
 
 def _is_held(robot: Robot, recordings: tuple[Recording, ...], named: bool, notes: _Notes) -> bool:
@@ -261,50 +242,13 @@ def _is_held(robot: Robot, recordings: tuple[Recording, ...], named: bool, notes
     choices = ["measured", "held_command"]
     if named:
         return notes.take("torque", choices[::-1], "the columns are called commands") == 0
-    if looks_held(robot, recordings):
+    late = samples_late(robot, recordings)
+    if late > 0.5:
+        reason = f"torques fit far better {late:g} samples later: a delay, for `explain` to find"
+        notes.take("torque", ["measured"], reason)
+        return False
+    if late:
         reason = "torques fit the motion far better half a sample later"
         return notes.take("torque", choices[::-1], reason) == 0
     notes.take("torque", ["measured"], "nothing shows that it is a command held between samples")
     return False
-
-
-def _drafted(
-    logs: Sequence[Log], recordings: Sequence[Recording], notes: _Notes
-) -> tuple[DraftedRecording, ...]:
-    """The recordings with their use, their periods and what is to know of them."""
-    uses, why = uses_of([log.record or log.file.stem for log in logs])
-    notes.take("use", [", ".join(dict.fromkeys(uses))], why)
-    periods = [period_of(one) for one in recordings]
-    if any(periods):
-        shown = ", ".join(f"{x:g} s" for x in dict.fromkeys(x for x in periods if x))
-        reason = "positions repeat after this time, which gives a noise floor"
-        if notes.take("period", [shown, "none"], reason) == 1:
-            periods = [None] * len(periods)
-    else:
-        notes.take("period", ["none"], "no motion repeats within its recording")
-    return tuple(
-        DraftedRecording(
-            file=log.file,
-            record=log.record,
-            layout=log.layout,
-            use="test" if use == "test" else "train",
-            period=period,
-            remark=_remark(one, period),
-        )
-        for log, use, period, one in zip(logs, uses, periods, recordings, strict=True)
-    )
-
-
-def _remark(recording: Recording, period: float | None) -> str:
-    """What a reader of the study wants to know of a recording, in a line."""
-    said = [f"{recording.duration:.4g} s at {recording.rate_hz:.5g} Hz"]
-    if recording.jitter > 0.01:
-        said.append(f"time steps vary by {100 * recording.jitter:.2g} %")
-    if period:
-        said.append(f"{recording.duration / period:.3g} repetitions")
-    looked = usable(replace(recording, period=period))
-    said += [
-        f"{one.reason} from {one.start:.4g} to {one.stop:.4g} s is left out by itself"
-        for one in looked.left_out or ()
-    ]
-    return "; ".join(said)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,6 +28,7 @@ class Log:
     columns : name -> (T,) numbers; `name[k]` for column k of a table. Text is left out.
     skipped : names of what is there and is no column of as many numbers as the others.
     layout : with which it was opened.
+    trouble : why the first of its columns could not be read; None where all could, or are text.
     """
 
     file: Path
@@ -36,6 +36,7 @@ class Log:
     columns: Mapping[str, np.ndarray]
     skipped: tuple[str, ...]
     layout: FileLayout
+    trouble: RecordingError | None = None
 
     @property
     def where(self) -> str:
@@ -79,7 +80,7 @@ def logs_of(path: str | Path, layout: FileLayout) -> tuple[Log, ...]:
 def _log(path: Path, record: str, table: ColumnTable, layout: FileLayout) -> Log:
     found: dict[str, np.ndarray] = {}
     skipped: list[str] = []
-    arrays = _arrays(table, table.names[:MOST_COLUMNS])
+    arrays, trouble = _arrays(table, table.names[:MOST_COLUMNS])
     for name in table.names[:MOST_COLUMNS]:
         columns = _numbers(name, arrays.get(name))
         if columns is None:
@@ -88,6 +89,8 @@ def _log(path: Path, record: str, table: ColumnTable, layout: FileLayout) -> Log
             found |= columns
     skipped += table.names[MOST_COLUMNS:]
     lengths = [len(x) for x in found.values()]
+    if not lengths and trouble is not None:
+        raise trouble
     if not lengths:
         what = "holds no column of numbers"
         raise RecordingError(what, table.file, "is it the right file?")
@@ -99,19 +102,30 @@ def _log(path: Path, record: str, table: ColumnTable, layout: FileLayout) -> Log
         # Several drivers on one topic of a bag: the clock is that of messages of these joints.
         kept = {"t": table.load(["t", *kept])["t"], **kept}
         skipped.remove("t")
-    return Log(file=path, record=record, columns=kept, skipped=tuple(skipped), layout=layout)
+    return Log(
+        file=path,
+        record=record,
+        columns=kept,
+        skipped=tuple(skipped),
+        layout=layout,
+        trouble=trouble,
+    )
 
 
-def _arrays(table: ColumnTable, names: Sequence[str]) -> dict[str, np.ndarray]:
-    """What a table holds under some names: at once if it can, else those that can be read."""
+def _arrays(
+    table: ColumnTable, names: Sequence[str]
+) -> tuple[dict[str, np.ndarray], RecordingError | None]:
+    """What a table holds under some names, at once if it can be, and the first that cannot."""
     try:
-        return table.load(names)
+        return table.load(names), None
     except RecordingError:  # one is text, say, or the messages of a bag do not share it
-        found = {}
+        found, trouble = {}, None
         for name in names:
-            with suppress(RecordingError):
+            try:
                 found[name] = table.load([name])[name]
-        return found
+            except RecordingError as error:
+                trouble = trouble or error
+        return found, trouble
 
 
 def _numbers(name: str, x: np.ndarray | None) -> dict[str, np.ndarray] | None:

@@ -15,14 +15,8 @@ from dynident.study_draft.column_roles import ColumnRole, Origin, Signal, role_o
 from dynident.study_draft.log import Log
 
 _INCREASING = 0.999  # share of the steps of a clock that go forward
-_PREFERRED: dict[str, tuple[Origin, ...]] = {
-    "q": ("measured", "plain"),
-    "v": ("measured", "plain"),
-    "tau": ("measured", "plain", "command", "reference"),
-    "current": ("measured", "plain", "command", "reference"),
-    "q_ref": ("reference", "command"),
-    "temperature": ("measured", "plain"),
-}
+_MEASURED: tuple[Origin, ...] = ("measured", "plain")
+_ASKED: tuple[Origin, ...] = ("reference", "command")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +39,11 @@ class Group:
         return names[0] if len(names) == 1 else f"{names[0]} ... {names[-1]}"
 
     @property
+    def is_current(self) -> bool:
+        """Whether what stands for torques are currents or voltages of drives."""
+        return self.roles[0].signal == "current"
+
+    @property
     def origin(self) -> Origin:
         """Whether it was measured, a reference or a command."""
         return self.roles[0].origin
@@ -58,12 +57,10 @@ class Matched:
     ----------
     time : the clock, and why; None where nothing is one.
     groups : signal ("q", "v", "tau", "q_ref", "temperature") -> groups, the likeliest first.
-    drive : whether what stands for torques are currents or voltages.
     """
 
     time: tuple[Column, str] | None
     groups: dict[str, tuple[Group, ...]] = field(default_factory=dict)
-    drive: bool = False
 
     def columns(self, robot: Robot, chosen: dict[str, int]) -> dict[str, Column]:
         """Our columns -> those of the log.
@@ -95,49 +92,63 @@ def match(log: Log, robot: Robot) -> Matched:
         If no group of columns holds a position, or none a torque, for every joint.
     """
     roles = [role for name in log.columns if (role := role_of(name, robot.names)) is not None]
-    groups: dict[str, tuple[Group, ...]] = {}
-    for signal in ("q", "v", "tau", "temperature"):
-        groups[signal] = _groups(roles, signal, signal, robot)
-    drive = not groups["tau"]
-    if drive:
-        groups["tau"] = _groups(roles, "current", "current", robot)
-    groups["q_ref"] = _groups(roles, "q", "q_ref", robot)
+    torques = [
+        *_groups(roles, "tau", _MEASURED, robot),
+        *_groups(roles, "current", _MEASURED, robot),
+        *_groups(roles, "tau", ("command", "reference"), robot),
+        *_groups(roles, "current", ("command", "reference"), robot),
+    ]
+    positions = _groups(roles, "q", (*_MEASURED, *_ASKED), robot)
+    # Motor and joint side, say: what has the same rest of its name belongs together.
+    stems = {group.roles[0].stem for group in torques[:1]}
+    measured = sorted(
+        (one for one in positions if one.origin in _MEASURED),
+        key=lambda one: one.roles[0].stem not in stems,
+    )
+    groups = {
+        "q": measured or [one for one in positions if one.origin == "reference"],
+        "v": _groups(roles, "v", _MEASURED, robot),
+        "tau": torques,
+        "temperature": _groups(roles, "temperature", _MEASURED, robot),
+        "q_ref": [one for one in positions if one.origin in _ASKED and measured],
+    }
     for signal, what in (("q", "positions"), ("tau", "torques or currents")):
         if not groups[signal]:
+            if log.trouble is not None:
+                raise log.trouble
             shown = ", ".join(list(log.columns)[:20]) + (", ..." if len(log.columns) > 20 else "")
             remedy = (
                 f"it holds {shown}; joints: {', '.join(robot.names)}. Write the study by hand, "
                 "with [columns]"
             )
-            raise RecordingError(
-                f"no {what} of {robot.n} joints are told by name", log.where, remedy
-            )
-    found = {signal: some for signal, some in groups.items() if some}
-    return Matched(time=_clock(log, roles), groups=found, drive=drive)
+            lack = f"no {what} of {robot.n} joints are told by name"
+            raise RecordingError(lack, log.where, remedy)
+    found = {signal: tuple(some) for signal, some in groups.items() if some}
+    return Matched(time=_clock(log, roles), groups=found)
 
 
 def _groups(
-    roles: Sequence[ColumnRole], signal: Signal, use: str, robot: Robot
-) -> tuple[Group, ...]:
+    roles: Sequence[ColumnRole], signal: Signal, origins: Sequence[Origin], robot: Robot
+) -> list[Group]:
     """Groups of columns that hold a signal of every joint, the likeliest first."""
-    origins = _PREFERRED[use]
-    sets: dict[tuple[Origin, tuple[str, ...]], list[ColumnRole]] = {}
+    sets: dict[tuple[Origin, str, tuple[str, ...]], list[ColumnRole]] = {}
     for role in roles:
         if role.signal == signal and role.origin in origins:
-            sets.setdefault((role.origin, role.stem), []).append(role)
+            sets.setdefault((role.origin, role.word, role.stem), []).append(role)
     found = [
         (origins.index(origin), len(stem), group)
-        for (origin, stem), some in sets.items()
+        for (origin, _, stem), some in sets.items()
         if (group := _at_joints(some, robot)) is not None
     ]
-    return tuple(group for _, _, group in sorted(found, key=lambda one: one[:2]))
+    return [group for _, _, group in sorted(found, key=lambda one: one[:2])]
 
 
 def _at_joints(roles: list[ColumnRole], robot: Robot) -> Group | None:
     """The roles in the order of the joints, if there is one for each."""
     n = robot.n
-    named = {role.joint: role for role in roles if role.joint is not None}
-    if set(named) == set(range(n)):
+    with_names = [role for role in roles if role.joint is not None]
+    named = {role.joint: role for role in with_names}
+    if set(named) == set(range(n)) and len(with_names) == n:
         ordered = tuple(named[j] for j in range(n))
         return Group(roles=ordered, reason="by the joints' names")
     if named:

@@ -51,7 +51,7 @@ def joint_side(
             name, sign = quoted(theirs.name), "-" if ratio < 0 else ""
             size = f"{abs(ratio):.12g}"
             text = f"{sign}{size}*{name}" if signal == "tau" else f"{sign}{name}/{size}"
-            found[f"{signal}.{joint}"] = Column(text, theirs.scale)
+            found[f"{signal}.{joint}"] = _Made(text, theirs.scale)
     return found
 
 
@@ -70,9 +70,15 @@ def turned(columns: dict[str, Column], robot: Robot, quarters: Sequence[int]) ->
             theirs = columns.get(f"{signal}.{joint}")
             if theirs is None or not count:
                 continue
-            text = theirs.name if "/" in theirs.name else quoted(theirs.name)
+            # What was made here is an expression; any other is a name, whatever signs are in it.
+            text = theirs.name if isinstance(theirs, _Made) else quoted(theirs.name)
             if theirs.scale != 1.0:
-                text = f"{theirs.scale!r}*{text}"
-            sign = "+" if count > 0 else "-"
-            found[f"{signal}.{joint}"] = Column(f"{text} {sign} {_TURNS[count]}")
+                text = f"{theirs.scale!r}*({text})"
+            found[f"{signal}.{joint}"] = _Made(
+                f"{text} {'+' if count > 0 else '-'} {_TURNS[count]}"
+            )
     return found
+
+
+class _Made(Column):
+    """A column that is an expression of the file's."""

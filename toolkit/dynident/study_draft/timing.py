@@ -17,6 +17,8 @@ from dynident.recording.repetition import repeats_after, shift_mismatch
 _CLOCKS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (1e-9, "ns"))
 _FASTEST = 2e4  # Hz that a robot is sampled at
 _REPEATS = 0.05  # of the motion that two repetitions may differ by
+_DERIVATIVE = 0.9  # correlation of a speed with the difference of its position
+_NEAR = 0.2  # of a ratio of units, by which it may miss one
 _WHOLE = 0.3  # samples by which a period is known
 _EVERY = 4  # of so many recordings one is held out
 _TRAIN, _TEST = ("train", "fit", "ident", "exc"), ("test", "val", "check")
@@ -38,6 +40,39 @@ def clock_scale(t: np.ndarray) -> tuple[float, str]:
         if step * scale <= LONGEST_STEP:
             return (scale, unit) if step * scale >= 1 / _FASTEST else (1.0, "s")
     return 1.0, "s"
+
+
+def clock_from_speeds(
+    t: np.ndarray, q: Sequence[np.ndarray], v: Sequence[np.ndarray]
+) -> tuple[float, str] | None:
+    """Seconds per unit of a clock, and the unit's name, from recorded speeds.
+
+    Parameters
+    ----------
+    t : (T,) stamps.
+    q, v : columns (T,) of positions and speeds, in the same units of length or angle.
+
+    Returns
+    -------
+    None where no speed is the derivative of its position.
+    """
+    ratios = []
+    for position, speed in zip(q, v, strict=False):
+        change = np.gradient(position, t)
+        both = np.linalg.norm(change) * np.linalg.norm(speed)
+        if both and change @ speed > _DERIVATIVE * both:
+            ratios.append(float(change @ change / (change @ speed)))
+    if not ratios:
+        return None
+    ratio = float(np.median(ratios))
+    for scale, unit in _CLOCKS:
+        if abs(ratio / scale - 1) < _NEAR:
+            return scale, unit
+    step = float(np.median(np.diff(t)))
+    if np.all(np.diff(t) == step):
+        rate = float(f"{1 / (ratio * step):.2g}")
+        return 1 / (rate * step), f"samples at {rate:g} Hz"
+    return None
 
 
 def period_of(recording: Recording) -> float | None:

@@ -1,4 +1,4 @@
-"""Whether a torque is a command that is held to the next sample, half a sample late on average."""
+"""How late torques are: a command that is held is half a sample late on average, a delay more."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ from dynident.robot import Robot
 from dynident.wiring.wiring_regression import WiringRegression
 from dynident.wiring.wiring_rows import rows_of
 
+_DELAYS = (1, 2, 4)  # samples
 
-def looks_held(robot: Robot, recordings: tuple[Recording, ...]) -> bool:
-    """Whether torques fit far better as held commands than as measured ones.
+
+def samples_late(robot: Robot, recordings: tuple[Recording, ...]) -> float:
+    """Samples by which torques act later than they are recorded: 0, 0.5 of a held command, or more.
 
     Parameters
     ----------
@@ -23,14 +25,25 @@ def looks_held(robot: Robot, recordings: tuple[Recording, ...]) -> bool:
 
     Returns
     -------
-    False also where half a sample is too short to show.
+    0 also where half a sample is too short to show.
     """
-    held = tuple(one.replace(torque="held_command") for one in recordings)
+    late = {0.5: tuple(one.replace(torque="held_command") for one in recordings)}
+    late |= {float(k): tuple(_delayed(one, k) for one in recordings) for k in _DELAYS}
     try:
-        (as_measured, rows), (as_held, _) = (_score(robot, some) for some in (recordings, held))
+        now, rows = _score(robot, recordings)
+        scores = {samples: _score(robot, some)[0] for samples, some in late.items()}
     except DynidentError:
-        return False
-    return (as_held - as_measured) * rows >= DEFAULTS.wiring.evidence
+        return 0.0
+    enough = DEFAULTS.wiring.evidence / rows
+    if scores[0.5] - now < enough:
+        return 0.0
+    best = max(_DELAYS, key=lambda k: scores[k])
+    return float(best) if scores[best] - scores[0.5] >= enough else 0.5
+
+
+def _delayed(one: Recording, samples: int) -> Recording:
+    tau = np.concatenate([np.repeat(one.tau[:1], samples, axis=0), one.tau[:-samples]])
+    return one.replace(tau=tau)
 
 
 def _score(robot: Robot, recordings: tuple[Recording, ...]) -> tuple[float, float]:

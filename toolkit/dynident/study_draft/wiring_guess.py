@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from dynident.criteria import DEFAULTS
 from dynident.errors import DynidentError
@@ -25,27 +26,28 @@ class WiringGuess:
 
     Attributes
     ----------
-    findings : (what, evidence) of each thing that is not as it was recorded.
+    findings, evidence : what is not as it was recorded, and what shows it.
     columns : ours -> theirs, with that mended.
+    left : share of the torque that a fit then leaves.
     gears : whether anything was found on the motor side of a gear.
     unknown_gears : joints whose positions are on the motor side of gears, of which the data do not
         tell the ratios: inertia and friction are as free as they are.
-    note : why nothing could be told, else empty.
     """
 
-    findings: tuple[tuple[str, str], ...]
+    findings: tuple[str, ...]
+    evidence: tuple[str, ...]
     columns: dict[str, Column]
-    gears: bool = False
-    unknown_gears: tuple[str, ...] = ()
-    note: str = ""
+    left: float
+    gears: bool
+    unknown_gears: tuple[str, ...]
 
 
 def guess_wiring(
     robot: Robot,
     recordings: tuple[Recording, ...],
     columns: dict[str, Column],
-    torque_unit: Literal["N m", "A"] = "N m",
-) -> WiringGuess:
+    in_drive_units: bool,
+) -> WiringGuess | None:
     """Compare recordings with the equations of motion of the robot as it is described.
 
     Parameters
@@ -53,40 +55,39 @@ def guess_wiring(
     robot : with its limits and described inertias.
     recordings : read with `columns`.
     columns : ours -> theirs, every `q` and `tau` among them.
-    torque_unit : "A" where they are currents: sizes and signs of them are gains to be identified,
-        and no fault.
+    in_drive_units : whether torques are currents: sizes and signs of them are gains to be
+        identified, and no fault.
 
     Returns
     -------
-    The columns as they are, or with units, gears, signs and order mended.
+    None where nothing is found, or the recordings are too short for the usual filter.
     """
     model, criteria = Model(robot), DEFAULTS.wiring
     try:
         rows = rows_of(Dataset(recordings), criteria.rows, criteria.independent_hz)
         result = search(model, rows, criteria)
-    except DynidentError as error:
-        return WiringGuess(findings=(), columns=columns, note=error.what)
-    if not result.accepted:
-        return WiringGuess(findings=(), columns=columns)
-    ignored = _OF_GAINS if torque_unit == "A" else ()
+    except DynidentError:
+        return None
+    faults = faults_of(model, result, recordings[0])
+    now = result.assignment
+    if in_drive_units:
+        faults = tuple(one for one in faults if one.kind not in _OF_GAINS)
+        now = replace(now, torque_scale=np.ones(robot.n))
+    if not faults:
+        return None
     several = {
         robot.names[j]
         for one in (accepted.hypothesis for accepted in result.accepted)
-        if one.kind.startswith("motor_side") and one.kind not in ignored and len(one.joints) > 1
+        if one.kind.startswith("motor_side") and len(one.joints) > 1
         for j in one.joints
     }
-    faults = [
-        fault for fault in faults_of(model, result, recordings[0]) if fault.kind not in ignored
-    ]
-    mended = _mended(robot, columns, result.assignment)
-    if torque_unit == "A":
-        plain = {column.name: column for ours, column in columns.items() if ours[:4] == "tau."}
-        mended |= {ours: plain[one.name] for ours, one in mended.items() if ours[:4] == "tau."}
     return WiringGuess(
-        findings=tuple((fault.what, fault.evidence) for fault in faults),
-        columns=mended,
-        unknown_gears=tuple(name for name in robot.names if name in several),
+        findings=tuple(fault.what for fault in faults),
+        evidence=tuple(fault.evidence for fault in faults),
+        columns=_mended(robot, columns, now),
+        left=float(np.sqrt(np.mean(result.fit.unexplained))),
         gears=any("side" in fault.kind for fault in faults),
+        unknown_gears=tuple(name for name in robot.names if name in several),
     )
 
 
@@ -103,5 +104,5 @@ def _mended(robot: Robot, columns: dict[str, Column], now: Assignment) -> dict[s
             continue
         for joint, source, scale in zip(robot.names, order, scales, strict=True):
             theirs = columns[f"{signal}.{robot.names[source]}"]
-            found[f"{signal}.{joint}"] = Column(theirs.name, theirs.scale * float(scale))
+            found[f"{signal}.{joint}"] = replace(theirs, scale=theirs.scale * float(scale))
     return found

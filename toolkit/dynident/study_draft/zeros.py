@@ -2,37 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from dynident.criteria import DEFAULTS
-from dynident.errors import DynidentError
-from dynident.model import Model
-from dynident.recording import Dataset, Recording
 from dynident.robot import Robot
-from dynident.tables import percent
-from dynident.wiring.wiring_regression import TorqueFit, WiringRegression
-from dynident.wiring.wiring_rows import WiringRows, rows_of
+from dynident.wiring.wiring_regression import TorqueFit
+from dynident.wiring.wiring_rows import WiringRows
 
 QUARTER = np.pi / 2
 
 
-@dataclass(frozen=True, kw_only=True)
-class ZeroGuess:
-    """Quarter turns between the recorded and the described zero of each joint.
-
-    Attributes
-    ----------
-    quarters : (n) whole numbers; ours = theirs + quarters * pi/2.
-    evidence : what shows it; empty where nothing is off.
-    """
-
-    quarters: tuple[int, ...]
-    evidence: str = ""
-
-
-def guess_zeros(robot: Robot, recordings: tuple[Recording, ...]) -> ZeroGuess:
+def guess_zeros(
+    robot: Robot, rows: WiringRows, fit: Callable[[Robot, WiringRows], TorqueFit]
+) -> tuple[tuple[int, ...], TorqueFit, TorqueFit]:
     """Turn zeros by quarter turns, one joint after the other, while the torques fit far better.
 
     Smaller errors are not looked for here: the diagnosis has an effect for them.
@@ -40,44 +25,36 @@ def guess_zeros(robot: Robot, recordings: tuple[Recording, ...]) -> ZeroGuess:
     Parameters
     ----------
     robot : as it is described; of its joints only those that turn.
-    recordings : in the units of the robot.
+    rows : of recordings in the units of the robot.
+    fit : of the equations of motion.
+
+    Returns
+    -------
+    quarters : (n) whole numbers; ours = theirs + quarters * pi/2.
+    start, best : fits without and with them.
     """
-    n, criteria = robot.n, DEFAULTS.wiring
-    none = ZeroGuess(quarters=(0,) * n)
-    try:
-        rows = rows_of(Dataset(recordings), criteria.rows, criteria.independent_hz)
-    except DynidentError:
-        return none  # too short for the usual filter: nothing is said
-    model = Model(robot)
-    found = [0] * n
-    first = now = _fit(model, rows, found)
+    criteria = DEFAULTS.wiring
+
+    def at(quarters: tuple[int, ...]) -> TorqueFit:
+        return fit(robot, replace(rows, q=rows.q + QUARTER * np.array(quarters)))
+
+    found = (0,) * robot.n
+    start = now = at(found)
     while True:
         tried = [
-            (other, _fit(model, rows, other))
-            for j in range(n)
+            (other, at(other))
+            for j in range(robot.n)
             if robot.kinds[j] == "revolute"
             for turn in (1, -1, 2)
-            if abs((other := _turned(found, j, turn))[j]) <= 2
+            if abs((other := (*found[:j], found[j] + turn, *found[j + 1 :]))[j]) <= 2
         ]
-        best = max(tried, key=lambda one: one[1].score, default=None)
-        if best is None:
+        if not tried:
             break
-        gain = best[1].score - now.score
+        other, best = max(tried, key=lambda one: one[1].score)
+        gain = best.score - now.score
         if gain < criteria.gain or gain * rows.independent < criteria.evidence:
             break
-        found, now = best
-    if not any(found):
-        return none
-    left = [percent(float(np.sqrt(np.mean(one.unexplained)))) for one in (first, now)]
-    evidence = f"a fit then leaves {left[1]} of the torque instead of {left[0]}"
-    return ZeroGuess(quarters=tuple(found), evidence=evidence)
-
-
-def _turned(quarters: list[int], joint: int, turn: int) -> list[int]:
-    return [one + turn * (j == joint) for j, one in enumerate(quarters)]
-
-
-def _fit(model: Model, rows: WiringRows, quarters: list[int]) -> TorqueFit:
-    moved = replace(rows, q=rows.q + QUARTER * np.array(quarters))
-    n = model.robot.n
-    return WiringRegression.of(model, moved).fit(np.arange(n), np.ones(n))
+        if np.mean(best.unexplained) >= np.mean(now.unexplained):
+            break
+        found, now = other, best
+    return found, start, now

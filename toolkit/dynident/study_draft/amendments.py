@@ -1,0 +1,211 @@
+"""What a draft mends so that the recordings suit the robot: mounting, zeros, units, signs, order.
+
+Each guess compares fits of the robot's equations of motion. They are tried side by side, for a
+robot on the ceiling looks like one whose joints count from elsewhere, and the best is taken first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dynident.criteria import DEFAULTS
+from dynident.errors import DynidentError, RecordingError
+from dynident.model import Model
+from dynident.recording import Column, Dataset, Recording
+from dynident.robot import Robot
+from dynident.study_draft.motor_side import turned
+from dynident.study_draft.wiring_guess import guess_wiring
+from dynident.study_draft.zeros import guess_zeros
+from dynident.tables import percent
+from dynident.wiring.wiring_regression import TorqueFit, WiringRegression
+from dynident.wiring.wiring_rows import WiringRows, rows_of
+
+_ROUNDS = 4
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """How files are read, and of which robot.
+
+    Attributes
+    ----------
+    robot : with the direction of gravity.
+    columns : ours -> theirs.
+    in_drive_units : whether what stands for torques are currents: their size tells nothing.
+    geared : whether the motors' side of a gear was found.
+    """
+
+    robot: Robot
+    columns: dict[str, Column]
+    in_drive_units: bool = False
+    geared: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Amendment:
+    """A reading that suits the robot far better.
+
+    Attributes
+    ----------
+    subject : what is mended.
+    what, why : in words.
+    left : share of the torque that a fit then leaves.
+    reading : the mended one.
+    """
+
+    subject: str
+    what: str
+    why: str
+    left: float
+    reading: Reading
+
+
+def amended(
+    reading: Reading,
+    read: Callable[[Reading], tuple[Recording, ...]],
+    take: Callable[[str, list[str], str], int],
+) -> Reading:
+    """Mend a reading, the best amendment first, until none is far better.
+
+    Parameters
+    ----------
+    reading : as the names of columns have it.
+    read : reads the recordings.
+    take : takes a decision: (subject, choices, reason) -> which of them.
+
+    Returns
+    -------
+    The reading as it was decided.
+
+    Raises
+    ------
+    RecordingError
+        If positions are on the motor side of gears whose ratios the data do not tell.
+    """
+    refused: set[str] = set()
+    for _ in range(_ROUNDS):
+        recordings = read(reading)
+        guesses = [guess(reading, recordings) for guess in (_mounting, _zeros, _wiring)]
+        found = [one for one in guesses if one is not None and one.subject not in refused]
+        if not found:
+            break
+        best = min(found, key=lambda one: one.left)
+        choices = [best.what, "as recorded"]
+        poor = best.left > DEFAULTS.wiring.poor_fit
+        reason = f"{best.why}{', which is still poor' if poor else ''}"
+        taken = take(best.subject, choices[::-1] if poor else choices, reason)
+        if taken == int(poor):
+            reading = best.reading
+        else:
+            refused.add(best.subject)
+    return reading
+
+
+def _mounting(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | None:
+    """A base on the ceiling or on a wall."""
+    size = float(np.linalg.norm(reading.robot.gravity))
+    rows = _rows(recordings)
+    if rows is None or not size:
+        return None
+    start = _fit(reading.robot, rows)
+    tried = []
+    for axis in range(3):
+        for sign in (1.0, -1.0):
+            robot = reading.robot.with_gravity(sign * size * np.eye(3)[axis])
+            tried.append((robot, _fit(robot, rows)))
+    robot, best = max(tried, key=lambda one: one[1].score)
+    if not wins(best, start, rows):
+        return None
+    shown = ", ".join(f"{x:g}" for x in robot.gravity)
+    return Amendment(
+        subject="gravity",
+        what=f"gravity = [{shown}] in the base's axes",
+        why=evidence(start, best),
+        left=misfit(best),
+        reading=replace(reading, robot=robot),
+    )
+
+
+def _zeros(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | None:
+    """Joints that count from a quarter turn elsewhere."""
+    rows = _rows(recordings)
+    if rows is None:
+        return None
+    robot = reading.robot
+    quarters, start, best = guess_zeros(robot, rows, _fit)
+    if not any(quarters):
+        return None
+    turns = zip(robot.names, quarters, strict=True)
+    moved = [f"{joint} by {90 * count:+d} deg" for joint, count in turns if count]
+    return Amendment(
+        subject="zeros",
+        what=f"moved: {', '.join(moved)}",
+        why=evidence(start, best),
+        left=misfit(best),
+        reading=replace(reading, columns=turned(reading.columns, robot, quarters)),
+    )
+
+
+def _wiring(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | None:
+    """Units, gears, signs and order of columns."""
+    guess = guess_wiring(reading.robot, recordings, reading.columns, reading.in_drive_units)
+    if guess is None:
+        return None
+    if guess.unknown_gears:
+        what = (
+            f"positions of {', '.join(guess.unknown_gears)} are on the motor side of gears, whose "
+            "ratios the data do not tell"
+        )
+        remedy = "give them: --gears 32,-48,1 for three joints, say"
+        raise RecordingError(what, recordings[0].where, remedy)
+    return Amendment(
+        subject="units and signs",
+        what="; ".join(guess.findings),
+        why="; ".join(dict.fromkeys(guess.evidence)),
+        left=guess.left,
+        reading=replace(reading, columns=guess.columns, geared=reading.geared or guess.gears),
+    )
+
+
+def _rows(recordings: tuple[Recording, ...]) -> WiringRows | None:
+    """A few hundred rows; None where recordings are too short for the usual filter."""
+    criteria = DEFAULTS.wiring
+    try:
+        return rows_of(Dataset(recordings), criteria.rows, criteria.independent_hz)
+    except DynidentError:
+        return None
+
+
+def _fit(robot: Robot, rows: WiringRows) -> TorqueFit:
+    """Fit the robot's equations of motion to rows, as they are."""
+    n = robot.n
+    return WiringRegression.of(Model(robot), rows).fit(np.arange(n), np.ones(n))
+
+
+def wins(best: TorqueFit, start: TorqueFit, rows: WiringRows) -> bool:
+    """Whether a fit is better by far, by the criteria of the wiring check.
+
+    Parameters
+    ----------
+    best, start : the fits.
+    rows : of which they are.
+    """
+    gain = best.score - start.score
+    criteria = DEFAULTS.wiring
+    # What no fit leaves less of is not mended, whatever became possible by it.
+    better = misfit(best) < misfit(start)
+    return better and gain >= criteria.gain and gain * rows.independent >= criteria.evidence
+
+
+def misfit(fit: TorqueFit) -> float:
+    """Share of the torque that a fit leaves."""
+    return float(np.sqrt(np.mean(fit.unexplained)))
+
+
+def evidence(start: TorqueFit, best: TorqueFit) -> str:
+    """What shows that one fit is better than another."""
+    left = [percent(misfit(one)) for one in (best, start)]
+    return f"a fit then leaves {left[0]} of the torque instead of {left[1]}"

@@ -1,0 +1,66 @@
+"""The recordings of a draft: which are to judge by, which repeat, and what is to know of each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from dynident.recording import Recording, usable
+from dynident.study_draft.draft import DraftedRecording
+from dynident.study_draft.log import Log
+from dynident.study_draft.timing import period_of, uses_of
+
+
+def drafted_recordings(
+    logs: Sequence[Log],
+    recordings: Sequence[Recording],
+    take: Callable[[str, list[str], str], int],
+) -> tuple[DraftedRecording, ...]:
+    """Return the entries of a study.
+
+    Parameters
+    ----------
+    logs : of the files.
+    recordings : read from them.
+    take : takes a decision: (subject, choices, reason) -> which of them.
+
+    Returns
+    -------
+    One for each log.
+    """
+    uses, why = uses_of([log.record or log.file.stem for log in logs])
+    take("use", [", ".join(dict.fromkeys(uses))], why)
+    periods = [period_of(one) for one in recordings]
+    if any(periods):
+        shown = ", ".join(f"{x:g} s" for x in dict.fromkeys(x for x in periods if x))
+        reason = "positions repeat after this time, which gives a noise floor"
+        if take("period", [shown, "none"], reason) == 1:
+            periods = [None] * len(periods)
+    else:
+        take("period", ["none"], "no motion repeats within its recording")
+    return tuple(
+        DraftedRecording(
+            file=log.file,
+            record=log.record,
+            layout=log.layout,
+            use="test" if use == "test" else "train",
+            period=period,
+            remark=_remark(one, period),
+        )
+        for log, use, period, one in zip(logs, uses, periods, recordings, strict=True)
+    )
+
+
+def _remark(recording: Recording, period: float | None) -> str:
+    """What a reader of the study wants to know of a recording, in a line."""
+    said = [f"{recording.duration:.4g} s at {recording.rate_hz:.5g} Hz"]
+    if recording.jitter > 0.01:
+        said.append(f"time steps vary by {100 * recording.jitter:.2g} %")
+    if period:
+        said.append(f"{recording.duration / period:.3g} repetitions")
+    looked = usable(replace(recording, period=period))
+    said += [
+        f"{one.reason} from {one.start:.4g} to {one.stop:.4g} s is left out by itself"
+        for one in looked.left_out or ()
+    ]
+    return "; ".join(said)
