@@ -405,7 +405,7 @@ def test_one_entry_may_name_several_files(tmp_path):
         ('file = "none_*.csv"', r"none_\*.csv: no file matches. check the pattern"),
         ("file = []", r"recordings.0: file = \[\] names no file"),
         ('file = "t*.csv"\nrecord = "a"', r"record = 'a' is of one file, and 2 are named"),
-        ('file = "train.csv"\nrate_hz = 1e9', r"recordings.0: rate_hz = 1000000000.0"),
+        ('file = "train.csv"\nrate_hz = 1e9', r"recordings.0.rate_hz: .*less than or equal"),
         (
             'file = "train.csv"\nrate_hz = 100.0',
             "rate_hz = 100 is given, and the file has a",

@@ -130,3 +130,47 @@ def test_what_is_not_told_by_name_is_refused_with_what_is_there(
     with pytest.raises(RecordingError, match=what) as caught:
         match(log_of(*names, t=CLOCK), two_links())
     assert "it holds" in str(caught.value) and "shoulder, elbow" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "name", ["actual_TCP_force_1", "tau_ext_1", "pos_err_1", "torque_limit_1", "wrench_force_0"]
+)
+def test_what_is_no_signal_of_a_joint_is_left_alone(name: str) -> None:
+    assert role_of(name, JOINTS) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "signal", "origin"),
+    [
+        ("tau_J_d_1", "tau", "reference"),
+        ("q_d_0", "q", "reference"),
+        ("FbkPosition1", "q", "measured"),
+        ("SetPosition1", "q", "reference"),
+        ("A1_torque", "tau", "plain"),
+        ("header.stamp.nsecs", "t", "plain"),
+        ("tau_current_1", "current", "plain"),
+    ],
+)
+def test_vendors_words_are_understood(name: str, signal: str, origin: str) -> None:
+    role = role_of(name, JOINTS)
+    assert role is not None and (role.signal, role.origin) == (signal, origin)
+
+
+def test_a_joint_may_be_called_after_a_signal() -> None:
+    role = role_of("q.theta", ("theta",))
+    assert role is not None and (role.signal, role.joint) == ("q", 0)
+
+
+def test_measured_currents_come_before_what_a_controller_wants() -> None:
+    names = [f"{kind}_{k}" for k in (0, 1) for kind in ("q", "target_moment", "actual_current")]
+    groups = match(log_of(*names, t=CLOCK), two_links()).groups["tau"]
+    assert [group.is_current for group in groups] == [True, False]
+
+
+def test_two_signals_of_one_joint_are_a_choice_never_a_mixture() -> None:
+    names = [f"{kind}_{joint}" for joint in JOINTS for kind in ("q", "theta", "tau")]
+    groups = match(log_of(*names, t=CLOCK), two_links()).groups["q"]
+    assert [group.title for group in groups] == [
+        "q_shoulder ... q_elbow",
+        "theta_shoulder ... theta_elbow",
+    ]

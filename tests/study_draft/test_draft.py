@@ -216,3 +216,50 @@ def test_currents_are_a_study_in_amperes_whose_gains_are_identified(arm: Path) -
         assert line in text
     shown = tomllib.loads(text)
     assert shown["torque_unit"] == "A" and shown["columns"]["tau.elbow"] == "actual_current_1"
+
+
+def test_a_robot_on_the_ceiling_is_seen_to_be_one(arm: Path) -> None:
+    robot = di.Robot.from_file(arm).with_gravity((0.0, 0.0, 9.81))
+    one = recording(1)
+    v = di.recording.central_difference(one.q, one.rate_hz)
+    a = di.recording.central_difference(v, one.rate_hz)
+    tau = robot.inverse_dynamics(one.q, v, a)
+    study, decisions = read_back(arm, as_logged(one, trq_1=tau[:, 0], trq_2=tau[:, 1]))
+    # In a plane it is one, too: that both are possible is what has to be said.
+    (found,) = (one for one in decisions if one.subject in ("zeros", "gravity"))
+    assert "gravity = [0, 0, 9.81] in the base's axes" in found.choices
+    fit = di.fit(study.model, study.train)
+    assert fit.error < 0.05
+
+
+def test_torques_that_are_later_still_are_delayed_not_held(arm: Path) -> None:
+    one = recording(2)
+    late = np.concatenate([one.q[:1], one.q[:1], one.q[:-2]])
+    study, decisions = read_back(arm, as_logged(one, pos_1=late[:, 0], pos_2=late[:, 1]))
+    assert study.train.recordings[0].torque == "measured"
+    assert any("samples later" in decision.reason for decision in decisions)
+
+
+def test_speeds_tell_the_unit_of_the_clock_and_a_counter(arm: Path) -> None:
+    one = recording(3)
+    v = np.gradient(one.q, one.t, axis=0)
+    counter = np.arange(one.samples, dtype=float)
+    speeds = {"vel_1": v[:, 0], "vel_2": v[:, 1]}
+    study, decisions = read_back(arm, as_logged(one, time=counter, **speeds))
+    assert_same(study, one)
+    assert any("samples at 100 Hz" in decision.words for decision in decisions)
+
+
+def test_a_broken_cell_is_told_for_what_it_is(arm: Path) -> None:
+    data = written(arm.parent / "run.csv", as_logged(recording(1)))
+    lines = data.read_text().splitlines()
+    lines[5] = lines[5].rpartition(",")[0] + ",oops"
+    data.write_text("\n".join(lines))
+    with pytest.raises(RecordingError, match="'oops' is not a number") as caught:
+        draft_study(arm, [data])
+    assert "line 6" in str(caught.value)
+
+
+def test_a_file_that_is_named_twice_is_read_once(arm: Path) -> None:
+    data = written(arm.parent / "run.csv", as_logged(recording(1)))
+    assert len(draft_study(arm, [data, str(data)]).recordings) == 1

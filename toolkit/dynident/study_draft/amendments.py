@@ -24,6 +24,7 @@ from dynident.wiring.wiring_regression import TorqueFit, WiringRegression
 from dynident.wiring.wiring_rows import WiringRows, rows_of
 
 _ROUNDS = 4
+_ALIKE = 1.02  # times the least misfit, within which amendments are not told apart
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,19 +89,23 @@ def amended(
     refused: set[str] = set()
     for _ in range(_ROUNDS):
         recordings = read(reading)
-        guesses = [guess(reading, recordings) for guess in (_mounting, _zeros, _wiring)]
+        guesses = [guess(reading, recordings) for guess in (_zeros, _mounting, _wiring)]
         found = [one for one in guesses if one is not None and one.subject not in refused]
         if not found:
             break
-        best = min(found, key=lambda one: one.left)
-        choices = [best.what, "as recorded"]
-        poor = best.left > DEFAULTS.wiring.poor_fit
-        reason = f"{best.why}{', which is still poor' if poor else ''}"
-        taken = take(best.subject, choices[::-1] if poor else choices, reason)
-        if taken == int(poor):
-            reading = best.reading
+        least = min(one.left for one in found)
+        # A planar arm on the ceiling, say, is one whose first joint counts from elsewhere.
+        close = [one for one in found if one.left <= _ALIKE * least]
+        choices = [one.what for one in close]
+        poor = least > DEFAULTS.wiring.poor_fit
+        at = 0 if poor else len(choices)
+        choices.insert(at, "as recorded")
+        reason = f"{close[0].why}{', which is still poor' if poor else ''}"
+        taken = take(close[0].subject, choices, reason)
+        if taken == at:
+            refused |= {one.subject for one in close}
         else:
-            refused.add(best.subject)
+            reading = close[taken - (taken > at)].reading
     return reading
 
 

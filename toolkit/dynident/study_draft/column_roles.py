@@ -104,7 +104,8 @@ def role_of(column: str, joints: Sequence[str]) -> ColumnRole | None:
     signal = _SIGNAL_OF[told]
     rest = [word for word in words if word != told]
     letters = [word for word in words if not word.isdigit()]
-    origin: Origin = next((_ORIGIN_OF[word] for word in rest if word in _ORIGIN_OF), "plain")
+    origins: list[Origin] = [_ORIGIN_OF[word] for word in rest if word in _ORIGIN_OF]
+    origin: Origin = origins[0] if origins else "plain"
     if origin == "plain" and letters[-1] == "d" and len(letters) > 1:
         origin = "reference"  # tau_J_d, q_d: desired
     scales = [_SCALES[word] for word in rest if word in _SCALES]
