@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -35,13 +36,13 @@ class Reading:
     ----------
     robot : with the direction of gravity.
     columns : ours -> theirs.
-    in_drive_units : whether what stands for torques are currents: their size tells nothing.
+    torque_unit : "A" where what stands for torques are currents: their size tells nothing.
     geared : whether the motors' side of a gear was found.
     """
 
     robot: Robot
     columns: dict[str, Column]
-    in_drive_units: bool = False
+    torque_unit: Literal["N m", "A"] = "N m"
     geared: bool = False
 
 
@@ -156,7 +157,7 @@ def _zeros(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | N
 
 def _wiring(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | None:
     """Units, gears, signs and order of columns."""
-    guess = guess_wiring(reading.robot, recordings, reading.columns, reading.in_drive_units)
+    guess = guess_wiring(reading.robot, recordings, reading.columns, reading.torque_unit)
     if guess is None:
         return None
     if guess.unknown_gears:

@@ -89,7 +89,7 @@ def draft_study(
         notes.take("gears", ["on the motors' side"], "the ratios were given")
     torque = matched.groups["tau"][chosen["tau"]]
     unit = _unit(torque, notes)
-    reading = Reading(robot=described, columns=columns, in_drive_units=unit == "A")
+    reading = Reading(robot=described, columns=columns, torque_unit=unit)
     reading = replace(reading, columns=_without_strangers(reading, logs, notes))
     reading = amended(reading, lambda one: _read(logs, one), notes.take)
     recordings = _read(logs, reading)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -46,7 +47,7 @@ def guess_wiring(
     robot: Robot,
     recordings: tuple[Recording, ...],
     columns: dict[str, Column],
-    in_drive_units: bool,
+    torque_unit: Literal["N m", "A"],
 ) -> WiringGuess | None:
     """Compare recordings with the equations of motion of the robot as it is described.
 
@@ -55,8 +56,8 @@ def guess_wiring(
     robot : with its limits and described inertias.
     recordings : read with `columns`.
     columns : ours -> theirs, every `q` and `tau` among them.
-    in_drive_units : whether torques are currents: sizes and signs of them are gains to be
-        identified, and no fault.
+    torque_unit : "A" where they are currents: sizes and signs of them are gains to be identified,
+        and no fault.
 
     Returns
     -------
@@ -70,7 +71,7 @@ def guess_wiring(
         return None
     faults = faults_of(model, result, recordings[0])
     now = result.assignment
-    if in_drive_units:
+    if torque_unit == "A":
         faults = tuple(one for one in faults if one.kind not in _OF_GAINS)
         now = replace(now, torque_scale=np.ones(robot.n))
     if not faults:
