@@ -198,6 +198,10 @@ def wins(best: TorqueFit, start: TorqueFit, rows: WiringRows) -> bool:
     ----------
     best, start : the fits.
     rows : of which they are.
+
+    Returns
+    -------
+    True if it is.
     """
     gain = best.score - start.score
     criteria = DEFAULTS.wiring
