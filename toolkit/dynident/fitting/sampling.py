@@ -31,7 +31,12 @@ from dynident.recording import (
 BLOCK = 8192
 """Samples at the full rate that are evaluated at a time, at most."""
 
-_MEMORY = 2**27  # bytes of the columns of so many samples: more than 12 joints get fewer
+_MEMORY = 2**27
+"""Bytes that the columns of a block are meant to take: more than 12 joints get fewer samples.
+
+No bound: a block is never shorter than twice the filter's overlap, which grows with the sampling
+rate over the cut-off, and has an overlap on either side besides.
+"""
 _LEAST_BLOCK = 2048  # fewer do not pay for a function of many samples
 
 LEAST_ROWS = 20
