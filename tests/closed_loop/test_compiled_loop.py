@@ -239,6 +239,18 @@ def test_stiff_friction_takes_more_steps_or_goes_to_drake(always, monkeypatch):
     assert other.notes == (f"Drake simulates 'run1': {refused}.",)
 
 
+@needs_compiler
+def test_exchanged_names_are_another_loop(always):
+    """The same tree, whose traced effect is at the other joint."""
+    names = {"shoulder": "elbow", "elbow": "shoulder"}
+    robot = arm()
+    joints = tuple(replace(one, name=names.get(one.name, one.name)) for one in robot.joints)
+    effects = FRICTION | {"presliding@shoulder": [2.0]}
+    for one in (robot, replace(robot, joints=joints)):
+        found = both([task(mechanism(one, effects, friction_width=0.05))], PD, lead_in=0.0)
+        np.testing.assert_allclose(found[0][0].q, found[1][0].q, rtol=0, atol=1e-6)
+
+
 # --- many at once -----------------------------------------------------------------------------
 
 

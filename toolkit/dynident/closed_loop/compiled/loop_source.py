@@ -38,7 +38,9 @@ class BodyStructure:
         """Return that of a mechanism."""
         others = tuple((one.effect, len(one.values)) for one in mechanism.others)
         widths = tuple(mechanism.friction_widths.tolist())
-        said = (widths, mechanism.carries_payload, mechanism.number) if others else ()
+        # Effects find their joints by name: their columns are written into the trace.
+        names = tuple(mechanism.robot.names)
+        said = (names, widths, mechanism.carries_payload, mechanism.number) if others else ()
         return cls(mechanism.robot.joint_tree, (others, said), mechanism.memory)
 
 
