@@ -62,8 +62,8 @@ class ClosedLoop:
     Parameters
     ----------
     accuracy : of the integrator, see `ACCURACY`.
-    integrator : "auto": compiled where the motion's accelerations are formulas and compiling pays
-        or was done before, as the environment variable DYNIDENT_COMPILE allows; motions that the
+    integrator : "auto": compiled where the motion's accelerations are formulas and the samples pay
+        for compiling, as the environment variable DYNIDENT_COMPILE allows; motions that the
         compiled loop cannot make go to Drake. Which of the two it is changes a motion by as much
         as their errors. "drake": always Drake, the reference.
     repeats : about as many simulations like each one are to come: more make compiling pay.

@@ -32,9 +32,10 @@ from dynident.closed_loop.stepped_motion import (
     rms,
 )
 
-PRICE = Price(look_after=2_000, compile_after=15_000)
-"""Samples of Drake's loop that take as long as to write the source, and as to compile it. Measured
-for 2 to 60 joints: a sample of a motion takes Drake 0.05 to 0.5 ms, the compiler 0.6 to 12 s."""
+PRICE = Price(look_after=5_000, compile_after=5_000)
+"""Samples of Drake's loop that are worth a compiler. The cache is asked no sooner: the same call
+then makes the same motions, whatever was simulated before, here or elsewhere. Measured for 2 to 60
+joints: a sample of a motion takes Drake 0.05 to 0.5 ms, the compiler, once, 0.6 to 12 s."""
 MOST_STEPS = 13
 """Logarithm (base 2) of the most steps of a stretch: Drake takes no shorter ones either."""
 _TIGHTER = 0.1
@@ -175,8 +176,6 @@ def compiled_loop(truth: Mechanism, nominal: Mechanism) -> CompiledLoop | str:
     for one in (truth, nominal):
         if why := obstacle(one):
             return why
-    if nominal is not truth and nominal.memory:
-        return "the model inside the controller remembers"
     key = BodyStructure.of(truth), BodyStructure.of(nominal)
     found = _loops.pop(key, None) or CompiledLoop(truth, nominal)
     while len(_loops) >= _KEPT:

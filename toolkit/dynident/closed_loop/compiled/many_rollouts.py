@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+from dynident.batch import wish
 from dynident.closed_loop.compiled.body_numbers import BodyNumbers, body_numbers
 from dynident.closed_loop.compiled.loop_function import CompiledLoop, LoopInput, compiled_loop
 from dynident.closed_loop.mechanism import Mechanism
@@ -67,8 +68,7 @@ class CompiledLoops:
             functions = [able[one] for one in some]
             for plan, given, motion in zip(some, inputs, _made(functions, inputs), strict=True):
                 if isinstance(motion, str):
-                    name = f"'{plan.task.name}'" if plan.task.name else "a motion"
-                    self.notes |= {f"Drake simulates {name}: {motion}.": None}
+                    self.notes |= {f"Drake simulates {_named(plan)}: {motion}.": None}
                 else:
                     found[plan] = plan.rollout(motion, given.reference)
             advance(len(found) / len(plans))
@@ -82,10 +82,12 @@ class CompiledLoops:
             # Of what the tasks hold: its identity lasts.
             key = id(one.task.mechanism), id(one.nominal)
             if key not in by_id:
-                by_id[key] = compiled_loop(one.task.mechanism, _nominal(one))
+                by_id[key] = _loop_of(one)
             loop = by_id[key]
             if not isinstance(loop, str):
                 loops[one] = loop
+            elif wish() != "never":
+                self.notes |= {f"Drake simulates {_named(one)}: {loop}.": None}
         functions = {}
         for loop in dict.fromkeys(loops.values()):
             samples = sum(one.samples for one, own in loops.items() if own is loop)
@@ -101,6 +103,18 @@ class CompiledLoops:
             for plan, loop in loops.items()
             if functions[loop] is not None
         }
+
+
+def _named(plan: Plan) -> str:
+    return f"'{plan.task.name}'" if plan.task.name else "a motion"
+
+
+def _loop_of(plan: Plan) -> CompiledLoop | str:
+    """The loop of a motion, or why there is none."""
+    nominal = _nominal(plan)
+    if plan.run.controller.law.through_model and nominal.memory:
+        return "the model inside the controller remembers"
+    return compiled_loop(plan.task.mechanism, nominal)
 
 
 def _nominal(plan: Plan) -> Mechanism:
