@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.synthetic import ARM, arm
+from tests.synthetic import arm
 
 from dynident.batch import compiler
 from dynident.closed_loop import (
@@ -367,19 +367,6 @@ def test_without_a_compiler_drake_simulates_and_says_so(monkeypatch, tmp_path):
 def test_no_other_integrator() -> None:
     with pytest.raises(SimulationError, match="integrators: auto, drake"):
         ClosedLoop(integrator="euler")  # type: ignore[arg-type]
-
-
-@needs_compiler
-def test_robots_of_one_shape_with_other_names_share_no_traced_effect(always):
-    """An effect finds its joint by name: the same tree may have it in another column."""
-    exchanged = ARM.replace('"shoulder"', '"x"').replace('"elbow"', '"shoulder"')
-    robots = (arm(), Robot.from_text(exchanged.replace('"x"', '"elbow"')))
-    stribeck = FRICTION | {"stribeck_friction@elbow": [2.0]}
-    for robot in robots:
-        body = mechanism(robot, stribeck)
-        (ours,) = ClosedLoop().simulate([task(body)], PD, lead_in=0.0)
-        (drakes,) = ClosedLoop(integrator="drake").simulate([task(body)], PD, lead_in=0.0)
-        assert np.abs(ours.q - drakes.q).max() < 1e-5
 
 
 def test_a_model_that_remembers_computes_no_torque_in_either_loop(always):
