@@ -142,8 +142,8 @@ def add(study: Path, labels: tuple[str, ...]) -> CommandAnswer:
     from dynident.effects import effects_of
     from dynident.study import add_effects
 
-    files.require_place(study)
     loaded = load_study(study)
+    files.require_place(study)
     every = (one for label in labels for one in effects_of(label, loaded.robot))
     fresh = tuple(dict.fromkeys(one for one in every if one not in loaded.model))
     if not fresh:
