@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import qr, solve_triangular
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from dynident.fitting.drive_gains.gain_rows import GainProblem
 from dynident.fitting.drive_gains.gain_scales import GainScales
@@ -115,7 +115,7 @@ def _wider(noise: np.ndarray, bread: np.ndarray, scores: BlockScores) -> np.ndar
     scatter = np.diag(bread @ scores.meat @ bread) / np.diag(noise)
     freedom = scores.count - 1
     return np.where(
-        scatter > chi2.isf(_LEVEL, freedom) / freedom, np.minimum(np.sqrt(scatter), _WIDEST), 1.0
+        scatter > chdtri(freedom, _LEVEL) / freedom, np.minimum(np.sqrt(scatter), _WIDEST), 1.0
     )
 
 
