@@ -1,8 +1,11 @@
-"""For all tests: no test of times, and the longest files first."""
+"""For all tests: no test of times, the longest files first, and each leaves the catalogue alone."""
 
 from pathlib import Path
 
+import pytest
 from hypothesis import settings
+
+from dynident.effects import known_effects
 
 # What a first example loads takes seconds, and machines differ: a deadline would test both.
 settings.register_profile("without deadlines", deadline=None)
@@ -45,3 +48,10 @@ assert all((HERE / file).is_file() for file in LONGEST)
 def pytest_collection_modifyitems(items):
     place = {HERE / file: i for i, file in enumerate(LONGEST)}
     items.sort(key=lambda item: place.get(item.path, len(LONGEST)))
+
+
+@pytest.fixture(autouse=True)
+def catalogue_as_it_was():
+    """Effects that a test defines join the catalogue for as long as it runs."""
+    with known_effects.unchanged():
+        yield

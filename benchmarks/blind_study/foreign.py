@@ -11,6 +11,7 @@ class PositionDependentViscosity(JointEffect):
     """A viscosity that varies with position, as an unevenly filled gearbox has it."""
 
     name = "position_dependent_viscosity"
+    in_catalogue = False
     law = "c v sin(3 q)"
     sign_of = "a slope against velocity that changes with position"
     experiment = "move {joint} at the same speeds in several places"
@@ -27,6 +28,7 @@ class SpeedProduct(JointEffect):
     """A torque that follows the product of two joints' speeds."""
 
     name = "speed_product"
+    in_catalogue = False
     place = "pair"
     law = "c v_i v_j"
     sign_of = "a residual where two joints move at once"
@@ -48,6 +50,7 @@ class LuGre(JointEffect):
     """
 
     name = "lugre_friction"
+    in_catalogue = False
     law = "Fc z"
     sign_of = "loops at reversals"
     experiment = "move {joint} to and fro by very little"

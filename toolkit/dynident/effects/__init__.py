@@ -1,8 +1,9 @@
 """The catalogue of physical effects: one class, in one file, each.
 
-A new effect is a new file in one of the folders here and nothing else: every subclass of `Effect`
-found in them joins the catalogue, and with it the fits, the diagnosis, the simulator, the report
-and the tests. `friction`, `drives`, `transmissions` and `bodies` say where an effect sits.
+A new effect is a subclass of `Effect` and nothing else: with a name of its own it joins the
+catalogue when it is defined, wherever that is, and with it the fits, the diagnosis, the simulator,
+the report and the tests. Those that dynident brings are files in the folders here: `friction`,
+`drives`, `transmissions` and `bodies` say where an effect sits.
 """
 
 from dynident.effects.block import FRICTION_WIDTH, Block

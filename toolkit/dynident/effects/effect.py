@@ -5,9 +5,10 @@ are linear in its parameters once its shape parameters are fixed, so that
 
     tau = Y(q, v, a) theta + sum over effects of columns(block) @ values.
 
-One class in one file holds everything that the rest of the package needs to know of an effect:
-columns, parameters, units, bounds, how it is simulated, what it is confounded with, and which
-experiment shows it. The questions about its columns are in `traits`, its simulation in `simulated`.
+One class holds everything that the rest of the package needs to know of an effect: columns,
+parameters, units, bounds, how it is simulated, what it is confounded with, what it means to a
+reader, and which experiment shows it; and it joins the catalogue when it is defined. The questions
+about its columns are in `traits`, its simulation in `simulated`.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 
 from dynident.effects.block import Block
+from dynident.effects.known_effects import join
 from dynident.effects.parameter import Parameter, ShapeParameter
 from dynident.effects.simulated import SimulatedEffect
 from dynident.effects.terms import Term
@@ -66,6 +68,9 @@ class Effect(EffectTraits, SimulatedEffect, ABC):
     point: tuple[float, ...] = ()
 
     name: ClassVar[str]
+    """As it is written in a study. A class that has one of its own joins the catalogue."""
+    in_catalogue: ClassVar[bool] = True
+    """False keeps a class, and those derived from it, out of the catalogue."""
     place: ClassVar[Literal["joint", "pair", "robot", "joint or robot"]] = "joint"
     """Where it sits; "joint or robot" is common to all joints where no joint is named."""
     law: ClassVar[str]
@@ -84,6 +89,11 @@ class Effect(EffectTraits, SimulatedEffect, ABC):
     most of the work."""
     found_by: ClassVar[Literal["residual", "repetition"]] = "residual"
     """Where it shows: in what repetitions have in common, or in what differs between them."""
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        """Join the catalogue, unless the class is internal; see `known_effects.join`."""
+        super().__init_subclass__(**keywords)
+        join(cls)
 
     # --- what it is ---------------------------------------------------------------------------
 

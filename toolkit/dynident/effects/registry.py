@@ -1,28 +1,65 @@
-"""The catalogue: every effect that stands in a file of this room, and what a label stands for."""
+"""The catalogue: every effect that is defined, here or elsewhere, and what a label stands for."""
 
 from __future__ import annotations
 
 import difflib
 import importlib
 import pkgutil
+import warnings
 from functools import cache
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import MappingProxyType
 
 from dynident.effects.effect import Effect
-from dynident.errors import EffectError
+from dynident.effects.known_effects import known_effects, unchanged_if_it_fails
+from dynident.errors import DynidentWarning, EffectError
+
+ENTRY_POINTS = "dynident.effects"
+"""Group of entry points by which packages bring effects: each names a module, or a class in one."""
+_asked: set[EntryPoint] = set()
+
+
+def catalogue() -> MappingProxyType[str, type[Effect]]:
+    """Return every effect that is defined by now, by its name, in alphabetical order.
+
+    The package's own, those of installed packages (entry points of the group `dynident.effects`),
+    and every subclass of `Effect` with a name of its own, wherever it was defined.
+    """
+    _load_packages()
+    return MappingProxyType({name: one.kind for name, one in known_effects().items()})
+
+
+def _load_own() -> None:
+    """Import every file of this room: before anybody can take the name of an effect in it."""
+    for module in pkgutil.walk_packages([str(Path(__file__).parent)], f"{__package__}."):
+        importlib.import_module(module.name)
 
 
 @cache
-def catalogue() -> MappingProxyType[str, type[Effect]]:
-    """Every effect by its name, in alphabetical order."""
-    found: dict[str, type[Effect]] = {}
-    for module in pkgutil.walk_packages([str(Path(__file__).parent)], f"{__package__}."):
-        content = importlib.import_module(module.name)
-        for value in vars(content).values():
-            if isinstance(value, type) and issubclass(value, Effect) and hasattr(value, "name"):
-                found[value.name] = value
-    return MappingProxyType(dict(sorted(found.items())))
+def _packages() -> tuple[EntryPoint, ...]:
+    found = entry_points(group=ENTRY_POINTS)
+    return tuple(sorted(found, key=lambda one: (_package(one), one.name)))
+
+
+def _package(one: EntryPoint) -> str:
+    return one.dist.name if one.dist else one.value
+
+
+def _load_packages() -> None:
+    """Import the effects of installed packages, once; one that fails is a warning."""
+    for one in _packages():
+        if one in _asked:
+            continue
+        _asked.add(one)
+        try:
+            with unchanged_if_it_fails():
+                one.load()
+        except (Exception, SystemExit) as error:
+            reason = " ".join(f"{type(error).__name__}: {error}".split())
+            where = f"the package {_package(one)} are missing: {one.value} fails"
+            said = f"effects of {where} ({reason})"
+            warnings.warn(said, DynidentWarning, stacklevel=2)
 
 
 def effects_of(label: str, robot) -> tuple[Effect, ...]:
@@ -64,3 +101,6 @@ def _joints(place: str, names: tuple[str, ...]) -> tuple[str, str | None]:
             return joint, place[len(joint) + 1 :]
     joint, _, source = place.partition(":")
     return joint, source or None
+
+
+_load_own()

@@ -37,6 +37,7 @@ class FrictionWidthColumn(JointEffect):
     """What dry friction that reverses over k times the width has less: no loss at speed."""
 
     name = "friction_width"
+    in_catalogue = False
     law = "Fc (tanh(v/(k w)) - tanh(v/w))"
     sign_of = "opposite spikes on both sides of zero velocity"
     experiment = "move {joint} with less noise in the drive"

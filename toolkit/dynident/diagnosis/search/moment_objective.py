@@ -39,6 +39,7 @@ class Tangent(Effect):
 
     of: Effect | None = None
     name: ClassVar[str] = "tangent"
+    in_catalogue: ClassVar[bool] = False
 
     @classmethod
     def to(cls, effect: Effect) -> Tangent:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from dynident.effects.effect import Block, Forceless, Parameter
 from dynident.effects.traits import Needs
@@ -46,6 +45,8 @@ class TorqueDelay(Forceless):
             raise EffectError("needs the predicted torque in the block", self.label)
         if len(block.t) < 2:
             raise EffectError("needs the whole recording in the block", self.label)
+        from scipy.interpolate import CubicSpline
+
         at = slice(None) if self.joint is None else [block.index(self.joint)]
         torque = block.torque[:, at]
         curve = CubicSpline(block.t, torque)
