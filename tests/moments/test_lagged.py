@@ -45,3 +45,16 @@ def test_some_rows_say_what_all_do_whatever_the_blocks() -> None:
     assert 0.2 < some.pairs[0] / every.pairs[0] < 0.3
     mean, like = (one.columns / one.pairs[:, None, None] for one in (every, some))
     np.testing.assert_allclose(like, mean, atol=0.1 * np.abs(mean).max())
+
+
+def test_every_lag_of_a_long_stretch_keeps_the_digits_of_its_columns() -> None:
+    """Rows of many windows; columns as far apart in size as masses and inertias."""
+    rng = np.random.default_rng(2)
+    T, lags = 1000, 12
+    X = np.cumsum(rng.normal(size=(T, 1, 3)), axis=0) * np.array([1.0, 1e-6, 1e5])
+    counts = np.ones((T, 1), dtype=bool)
+    found = lagged_products([(True, X, X[:, :, 0], counts)], lags).columns[0]
+    sizes = np.linalg.norm(X[:, 0], axis=0)
+    for k in range(lags + 1):
+        direct = X[: T - k, 0].T @ X[k:, 0]
+        np.testing.assert_array_less(np.abs(found[k] - direct), 1e-14 * np.outer(sizes, sizes))

@@ -6,14 +6,16 @@ joint and lag, sums of products of columns, and of residuals.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from dynident.moments.window_spectra import windowed_products
+
 _STRETCH = 64
 """Rows that follow each other where not all are multiplied: several times the lags, and few, for
-rows far apart show more of a motion than as many that are neighbours."""
+rows far apart show more of a motion than as many that are neighbours. Also rows of a window."""
 
 RowBlock = tuple[bool, np.ndarray, np.ndarray, np.ndarray]
 """Whether a new stretch begins; columns (T, n, p); residual (T, n); mask of what counts (T, n)."""
@@ -129,10 +131,15 @@ class LaggedColumns:
         """Add rows (T, n, p) of a recording, the first of which is its row number `first`."""
         if not self._joints:
             self._joints = [_Joint(columns.shape[2], self.lags) for _ in range(columns.shape[1])]
-        for begin, start, stop in self._stretches(first, first + len(columns)):
-            for j, joint in enumerate(self._joints):
-                joint.add(start == begin, columns[start - first : stop - first, j])
-            k = np.arange(self.lags + 1)
+        stretches = list(self._stretches(first, first + len(columns)))
+        if not stretches:
+            return
+        pieces = [slice(start - first, stop - first) for _, start, stop in stretches]
+        begins = stretches[0][0] == stretches[0][1]
+        for j, joint in enumerate(self._joints):
+            joint.add(begins, columns[:, j], pieces)
+        k = np.arange(self.lags + 1)
+        for begin, start, stop in stretches:
             self._pairs += np.maximum(stop - begin - np.maximum(start - begin, k), 0)
 
     def _stretches(self, first: int, last: int) -> Iterator[tuple[int, int, int]]:
@@ -190,22 +197,53 @@ class _Joint:
         self._lags = lags
         self._before = np.zeros((0, size))
 
-    def add(self, begins: bool, columns: np.ndarray) -> None:
-        """Add rows (T, p)."""
+    def add(
+        self, begins: bool, columns: np.ndarray, pieces: Sequence[slice] = (slice(None),)
+    ) -> None:
+        """Add rows.
+
+        Parameters
+        ----------
+        begins : whether the first piece begins a stretch, or goes on with the rows before.
+        columns : (T, p)
+        pieces : which of the rows follow each other; every piece but the first begins a stretch.
+        """
         before = self._before[:0] if begins else self._before
         some = columns[0] != 0.0
         for name in np.flatnonzero(~some):
             some[name] = columns[:, name].any() or before[:, name].any()
-        used, old = np.flatnonzero(some), len(before)
+        used = np.flatnonzero(some)
+        index, beyond = _windows([range(*one.indices(len(columns))) for one in pieces], self._lags)
+        windows = np.empty((len(used), *index.shape))
         # Column by column, as blocks have them.
-        rows = np.empty((len(used), old + len(columns)))
-        rows[:, :old] = before[:, used].T
-        for row, name in zip(rows[:, old:], used, strict=True):
-            row[:] = columns[:, name]
-        for k in range(self._lags + 1):
-            late = rows[:, max(old, k) :]
-            if late.shape[1]:
-                early = rows[:, max(old, k) - k : rows.shape[1] - k]
-                self.sums[k][np.ix_(used, used)] += early @ late.T
-        last = np.concatenate([before, columns[-self._lags :]]) if self._lags else columns[:0]
-        self._before = np.array(last[max(0, len(last) - self._lags) :])
+        for place, name in enumerate(used):
+            windows[place] = np.take(columns[:, name], index, mode="clip")
+        windows[:, beyond] = 0.0
+        found = windowed_products(windows, self._lags)
+        last, old = before[:, used].T, len(before)
+        for k in range(1, self._lags + 1):
+            found[k] += last[:, max(0, old - k) :] @ windows[:, 0, max(0, k - old) : k].T
+        self.sums[:, used[:, None], used] += found
+        after = columns[pieces[-1]]
+        after = after[max(0, len(after) - self._lags) :]
+        if len(pieces) == 1:
+            after = np.concatenate([before, after])
+        self._before = np.array(after[max(0, len(after) - self._lags) :])
+
+
+def _windows(pieces: Sequence[range], lags: int) -> tuple[np.ndarray, np.ndarray]:
+    """Which rows are in the windows of `windowed_products`, and which of these are not there.
+
+    Parameters
+    ----------
+    pieces : of rows.
+    lags : K.
+
+    Returns
+    -------
+    (S, N) numbers of rows, and whether they are beyond their piece.
+    """
+    starts = [np.arange(one.start, one.stop, _STRETCH) for one in pieces]
+    stops = np.repeat([one.stop for one in pieces], [len(some) for some in starts])
+    index = np.concatenate(starts)[:, None] + np.arange(_STRETCH + lags)
+    return index, index >= stops[:, None]

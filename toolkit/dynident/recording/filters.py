@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -192,7 +193,15 @@ def butterworth(
             where,
             f"choose it above 0 and below {rate_hz / 2:.6g} Hz",
         )
-    return np.asarray(scipy.signal.butter(order, cutoff_hz / (rate_hz / 2), output="sos"))
+    return _sections(cutoff_hz / (rate_hz / 2), order)
+
+
+@lru_cache(64)
+def _sections(share: float, order: int) -> np.ndarray:
+    """A low-pass with its cut-off at a share of half the sampling rate; not to be written to."""
+    found = np.asarray(scipy.signal.butter(order, share, output="sos"))
+    found.flags.writeable = False
+    return found
 
 
 def central_difference(x: np.ndarray, rate_hz: float) -> np.ndarray:

@@ -165,37 +165,50 @@ def input_bias(
 class _NoiseProducts:
     """Weighted products W'D of noisy columns and what they are off, over all rows.
 
-    In directions in which the fitted columns are orthonormal, so that W'W is one.
+    With noise and with its mirror image columns are W = S +- H, so that the mean of W'D is that of
+    S'(S - W0) + H'H, with the columns W0 that are seen, and of S'(W0 - X), with the true ones.
     """
 
     def __init__(self, model: Model, values: np.ndarray, solution: LinearSolution) -> None:
         self._model, self._values, self._solution = model, values, solution
-        rank = len(solution.basis.independent)
-        self.noise, self.hidden = np.zeros((rank, rank)), np.zeros((rank, rank))
+        self._noise, self._hidden = (np.zeros((model.size, model.size)) for _ in range(2))
 
     def add(self, part: NoisyPart) -> None:
         """Add the rows of a recording, for both draws."""
-        for seen, true, one, other in part.columns(self._model, self._values):
-            sharp = true is seen
+        for columns in part.columns(self._model, self._values):
+            every = [columns.mean, columns.half, columns.seen]
+            every += [] if columns.true is None else [columns.true]
             # Joint by joint: of most columns a joint has none.
             for j, weight in enumerate(self._solution.weights):
-                W0, W1, W2 = (self._turned(x[:, j], weight) for x in (seen, one, other))
-                self.noise += (W1.T @ (W1 - W0) + W2.T @ (W2 - W0)) / (2 * part.share)
-                if not sharp:
-                    X = self._turned(true[:, j], weight)
-                    self.hidden += (W1 + W2).T @ (W0 - X) / (2 * part.share)
+                used = self._used([one[:, j] for one in every])
+                mean, half, seen, *true = (one[:, j].T[used] for one in every)
+                places, factor = np.ix_(used, used), weight**2 / part.share
+                self._noise[places] += factor * (mean @ (mean - seen).T + half @ half.T)
+                if true:
+                    self._hidden[places] += factor * (mean @ (seen - true[0]).T)
 
-    def _turned(self, columns: np.ndarray, weight: float) -> np.ndarray:
-        """Rows (T, p) of a joint in the directions of the fit, (T, r)."""
-        some = [
-            (place, name)
-            for place, name in enumerate(self._solution.basis.independent)
-            if columns[0, name] != 0.0 or columns[:, name].any()
+    def _used(self, every: list[np.ndarray]) -> list[int]:
+        """Numbers of the independent columns that are not zero in all of some rows (T, p) each."""
+        begin = np.any([one[0] != 0.0 for one in every], axis=0)
+        return [
+            name
+            for name in self._solution.basis.independent
+            if begin[name] or any(one[:, name].any() for one in every)
         ]
-        if not some:
-            return np.zeros((len(columns), len(self._solution.inverse)))
-        places, names = (list(one) for one in zip(*some, strict=True))
-        return columns[:, names] @ (weight * self._solution.inverse[places])
+
+    @property
+    def noise(self) -> np.ndarray:
+        """Of what noise adds to the columns, (r, r) in directions in which W'W is one."""
+        return self._turned(self._noise)
+
+    @property
+    def hidden(self) -> np.ndarray:
+        """Of what is hidden of the true motion, (r, r) in the same directions."""
+        return self._turned(self._hidden)
+
+    def _turned(self, products: np.ndarray) -> np.ndarray:
+        kept, turn = list(self._solution.basis.independent), self._solution.inverse
+        return turn.T @ products[np.ix_(kept, kept)] @ turn
 
     def bias(self, products: np.ndarray) -> np.ndarray:
         """Error (r,) of an estimate that is (1 - W'D) times the truth."""

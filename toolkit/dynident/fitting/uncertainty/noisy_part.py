@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dynident.fitting.sampling import Sampled, sample
+from dynident.fitting.sampling import BLOCK, Sampled, sample
 from dynident.fitting.uncertainty.trembling import trembling
 from dynident.model import Model
 from dynident.recording import (
@@ -28,10 +28,31 @@ from dynident.recording.white_noise import encoder_noise_std
 _POINTS = (0.5 - 0.5 / 3.0**0.5, 0.5 + 0.5 / 3.0**0.5)
 """Shares of a step at which a mean over it is taken (Gauss, two points)."""
 _PASSES = 4  # of the positions' low-pass and of sums in time, that `trembling` takes one by one
-_AT_ONCE = 2048  # samples of which the columns of five motions are held at a time
+_MEMORY = 12 * 2**20
+"""Bytes that the columns of a motion in a block are meant to take; of four motions they are held at
+a time."""
+_LEAST_BLOCK = 3072  # samples; fewer do not pay for a function of many of more than six joints
 _FINEST = 1e-7
 """Noise over a joint's travel that no encoder is below: what high differences show of smooth motion
 without noise is less."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NoisyColumns:
+    """Columns of some rows, (T, n, p) each.
+
+    Attributes
+    ----------
+    seen : of the motion as it is seen.
+    true : of the motion as it was, in the mean; None where all is seen.
+    mean : of those with noise and with its mirror image.
+    half : half of what these two differ by.
+    """
+
+    seen: np.ndarray
+    true: np.ndarray | None
+    mean: np.ndarray
+    half: np.ndarray
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -101,9 +122,11 @@ class NoisyPart:
             true = (replace(seen, v=seen.v + one), replace(seen, v=seen.v - other))
         fewer = min(sampled.count, fewer)
         start = sampled.kept.start + (sampled.count - fewer) // 2
+        fitting = _MEMORY // (8 * model.robot.n * model.size)
+        at_once = min(BLOCK, max(_LEAST_BLOCK, fitting))
         return cls(
             sampled=replace(
-                sampled, source=seen, kept=slice(start, start + fewer), at_once=_AT_ONCE
+                sampled, source=seen, kept=slice(start, start + fewer), at_once=at_once
             ),
             true=true,
             noisy=(_moved(seen, added, 1.0), _moved(seen, added, -1.0)),
@@ -111,12 +134,30 @@ class NoisyPart:
             share=fewer / whole.count,
         )
 
-    def columns(self, model: Model, values: np.ndarray) -> Iterator[tuple[np.ndarray, ...]]:
-        """Yield columns (T, n, p): seen, true, and of both draws."""
-        motions = (self.sampled.motion, *self.noisy, *self.true)
-        every = (replace(self.sampled, source=one).columns(model, values) for one in motions)
-        for seen, one, other, *true in zip(*every, strict=True):
-            yield seen, ((true[0] + true[1]) / 2 if true else seen), one, other
+    def columns(self, model: Model, values: np.ndarray) -> Iterator[NoisyColumns]:
+        """Yield the columns of the motions, block by block.
+
+        Parameters
+        ----------
+        model, values : (p,) the fit.
+        """
+        # One after the other, in each other's place: every block of columns takes megabytes.
+        seen, draw, mirrored, *others = (
+            replace(self.sampled, source=one).columns(model, values)
+            for one in (self.sampled.motion, *self.noisy, *self.true)
+        )
+        for mean in draw:
+            half = next(mirrored)
+            half -= mean
+            half *= -0.5
+            mean -= half
+            true = None
+            if others:
+                true = next(others[0])
+                true += next(others[1])
+                true *= 0.5
+            yield NoisyColumns(seen=next(seen), true=true, mean=mean, half=half)
+            del mean, half, true
 
 
 def _middle(whole: Sampled, settings: Filter, model: Model, rows: int) -> Sampled:

@@ -15,6 +15,7 @@ import numpy as np
 
 from dynident.errors import SimulationError
 from dynident.model import InertiaMatrices, Model
+from dynident.moments.factors import factorise
 from dynident.recording import Recording, lowpass
 
 _READINGS = 8
@@ -74,11 +75,16 @@ def _above(x: np.ndarray, rate_hz: float, cutoff_hz: float) -> np.ndarray:
 
 def _fed_back(torque: np.ndarray, readings: np.ndarray) -> np.ndarray:
     """What the last readings (T, n) explain of a torque (T, n)."""
-    count = len(readings)
-    shifted = np.zeros((count, _READINGS, readings.shape[1]))
+    count, n = readings.shape
+    rows = np.zeros((_READINGS, n, count))
     for lag in range(min(_READINGS, count)):
-        shifted[lag:, lag] = readings[: count - lag]
-    inputs = shifted.reshape(count, -1)
-    scale = np.sqrt(np.einsum("ij,ij->j", inputs, inputs))
-    inputs /= np.where(scale > 0, scale, 1.0)
-    return inputs @ np.linalg.lstsq(inputs, torque, rcond=None)[0]
+        rows[lag, :, lag:] = readings[: count - lag].T
+    rows = rows.reshape(-1, count)
+    scale = np.linalg.norm(rows, axis=1, keepdims=True)
+    rows /= np.where(scale > 0, scale, 1.0)
+    # Least squares of the triangular factor, which has as few rows as there are columns.
+    both = np.concatenate([rows, torque.T]).T[:, None]
+    (factor,) = factorise([(both[:, :, :-1], both[:, :, -1])]).R
+    size, rounding = len(rows), np.finfo(float).eps * max(rows.shape)
+    found = np.linalg.lstsq(factor[:, :size], factor[:, size:], rcond=rounding)[0]
+    return (found.T @ rows).T
