@@ -34,6 +34,7 @@ FLOORS = (
     ("evidence",),
     ("diagnosis",),
     ("study",),
+    ("effect_contract",),
     ("study_draft",),
     ("refitting",),
     ("reporting",),

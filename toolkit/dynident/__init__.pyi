@@ -2,6 +2,7 @@ from . import closed_loop as closed_loop
 from . import consistency as consistency
 from . import constraints as constraints
 from . import diagnosis as diagnosis
+from . import effect_contract as effect_contract
 from . import effects as effects
 from . import errors as errors
 from . import evidence as evidence
@@ -20,6 +21,7 @@ from . import validation as validation
 from . import wiring as wiring
 from .consistency.checking import check as check
 from .diagnosis.procedure import diagnose as diagnose
+from .effect_contract.check_effect import check_effect as check_effect
 from .effects.effect import Effect as Effect
 from .effects.registry import catalogue as catalogue
 from .effects.registry import effects_of as effects_of

@@ -7,7 +7,7 @@ the report and the tests. Those that dynident brings are files in the folders he
 """
 
 from dynident.effects.block import FRICTION_WIDTH, Block
-from dynident.effects.effect import Effect, JointEffect
+from dynident.effects.effect import Effect, JointEffect, force_unit, motion_unit
 from dynident.effects.parameter import Parameter, ShapeParameter
 from dynident.effects.registry import catalogue, effects_of
 from dynident.effects.terms import Term
@@ -26,4 +26,6 @@ __all__ = [
     "Transmission",
     "catalogue",
     "effects_of",
+    "force_unit",
+    "motion_unit",
 ]
