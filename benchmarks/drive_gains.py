@@ -18,7 +18,8 @@ import numpy as np
 
 import dynident as di
 from arms import chain
-from dynident.fitting.drive_gains import DriveGains, GainProblem, Load, fit_drive_gains
+from dynident.fitting.drive_gains import DriveGains, GainProblem, fit_drive_gains
+from dynident.fitting.loads import Load
 from dynident.inertia import from_com, to_com
 from dynident.model import Model
 from dynident.recording import Dataset, Recording

@@ -43,7 +43,7 @@ T = TypeVar("T", bound=SettingsTable)
 _LEVEL = r"(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')\s*+\.\s*+"
 _DEEP = re.compile(rf"(?:{_LEVEL}){{{DEEPEST}}}")
 """A dotted key of very many levels, which takes a parser memory by their square."""
-_TRIED = re.compile(r"str|float|int|bool|list\[\w+\]|_\w+")
+_TRIED = re.compile(r"str|float|int|bool|list\[\w+\]|_\w+|[A-Z]\w*Entry")
 
 
 def read_toml(path: str | Path, schema: type[T]) -> T:

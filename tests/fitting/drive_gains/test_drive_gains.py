@@ -11,7 +11,8 @@ import pytest
 from chains import chain, chain_text
 from dynident.effects import effects_of
 from dynident.errors import StudyError
-from dynident.fitting.drive_gains import DriveGains, GainProblem, Load, fit_drive_gains
+from dynident.fitting.drive_gains import DriveGains, GainProblem, fit_drive_gains
+from dynident.fitting.loads import Load
 from dynident.inertia import from_com, to_com
 from dynident.model import Model
 from dynident.recording import Dataset, Recording

@@ -116,15 +116,35 @@ def payload(study: Path) -> CommandAnswer:
     "crate"; at least one recording is without it. What the table of the load leaves out is
     identified. Of currents (torque_unit = "A") the gains of the drives come with it.
 
+    Where files have the columns of a wrench sensor, wrench.LINK.fx to wrench.LINK.tz in the frame
+    of that link, the sensor weighs, and no torques are needed: whatever hangs on it in recordings
+    that name no load, and the loads that others name.
+
     Exit status 1 if no rigid body can have the parameters of a load.
 
     Example: dynident payload study.toml
     """
+    from dynident.fitting.wrench_sensor import fit_wrench
+    from dynident.study import load_wrenches
+
+    with progress("reading"):
+        problems = load_wrenches(study)
+    if problems:
+        with progress("weighing"):
+            sensed = tuple(fit_wrench(problem) for problem in problems)
+        return CommandAnswer(
+            content=lambda: {"wrench_sensors": [one.to_dict() for one in sensed]},
+            parts=lambda: tuple(part for one in sensed for part in one.tables()),
+            status=int(not all(one.is_consistent for one in sensed)),
+        )
     loaded = load_study(study)
     drives = loaded.drives
     found = () if drives is None else tuple(one for one in drives.loads if not one.load.is_known)
     if drives is None or not found:
-        remedy = 'add [loads.crate], and payload = "crate" to the [[recordings]] that carry it'
+        remedy = (
+            'add [loads.crate], and payload = "crate" to the [[recordings]] that carry it; or name '
+            "the columns of a wrench sensor wrench.LINK.fx to wrench.LINK.tz"
+        )
         raise StudyError("no recording names a load that is to be weighed", str(study), remedy)
     broken = any(one.is_whole and not one.is_consistent for one in found)
     return CommandAnswer(content=drives.to_dict, parts=drives.tables, status=int(broken))

@@ -211,7 +211,10 @@ GAINS = tuple(dict.fromkeys(name for law in LAWS.values() for name in law.gains)
 
 
 class ControllerFile(SettingsTable):
-    """The table [controller] of a study or an experiment file."""
+    """The table [controller] of a study or an experiment file; its keys are those of `Controller`.
+
+    A number in the place of a list stands for every joint.
+    """
 
     kind: str
     rate_hz: Rate | None = None

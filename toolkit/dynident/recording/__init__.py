@@ -2,7 +2,8 @@
 
 `read` and `write` exchange them with CSV, NPZ, MAT and Parquet files (other names and units
 through `Column`; what a file does not say of itself through `FileLayout`), `open_table` opens any
-file with its columns under its own names, `Recording` checks what is read.
+file with its columns under its own names, `Recording` checks what is read. `read_wrench` reads a
+wrench sensor's columns as the torques of six joints that stand still.
 `uniform` puts jittered time stamps on a uniform clock. `differentiate` turns positions into a
 `Motion`, `MotionInParts` as much of it as is asked for; `ParallelFilter` passes regressor columns
 and torque through one low-pass and decimation, in blocks if asked; both follow a `Filter`.
@@ -23,6 +24,14 @@ from dynident.recording.formats.column_names import Column
 from dynident.recording.formats.column_table import ColumnTable, FileLayout
 from dynident.recording.formats.open_table import READABLE, open_table
 from dynident.recording.formats.read import SUFFIXES, read
+from dynident.recording.formats.wrench_file import (
+    COMPONENTS,
+    WrenchColumns,
+    frame_of,
+    frames_in,
+    read_wrench,
+    sensed_frames,
+)
 from dynident.recording.formats.write import write
 from dynident.recording.masks import moving, within
 from dynident.recording.motion import Motion, MotionInParts, differentiate
@@ -45,6 +54,7 @@ from dynident.recording.usable_rows import (
 )
 
 __all__ = [
+    "COMPONENTS",
     "READABLE",
     "SIGNALS",
     "SUFFIXES",
@@ -63,12 +73,15 @@ __all__ = [
     "Provenance",
     "Recording",
     "RowCount",
+    "WrenchColumns",
     "central_difference",
     "choose_factor",
     "count_rows",
     "default_filter",
     "default_position_cutoff",
     "differentiate",
+    "frame_of",
+    "frames_in",
     "lowpass",
     "mismatch",
     "moving",
@@ -76,11 +89,13 @@ __all__ = [
     "open_table",
     "periods",
     "read",
+    "read_wrench",
     "require_motion",
     "require_repetition",
     "require_torque",
     "resolution",
     "rows_in_words",
+    "sensed_frames",
     "uniform",
     "usable",
     "usable_rows",

@@ -9,20 +9,12 @@ from dynident.fitting.drive_gains.drive_gains import DriveGains
 from dynident.fitting.drive_gains.fit_gains import fit_drive_gains
 from dynident.fitting.drive_gains.gain_errors import with_gain_errors
 from dynident.fitting.drive_gains.gain_rows import GainProblem
-from dynident.fitting.drive_gains.identified_load import IdentifiedLoad
-from dynident.fitting.drive_gains.load_entry import LoadEntry, PayloadEntry, loads_of
-from dynident.fitting.drive_gains.loads import Load
 from dynident.fitting.drive_gains.newton_metres import in_newton_metres
 
 __all__ = [
     "DriveGains",
     "GainProblem",
-    "IdentifiedLoad",
-    "Load",
-    "LoadEntry",
-    "PayloadEntry",
     "fit_drive_gains",
     "in_newton_metres",
-    "loads_of",
     "with_gain_errors",
 ]

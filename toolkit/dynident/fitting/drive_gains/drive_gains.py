@@ -7,8 +7,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from dynident.fitting.drive_gains.identified_load import IdentifiedLoad
 from dynident.fitting.estimate import DataSource
+from dynident.fitting.loads import IdentifiedLoad
 from dynident.tables import Shown, Table, finite, number, percent
 
 Finding = Literal["given", "identified", "up to a common scale", "not told apart"]

@@ -13,10 +13,14 @@ from dynident.fitting.drive_gains.gain_covariance import GainCovariance, gain_co
 from dynident.fitting.drive_gains.gain_rows import GainProblem
 from dynident.fitting.drive_gains.gain_scales import GainScales, as_described, gain_scales
 from dynident.fitting.drive_gains.gain_solution import GainSolution, solve_gains
-from dynident.fitting.drive_gains.identified_load import IdentifiedLoad
-from dynident.fitting.drive_gains.loads import Load, placement
 from dynident.fitting.least_squares import sources_of
-from dynident.inertia import frame_change
+from dynident.fitting.loads import (
+    IdentifiedLoad,
+    Load,
+    SolvedParts,
+    identified_load,
+    placement,
+)
 from dynident.moments.factors import TriangularFactors, factorise
 from dynident.threads import single_threaded
 
@@ -108,27 +112,15 @@ def _identified(
     open_scale: Sequence[str],
 ) -> IdentifiedLoad:
     n, part = len(solution.gains), problem.slices[load.name]
-    parts = problem.splits[load.name]
-    values = np.where(_told_apart(solution), solution.values, np.nan)[part]
-    # Parameters that are not told apart make those NaN that they are part of, and no others.
-    unknown = np.where(parts.unknown != 0.0, parts.unknown * np.nan_to_num(values), 0.0)
-    phi = parts.given + unknown.sum(axis=1)
-    phi[np.any((parts.unknown != 0.0) & np.isnan(values), axis=1)] = np.nan
     own = slice(n + part.start, n + part.stop)
-    covariance = parts.unknown @ found.matrix[own, own] @ parts.unknown.T
-    R, p = placement(load, problem.model.robot)
-    back = frame_change(R.T, -R.T @ p)
-    moved = np.full(10, np.nan)
-    for row in range(10):
-        used = back[row] != 0.0
-        moved[row] = back[row, used] @ phi[used]
-    return IdentifiedLoad(
-        load=load,
-        phi=moved,
-        covariance=back @ covariance @ back.T,
-        acting=parts.given + parts.unknown @ solution.values[part],
+    solved = SolvedParts(
+        values=solution.values[part],
+        covariance=found.matrix[own, own],
+        alone=_told_apart(solution)[part],
         scale=tuple(open_scale),
     )
+    where = placement(load, problem.model.robot)
+    return identified_load(load, problem.splits[load.name], solved, where)
 
 
 def _told_apart(solution: GainSolution) -> np.ndarray:

@@ -8,26 +8,14 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import qr, solve_triangular
-from scipy.special import chdtri
 
 from dynident.fitting.drive_gains.gain_rows import GainProblem
 from dynident.fitting.drive_gains.gain_scales import GainScales
 from dynident.fitting.drive_gains.gain_solution import GainSolution
-from dynident.fitting.linear_solution import LinearSolution
 from dynident.fitting.sampling import Sampled
-from dynident.fitting.uncertainty.cluster_sandwich import BlockScores, time_blocks
-from dynident.fitting.uncertainty.lagged_rows import LAGS
-from dynident.fitting.uncertainty.noise_shapes import noise_shapes
-from dynident.fitting.uncertainty.row_errors import RowErrors, errors_of
+from dynident.fitting.uncertainty.row_errors import RowErrors
+from dynident.fitting.uncertainty.scattered_errors import SolvedRows, scattered_errors
 from dynident.moments.factors import RANK_TOLERANCE, TriangularFactors
-from dynident.moments.lagged import RowBlock, lagged_products
-from dynident.robot import base_parameters
-
-_LEVEL = 1e-3
-"""Chance that scatter between blocks of time which is noise alone counts as more."""
-_WIDEST = 10.0
-"""Factor of sigma beyond which the scatter is that of a direction that the data hardly know, where
-few blocks measure nothing. Taste."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -66,56 +54,21 @@ def gain_covariance(
     n, kept = len(solution.gains), list(solution.basis.independent)
     columns = [*_seen_gains(problem, scales), *(n + k for k in kept)]
     samples = list(problem.samples())
-    lags = min(LAGS, *(one.count // 10 for one in samples))
-
-    scores = BlockScores(len(columns))
-
-    def blocks() -> Iterator[RowBlock]:
-        for sampled in samples:
-            begins, start, first = True, 0, scores.count
-            places = time_blocks(sampled, len(samples))
-            for found, left in _derivatives(problem, solution, sampled, columns):
-                own = np.einsum("tjr,tj->tr", found, left * solution.weights**2)
-                scores.add(places[start : start + len(left)], own, first)
-                start += len(left)
-                yield begins, found, left, np.ones(left.shape, dtype=bool)
-                begins = False
-
     triangle = _triangle(factors, solution, columns)
-    inverse = solve_triangular(triangle, np.eye(len(columns)))
-    names = tuple(str(c) for c in columns)
-    linear = LinearSolution(
-        values=solution.values,
-        covariance=inverse @ inverse.T,
-        basis=base_parameters(np.eye(len(columns)), names),
-        torque_std=solution.residual_std,
-        condition_number=float(np.linalg.cond(triangle)),
-        weights=solution.weights,
-        inverse=inverse,
-    )
-    squares = np.asarray(factors.torque_norms) ** 2
-    errors = errors_of(
-        lagged_products(blocks(), lags), noise_shapes(samples[0], lags), linear, squares
+    found = scattered_errors(
+        samples,
+        lambda sampled: _derivatives(problem, solution, sampled, columns),
+        SolvedRows(
+            weights=solution.weights,
+            inverse=solve_triangular(triangle, np.eye(len(columns))),
+            squares=np.asarray(factors.torque_norms) ** 2,
+        ),
     )
     matrix = np.zeros((n + problem.size, n + problem.size))
-    wider = _wider(errors.covariance, linear.covariance, scores)
-    matrix[np.ix_(columns, columns)] = errors.covariance * np.outer(wider, wider)
+    matrix[np.ix_(columns, columns)] = found.covariance
     gauge = _gauge(problem, factors, solution, scales)
     return GainCovariance(
-        matrix=gauge @ matrix @ gauge.T, errors=errors, lacking=bool(np.any(wider > 1.0))
-    )
-
-
-def _wider(noise: np.ndarray, bread: np.ndarray, scores: BlockScores) -> np.ndarray:
-    """Factors (r,) of the standard deviations of noise where blocks of time scatter by far more.
-
-    What the model lacks is no noise of any colour; it shows as estimates that differ from one
-    stretch of the motion to the next.
-    """
-    scatter = np.diag(bread @ scores.meat @ bread) / np.diag(noise)
-    freedom = scores.count - 1
-    return np.where(
-        scatter > chdtri(freedom, _LEVEL) / freedom, np.minimum(np.sqrt(scatter), _WIDEST), 1.0
+        matrix=gauge @ matrix @ gauge.T, errors=found.errors, lacking=found.lacking
     )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from dynident.effects import effects_of
 from dynident.errors import StudyError
-from dynident.fitting.drive_gains.loads import Load, LoadSplit, placement, split
+from dynident.fitting.loads import Load, LoadSplit, placement, split
 from dynident.fitting.sampling import Sampled, sample
 from dynident.inertia import frame_change
 from dynident.model import Model

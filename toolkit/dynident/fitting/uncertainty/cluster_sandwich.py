@@ -12,6 +12,7 @@ Biometrika 73 (1986).
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import chdtri
 
 from dynident.fitting.sampling import Sampled
 
@@ -19,6 +20,11 @@ BLOCKS = 20
 """Of all recordings together. Taste: fewer scatter too much themselves, more are too short to hold
 what hangs together."""
 _LEAST = 4  # in a recording
+_LEVEL = 1e-3
+"""Chance that scatter between blocks of time which is noise alone counts as more."""
+_WIDEST = 10.0
+"""Factor of sigma beyond which the scatter is that of a direction that the data hardly know, where
+few blocks measure nothing. Taste."""
 
 
 def time_blocks(sampled: Sampled, recordings: int) -> np.ndarray:
@@ -72,3 +78,22 @@ class BlockScores:
         """Covariance of the sum of all scores, (r, r)."""
         sums = np.array(self._sums)
         return sums.T @ sums * self.count / (self.count - 1)
+
+
+def scatter_factors(noise: np.ndarray, bread: np.ndarray, scores: BlockScores) -> np.ndarray:
+    """Return factors (r,) of the deviations of noise where blocks of time scatter by far more.
+
+    What the model lacks is no noise of any colour; it shows as estimates that differ from one
+    stretch of the motion to the next.
+
+    Parameters
+    ----------
+    noise : (r, r) covariance as noise in the rows makes it.
+    bread : (r, r) inverse of the weighted normal matrix.
+    scores : of the same r parameters.
+    """
+    scatter = np.diag(bread @ scores.meat @ bread) / np.diag(noise)
+    freedom = scores.count - 1
+    return np.where(
+        scatter > chdtri(freedom, _LEVEL) / freedom, np.minimum(np.sqrt(scatter), _WIDEST), 1.0
+    )

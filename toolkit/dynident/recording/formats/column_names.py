@@ -136,6 +136,33 @@ def resolve(
     return found
 
 
+def locate(
+    table: ColumnTable, wanted: Sequence[str], columns: Mapping[str, Column | str]
+) -> dict[str, LocatedColumn]:
+    """Find columns by their names, all of which have to be there.
+
+    Parameters
+    ----------
+    table : what the file holds.
+    wanted : ours.
+    columns : ours -> theirs, for those whose names differ.
+
+    Returns
+    -------
+    ours -> the column as the table names it.
+
+    Raises
+    ------
+    RecordingError
+        If a column is missing, or an expression is none.
+    """
+    return _located(table, wanted, {ours: _column(theirs) for ours, theirs in columns.items()})
+
+
+def _column(theirs: Column | str) -> Column:
+    return theirs if isinstance(theirs, Column) else Column(theirs)
+
+
 def _located(
     table: ColumnTable, wanted: Sequence[str], mapping: Mapping[str, Column]
 ) -> dict[str, LocatedColumn]:
@@ -198,10 +225,7 @@ def _checked(
             )
             what = f"the column mapping names '{ours}', which is not ours"
             raise RecordingError(what, file, remedy + _close(ours, valid))
-    return {
-        ours: theirs if isinstance(theirs, Column) else Column(theirs)
-        for ours, theirs in columns.items()
-    }
+    return {ours: _column(theirs) for ours, theirs in columns.items()}
 
 
 def _find(table: ColumnTable, name: str) -> str | None:

@@ -81,7 +81,7 @@ def read(
     names = joints_in(table) if joints is None else _joint_names(joints, where)
     if kinds is not None and len(kinds) != len(names):
         raise RecordingError(f"{len(kinds)} kinds for {len(names)} joints", where)
-    located = resolve(table, names, _with_prefix(table, names) | _with_rate(table, columns, layout))
+    located = resolve(table, names, named_otherwise(table, names, columns, layout))
     try:
         found = load(table, located)
     except MemoryError:
@@ -125,6 +125,29 @@ def _stacked(columns: list[np.ndarray]) -> np.ndarray:
     array = np.column_stack(columns)
     array.setflags(write=False)
     return array
+
+
+def named_otherwise(
+    table: ColumnTable,
+    joints: Sequence[str],
+    columns: Mapping[str, Column | str] | None,
+    layout: FileLayout,
+) -> dict[str, Column | str]:
+    """Return the mapping of columns, with what prefixes of joints and a stated rate make of it.
+
+    Parameters
+    ----------
+    table : what the file holds.
+    joints : of the robot.
+    columns : ours -> theirs.
+    layout : what the file does not say of itself.
+
+    Raises
+    ------
+    RecordingError
+        If joints come with several prefixes, or there are a rate and a column of time.
+    """
+    return _with_prefix(table, joints) | _with_rate(table, columns, layout)
 
 
 def _with_rate(

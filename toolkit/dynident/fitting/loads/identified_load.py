@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dynident.fitting.drive_gains.loads import SYMMETRIC, Load
-from dynident.inertia import PARAMETERS, inertia_matrix, margins, pseudo_inertia, to_com
+from dynident.fitting.loads.load import SYMMETRIC, Load, LoadSplit
+from dynident.inertia import (
+    PARAMETERS,
+    frame_change,
+    inertia_matrix,
+    margins,
+    pseudo_inertia,
+    to_com,
+)
 from dynident.tables import Table, number
+
+if TYPE_CHECKING:
+    from dynident.fitting.loads.nearest_possible import PossibleLoad
 
 _STEP = 1e-6  # relative, of central differences
 _DIAGONAL = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
@@ -27,8 +38,8 @@ class IdentifiedLoad:
     phi : (10,) in the frame of its link, see `dynident.inertia.PARAMETERS`; NaN where the data do
         not tell a parameter apart.
     covariance : (10, 10) of phi, that of the gains in it; zero for what was given.
-    acting : (10,) in the last joint's frame, with what is not told apart at some value: together
-        they make the load's torque.
+    acting : (10,) in the frame of the last joint, or of the sensor, with what is not told apart at
+        some value: together they make the load's torque.
     scale : the joints whose common scale phi is known up to; empty where the scale is fixed.
     """
 
@@ -106,17 +117,36 @@ class IdentifiedLoad:
             return f"not possible as it is ({why}), but a possible body is within the errors"
         return f"not possible: {why}, by more than the errors explain"
 
+    @cached_property
+    def possible(self) -> PossibleLoad | None:
+        """The nearest body that can exist, by the errors; None where this one can, or is not whole.
+
+        Raises
+        ------
+        FitError
+            If the program that finds it is not solved.
+        """
+        if not self.is_whole or self.is_consistent:
+            return None
+        # Programs take long to load, and most loads need none.
+        from dynident.fitting.loads.nearest_possible import nearest_possible
+
+        return nearest_possible(self.phi, self.covariance)
+
     def table(self) -> Table:
-        """Mass, centre and inertia, and the verdict."""
+        """Mass, centre and inertia, the verdict, and where it is negative the nearest body."""
         load = self.load
         given = [load.mass is not None] + [load.centre is not None] * 3
         given += [load.inertia is not None] * 6
+        nearest = self.possible
+        near = np.full(10, np.nan) if nearest is None else _quantities(nearest.phi)
         rows = []
-        for name, unit, value, sigma, known in zip(
-            QUANTITIES, UNITS, self.values, self.sigma, given, strict=True
+        for name, unit, value, sigma, known, other in zip(
+            QUANTITIES, UNITS, self.values, self.sigma, given, near, strict=True
         ):
             how = "given" if known else "identified" if np.isfinite(value) else "not told apart"
-            rows.append((name, number(value), number(np.nan if known else sigma, 2), unit, how))
+            row = (name, number(value), number(np.nan if known else sigma, 2), unit, how)
+            rows.append(row if nearest is None else (*row, number(other)))
         notes = [f"A body with these parameters is {self.verdict}."] if self.is_whole else []
         if not self.is_whole:
             notes.append(f"Whether a body can have these parameters is {self.verdict}.")
@@ -125,11 +155,16 @@ class IdentifiedLoad:
                 "Mass and inertia are known up to the common scale of the drives of "
                 f"{', '.join(self.scale)}; the centre is not touched by it."
             )
+        if nearest is not None:
+            notes.append(
+                f"The nearest body that can exist is {number(nearest.distance, 3)} standard "
+                f"deviations away. {nearest.certificate.sentence}"
+            )
         where = f"in the frame of '{load.link}'" if load.link else "in the last link's frame"
         title = f"Load '{load.name}': centre {where}, inertia about the centre"
-        return Table(
-            title, ("quantity", "value", "sigma", "unit", "found"), tuple(rows), tuple(notes)
-        )
+        columns = ("quantity", "value", "sigma", "unit", "found")
+        columns = columns if nearest is None else (*columns, "possible")
+        return Table(title, columns, tuple(rows), tuple(notes))
 
     def to_dict(self) -> dict[str, Any]:
         """The load as JSON has it."""
@@ -147,7 +182,73 @@ class IdentifiedLoad:
             "verdict": self.verdict,
             "consistent": self.is_consistent if self.is_whole else None,
             "common_scale_of": list(self.scale),
+            "nearest_possible": self._possible_as_json(),
         }
+
+    def _possible_as_json(self) -> dict[str, Any] | None:
+        if self.possible is None:
+            return None
+        values = _quantities(self.possible.phi).tolist()
+        return {
+            "mass": values[0],
+            "centre": values[1:4],
+            "inertia": values[4:],
+            "distance": self.possible.distance,
+            "certificate": self.possible.certificate.to_dict(),
+        }
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SolvedParts:
+    """What was found of the k unknown parameters of a load, see `LoadSplit`.
+
+    Attributes
+    ----------
+    values : (k,).
+    covariance : (k, k).
+    alone : (k,) bool, which are identified on their own.
+    scale : joints whose common scale they are known up to.
+    """
+
+    values: np.ndarray
+    covariance: np.ndarray
+    alone: np.ndarray
+    scale: tuple[str, ...] = ()
+
+
+def identified_load(
+    load: Load,
+    parts: LoadSplit,
+    solved: SolvedParts,
+    placement: tuple[np.ndarray, np.ndarray],
+) -> IdentifiedLoad:
+    """Return a load in the frame of its link, from what was solved for in another frame.
+
+    Parameters
+    ----------
+    load : what was known of it.
+    parts : known and unknown parts, in the frame in which they act.
+    solved : the unknown ones.
+    placement : R (3, 3), p (3,) in m of the load's link in that frame.
+    """
+    # Parameters that are not told apart make those NaN that they are part of, and no others.
+    held = parts.unknown != 0.0
+    phi = parts.given + parts.unknown @ np.where(solved.alone, solved.values, 0.0)
+    phi[np.any(held & ~solved.alone, axis=1)] = np.nan
+    R, p = placement
+    back = frame_change(R.T, -R.T @ p)
+    moved = np.full(10, np.nan)
+    for row in range(10):
+        used = back[row] != 0.0
+        moved[row] = back[row, used] @ phi[used]
+    covariance = parts.unknown @ solved.covariance @ parts.unknown.T
+    return IdentifiedLoad(
+        load=load,
+        phi=moved,
+        covariance=back @ covariance @ back.T,
+        acting=parts.given + parts.unknown @ solved.values,
+        scale=solved.scale,
+    )
 
 
 def _quantities(phi: np.ndarray) -> np.ndarray:

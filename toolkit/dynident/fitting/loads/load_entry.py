@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pydantic import Field
 
 from dynident.errors import StudyError
-from dynident.fitting.drive_gains.loads import Load
+from dynident.fitting.loads.load import Load
 from dynident.settings import SettingsTable, nearest
 
 _LARGEST = 1e6
@@ -24,7 +24,8 @@ class LoadEntry(SettingsTable):
     centre : [x, y, z] of its centre of mass, m, in the frame of `link`.
     inertia : [Ixx, Ixy, Ixz, Iyy, Iyz, Izz] about its centre of mass, kg m^2, in the axes of
         `link`; goes with a centre.
-    link : a link that the last joint moves, as "tool0"; by default the one that it drives.
+    link : a link that the last joint moves, as "tool0"; by default the one that it drives, or that
+        of the wrench sensor that weighs the load.
     """
 
     mass: float | None = Field(default=None, gt=0, le=_LARGEST)

@@ -1,0 +1,111 @@
+"""Errors of a fit whose rows no `Model` makes: noise with its colour, or scatter between blocks.
+
+Noise explains how estimates of two stretches of a motion differ; what the model lacks makes them
+differ by more, and then that scatter is their error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynident.fitting.linear_solution import LinearSolution
+from dynident.fitting.sampling import Sampled
+from dynident.fitting.uncertainty.cluster_sandwich import (
+    BlockScores,
+    scatter_factors,
+    time_blocks,
+)
+from dynident.fitting.uncertainty.lagged_rows import LAGS
+from dynident.fitting.uncertainty.noise_shapes import noise_shapes
+from dynident.fitting.uncertainty.row_errors import RowErrors, errors_of
+from dynident.moments.lagged import RowBlock, lagged_products
+from dynident.robot import base_parameters
+
+RowsOf = Callable[[Sampled], Iterator[tuple[np.ndarray, np.ndarray]]]
+"""Of a recording: derivatives (T, m, r) of its rows by r unknowns, and what is left (T, m)."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SolvedRows:
+    """What was solved, in the form that its errors need.
+
+    Attributes
+    ----------
+    weights : (m,) of the groups of rows: joints, or components of a wrench.
+    inverse : (r, r) of the triangular factor of the weighted derivatives.
+    squares : (m,) sum of squares of what was measured, below which residuals are rounding.
+    """
+
+    weights: np.ndarray
+    inverse: np.ndarray
+    squares: np.ndarray
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ScatteredErrors:
+    """Errors of r unknowns.
+
+    Attributes
+    ----------
+    covariance : (r, r).
+    errors : of the rows.
+    lacking : whether some variances are those of the scatter between blocks of time, which noise
+        does not explain: the model lacks something.
+    """
+
+    covariance: np.ndarray
+    errors: RowErrors
+    lacking: bool
+
+
+def scattered_errors(
+    samples: Sequence[Sampled], rows_of: RowsOf, solved: SolvedRows
+) -> ScatteredErrors:
+    """Measure the errors of the rows in one more pass, and carry them to the unknowns.
+
+    Parameters
+    ----------
+    samples : the recordings.
+    rows_of : their rows at the solution.
+    solved : what came out.
+
+    Returns
+    -------
+    The covariance, wider than noise makes it where blocks of time scatter by far more.
+    """
+    rank, weights = len(solved.inverse), solved.weights
+    lags = min(LAGS, *(one.count // 10 for one in samples))
+    scores = BlockScores(rank)
+
+    def blocks() -> Iterator[RowBlock]:
+        for sampled in samples:
+            begins, start, first = True, 0, scores.count
+            places = time_blocks(sampled, len(samples))
+            for found, left in rows_of(sampled):
+                own = np.einsum("tjr,tj->tr", found, left * weights**2)
+                scores.add(places[start : start + len(left)], own, first)
+                start += len(left)
+                yield begins, found, left, np.ones(left.shape, dtype=bool)
+                begins = False
+
+    bread = solved.inverse @ solved.inverse.T
+    linear = LinearSolution(
+        values=np.zeros(rank),
+        covariance=bread,
+        basis=base_parameters(np.eye(rank), tuple(map(str, range(rank)))),
+        torque_std=1.0 / weights,
+        condition_number=float(np.linalg.cond(solved.inverse)),
+        weights=weights,
+        inverse=solved.inverse,
+    )
+    products = lagged_products(blocks(), lags)
+    errors = errors_of(products, noise_shapes(samples[0], lags), linear, solved.squares)
+    wider = scatter_factors(errors.covariance, bread, scores)
+    return ScatteredErrors(
+        covariance=errors.covariance * np.outer(wider, wider),
+        errors=errors,
+        lacking=bool(np.any(wider > 1.0)),
+    )

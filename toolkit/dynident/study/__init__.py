@@ -1,0 +1,13 @@
+"""A study file read into a model, recordings and settings; and written back with an effect more.
+
+`load` reads a study, `load_wrenches` the wrench sensors in it, `add_effects` writes into it. Paths
+in a study are relative to its folder; unknown keys are refused by name. Its keys:
+"""
+
+from dynident.study.adding import add_effects
+from dynident.study.keys import keys_in_words
+from dynident.study.loading import Study, load
+from dynident.study.wrenches import load_wrenches
+
+__all__ = ["Study", "add_effects", "load", "load_wrenches"]
+__doc__ = f"{__doc__}\n{keys_in_words()}\n"

@@ -1,0 +1,70 @@
+"""A study file written back with effects more, all else in it untouched."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import tomlkit
+
+from dynident import files
+from dynident.effects import Effect
+from dynident.errors import StudyError
+
+
+def add_effects(path: str | Path, effects: tuple[Effect, ...]) -> None:
+    """Write effects into a study file, comments and order untouched.
+
+    Parameters
+    ----------
+    path : the study file.
+    effects : to add to its list.
+
+    Raises
+    ------
+    StudyError
+        If there is no way to do so that leaves all else in the file as it is.
+    """
+    path = Path(path)
+    text = files.read_text(path)
+    labels = [effect.label for effect in effects]
+    wanted = tomllib.loads(text)
+    wanted["effects"] = sorted([*wanted.get("effects", []), *labels])
+    for candidate in _with_effects(text, labels):
+        try:
+            said = tomllib.loads(candidate)
+        except tomllib.TOMLDecodeError:
+            continue
+        if {**said, "effects": sorted(said.get("effects", []))} == wanted:
+            files.write_text(path, candidate)
+            return
+    remedy = f"write them into it: {', '.join(labels)}"
+    raise StudyError("the effects cannot be added to this file", str(path), remedy)
+
+
+def _with_effects(text: str, labels: list[str]) -> Iterator[str]:
+    """Yield texts of a study with more effects, nicest first; not every one need be valid."""
+    document = tomlkit.parse(text)
+    if "effects" not in document:
+        # A top-level key comes before the first table; `robot` is always there.
+        line = f"effects = {json.dumps(labels)}"
+        newline = "\r\n" if "\r\n" in text else "\n"
+        yield re.sub(
+            r"^[ \t]*robot[ \t]*=[^\r\n]*",
+            lambda found: found[0] + newline + line,
+            text,
+            count=1,
+            flags=re.MULTILINE,
+        )
+        yield line + newline + text
+        return
+    document["effects"].extend(labels)  # type: ignore[union-attr]
+    yield tomlkit.dumps(document)
+    # tomlkit 0.15 forgets the comma after a last item with a comment behind it.
+    document = tomlkit.parse(text)
+    for label in reversed(labels):
+        document["effects"].insert(0, label)  # type: ignore[union-attr]
+    yield tomlkit.dumps(document)

@@ -1,0 +1,160 @@
+"""A study file read into a model, recordings and settings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dynident.closed_loop import Controller
+from dynident.criteria import DEFAULTS, Criteria
+from dynident.effects import FRICTION_WIDTH, effects_of
+from dynident.errors import DynidentError, EffectError, StudyError
+from dynident.fitting.drive_gains import (
+    DriveGains,
+    GainProblem,
+    fit_drive_gains,
+    in_newton_metres,
+)
+from dynident.model import Model
+from dynident.recording import (
+    Dataset,
+    Noise,
+    require_motion,
+    require_torque,
+    warn_of_missing_torque,
+)
+from dynident.robot import Robot
+from dynident.settings import read_toml
+from dynident.study.named_files import filter_of, naming, recordings_of, robot_of
+from dynident.study.study_file import StudyFile
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """What a study file says.
+
+    Attributes
+    ----------
+    path : the file.
+    model : the robot and the effects that it is said to have.
+    train, test : recordings to fit and recordings to judge by; `test` is empty where the study
+        names none, and the diagnosis then holds out blocks of time. Their torques are in N m, and
+        those of the robot alone where loads have names.
+    drives : gains by which torques were converted, and loads that were identified; None where the
+        recordings are in N m and no load has a name.
+    controller : of the closed loop, where the study states one.
+    criteria : the numbers that decide a diagnosis, with those that the study wants otherwise: a
+        table for each group, as `[criteria.gates] level = 0.005`; see `dynident.criteria`.
+    """
+
+    path: Path
+    model: Model
+    train: Dataset
+    test: Dataset
+    drives: DriveGains | None = None
+    controller: Controller | None = None
+    criteria: Criteria = DEFAULTS
+
+    @property
+    def robot(self) -> Robot:
+        """The robot as its description gives it."""
+        return self.model.robot
+
+
+def load(path: str | Path) -> Study:
+    """Read a study file and everything that it names.
+
+    Raises
+    ------
+    StudyError
+        If the file is not a study: it names the key, and the remedy.
+    DynidentError
+        If the robot or a recording that it names is unusable.
+    """
+    path = Path(path)
+    said = read_toml(path, StudyFile)
+    if not said.recordings:
+        raise StudyError("no [[recordings]]", str(path), "add at least one")
+    robot = robot_of(said, path)
+    try:
+        effects = tuple(effect for label in said.effects for effect in effects_of(label, robot))
+        model = Model(robot, effects, _widths(said.friction_width, robot))
+    except DynidentError as error:
+        raise StudyError(str(error), f"{path}: effects") from None
+    recordings, loads = recordings_of(said, path, robot)
+    with naming(path, "filter"):
+        settings = filter_of(said.filter, recordings) if said.filter else None
+    with naming(path, "criteria"):
+        criteria = Criteria.with_values(said.criteria)
+    noise = None
+    if said.noise:
+        noise = Noise(
+            _per_joint(said.noise.position_std, robot, f"{path}: noise.position_std"),
+            _per_joint(said.noise.torque_std, robot, f"{path}: noise.torque_std"),
+        )
+    sets = {
+        use: Dataset(tuple(r for r in recordings if r.use == use), settings, noise)
+        for use in ("train", "test")
+    }
+    if not sets["train"].recordings:
+        remedy = 'set use = "train" for some of them'
+        raise StudyError("no recording is for training", str(path), remedy)
+    for dataset in sets.values():
+        require_torque(dataset.recordings)
+    warn_of_missing_torque(recordings)
+    require_motion(sets["train"].recordings, robot.kinds)
+    controller = None
+    if said.controller:
+        controller = said.controller.controller(robot, f"{path}: controller")
+    drives = None
+    if said.torque_unit != "N m" or said.drive_gains or loads:
+        known = said.drive_gains
+        if said.torque_unit == "N m":
+            known = dict.fromkeys(robot.names, 1.0)
+        drives = _drives(said, path, GainProblem(model, sets["train"], known, loads))
+        sets = {use: in_newton_metres(one, drives, robot) for use, one in sets.items()}
+    return Study(
+        path=path,
+        model=model,
+        train=sets["train"],
+        test=sets["test"],
+        drives=drives,
+        controller=controller,
+        criteria=criteria,
+    )
+
+
+def _widths(said: float | dict[str, float], robot: Robot) -> float | tuple[float, ...]:
+    """Friction width of all joints, or of each: of those that are not named, the default."""
+    if not isinstance(said, dict):
+        return said
+    for name in said:
+        if name not in robot.names:
+            remedy = f"joints: {', '.join(robot.names)}"
+            raise EffectError(f"the robot has no joint '{name}'", "friction_width", remedy)
+    return tuple(said.get(name, FRICTION_WIDTH) for name in robot.names)
+
+
+def _drives(said: StudyFile, path: Path, problem: GainProblem) -> DriveGains:
+    """Gains and loads that the training recordings tell."""
+    if said.torque_unit == "N m" and said.drive_gains:
+        what, remedy = "gains of drives, and torques in N m", 'state torque_unit = "A" or "%"'
+        raise StudyError(what, f"{path}: drive_gains", remedy)
+    trained = {recording.load for recording in problem.dataset.recordings}
+    for load in problem.loads:
+        if load.name not in trained and not load.is_known:
+            what = f"no training recording carries the load '{load.name}', which is not known"
+            remedy = "state all of it, or train with a recording that carries it"
+            raise StudyError(what, str(path), remedy)
+    return fit_drive_gains(problem, said.torque_unit)
+
+
+def _per_joint(value: float | list[float], robot: Robot, where: str) -> np.ndarray:
+    values = np.full(robot.n, value) if isinstance(value, float) else np.array(value)
+    if values.shape != (robot.n,):
+        raise StudyError(f"{len(values)} values for {robot.n} joints", where, "give one per joint")
+    if not np.all(values > 0):
+        raise StudyError("a standard deviation is not positive", where)
+    return values

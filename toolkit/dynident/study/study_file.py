@@ -1,0 +1,169 @@
+"""The keys of a study file: tables, what each key means, and which values it takes."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, field_validator
+from pydantic_core import PydanticCustomError
+
+from dynident.closed_loop import ControllerFile
+from dynident.effects import FRICTION_WIDTH
+from dynident.fitting.loads import LoadEntry, PayloadEntry
+from dynident.settings import Duration, Rate, SettingsTable, Time
+
+_NARROWEST, _WIDEST = 1e-9, 1e3
+"""rad/s or m/s over which dry friction changes its sign."""
+_Gravity = Annotated[float, Field(ge=-100, le=100)]
+
+
+class RecordingEntry(SettingsTable):
+    """A file of data, or several that have the rest in common.
+
+    Attributes
+    ----------
+    file : its name, from the folder of the study; a pattern, as `"runs/train_*.csv"`, one
+        recording for each file that matches, in the order of the numbers in their names; or a list
+        of either.
+    record : which one of an NPZ or MAT file that holds several; then it is one file.
+    columns : names of the columns of a text file without a header line, by position, as
+        `["t", "q.joint1", "-"]`; "" or "-" skips one.
+    rate_hz : sampling rate, where the file has no column of time.
+    topic : of a bag that holds the joints on several, as `"/joint_states"`.
+    use : "train" to fit, "test" to judge by.
+    period : s after which the excitation repeats.
+    start : s, when the recording began in the session, for what warms up.
+    window : [t0, t1] in s of the file's clock: what is used of it once the whole is filtered.
+    payload : whether the load under study was on board, true or false; "unknown" asks for it. Or
+        the name of one of several loads, see `LoadEntry`, or what is known of a load without one:
+        `payload = { mass = 2.8, centre = [0.0, 0.02, 0.05] }`.
+    """
+
+    file: str | list[str]
+    record: str | None = None
+    columns: list[str] | None = None
+    rate_hz: Rate | None = None
+    topic: str = ""
+    use: Literal["train", "test"] = "train"
+    period: Duration | None = None
+    start: Time = 0.0
+    window: tuple[Time, Time] | None = None
+    payload: PayloadEntry = None
+
+
+class FilterEntry(SettingsTable):
+    """How positions are differentiated, and columns and torque filtered alike.
+
+    Without this table frequencies follow the sampling rate; see `dynident.recording.Filter`.
+
+    Attributes
+    ----------
+    position_cutoff_hz : zero-phase low-pass of q before it is differentiated; "none" for none. By
+        default it follows the sampling rate.
+    cutoff_hz : the same low-pass on every column and on the torque.
+    rate_hz : decimated to about this; without it every sample is kept.
+    decimation : "pick" keeps every k-th filtered row, "chebyshev" filters as MATLAB's `decimate`.
+    edge_s : [start, end] in s dropped after differentiation.
+    ends : "drop" leaves out what filters make up at the ends, "keep" uses all of the record.
+    """
+
+    position_cutoff_hz: Rate | Literal["default", "none"] = "default"
+    cutoff_hz: Rate | None = None
+    rate_hz: Rate | None = None
+    decimation: Literal["pick", "chebyshev"] = "pick"
+    edge_s: tuple[Time, Time] = (0.0, 0.0)
+    ends: Literal["drop", "keep"] = "drop"
+
+
+class NoiseEntry(SettingsTable):
+    """Standard deviations of a raw sample, where nothing repeats: one number, or one per joint.
+
+    Attributes
+    ----------
+    position_std : rad or m.
+    torque_std : in the unit of the torques.
+    """
+
+    position_std: float | list[float]
+    torque_std: float | list[float]
+
+
+class ColumnEntry(SettingsTable):
+    """Where a column is found in files that use other names, units or coordinates.
+
+    `name` (or a bare string in its place) is the file's name, `name[2]` the third column of a
+    table of numbers. What is no name in the file is read as a linear expression of its columns:
+    `"q.joint6" = "motor_position[5]/32 - motor_position[4]/45 - 1.5707963"`, with numbers, `pi`,
+    `+ - * /`, signs and parentheses, at most 300 characters. A name that such an expression could
+    not hold goes between backticks: "0.5 * `left current (A)` - 0.5 * `right current (A)`". It is
+    read by rules and never evaluated as code. Ours is `scale` times the whole.
+    """
+
+    name: str
+    scale: float = 1.0
+
+
+class StudyFile(SettingsTable):
+    """What a study file says; `robot` and [[recordings]] have to be there.
+
+    Attributes
+    ----------
+    robot : its description (URDF, SDF, MJCF), a path from the folder of the study.
+    joints : names, the order of columns; by default every joint that moves.
+    effects : that the robot is said to have, `name` or `name@joint`.
+    torque : "measured", or "held_command" where a command acts from its sample to the next.
+    torque_unit : "N m" (and N, of prismatic joints), or the unit of the drives, "A" or "%": then
+        each joint's gain is identified, and torques are converted before anything else is done.
+    drive_gains : joint -> its gain where that is known, N m (or N) per unit; one fixes the scale.
+    loads : name -> a load that recordings carry; a known one fixes the scale.
+    friction_width : speed (rad/s or m/s) within which dry friction turns over; one, or by joint.
+    gravity : m/s^2, in the axes of the description's base.
+    recordings : files of data.
+    filter : how positions are differentiated, and what is filtered alike.
+    noise : of a raw sample, where nothing repeats.
+    controller : of the closed loop; see `dynident.Controller`.
+    columns : ours -> the files' names of columns, or linear expressions of them. Ours are t, and
+        for each joint q.<joint>, tau.<joint>, v.<joint>, a.<joint>, q_ref.<joint> and
+        temperature.<joint>; for a wrench sensor wrench.<link>.fx, .fy, .fz, .tx, .ty and .tz, in N
+        and N m in the frame of that link of the description, for `dynident payload`.
+    criteria : numbers that decide a diagnosis, otherwise than by default; see `Criteria`.
+    """
+
+    robot: str
+    joints: list[str] | None = None
+    effects: list[str] = Field(default_factory=list)
+    torque: Literal["measured", "held_command"] = "measured"
+    torque_unit: Literal["N m", "A", "%"] = "N m"
+    drive_gains: dict[str, float] = Field(default_factory=dict)
+    loads: dict[str, LoadEntry] = Field(default_factory=dict)
+    friction_width: float | dict[str, float] = FRICTION_WIDTH
+    gravity: tuple[_Gravity, _Gravity, _Gravity] | None = None
+    recordings: list[RecordingEntry]
+    filter: FilterEntry | None = None
+    noise: NoiseEntry | None = None
+    controller: ControllerFile | None = None
+    columns: dict[str, str | ColumnEntry] = Field(default_factory=dict)
+    criteria: dict[str, Any] = Field(default_factory=dict)
+
+    @field_validator("friction_width")
+    @classmethod
+    def _positive(cls, width: float | dict[str, float]) -> float | dict[str, float]:
+        """Refuse a width that is no width."""
+        for one in width.values() if isinstance(width, dict) else (width,):
+            if not one > 0:
+                raise PydanticCustomError("width", "input should be greater than 0")  # pyright: ignore
+            if not _NARROWEST <= one <= _WIDEST:
+                what = f"input should be from {_NARROWEST:g} to {_WIDEST:g} rad/s or m/s"
+                raise PydanticCustomError("width", what)  # pyright: ignore
+        return width
+
+    @field_validator("columns", mode="before")
+    @classmethod
+    def _quoted(cls, columns: Any) -> Any:
+        """Refuse `q.elbow = ...` without quotes, which TOML reads as a table `q`."""
+        for ours, theirs in columns.items() if isinstance(columns, dict) else ():
+            if isinstance(theirs, dict) and "name" not in theirs:
+                inner = next(iter(theirs), "joint")
+                what = f'a name with a dot needs quotes: "{ours}.{inner}" = ...'
+                raise PydanticCustomError("quotes", what)  # pyright: ignore
+        return columns
