@@ -22,7 +22,7 @@ FLOORS = (
     ("criteria",),
     ("inertia", "moments", "batch"),
     ("recording",),
-    ("robot",),
+    ("robot", "formulas"),
     ("effects",),
     ("model",),
     ("constraints",),

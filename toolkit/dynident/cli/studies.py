@@ -164,7 +164,7 @@ def add(study: Path, labels: tuple[str, ...]) -> CommandAnswer:
 
     loaded = load_study(study)
     files.require_place(study)
-    every = (one for label in labels for one in effects_of(label, loaded.robot))
+    every = (one for label in labels for one in effects_of(label, loaded.robot, loaded.model.laws))
     fresh = tuple(dict.fromkeys(one for one in every if one not in loaded.model))
     if not fresh:
         raise StudyError(f"has {', '.join(labels)} already", str(study), "nothing was changed")

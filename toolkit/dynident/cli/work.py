@@ -92,7 +92,7 @@ def comparison_of(study: Study, additions: tuple[tuple[str, ...], ...]) -> Compa
     for labels in additions:
         model = study.model
         for label in labels:
-            for effect in effects_of(label, study.robot):
+            for effect in effects_of(label, study.robot, study.model.laws):
                 model = model if effect in model else model + effect
         models["+ " + " + ".join(labels)] = model
     with progress("comparing"):

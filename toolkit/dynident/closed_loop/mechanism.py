@@ -83,7 +83,7 @@ class Mechanism(ActingEffects):
         made = cls(
             robot, tuple(acting), friction_width=friction_width, carries_payload=carries_payload
         )
-        made.require_gain()
+        made.require_possible()
         return made
 
     @classmethod
@@ -137,7 +137,7 @@ class Mechanism(ActingEffects):
             friction_width=model.friction_width,
             carries_payload=carries_payload,
         )
-        made.require_gain()
+        made.require_possible()
         return made
 
     def command(self, t: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:

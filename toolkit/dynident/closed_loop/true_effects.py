@@ -13,7 +13,7 @@ from typing import Self
 
 import numpy as np
 
-from dynident.effects import FRICTION_WIDTH, Block, Effect, Term, Transmission, effects_of
+from dynident.effects import FRICTION_WIDTH, Block, Effect, Law, Term, Transmission, effects_of
 from dynident.errors import EffectError, SimulationError
 from dynident.robot import Robot
 from dynident.settings import nearest
@@ -43,6 +43,7 @@ class TrueEffect:
         shape: Mapping[str, float] | Sequence[float] = (),
         *,
         hidden: bool = False,
+        laws: Sequence[Law] = (),
     ) -> tuple[TrueEffect, ...]:
         """Return the effects of a label: `name@joint` one, `name` one per place.
 
@@ -53,6 +54,7 @@ class TrueEffect:
         values, shape : by name (parameters left out are 0, shape parameters at their default) or
             all in order.
         hidden : see the class.
+        laws : that labels may name besides the catalogue.
 
         Raises
         ------
@@ -61,7 +63,7 @@ class TrueEffect:
         """
         return tuple(
             cls(effect, ordered(effect, robot, values), hidden)
-            for effect in (_shaped(one, robot, shape) for one in effects_of(label, robot))
+            for effect in (_shaped(one, robot, shape) for one in effects_of(label, robot, laws))
         )
 
 
@@ -142,14 +144,18 @@ class ActingEffects:
             return replace(self, number=number)
         return self
 
-    def require_gain(self) -> None:
-        """Refuse torque gains that are not positive.
+    def require_possible(self) -> None:
+        """Refuse effects that cannot be simulated, and torque gains that are not positive.
 
         Raises
         ------
         SimulationError
-            Naming the joint.
+            Naming the effect or the joint.
         """
+        for one in self.effects:
+            if why := one.effect.not_simulated:
+                remedy = "leave it out of what is simulated; fits can have it"
+                raise SimulationError(f"cannot be simulated: {why}", one.effect.label, remedy)
         for joint, gain in zip(self.robot.names, self.gain, strict=True):
             if not (gain > 0 and np.isfinite(gain)):
                 what, remedy = f"torque gain {gain:g}", "choose a gain error above -1"

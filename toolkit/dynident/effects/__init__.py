@@ -8,6 +8,15 @@ the report and the tests. Those that dynident brings are files in the folders he
 
 from dynident.effects.block import FRICTION_WIDTH, Block
 from dynident.effects.effect import Effect, JointEffect, force_unit, motion_unit
+from dynident.effects.laws import (
+    Law,
+    LawEffect,
+    LawEntry,
+    LawsEntry,
+    law_effect,
+    laws_of,
+    laws_table,
+)
 from dynident.effects.parameter import Parameter, ShapeParameter
 from dynident.effects.registry import catalogue, effects_of
 from dynident.effects.terms import Term
@@ -19,6 +28,10 @@ __all__ = [
     "Block",
     "Effect",
     "JointEffect",
+    "Law",
+    "LawEffect",
+    "LawEntry",
+    "LawsEntry",
     "Needs",
     "Parameter",
     "ShapeParameter",
@@ -27,5 +40,8 @@ __all__ = [
     "catalogue",
     "effects_of",
     "force_unit",
+    "law_effect",
+    "laws_of",
+    "laws_table",
     "motion_unit",
 ]

@@ -197,6 +197,11 @@ class Effect(EffectTraits, SimulatedEffect, ABC):
             return words
         return f"{words} at {self.joint}" + (f" from {self.source}" if self.source else "")
 
+    def parameter_name(self, name: str) -> str:
+        """Return the name of a parameter in a model: `Fv@joint`, or `payload.m`."""
+        place = self.label.partition("@")[2]
+        return f"{name}@{place}" if place else f"{self.name}.{name}"
+
     @property
     def advice(self) -> str:
         """The experiment that shows this effect at its place."""
@@ -228,7 +233,9 @@ class Effect(EffectTraits, SimulatedEffect, ABC):
         return np.ones(len(block.t))
 
     def sensitivities(self, block: Block) -> np.ndarray | None:
-        """Derivatives of the columns by the logarithm of each of s shape parameters.
+        """Derivatives of the columns by the coordinate of each of s shape parameters.
+
+        See `ShapeParameter`: by the logarithms of those that are positive.
 
         Returns
         -------

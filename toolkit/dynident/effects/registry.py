@@ -6,6 +6,7 @@ import difflib
 import importlib
 import pkgutil
 import warnings
+from collections.abc import Sequence
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -36,6 +37,10 @@ def _load_own() -> None:
         importlib.import_module(module.name)
 
 
+from dynident.effects.laws import PREFIX, Law, law_effect
+from dynident.settings import nearest
+
+
 @cache
 def _packages() -> tuple[EntryPoint, ...]:
     found = entry_points(group=ENTRY_POINTS)
@@ -62,15 +67,17 @@ def _load_packages() -> None:
             warnings.warn(said, DynidentWarning, stacklevel=2)
 
 
-def effects_of(label: str, robot) -> tuple[Effect, ...]:
+def effects_of(label: str, robot, laws: Sequence[Law] = ()) -> tuple[Effect, ...]:
     """Return the effects that a label stands for: `name@joint` one, `name` one per place.
 
     Parameters
     ----------
     label : str
-        `name`, `name@joint` or `name@joint:source`.
+        `name`, `name@joint` or `name@joint:source`; `law:name` of a law.
     robot : Robot
         The robot on which they sit.
+    laws : of Law
+        Those that there are besides the catalogue.
 
     Raises
     ------
@@ -78,7 +85,10 @@ def effects_of(label: str, robot) -> tuple[Effect, ...]:
         If the name or a joint is unknown; the message lists the valid choices.
     """
     name, _, place = label.partition("@")
-    known = catalogue()
+    known = {**catalogue(), **{law.label: law_effect(law) for law in laws}}
+    if name.startswith(PREFIX) and name not in known:
+        remedy = nearest(name, [law.label for law in laws], "laws") if laws else "none is stated"
+        raise EffectError(f"no law is named '{name.removeprefix(PREFIX)}'", remedy=remedy)
     if name not in known:
         close = difflib.get_close_matches(name, known, n=1)
         hint = f"did you mean '{close[0]}'?" if close else f"effects: {', '.join(known)}"

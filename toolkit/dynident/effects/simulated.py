@@ -28,6 +28,11 @@ class SimulatedEffect(ABC):
 
     memory: ClassVar[int] = 0
 
+    @property
+    def not_simulated(self) -> str:
+        """Why it cannot be simulated; empty where it can."""
+        return ""
+
     @abstractmethod
     def columns(self, block: Block) -> np.ndarray:
         """Torque per unit of each linear parameter, (T, n, k) in N m or N."""

@@ -35,6 +35,23 @@ class DataSource:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ShapeValue:
+    """A parameter inside an effect, in which the torque is not linear.
+
+    Attributes
+    ----------
+    name : as `vs@elbow`.
+    value, sigma : in `unit`; sigma NaN where it is not known.
+    unit : of both.
+    """
+
+    name: str
+    value: float
+    sigma: float
+    unit: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class Estimate(Shown):
     """Identified parameters of a model.
 
@@ -61,6 +78,7 @@ class Estimate(Shown):
     details : tables of what else the method has to say.
     sigma_words : what the standard deviations hold, where the method has its own.
     headline : what is to be read before any number: that the model is rejected; empty if it is not.
+    shapes : parameters inside effects, as they were found.
     """
 
     model: Model
@@ -82,6 +100,7 @@ class Estimate(Shown):
     details: tuple[Table, ...] = ()
     sigma_words: str = ""
     headline: str = ""
+    shapes: tuple[ShapeValue, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -161,6 +180,13 @@ class Estimate(Shown):
         columns = ("parameter", "value", "sigma", "relative", "unit", "stands for")
         return Table("Parameters", columns, tuple(rows), self._parameter_notes())
 
+    def shape_table(self) -> Table:
+        """Parameters inside effects."""
+        rows = tuple(
+            (one.name, number(one.value, 6), number(one.sigma, 3), one.unit) for one in self.shapes
+        )
+        return Table("Parameters inside effects", ("parameter", "value", "sigma", "unit"), rows)
+
     def error_table(self) -> Table:
         """Torque errors on the data of the fit."""
         robot = self.model.robot
@@ -189,7 +215,16 @@ class Estimate(Shown):
         iterated = self.history.tables() if self.history else ()
         own = (*iterated, *self.details)
         first = (self.headline,) if self.headline else ()
-        return (*first, self.parameter_table(), *own, self.error_table(), *proved, *self.notes)
+        inside = (self.shape_table(),) if self.shapes else ()
+        return (
+            *first,
+            self.parameter_table(),
+            *inside,
+            *own,
+            self.error_table(),
+            *proved,
+            *self.notes,
+        )
 
     def summary(self) -> str:
         """The tables as text."""
@@ -245,6 +280,15 @@ class Estimate(Shown):
             "sigma_words": self.words_of_sigma,
             "headline": self.headline,
             "recordings": [vars(source) for source in self.sources],
+            "shapes": [
+                {
+                    "name": one.name,
+                    "value": one.value,
+                    "sigma": one.sigma if np.isfinite(one.sigma) else None,
+                    "unit": one.unit,
+                }
+                for one in self.shapes
+            ],
             "links": self.links and {name: phi.tolist() for name, phi in self.links.items()},
             "certificate": self.certificate and self.certificate.to_dict(),
             "iterations": self.history and self.history.to_dict(),

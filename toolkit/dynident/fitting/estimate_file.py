@@ -15,9 +15,9 @@ import numpy as np
 from pydantic import ValidationError
 
 from dynident import files
-from dynident.effects import catalogue
-from dynident.errors import DynidentError, FitError
-from dynident.fitting.estimate import DataSource, Estimate
+from dynident.effects import Law, catalogue, law_effect
+from dynident.errors import DynidentError, EffectError, FitError
+from dynident.fitting.estimate import DataSource, Estimate, ShapeValue
 from dynident.fitting.estimate_schema import BasisPart, EstimateFile, ModelPart
 from dynident.inertia import PARAMETERS
 from dynident.model import Model
@@ -100,12 +100,32 @@ def _estimate(content: EstimateFile, model: Model, where: str) -> Estimate:
         links=links,
         sigma_words=content.sigma_words,
         headline=content.headline,
+        shapes=tuple(
+            ShapeValue(
+                name=one.name,
+                value=one.value,
+                sigma=np.nan if one.sigma is None else one.sigma,
+                unit=one.unit,
+            )
+            for one in content.shapes
+        ),
     )
 
 
 def _model(given: ModelPart, where: str) -> Model:
     _require_count(given.gravity, 3, "model.gravity", where)
-    known = catalogue()
+    try:
+        laws = tuple(
+            Law(
+                name=one.name,
+                torque=one.torque,
+                shape=tuple((part.name, part.lower, part.upper) for part in one.shape),
+            )
+            for one in given.laws
+        )
+    except EffectError as error:
+        raise _refusal("model.laws", str(error), where) from None
+    known = {**catalogue(), **{law.label: law_effect(law) for law in laws}}
     for number, one in enumerate(given.effects):
         if one.effect not in known:
             what = f"no effect is named '{one.effect[:40]}'"
@@ -118,7 +138,7 @@ def _model(given: ModelPart, where: str) -> Model:
         )
         width = given.friction_width
         width = tuple(width) if isinstance(width, list) else width
-        model = Model(robot, effects, width)
+        model = Model(robot, effects, width, laws)
         # The names are found from the dynamics: some descriptions fail only there.
         assert model.names
     except DynidentError as error:

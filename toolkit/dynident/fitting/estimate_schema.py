@@ -78,6 +78,25 @@ class _Effect(_Part):
     point: list[_Number] = []
 
 
+class _Range(_Part):
+    name: str
+    lower: _Number
+    upper: _Number
+
+
+class _Law(_Part):
+    name: str
+    torque: str
+    shape: list[_Range] = []
+
+
+class _Shape(_Part):
+    name: str
+    value: _Number
+    sigma: _Size | None
+    unit: str
+
+
 class ModelPart(_Part):
     """The model that was fitted."""
 
@@ -86,6 +105,7 @@ class ModelPart(_Part):
     gravity: list[_Number]
     friction_width: _Positive | list[_Positive]
     effects: list[_Effect]
+    laws: list[_Law] = []
 
 
 class EstimateFile(_Part):
@@ -105,6 +125,7 @@ class EstimateFile(_Part):
     notes: list[str]
     sigma_words: str = ""
     headline: str = ""
+    shapes: list[_Shape] = []
     recordings: list[_Recording]
     links: dict[str, list[_Number]] | None = None
     certificate: dict[str, Any] | None = None
@@ -147,5 +168,13 @@ def model_part(model: Model) -> dict[str, Any]:
                 "point": list(effect.point),
             }
             for effect in model.effects
+        ],
+        "laws": [
+            {
+                "name": law.name,
+                "torque": law.torque,
+                "shape": [{"name": n, "lower": low, "upper": up} for n, low, up in law.shape],
+            }
+            for law in model.laws
         ],
     }

@@ -9,6 +9,7 @@ from dynident.errors import FitError
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import LeastSquares
 from dynident.fitting.row_objective import refine_shapes, shaped_effects
+from dynident.fitting.uncertainty.shape_errors import with_shape_errors
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
 from dynident.threads import single_threaded
@@ -79,4 +80,6 @@ def _fitted(model: Model, dataset: Dataset, method: Method) -> Estimate:
         return method.fit(model, dataset)
     shaped = refine_shapes(model, dataset)
     estimate = method.fit(shaped.model, dataset)
-    return replace(estimate, status=f"{estimate.status}, {shaped.status}")
+    estimate = replace(estimate, status=f"{estimate.status}, {shaped.status}")
+    again = isinstance(method, LeastSquares)
+    return with_shape_errors(estimate, (lambda one: method.fit(one, dataset)) if again else None)

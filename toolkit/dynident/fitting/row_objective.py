@@ -32,7 +32,7 @@ from dynident.moments.factors import RANK_TOLERANCE, factorise
 from dynident.recording import Dataset
 
 _SCREEN_MOST = 400  # combinations of all effects' variants that are screened at most
-_PRECISION = 1e-4  # of the logarithm of a shape parameter
+_PRECISION = 1e-4  # of the coordinate of a shape parameter
 _PASSES = 5  # of shapes and values in turn, where columns depend on the values
 
 Signals = list[np.ndarray]
@@ -55,7 +55,7 @@ def shaped_effects(model: Model) -> tuple[Effect, ...]:
 def refine_shapes(model: Model, dataset: Dataset) -> Shaped:
     """Find the shape parameters of a model at which least squares fits best.
 
-    The effects' variants are screened first. Then the logarithms of the shapes are sought, within
+    The effects' variants are screened first. Then the coordinates of the shapes are sought, within
     their bounds: by least squares where every effect knows its derivatives, else by a simplex
     search. Where columns depend on the fit, shapes and values are sought in turn.
 
@@ -86,7 +86,7 @@ def refine_shapes(model: Model, dataset: Dataset) -> Shaped:
         relaxed = LeastSquares(errors="independent").fit(before, dataset)
         rows = _RowObjective(relaxed.model, samples, relaxed.values)
         shaped = _best(rows, rows.effects)
-        if np.allclose(_logarithms(before), _logarithms(shaped.model), atol=10 * _PRECISION):
+        if np.allclose(_coordinates(before), _coordinates(shaped.model), atol=10 * _PRECISION):
             break
     return shaped
 
@@ -100,7 +100,7 @@ def _best(rows: _RowObjective, effects: tuple[Effect, ...]) -> Shaped:
         fall, most = 1e-9 * rows.loss(effects), 200 * len(problem.start)
         solver = Simplex(_PRECISION, fall=fall, evaluations=most)
     found = search(problem, solver)
-    return Shaped(rows.model.with_shapes(rows.at(effects, found.logarithms)), rows.status(found))
+    return Shaped(rows.model.with_shapes(rows.at(effects, found.coordinates)), rows.status(found))
 
 
 def _without_nonlinear(model: Model, dataset: Dataset) -> np.ndarray:
@@ -116,8 +116,16 @@ def _without_nonlinear(model: Model, dataset: Dataset) -> np.ndarray:
     return values
 
 
-def _logarithms(model: Model) -> np.ndarray:
-    return np.log([s for effect in shaped_effects(model) for s in effect.shape])
+def _coordinates(model: Model) -> np.ndarray:
+    return np.array(
+        [
+            parameter.coordinate(value)
+            for effect in shaped_effects(model)
+            for parameter, value in zip(
+                effect.shape_parameters(model.robot), effect.shape, strict=True
+            )
+        ]
+    )
 
 
 class _RowObjective:
@@ -146,8 +154,10 @@ class _RowObjective:
 
     def problem(self, effects: tuple[Effect, ...]) -> ShapeProblem[_RowTrial]:
         """Return the search for shapes that begins at those of some effects."""
-        lower, upper = np.log([(s.lower, s.upper) for s in self._parameters]).T
-        start = np.log([s for effect in effects for s in effect.shape])
+        lower, upper = self._limits
+        shape = (value for effect in effects for value in effect.shape)
+        pairs = zip(self._parameters, shape, strict=True)
+        start = np.array([parameter.coordinate(value) for parameter, value in pairs])
         return ShapeProblem(
             lower=lower,
             upper=upper,
@@ -155,6 +165,12 @@ class _RowObjective:
             evaluate=lambda points: [_RowTrial(self, self.at(effects, x)) for x in points],
             differentiable=self._differentiable(effects),
         )
+
+    @property
+    def _limits(self) -> np.ndarray:
+        """Lower and upper bounds of the coordinates, (2, s)."""
+        pairs = [(s.coordinate(s.lower), s.coordinate(s.upper)) for s in self._parameters]
+        return np.array(pairs).T
 
     def screened(self) -> tuple[Effect, ...]:
         """Return the best of the variants: of all combinations, or of each effect in turn."""
@@ -169,19 +185,19 @@ class _RowObjective:
         """How a search ended, in words."""
         at_bound = [
             s.name
-            for s, x in zip(self._parameters, found.logarithms, strict=True)
-            if min(x - np.log(s.lower), np.log(s.upper) - x) < 10 * _PRECISION
+            for s, x, low, high in zip(
+                self._parameters, found.coordinates, *self._limits, strict=True
+            )
+            if min(x - low, high - x) < 10 * _PRECISION
         ]
         status = "shape parameters converged" if found.converged else f"shapes: {found.message}"
         if at_bound:
             status += f"; at a bound: {', '.join(at_bound)}"
         return status
 
-    def at(self, effects: tuple[Effect, ...], logarithms: np.ndarray) -> tuple[Effect, ...]:
+    def at(self, effects: tuple[Effect, ...], coordinates: np.ndarray) -> tuple[Effect, ...]:
         """Return effects at other shapes."""
-        remaining = np.exp(logarithms)
-        bounds = [(s.lower, s.upper) for s in self._parameters]
-        shape = [float(np.clip(x, *limits)) for x, limits in zip(remaining, bounds, strict=True)]
+        shape = [s.at(x) for s, x in zip(self._parameters, coordinates, strict=True)]
         found = []
         for effect in effects:
             own = len(effect.shape)
@@ -210,7 +226,7 @@ class _RowObjective:
         return np.hstack([self._left(self._evaluated(e, e.columns)) for e in effects])
 
     def change(self, effects: tuple[Effect, ...], values: np.ndarray) -> np.ndarray:
-        """Weighted rows of the effects' torque, derived by the logarithm of each shape, (N, s)."""
+        """Weighted rows of the effects' torque, derived by the coordinate of each shape, (N, s)."""
         start, found = 0, []
         for e in effects:
             own = values[start : start + len(e.parameters(self.model.robot))]
@@ -275,7 +291,7 @@ class _RowTrial:
 
     @property
     def jacobian(self) -> np.ndarray:
-        """Derivative of the residual by the logarithms, as if the linear values stayed, (N, s).
+        """Derivative of the residual by the coordinates, as if the linear values stayed, (N, s).
 
         Source: L. Kaufman, "A variable projection method for solving separable nonlinear least
         squares problems", BIT 15 (1975).

@@ -2,8 +2,8 @@
 
 The linear parameters are solved for at each trial (variable projection; Golub and Pereyra, "The
 differentiation of pseudo-inverses and nonlinear least squares problems whose variables separate",
-1973), so that a problem knows nothing but the shapes. They are sought by their logarithms. `search`
-takes a problem and a solver:
+1973), so that a problem knows nothing but the shapes. They are sought by their
+coordinates, see `dynident.effects.ShapeParameter`. `search` takes a problem and a solver:
 
 - `TrustRegion`, where residual and derivatives are known;
 - `Simplex` and, of one unknown, `Bracket`, where they are not;
@@ -35,7 +35,7 @@ class Trial(Protocol):
     """What some shapes leave.
 
     Those of a differentiable problem are least-squares problems: they have a `residual` (r,), and
-    its derivatives by the logarithms as `jacobian` (r, s), as well.
+    its derivatives by the coordinates as `jacobian` (r, s), as well.
     """
 
     @property
@@ -55,7 +55,7 @@ V = TypeVar("V")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ShapeProblem(Generic[T]):
-    """Shapes that are sought by the natural logarithms of their values.
+    """Shapes that are sought by their coordinates, see `dynident.effects.ShapeParameter`.
 
     Attributes
     ----------
@@ -71,9 +71,9 @@ class ShapeProblem(Generic[T]):
     evaluate: Callable[[Sequence[np.ndarray]], Sequence[T]]
     differentiable: bool = False
 
-    def at(self, logarithms: np.ndarray) -> T:
+    def at(self, coordinates: np.ndarray) -> T:
         """Return the trial of one."""
-        return self.evaluate([logarithms])[0]
+        return self.evaluate([coordinates])[0]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -82,14 +82,14 @@ class ShapeSolution(Generic[T]):
 
     Attributes
     ----------
-    logarithms : (s,) of the shapes.
+    coordinates : (s,) of the shapes.
     converged : whether the solver says so.
     message : of the solver.
     best : the admissible trials with the least loss on the way, best first.
     evaluations : number of trials.
     """
 
-    logarithms: np.ndarray
+    coordinates: np.ndarray
     converged: bool
     message: str
     best: tuple[T, ...]
@@ -114,7 +114,7 @@ def search(problem: ShapeProblem[T], solver: ShapeSolver) -> ShapeSolution[T]:
     log = _Log(problem, solver.finalists)
     found = solver.run(problem, log)
     return ShapeSolution(
-        logarithms=np.atleast_1d(found.x),
+        coordinates=np.atleast_1d(found.x),
         converged=bool(found.success),
         message=str(found.message),
         best=log.best,
@@ -151,7 +151,7 @@ class TrustRegion:
 
     Attributes
     ----------
-    precision : of the logarithms, relative to their norm.
+    precision : of the coordinates, relative to their norm.
     fall : relative, of what is left, below which a step is the last one.
     slope : of what is left, below which it ends.
     evaluations : at most.
@@ -183,7 +183,7 @@ class Simplex:
 
     Attributes
     ----------
-    precision : of the logarithms.
+    precision : of the coordinates.
     fall : absolute, of the loss.
     evaluations : at most; None for 200 an unknown, and as many iterations.
     """
@@ -214,7 +214,7 @@ class Bracket:
 
     Attributes
     ----------
-    precision : of the logarithm.
+    precision : of the coordinate.
     evaluations : at most.
     """
 
@@ -294,11 +294,11 @@ class _Log(Generic[T]):
         self.best: tuple[T, ...] = ()
         self.evaluations = 0
 
-    def at(self, logarithms: np.ndarray) -> T:
+    def at(self, coordinates: np.ndarray) -> T:
         """Return the trial of one."""
-        key = logarithms.tobytes()
+        key = coordinates.tobytes()
         if self._last is None or self._last[0] != key:
-            self._last = (key, self.many([logarithms])[0])
+            self._last = (key, self.many([coordinates])[0])
         return self._last[1]
 
     def many(self, points: Sequence[np.ndarray] | np.ndarray) -> Sequence[T]:

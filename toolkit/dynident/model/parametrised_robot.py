@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from dynident.effects import FRICTION_WIDTH, Effect, effects_of
+from dynident.effects import FRICTION_WIDTH, Effect, Law, effects_of
 from dynident.errors import EffectError
 from dynident.robot import BaseParameters, Robot, nearest_parameters, structural_base
 
@@ -26,11 +26,13 @@ class ParametrisedRobot:
     effects : at most one of a label.
     friction_width : rad/s or m/s, see `dynident.effects.FRICTION_WIDTH`; of all joints, or n of
         them.
+    laws : of the user, whose effects can be in the model, and are looked for where it fails.
     """
 
     robot: Robot
     effects: tuple[Effect, ...] = ()
     friction_width: float | tuple[float, ...] = FRICTION_WIDTH
+    laws: tuple[Law, ...] = ()
 
     def __post_init__(self) -> None:
         checked = tuple(effect.on(self.robot) for effect in self.effects)
@@ -61,7 +63,7 @@ class ParametrisedRobot:
     def __add__(self, addition: Effect | str | tuple[Effect, ...]) -> Self:
         """Return the model with an effect more (`name`, `name@joint`, an effect or several)."""
         if isinstance(addition, str):
-            addition = effects_of(addition, self.robot)
+            addition = effects_of(addition, self.robot, self.laws)
         more = addition if isinstance(addition, tuple) else (addition,)
         return replace(self, effects=(*self.effects, *more))
 
@@ -169,12 +171,8 @@ class ParametrisedRobot:
         found = []
         for effect in self.effects:
             for parameter in effect.parameters(self.robot):
-                place = effect.label.partition("@")[2]
-                tail = f"@{place}" if place and attribute == "name" else ""
-                head = str(getattr(parameter, attribute))
-                if attribute == "name" and not place:
-                    head = f"{effect.name}.{head}"
-                found.append(head + tail)
+                value = str(getattr(parameter, attribute))
+                found.append(effect.parameter_name(value) if attribute == "name" else value)
         return tuple(found)
 
     # --- the robot that the parameters describe -------------------------------------------------

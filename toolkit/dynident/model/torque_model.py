@@ -25,6 +25,7 @@ class Model(ParametrisedRobot):
     effects : at most one of a label.
     friction_width : rad/s or m/s, see `dynident.effects.FRICTION_WIDTH`; of all joints, or n of
         them.
+    laws : of the user, whose effects can be in the model, and are looked for where it fails.
     """
 
     # --- torque --------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ import numpy as np
 
 from dynident.closed_loop import Controller
 from dynident.criteria import DEFAULTS, Criteria
-from dynident.effects import FRICTION_WIDTH, effects_of
+from dynident.effects import FRICTION_WIDTH, effects_of, law_effect, laws_of
 from dynident.errors import DynidentError, EffectError, StudyError
 from dynident.fitting.drive_gains import (
     DriveGains,
@@ -78,9 +78,12 @@ def load(path: str | Path) -> Study:
     if not said.recordings:
         raise StudyError("no [[recordings]]", str(path), "add at least one")
     robot = robot_of(said, path)
+    laws = laws_of(said.laws, path)
     try:
-        effects = tuple(effect for label in said.effects for effect in effects_of(label, robot))
-        model = Model(robot, effects, _widths(said.friction_width, robot))
+        for law in laws:
+            tuple(law_effect(law).candidates(robot))
+        effects = tuple(one for label in said.effects for one in effects_of(label, robot, laws))
+        model = Model(robot, effects, _widths(said.friction_width, robot), laws)
     except DynidentError as error:
         raise StudyError(str(error), f"{path}: effects") from None
     recordings, loads = recordings_of(said, path, robot)

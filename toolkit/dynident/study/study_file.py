@@ -8,7 +8,7 @@ from pydantic import Field, field_validator
 from pydantic_core import PydanticCustomError
 
 from dynident.closed_loop import ControllerFile
-from dynident.effects import FRICTION_WIDTH
+from dynident.effects import FRICTION_WIDTH, LawsEntry
 from dynident.fitting.loads import LoadEntry, PayloadEntry
 from dynident.settings import Duration, Rate, SettingsTable, Time
 
@@ -122,6 +122,8 @@ class StudyFile(SettingsTable):
     filter : how positions are differentiated, and what is filtered alike.
     noise : of a raw sample, where nothing repeats.
     controller : of the closed loop; see `dynident.Controller`.
+    laws : effects as formulas, in tables `[laws.NAME]` or files of their own; see
+        `dynident.effects.LawEntry`. At a joint such an effect is `law:NAME@joint`.
     columns : ours -> the files' names of columns, or linear expressions of them. Ours are t, and
         for each joint q.<joint>, tau.<joint>, v.<joint>, a.<joint>, q_ref.<joint> and
         temperature.<joint>; for a wrench sensor wrench.<link>.fx, .fy, .fz, .tx, .ty and .tz, in N
@@ -142,6 +144,7 @@ class StudyFile(SettingsTable):
     filter: FilterEntry | None = None
     noise: NoiseEntry | None = None
     controller: ControllerFile | None = None
+    laws: LawsEntry = Field(default_factory=dict)
     columns: dict[str, str | ColumnEntry] = Field(default_factory=dict)
     criteria: dict[str, Any] = Field(default_factory=dict)
 

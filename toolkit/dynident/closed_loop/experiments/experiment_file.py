@@ -13,7 +13,7 @@ from dynident.closed_loop.rollout import LEAD_IN
 from dynident.closed_loop.sensors import Sensors
 from dynident.closed_loop.trajectories import Fourier
 from dynident.closed_loop.true_effects import TrueEffect
-from dynident.effects import FRICTION_WIDTH
+from dynident.effects import FRICTION_WIDTH, LawsEntry, laws_of
 from dynident.errors import DynidentError, StudyError
 from dynident.robot import Robot
 from dynident.settings import Duration, SettingsTable, Time, read_toml
@@ -63,6 +63,7 @@ class _ExperimentFile(SettingsTable):
     torque: Literal["held_command", "measured"] = "held_command"
     lead_in: float = Field(default=LEAD_IN, ge=0)
     effects: list[_EffectEntry] = Field(default_factory=list)
+    laws: LawsEntry = Field(default_factory=dict)
     controller: ControllerFile
     sensors: _SensorsEntry = _SensorsEntry()
     recordings: list[_ExperimentRecordingEntry]
@@ -73,11 +74,11 @@ def load_experiment(path: str | Path) -> Experiment:
 
     Keys: `robot` (the true one; paths are relative to the file), `nominal` (given to the user;
     default the true one), `joints`, `gravity`, `seed`, `friction_width`, `torque`, `lead_in`;
-    [[effects]] `effect`, `values`, `shape`, `hidden`; [controller] as in a study; [sensors]
-    `position_std`, `position_resolution`, `torque_std`, `torque_resolution`, `temperature_std` (a
-    number, or one per joint; without the last there are no temperatures); [[recordings]] `file`,
-    `use`, `duration`, `period`, `start`, `payload`, `trajectory` with `harmonics`, `seed`,
-    `amplitude`, `speed`, `acceleration`, `centre`.
+    [[effects]] `effect`, `values`, `shape`, `hidden`; [laws] and [controller] as in a study;
+    [sensors] `position_std`, `position_resolution`, `torque_std`, `torque_resolution`,
+    `temperature_std` (a number, or one per joint; without the last there are no temperatures);
+    [[recordings]] `file`, `use`, `duration`, `period`, `start`, `payload`, `trajectory` with
+    `harmonics`, `seed`, `amplitude`, `speed`, `acceleration`, `centre`.
 
     Raises
     ------
@@ -91,11 +92,12 @@ def load_experiment(path: str | Path) -> Experiment:
     robot = _robot(said, path, said.robot)
     nominal = None if said.nominal is None else _robot(said, path, said.nominal)
     controller = said.controller.controller(robot, f"{path}: controller")
+    laws = laws_of(said.laws, path)
     effects = []
     for number, entry in enumerate(said.effects):
         try:
             effects += TrueEffect.of(
-                entry.effect, robot, entry.values, entry.shape, hidden=entry.hidden
+                entry.effect, robot, entry.values, entry.shape, hidden=entry.hidden, laws=laws
             )
         except DynidentError as error:
             raise _at(error, path, f"effects.{number}") from None

@@ -9,7 +9,7 @@ import tomlkit
 
 from dynident import files
 from dynident.closed_loop.experiments.experiment import Experiment, Progress
-from dynident.effects import FRICTION_WIDTH, catalogue
+from dynident.effects import FRICTION_WIDTH, Effect, Law, LawEffect, laws_table
 from dynident.errors import FileError, SimulationError
 from dynident.recording import write as write_recording
 from dynident.robot import Robot
@@ -94,6 +94,8 @@ def _study(experiment: Experiment, nominal: Robot, description: str) -> tomlkit.
             entry["payload"] = run.payload
         entries.append(entry)
     document["recordings"] = entries
+    if laws := _laws(experiment):
+        document["laws"] = laws_table(laws)
     document["controller"] = _controller(experiment)
     return document
 
@@ -101,14 +103,21 @@ def _study(experiment: Experiment, nominal: Robot, description: str) -> tomlkit.
 def _labels(experiment: Experiment) -> list[str]:
     """Labels of the known effects; one that sits at every place is named once."""
     known = [one.effect for one in experiment.known_effects]
-    by_name: dict[str, list[str]] = {}
+    by_kind: dict[type[Effect], list[str]] = {}
     for effect in known:
-        by_name.setdefault(effect.name, []).append(effect.label)
+        by_kind.setdefault(type(effect), []).append(effect.label)
     found = []
-    for name, labels in by_name.items():
-        everywhere = [one.label for one in catalogue()[name].candidates(experiment.robot)]
+    for kind, labels in by_kind.items():
+        name = kind.name
+        everywhere = [one.label for one in kind.candidates(experiment.robot)]
         found += [name] if sorted(labels) == sorted(everywhere) else labels
     return found
+
+
+def _laws(experiment: Experiment) -> tuple[Law, ...]:
+    """The laws of the known effects."""
+    known = (one.effect for one in experiment.known_effects)
+    return tuple(dict.fromkeys(e.made_of for e in known if isinstance(e, LawEffect)))
 
 
 def _multiline(labels: list[str]):

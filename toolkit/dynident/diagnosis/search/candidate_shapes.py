@@ -114,7 +114,9 @@ def _by_trial(objective: MomentObjective) -> Score:
         limits, solver = [_neighbours(shapes[0], effect.shape[0])], Bracket(2 * precision)
     else:
         limits, solver = [(s.lower, s.upper) for s in shapes], Simplex()
-    lower, upper = np.log(limits).T
+    lower, upper = np.array(
+        [[s.coordinate(x) for x in pair] for s, pair in zip(shapes, limits, strict=True)]
+    ).T
     return search(objective.by_trial(lower, upper), solver).best[0].found
 
 
@@ -153,6 +155,11 @@ def _neighbours(shape, value: float) -> tuple[float, float]:
     if len(grid) < 2:
         return shape.lower, shape.upper
     i = int(np.argmin(np.abs(grid - value)))
-    low = grid[i - 1] if i > 0 else max(shape.lower, grid[0] ** 2 / grid[1])
-    high = grid[i + 1] if i + 1 < len(grid) else min(shape.upper, grid[-1] ** 2 / grid[-2])
+    # Beyond its ends the grid goes on as it is spaced.
+    before, after = (
+        shape.at(2 * shape.coordinate(end) - shape.coordinate(inner))
+        for end, inner in ((grid[0], grid[1]), (grid[-1], grid[-2]))
+    )
+    low = grid[i - 1] if i > 0 else before
+    high = grid[i + 1] if i + 1 < len(grid) else after
     return float(low), float(high)

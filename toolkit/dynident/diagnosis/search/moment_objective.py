@@ -22,17 +22,18 @@ from dynident.diagnosis.search.scoring import (
     moments_with_payload,
     score,
 )
-from dynident.effects import Block, Effect, Needs, Parameter
+from dynident.effects import Block, Effect, Needs, Parameter, ShapeParameter
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.fitting.shape_search import ShapeProblem
 
+_LEAST_VALUE = 1e-300
 _ROUNDING = 1e-12  # of the largest curvature, to which others are rounding errors
 
 
 @dataclass(frozen=True)
 class Tangent(Effect):
-    """An effect's columns, then their derivatives by the logarithm of each shape parameter.
+    """An effect's columns, then their derivatives by the coordinate of each shape parameter.
 
     Last comes the derivative by the value at which a column is taken, where there is one.
     """
@@ -77,7 +78,7 @@ class ScoreTrial:
     found : its score.
     loss : what it leaves, less a constant: the drop, negative.
     admissible : whether its values are possible.
-    residual, jacobian : (s + 1,) and (s + 1, s), by the logarithms; None where no derivatives are
+    residual, jacobian : (s + 1,) and (s + 1, s), by the coordinates; None where no derivatives are
         known. Their products are those of the whitened residual and its derivatives, whose noise is
         taken out of all but the sum.
     """
@@ -121,34 +122,43 @@ class MomentObjective:
     def by_derivatives(self) -> ShapeProblem[ScoreTrial]:
         """Return the search for shapes, and the value at which a column is taken, together."""
         effect, robot = self.one.effect, self.fitted.model.robot
-        pointed = effect.parameters(robot) if effect.point else ()
-        sought = (*effect.shape_parameters(robot), *pointed)
-        limits = np.array([(s.lower, s.upper) for s in sought]).T
-        start = np.array([*effect.shape, *effect.point])
+        sought = [*effect.shape_parameters(robot)]
+        if effect.point:
+            # A value at which a column is taken is positive, and sought as shapes are.
+            sought += [_as_shape(p) for p in effect.parameters(robot)]
+        start = [
+            s.coordinate(x) for s, x in zip(sought, (*effect.shape, *effect.point), strict=True)
+        ]
         # Not further than to the next shapes of the grid: beyond, other peaks lead astray.
         furthest = self.fitted.criteria.shapes.furthest
-        low, high = np.log(np.clip(np.outer((1.0 / furthest, furthest), start), *limits))
+        reach = np.array([s.reach(furthest) for s in sought])
+        limits = np.array([(s.coordinate(s.lower), s.coordinate(s.upper)) for s in sought]).T
 
-        def trial(logarithms: np.ndarray) -> ScoreTrial:
-            x, shapes = np.clip(np.exp(logarithms), *limits), len(effect.shape)
-            return self._differentiated(effect.shaped(*x[:shapes]).at(x[shapes:].tolist()))
+        def trial(coordinates: np.ndarray) -> ScoreTrial:
+            x = [s.at(c) for s, c in zip(sought, coordinates, strict=True)]
+            shapes = len(effect.shape)
+            return self._differentiated(effect.shaped(*x[:shapes]).at(x[shapes:]))
 
         return ShapeProblem(
-            lower=low,
-            upper=high,
-            start=np.log(start),
+            lower=np.clip(start - reach, *limits),
+            upper=np.clip(start + reach, *limits),
+            start=np.array(start),
             evaluate=_each(trial),
             differentiable=True,
         )
 
     def by_trial(self, lower: np.ndarray, upper: np.ndarray) -> ShapeProblem[ScoreTrial]:
         """Return the search for shapes between bounds (s,) whose derivatives are not known."""
+        effect = self.one.effect
+        sought = effect.shape_parameters(self.fitted.model.robot)
 
-        def trial(logarithms: np.ndarray) -> ScoreTrial:
-            found = self.score_at(self.one.effect.shaped(*np.exp(logarithms)))
+        def trial(coordinates: np.ndarray) -> ScoreTrial:
+            shape = (s.at(x) for s, x in zip(sought, coordinates, strict=True))
+            found = self.score_at(effect.shaped(*shape))
             return ScoreTrial(found=found, loss=-found.drop)
 
-        start = np.log(self.one.effect.shape)
+        pairs = zip(sought, effect.shape, strict=True)
+        start = np.array([s.coordinate(x) for s, x in pairs])
         return ShapeProblem(lower=lower, upper=upper, start=start, evaluate=_each(trial))
 
     def by_value(self, span: float) -> ShapeProblem[ScoreTrial]:
@@ -187,6 +197,11 @@ class MomentObjective:
         return replace(self._judged(found), residual=residual, jacobian=jacobian)
 
 
+def _as_shape(value: Parameter) -> ShapeParameter:
+    """A value at which a column is taken, sought by its logarithm."""
+    return ShapeParameter(value.name, value.unit, (), lower=_LEAST_VALUE, upper=value.upper)
+
+
 def _each(
     trial: Callable[[np.ndarray], ScoreTrial],
 ) -> Callable[[Sequence[np.ndarray]], list[ScoreTrial]]:
@@ -211,7 +226,7 @@ def _square_root(
     p, k = len(fitted.values), len(found.effect.parameters(fitted.model.robot))
     values = np.array(found.effect.point or found.values or (0.0,) * k)
     count = with_self.shape[0] // k - 1
-    # What the torque changes by, along the logarithm of each shape.
+    # What the torque changes by, along the coordinate of each shape.
     along = block_diag(np.eye(k), *[values[:, None]] * count)
     with_model, with_self = with_model @ along, along.T @ with_self @ along
     back = fitted.solution.project(with_model[:p])

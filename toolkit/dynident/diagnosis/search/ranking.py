@@ -17,7 +17,7 @@ from dynident.diagnosis.search.scoring import (
     moments_with_payload,
     score,
 )
-from dynident.effects import Block, Effect, catalogue
+from dynident.effects import Block, Effect, catalogue, law_effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, residuals
 from dynident.evidence.noise_model import differences, systematic_square
@@ -64,7 +64,8 @@ class Ranking:
 def candidates(model: Model) -> list[Effect]:
     """Every effect that shows in residuals, wherever the model has none of its label."""
     found = []
-    for effect in catalogue().values():
+    laws = (law_effect(law) for law in model.laws)
+    for effect in (*catalogue().values(), *laws):
         if effect.found_by == "residual":
             found += [e.on(model.robot) for e in effect.candidates(model.robot) if e not in model]
     return found

@@ -1,0 +1,38 @@
+"""Laws that users write as formulas: read by a whitelist, never evaluated as code.
+
+`parse_formula` makes a tree of a text, `linear_parameters` says in which of its parameters it is
+linear, `units_of` which units they have, and `evaluate` computes it, of numbers or of symbols.
+"""
+
+from dynident.formulas.evaluation import Values, evaluate
+from dynident.formulas.linearity import linear_parameters
+from dynident.formulas.parsing import LONGEST, parse_formula
+from dynident.formulas.tree import (
+    Formula,
+    Number,
+    Operation,
+    Parameter,
+    Quantity,
+    Signal,
+    nodes,
+    text_of,
+)
+from dynident.formulas.units import Unit, units_of
+
+__all__ = [
+    "LONGEST",
+    "Formula",
+    "Number",
+    "Operation",
+    "Parameter",
+    "Quantity",
+    "Signal",
+    "Unit",
+    "Values",
+    "evaluate",
+    "linear_parameters",
+    "nodes",
+    "parse_formula",
+    "text_of",
+    "units_of",
+]
