@@ -14,7 +14,9 @@ from types import MappingProxyType
 
 from dynident.effects.effect import Effect
 from dynident.effects.known_effects import known_effects, unchanged_if_it_fails
+from dynident.effects.laws import PREFIX, Law, law_effect
 from dynident.errors import DynidentWarning, EffectError
+from dynident.settings import nearest
 
 ENTRY_POINTS = "dynident.effects"
 """Group of entry points by which packages bring effects: each names a module, or a class in one."""
@@ -35,10 +37,6 @@ def _load_own() -> None:
     """Import every file of this room: before anybody can take the name of an effect in it."""
     for module in pkgutil.walk_packages([str(Path(__file__).parent)], f"{__package__}."):
         importlib.import_module(module.name)
-
-
-from dynident.effects.laws import PREFIX, Law, law_effect
-from dynident.settings import nearest
 
 
 @cache
