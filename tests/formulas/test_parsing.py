@@ -14,8 +14,8 @@ from dynident.formulas import (
     Formula,
     Number,
     Operation,
-    Parameter,
     Signal,
+    Unknown,
     evaluate,
     parse_formula,
     text_of,
@@ -24,7 +24,7 @@ from dynident.formulas.parsing import LONGEST, MOST_NODES
 
 LEAVES = st.one_of(
     st.sampled_from([Number(2.0), Number(0.25), Number(-3.0), Number(1e-7)]),
-    st.sampled_from([Parameter("c"), Parameter("k1")]),
+    st.sampled_from([Unknown("c"), Unknown("k1")]),
     st.sampled_from([Signal("q"), Signal("v"), Signal("load", "left arm/j-1"), Signal("t")]),
 )
 

@@ -40,7 +40,7 @@ class Feedback:
 
 
 @dataclass(frozen=True)
-class Law:
+class ControlLaw:
     """One kind of controller.
 
     Attributes
@@ -147,7 +147,7 @@ class Controller:
         return len(self.kp)
 
     @property
-    def law(self) -> Law:
+    def law(self) -> ControlLaw:
         """What its kind does."""
         return LAWS[self.kind]
 
@@ -199,11 +199,11 @@ def _cascade(controller: Controller) -> Feedback:
     return Feedback(kv * kp, np.zeros(len(kp)), kv, 0.0)
 
 
-LAWS: dict[str, Law] = {
-    "pd": Law(("kp", "kd"), (2, 1), _parallel),
-    "pid": Law(("kp", "ki", "kd"), (2, 3, 1), _parallel),
-    "cascade": Law(("kp", "kv"), (1, 1), _cascade),
-    "computed_torque": Law(("kp", "kd"), (2, 1), _parallel, through_model=True),
+LAWS: dict[str, ControlLaw] = {
+    "pd": ControlLaw(("kp", "kd"), (2, 1), _parallel),
+    "pid": ControlLaw(("kp", "ki", "kd"), (2, 3, 1), _parallel),
+    "cascade": ControlLaw(("kp", "kv"), (1, 1), _cascade),
+    "computed_torque": ControlLaw(("kp", "kd"), (2, 1), _parallel, through_model=True),
 }
 """The kinds by name."""
 GAINS = tuple(dict.fromkeys(name for law in LAWS.values() for name in law.gains))

@@ -90,7 +90,7 @@ class _Law(_Part):
     shape: list[_Range] = []
 
 
-class _Shape(_Part):
+class _ShapePart(_Part):
     name: str
     value: _Number
     sigma: _Size | None
@@ -125,7 +125,7 @@ class EstimateFile(_Part):
     notes: list[str]
     sigma_words: str = ""
     headline: str = ""
-    shapes: list[_Shape] = []
+    shapes: list[_ShapePart] = []
     recordings: list[_Recording]
     links: dict[str, list[_Number]] | None = None
     certificate: dict[str, Any] | None = None

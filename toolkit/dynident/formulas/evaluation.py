@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from dynident.formulas.tree import Formula, Number, Operation, Parameter, Signal, nodes
+from dynident.formulas.tree import Formula, Number, Operation, Signal, Unknown, nodes
 
 _FUNCTIONS = {
     "sin": np.sin,
@@ -55,7 +55,7 @@ def _value(formula: Formula, values: Values) -> Any:
     match formula:
         case Number(value):
             return value
-        case Parameter(name):
+        case Unknown(name):
             return values.parameter(name)
         case Signal():
             return values.signal(formula)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from dynident.errors import EffectError
-from dynident.formulas.tree import Formula, Number, Operation, Parameter, nodes, text_of
+from dynident.formulas.tree import Formula, Number, Operation, Unknown, nodes, text_of
 
 
 def linear_parameters(formula: Formula, shapes: Collection[str]) -> tuple[str, ...]:
@@ -24,7 +24,7 @@ def linear_parameters(formula: Formula, shapes: Collection[str]) -> tuple[str, .
         If a shape does not occur, no other parameter is left, one of those left stands inside a
         function, a power, a divisor or a product with another, or a term holds none.
     """
-    found = [node.name for node in nodes(formula) if isinstance(node, Parameter)]
+    found = [node.name for node in nodes(formula) if isinstance(node, Unknown)]
     for name in shapes:
         if name not in found:
             raise EffectError(f"'{name}' has a range and is not in the formula", remedy=_RANGE)
@@ -45,7 +45,7 @@ def _degree(formula: Formula, shapes: frozenset[str]) -> int | None:
     match formula:
         case Number(value):
             return None if value == 0.0 else 0
-        case Parameter(name):
+        case Unknown(name):
             return 0 if name in shapes else 1
         case Operation():
             return _of_operation(formula, shapes)
@@ -77,7 +77,7 @@ def _of_operation(formula: Operation, shapes: frozenset[str]) -> int | None:
 
 
 def _linear(formula: Formula, shapes: frozenset[str]) -> list[str]:
-    own = (one.name for one in nodes(formula) if isinstance(one, Parameter))
+    own = (one.name for one in nodes(formula) if isinstance(one, Unknown))
     return [name for name in dict.fromkeys(own) if name not in shapes]
 
 

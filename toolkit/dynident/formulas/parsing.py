@@ -19,9 +19,9 @@ from dynident.formulas.tree import (
     Formula,
     Number,
     Operation,
-    Parameter,
     Quantity,
     Signal,
+    Unknown,
     nodes,
 )
 
@@ -150,7 +150,7 @@ class _Reading:
             self._refuse(f"names the function {name} without its argument")
         if not _NAME.fullmatch(name) or keyword.iskeyword(name):
             self._refuse(f"names a parameter '{name[:40]}': use up to 24 letters and digits")
-        return Parameter(name)
+        return Unknown(name)
 
     def _signal(self, name: str, place: ast.expr) -> Signal:
         if name not in _QUANTITIES or name in _OF_NO_JOINT:

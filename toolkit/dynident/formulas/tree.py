@@ -22,7 +22,7 @@ class Number:
 
 
 @dataclass(frozen=True)
-class Parameter:
+class Unknown:
     """A quantity to be identified."""
 
     name: str
@@ -38,7 +38,7 @@ class Signal:
 
 @dataclass(frozen=True)
 class Operation:
-    """A sum, a product ... or a function; of "^" the second operand is a whole number.
+    """A sum, a product or a function; of "^" the second operand is a whole number.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Operation:
     of: tuple[Formula, ...]
 
 
-Formula = Number | Parameter | Signal | Operation
+Formula = Number | Unknown | Signal | Operation
 
 
 def nodes(formula: Formula) -> Iterator[Formula]:
@@ -70,7 +70,7 @@ def text_of(formula: Formula) -> str:
         case Number(value):
             whole = value == int(value) and abs(value) < 1e6
             return str(int(value)) if whole else repr(value)
-        case Parameter(name):
+        case Unknown(name):
             return name
         case Signal(quantity, joint):
             return quantity if joint is None else f"{quantity}[{_quoted(joint)}]"

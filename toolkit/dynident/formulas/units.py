@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 from dynident.errors import EffectError
-from dynident.formulas.tree import Formula, Number, Operation, Parameter, Signal, nodes, text_of
+from dynident.formulas.tree import Formula, Number, Operation, Signal, Unknown, nodes, text_of
 
 BASE = ("N", "m", "rad", "s", "degC")
 """Base units, in the order of exponents."""
@@ -101,7 +101,7 @@ class _Equations:
         self._signal_unit = signal_unit
         self._numbers = 0
         self._rows: list[tuple[_Exponents, str]] = []
-        self._names = {n.name for n in nodes(formula) if isinstance(n, Parameter)}
+        self._names = {n.name for n in nodes(formula) if isinstance(n, Unknown)}
         self._found = self._exponents(formula, added=False)
 
     def solved(self, result: Unit) -> Mapping[str, Unit]:
@@ -144,7 +144,7 @@ class _Equations:
                 self._numbers += 1
                 loose = added or value == 0.0 or value != round(value)
                 return _Exponents(np.zeros(len(BASE)), {f"#{self._numbers}": 1.0} if loose else {})
-            case Parameter(name):
+            case Unknown(name):
                 return _Exponents(np.zeros(len(BASE)), {name: 1.0})
             case Signal():
                 return _Exponents(np.array(self._signal_unit(node).exponents))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.effects.laws.law import Law
-from dynident.formulas import Formula, Operation, Parameter, Signal, nodes
+from dynident.formulas import Formula, Operation, Signal, Unknown, nodes
 
 _MOST = 400  # combinations of all shapes
 _SPACING = 0.5  # of a frequency, rad per rad, m or s: a cycle more or less over 4 pi
@@ -62,8 +62,8 @@ def _kinds(formula: Formula) -> dict[str, str]:
                 if isinstance(inner, Operation) and inner.name in "*/":
                     own = [n for one in inner.of for n in nodes(one)]
                     if any(isinstance(n, Signal) for n in own):
-                        found |= {n.name: "frequency" for n in own if isinstance(n, Parameter)}
+                        found |= {n.name: "frequency" for n in own if isinstance(n, Unknown)}
             for inner in nodes(node.of[0]):
-                if isinstance(inner, Parameter):
+                if isinstance(inner, Unknown):
                     found.setdefault(inner.name, "phase")
     return found
