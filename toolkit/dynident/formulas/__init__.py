@@ -4,10 +4,7 @@
 linear, `units_of` which units they have, and `evaluate` computes it, of numbers or of symbols.
 """
 
-from dynident.formulas.evaluation import Values, evaluate
-from dynident.formulas.linearity import linear_parameters
-from dynident.formulas.parsing import LONGEST, parse_formula
-from dynident.formulas.tree import (
+from dynident.formulas.formula_tree import (
     Formula,
     Number,
     Operation,
@@ -17,6 +14,9 @@ from dynident.formulas.tree import (
     nodes,
     text_of,
 )
+from dynident.formulas.formula_value import Values, evaluate
+from dynident.formulas.linearity import linear_parameters
+from dynident.formulas.parsing import LONGEST, parse_formula
 from dynident.formulas.units import Unit, units_of
 
 __all__ = [

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from dynident.errors import EffectError
-from dynident.formulas.tree import Formula, Number, Operation, Unknown, nodes, text_of
+from dynident.formulas.formula_tree import Formula, Number, Operation, Unknown, nodes, text_of
 
 
 def linear_parameters(formula: Formula, shapes: Collection[str]) -> tuple[str, ...]:

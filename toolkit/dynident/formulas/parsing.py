@@ -14,7 +14,7 @@ import warnings
 from typing import NoReturn, get_args
 
 from dynident.errors import EffectError
-from dynident.formulas.tree import (
+from dynident.formulas.formula_tree import (
     FUNCTIONS,
     Formula,
     Number,
@@ -71,7 +71,7 @@ def parse_formula(text: str) -> Formula:
     ----------
     text : numbers, `pi`, parameters (words of up to 24 letters, digits and underscores), signals
         (`q`, `v`, `a`, `load`, `temperature`, of this joint, or `q[elbow]` of another; `t`),
-        `+ - * / ^`, parentheses and the functions of `dynident.formulas.tree.FUNCTIONS`.
+        `+ - * / ^`, parentheses and the functions of `dynident.formulas.formula_tree.FUNCTIONS`.
 
     Raises
     ------

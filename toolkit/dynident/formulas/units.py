@@ -15,7 +15,15 @@ import numpy as np
 from scipy.optimize import linprog
 
 from dynident.errors import EffectError
-from dynident.formulas.tree import Formula, Number, Operation, Signal, Unknown, nodes, text_of
+from dynident.formulas.formula_tree import (
+    Formula,
+    Number,
+    Operation,
+    Signal,
+    Unknown,
+    nodes,
+    text_of,
+)
 
 BASE = ("N", "m", "rad", "s", "degC")
 """Base units, in the order of exponents."""

@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from dynident.formulas.tree import Formula, Number, Operation, Signal, Unknown, nodes
+from dynident.formulas.formula_tree import Formula, Number, Operation, Signal, Unknown, nodes
 
 _FUNCTIONS = {
     "sin": np.sin,
