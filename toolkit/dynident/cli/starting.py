@@ -72,7 +72,7 @@ def init(robot: Path, data: tuple[str, ...], out: Path, told: _Told) -> CommandA
         content=lambda: {"out": str(out), **draft.to_dict()},
         parts=lambda: (
             draft.decision_table(),
-            f"Written: {out}. Read it, then: dynident explain {out}",
+            f"Written: {out}. Read it, then: {draft.next_command} {out}",
         ),
     )
 

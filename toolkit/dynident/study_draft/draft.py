@@ -12,11 +12,11 @@ from typing import Any, Literal
 from dynident import files
 from dynident.effects import FRICTION_WIDTH
 from dynident.recording import Column, FileLayout, default_filter
-from dynident.study import load
+from dynident.study import load, load_wrenches
 from dynident.study_draft.decision import Decision
 from dynident.tables import Table
 
-_SIGNALS = ("t", "q", "v", "a", "tau", "q_ref", "temperature")
+_SIGNALS = ("t", "q", "v", "a", "tau", "q_ref", "temperature", "wrench")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +55,8 @@ class StudyDraft:
     rate_hz : of the slowest recording.
     gravity : (3) m/s^2, in the base's axes.
     is_mounted_otherwise : whether that is not the description's.
+    has_torques : whether the files hold torques or currents of the joints; without them only what
+        hangs on a wrench sensor can be weighed.
     has_reference : whether the files hold positions that were asked for.
     decisions : what was decided, and why.
     """
@@ -69,15 +71,21 @@ class StudyDraft:
     rate_hz: float
     gravity: tuple[float, ...]
     is_mounted_otherwise: bool
+    has_torques: bool
     has_reference: bool
     decisions: tuple[Decision, ...]
+
+    @property
+    def next_command(self) -> str:
+        """What to do with the study."""
+        return "dynident explain" if self.has_torques else "dynident payload"
 
     def text(self, folder: str | Path = ".") -> str:
         """Return the study as TOML, with paths relative to a folder."""
         folder = Path(folder)
         parts = [
             self._head(folder),
-            self._model(),
+            self._model() if self.has_torques else "",
             self._columns(),
             self._filter(),
             *(self._recording(one, folder) for one in self.recordings),
@@ -96,7 +104,8 @@ class StudyDraft:
             If what was drafted is no study; whatever the file held is then untouched.
         """
         path = files.require_place(path)
-        return files.write_bytes(path, self.text(path.parent).encode(), verify=load)
+        verify = load if self.has_torques else load_wrenches
+        return files.write_bytes(path, self.text(path.parent).encode(), verify=verify)
 
     def decision_table(self) -> Table:
         """What was decided, and why."""
@@ -122,7 +131,7 @@ class StudyDraft:
     def _head(self, folder: Path) -> str:
         lines = [
             "# A study of dynident, drafted from the files that it names. Read what was decided,",
-            "# correct what is wrong, then: dynident explain <this file>",
+            f"# correct what is wrong, then: {self.next_command} <this file>",
             f"robot = {_quoted(_relative(self.robot, folder))}",
         ]
         if self.joints is not None:

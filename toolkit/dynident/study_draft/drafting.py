@@ -12,7 +12,15 @@ import numpy as np
 
 from dynident.data_files import find_all
 from dynident.errors import DynidentWarning, RecordingError
-from dynident.recording import Column, FileLayout, Recording, read
+from dynident.recording import (
+    Column,
+    FileLayout,
+    Recording,
+    WrenchColumns,
+    frames_in,
+    read,
+    read_wrench,
+)
 from dynident.robot import Robot
 from dynident.study_draft.amendments import Reading, amended
 from dynident.study_draft.by_numbers import named_by_numbers
@@ -24,6 +32,7 @@ from dynident.study_draft.matching import Group, Matched, match
 from dynident.study_draft.motor_side import joint_side, require_ratios
 from dynident.study_draft.timing import clock_from_speeds, clock_scale
 from dynident.study_draft.torque_timing import samples_late
+from dynident.study_draft.wrench_groups import in_radians, wrench_columns, wrench_groups
 from dynident.threads import single_threaded
 
 _FRICTION = ("viscous_friction", "coulomb_friction", "torque_offset")
@@ -69,20 +78,21 @@ def draft_study(
     RobotError
         If the description is none.
     RecordingError
-        If a file holds no positions, torques and time of every joint, or files differ in their
-        columns.
+        If a file holds no positions and time of every joint, neither torques nor a wrench sensor,
+        or files differ in their columns.
     """
     described = Robot.from_file(robot, joints)
     notes = _Notes(ask)
-    layout = FileLayout(names="numbered", rate_hz=rate_hz)
-    logs = _opened(data, layout)
-    if logs[0].is_unnamed:
-        names = _by_numbers(logs[0], described, rate_hz, notes)
-        logs = _opened(data, FileLayout(names=names, rate_hz=rate_hz))
-    matched = match(logs[0], described)
+    logs = _named(data, described, rate_hz, notes)
+    sensors = wrench_groups(list(logs[0].columns), described)
+    matched = match(logs[0], described, ("q",) if sensors else ("q", "tau"))
     chosen = _chosen(matched, notes)
+    wrench = wrench_columns(sensors, notes.take)
     columns = matched.columns(described, chosen)
     columns = _with_clock(columns, logs[0], matched, notes)
+    files = _Sources(robot, joints, logs)
+    if "tau" not in matched.groups:
+        return _of_sensor(files, described, columns | wrench, notes)
     ratios = require_ratios(gears, described)
     if ratios is not None:
         columns = joint_side(columns, described, ratios)
@@ -97,9 +107,9 @@ def draft_study(
     behind_gears = reading.geared or ratios is not None or torque.is_current
     mounted = not np.array_equal(reading.robot.gravity, described.gravity)
     return StudyDraft(
-        robot=Path(robot),
-        joints=None if joints is None else tuple(joints),
-        columns=reading.columns,
+        robot=files.robot,
+        joints=files.joints,
+        columns=reading.columns | wrench,
         recordings=drafted_recordings(logs, recordings, notes.take),
         torque="held_command" if held else "measured",
         torque_unit=unit,
@@ -107,7 +117,53 @@ def draft_study(
         rate_hz=min(one.rate_hz for one in recordings),
         gravity=tuple(float(x) for x in reading.robot.gravity),
         is_mounted_otherwise=mounted,
+        has_torques=True,
         has_reference=recordings[0].q_ref is not None,
+        decisions=tuple(notes.decisions),
+    )
+
+
+@dataclass(frozen=True)
+class _Sources:
+    """What was named by whoever asks for a draft."""
+
+    path: str | Path
+    chosen: Sequence[str] | None
+    logs: tuple[Log, ...]
+
+    @property
+    def robot(self) -> Path:
+        return Path(self.path)
+
+    @property
+    def joints(self) -> tuple[str, ...] | None:
+        return None if self.chosen is None else tuple(self.chosen)
+
+
+def _of_sensor(
+    files: _Sources, robot: Robot, columns: dict[str, Column], notes: _Notes
+) -> StudyDraft:
+    """Draft a study of a wrench sensor alone, where nothing is known of the drives."""
+    (frame,) = frames_in(list(columns))
+    columns = in_radians(columns, files.logs, robot, notes.take)
+    wanted = WrenchColumns(frame=frame, joints=robot.names, columns=columns)
+    recordings = [
+        read_wrench(log.file, wanted, log.record or None, layout=log.layout).select(robot.names)
+        for log in files.logs
+    ]
+    return StudyDraft(
+        robot=files.robot,
+        joints=files.joints,
+        columns={ours: one for ours, one in columns.items() if not ours.startswith("v.")},
+        recordings=drafted_recordings(files.logs, recordings, notes.take),
+        torque="measured",
+        torque_unit="N m",
+        effects=(),
+        rate_hz=min(one.rate_hz for one in recordings),
+        gravity=tuple(float(x) for x in robot.gravity),
+        is_mounted_otherwise=False,
+        has_torques=False,
+        has_reference=False,
         decisions=tuple(notes.decisions),
     )
 
@@ -124,6 +180,17 @@ class _Notes:
         one = decided(Decision(subject=subject, choices=tuple(choices), reason=reason), self.ask)
         self.decisions.append(one)
         return one.chosen
+
+
+def _named(
+    data: Sequence[str | Path], robot: Robot, rate_hz: float | None, notes: _Notes
+) -> tuple[Log, ...]:
+    """Every record of every file, whose columns have names, if only ours."""
+    logs = _opened(data, FileLayout(names="numbered", rate_hz=rate_hz))
+    if logs[0].is_unnamed:
+        names = _by_numbers(logs[0], robot, rate_hz, notes)
+        logs = _opened(data, FileLayout(names=names, rate_hz=rate_hz))
+    return logs
 
 
 def _opened(data: Sequence[str | Path], layout: FileLayout) -> tuple[Log, ...]:

@@ -78,18 +78,19 @@ class Matched:
         return found
 
 
-def match(log: Log, robot: Robot) -> Matched:
-    """Match the columns of a log to time, signals and joints.
+def match(log: Log, robot: Robot, needed: Sequence[str] = ("q", "tau")) -> Matched:
+    """Return the columns of a log by time, signals and joints.
 
     Parameters
     ----------
     log : of which only the clock's numbers are looked at, not those of other columns.
     robot : whose joints they are of.
+    needed : signals without which there is no study.
 
     Raises
     ------
     RecordingError
-        If no group of columns holds a position, or none a torque, for every joint.
+        If no group of columns holds what is needed of every joint.
     """
     roles = [role for name in log.columns if (role := role_of(name, robot.names)) is not None]
     torques = [
@@ -113,7 +114,7 @@ def match(log: Log, robot: Robot) -> Matched:
         "q_ref": [one for one in positions if one.origin in _ASKED and measured],
     }
     for signal, what in (("q", "positions"), ("tau", "torques or currents")):
-        if not groups[signal]:
+        if signal in needed and not groups[signal]:
             if log.trouble is not None:
                 raise log.trouble
             shown = ", ".join(list(log.columns)[:20]) + (", ..." if len(log.columns) > 20 else "")
