@@ -1,4 +1,4 @@
-"""The fast reader of large CSV files is taken where nothing is odd, and reads nothing else."""
+"""The fast readers of CSV files are taken where nothing is odd, and read nothing else."""
 
 import sys
 
@@ -42,9 +42,14 @@ def no_careful_reader(monkeypatch):
     monkeypatch.setattr(csv_file, "_careful", fail)
 
 
+@pytest.fixture(params=[0, csv_file._SMALL], ids=["pandas", "NumPy"])
+def small(request, monkeypatch):
+    """Bytes up to which the fast reader is NumPy's."""
+    monkeypatch.setattr(csv_file, "_SMALL", request.param)
+
+
 @pytest.mark.parametrize("kind", REGULAR)
-def test_a_regular_file_is_read_fast(tmp_path, monkeypatch, no_careful_reader, kind):
-    monkeypatch.setattr(csv_file, "_SMALL", 0)
+def test_a_regular_file_is_read_fast(tmp_path, small, no_careful_reader, kind):
     path = tmp_path / "run.csv"
     path.write_bytes(REGULAR[kind].encode())
     recording = read(path)
@@ -61,29 +66,32 @@ def test_what_we_write_is_read_fast(arm, tmp_path, no_careful_reader):
         np.testing.assert_array_equal(getattr(again, signal), getattr(many, signal))
 
 
-def test_a_small_file_is_read_without_pandas(arm, tmp_path, monkeypatch):
+def test_a_small_file_is_read_without_pandas(arm, tmp_path, monkeypatch, no_careful_reader):
     path = write(arm, tmp_path / "run.csv")
     monkeypatch.setitem(sys.modules, "pandas", None)
     np.testing.assert_array_equal(read(path).tau, arm.tau)
 
 
-def test_the_fast_reader_leaves_what_is_odd_to_the_careful_one():
+def test_the_fast_reader_leaves_what_is_odd_to_the_careful_one(small):
     for cell in ODD:
         data = f"t;q.a;tau.a\n0;1;3\n.01;{cell};4\n".encode()
         assert csv_file._fast(data, ";", 3, [0, 1, 2]) is None
         assert csv_file._fast(data, ";", 3, [0, 2]) is not None
 
 
+@pytest.mark.parametrize("read_by", [csv_file._by_numpy, csv_file._by_pandas])
 @given(
     rows=st.lists(
         st.lists(st.sampled_from(CELLS + ODD + CELLS * 2), min_size=2, max_size=4), max_size=4
     ),
     end=st.sampled_from(["", "\n", "\n\n", " \n"]),
 )
-def test_both_readers_agree(rows, end):
+def test_both_readers_agree(read_by, rows, end):
     """Whatever the fast one returns, the careful one returns to the last bit."""
     data = ("a;b;c\n" + "\n".join(map(";".join, rows)) + end).encode()
-    fast = csv_file._fast(data, ";", 3, [2, 0])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(csv_file, "_SMALL", len(data) if read_by is csv_file._by_numpy else 0)
+        fast = csv_file._fast(data, ";", 3, [2, 0])
     try:
         careful = csv_file._careful(data, ";", ("a", "b", "c"), [2, 0], "run.csv")
     except RecordingError:

@@ -117,6 +117,6 @@ def test_no_memory_is_one_line(tmp_path, monkeypatch):
     def none_left(*_, **__):
         raise MemoryError
 
-    monkeypatch.setattr(csv_file, "_careful", none_left)
+    monkeypatch.setattr(csv_file, "_fast", none_left)
     with pytest.raises(RecordingError, match=r"a.csv: does not fit into memory. cut it into"):
         read(tmp_path / "a.csv")

@@ -8,9 +8,12 @@ noise floor is measured. Of others nothing is known, and nothing is said.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
+
+from scipy.special import ndtri
 
 from dynident.tables import percent
 
@@ -67,10 +70,11 @@ class TrackRecord:
     @property
     def interval(self) -> tuple[float, float]:
         """The 95 % interval of the probability of being right (Wilson, 1927)."""
-        from scipy.stats import binomtest
-
-        found = binomtest(self.right, self.cases).proportion_ci(method="wilson")
-        return float(found.low), float(found.high)
+        weight = float(ndtri(0.975)) ** 2
+        share, total = self.right / self.cases, self.cases + weight
+        middle = (self.right + weight / 2) / total
+        half = math.sqrt(weight * (self.cases * share * (1 - share) + weight / 4)) / total
+        return max(0.0, middle - half), min(1.0, middle + half)
 
     def __str__(self) -> str:
         low, high = (percent(x, 0) for x in self.interval)

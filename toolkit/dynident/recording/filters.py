@@ -8,9 +8,9 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
-import scipy
 
 from dynident.errors import RecordingError
+from dynident.recording.sections import butterworth_sections, slowest_pole
 from dynident.recording.zero_phase import zero_phase
 
 FORGOTTEN = 1e-12
@@ -147,7 +147,7 @@ def lowpass(
     x : (T, ...).
     rate_hz : sampling rate.
     cutoff_hz : where one pass lets 1/sqrt 2 through (both passes: 1/2).
-    order : of one pass.
+    order : of one pass, even.
     where : file, for messages.
 
     Returns
@@ -172,18 +172,20 @@ def butterworth(
     Parameters
     ----------
     rate_hz, cutoff_hz : of the samples, and of half the power.
-    order : of the filter.
+    order : of the filter, even.
     where : file, for messages.
 
     Returns
     -------
-    (order / 2, 6) sections, as `scipy.signal.butter` gives them.
+    (order / 2, 6) sections, as `butterworth_sections` gives them.
 
     Raises
     ------
     RecordingError
-        If the cut-off is not between 0 and half the sampling rate.
+        If the cut-off is not between 0 and half the sampling rate, or the order is odd.
     """
+    if order % 2:
+        raise RecordingError(f"a low-pass of order {order}", where, "choose an even order")
     if 0 < cutoff_hz < _LEAST_SHARE * rate_hz:
         what = f"samples at {rate_hz:.6g} Hz are too many for a cut-off of {cutoff_hz:g} Hz"
         raise RecordingError(what, where, "are the time stamps in s?")
@@ -199,7 +201,7 @@ def butterworth(
 @lru_cache(64)
 def _sections(share: float, order: int) -> np.ndarray:
     """A low-pass with its cut-off at a share of half the sampling rate; not to be written to."""
-    found = np.asarray(scipy.signal.butter(order, share, output="sos"))
+    found = butterworth_sections(share, order)
     found.flags.writeable = False
     return found
 
@@ -231,5 +233,4 @@ def memory(sections: np.ndarray, share: float) -> int:
     sections : of a filter, as of `butterworth`.
     share : below one.
     """
-    _, poles, _ = scipy.signal.sos2zpk(sections)
-    return math.ceil(1.5 * math.log(share) / math.log(np.abs(np.asarray(poles)).max()))
+    return math.ceil(1.5 * math.log(share) / math.log(slowest_pole(sections)))

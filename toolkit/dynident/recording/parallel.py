@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy
 
 from dynident.batch import side_by_side
 from dynident.errors import RecordingError
@@ -101,7 +100,9 @@ class ParallelFilter:
                 )
             found.append((butterworth(self.rate_hz, cutoff, where=self.where), 12))
         if self.filter.decimation == "chebyshev" and self.factor > 1:
-            found.append((scipy.signal.cheby1(8, 0.05, 0.8 / self.factor, output="sos"), 24))
+            from scipy.signal import cheby1  # takes long to load
+
+            found.append((cheby1(8, 0.05, 0.8 / self.factor, output="sos"), 24))
         return tuple(found)
 
     @cached_property

@@ -11,10 +11,10 @@ from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
-import scipy
 
 from dynident.batch import c_function, side_by_side
 from dynident.errors import RecordingError
+from dynident.recording.sections import state_at_rest
 
 _LANES = 8  # columns that are filtered together
 _AT_ONCE = 64  # columns that SciPy filters at a time; bounds the temporary memory
@@ -73,7 +73,7 @@ def zero_phase(
     Parameters
     ----------
     x : (T, ...) of any quantity.
-    sections : of the filter, (s, 6) as `scipy.signal.butter` gives them.
+    sections : of the filter, (s, 6) as `butterworth_sections` gives them.
     padding : samples of point reflection at each end.
     where : file, for messages.
     rows : (R,) the rows that are wanted; None for all.
@@ -162,6 +162,8 @@ def _compiled(
 
 
 def _by_scipy(x: np.ndarray, sections: np.ndarray, padding: int) -> np.ndarray:
+    from scipy.signal import sosfilt  # takes long to load
+
     # As sosfiltfilt, to the last bit, but for one or two columns in half the time: the filter's
     # state at rest is kept, and each column lies in one piece.
     columns = x.T
@@ -171,11 +173,11 @@ def _by_scipy(x: np.ndarray, sections: np.ndarray, padding: int) -> np.ndarray:
     y[:, padding + len(x) :] = 2 * columns[:, -1:] - columns[:, -2 : -padding - 2 : -1]
     state = _state_at_rest(sections.tobytes(), len(sections))[:, None, :]
     for _ in range(2):
-        y = scipy.signal.sosfilt(sections, y, axis=1, zi=state * y[None, :, :1])[0][:, ::-1]
+        y = sosfilt(sections, y, axis=1, zi=state * y[None, :, :1])[0][:, ::-1]
     return y[:, padding : padding + len(x)].T
 
 
 @lru_cache(32)
 def _state_at_rest(sections: bytes, count: int) -> np.ndarray:
     """State of each section after a long time at one, (count, 2)."""
-    return np.ascontiguousarray(scipy.signal.sosfilt_zi(np.frombuffer(sections).reshape(count, 6)))
+    return state_at_rest(np.frombuffer(sections).reshape(count, 6))

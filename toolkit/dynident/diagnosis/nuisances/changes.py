@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy
+from scipy import fft
 from scipy.special import stdtr, stdtrit
 
 from dynident.criteria import ContactCriteria, Criteria
@@ -80,15 +80,15 @@ class Changes:
         backward, and of the scales' products at each lag; and the filter's own products (lags,).
         """
         rows, lags = len(self.change), range(min(len(self.colour), len(self.change)))
-        size = int(scipy.fft.next_fast_len(2 * rows, real=True))
-        white = np.asarray(scipy.signal.lfilter(self.colour, [1.0], self.change * self.still))
+        size = int(fft.next_fast_len(2 * rows, real=True))
+        white = _filtered(self.colour, self.change * self.still)
         signals = np.zeros((1 + len(lags), rows))
-        back = np.asarray(scipy.signal.lfilter(self.colour, [1.0], white[::-1]))[::-1]
+        back = _filtered(self.colour, white[::-1])[::-1]
         signals[0] = back * self.still
         for lag in lags:
             signals[1 + lag, : rows - lag] = self.still[: rows - lag] * self.still[lag:]
         mixed = [self.colour[: len(self.colour) - lag] @ self.colour[lag:] for lag in lags]
-        return size, scipy.fft.rfft(signals, size, axis=1), np.array(mixed)
+        return size, fft.rfft(signals, size, axis=1), np.array(mixed)
 
     def certainty(self, row: float, width: float) -> float:
         """Share of a pulse's z value that is left for two doubts.
@@ -106,7 +106,7 @@ class Changes:
         pulse = np.exp(-(((np.arange(own.start, own.stop) - row) / width) ** 2) / 2)
         columns = np.column_stack([self.change[own], pulse, *_slow(self.of.speed[p]).T])
         columns = columns * self.still[own, None]
-        white = np.asarray(scipy.signal.lfilter(self.colour, [1.0], columns, axis=0))
+        white = _filtered(self.colour, columns)
         change, pulse, slow = white[:, 0], white[:, 1], white[:, 2:]
         power = max(float(pulse @ pulse), 1e-300)
         along = slow.T @ pulse
@@ -140,11 +140,19 @@ class Changes:
         inside = (around >= 0) & (around < length)
         at = np.clip(around, 0, length - 1)
         pulse = np.exp(-(((around - rows[:, None]) / width) ** 2) / 2) * inside
-        template = scipy.signal.lfilter(self.colour, [1.0], pulse * self.still[at], axis=1) * inside
-        white = scipy.signal.lfilter(self.colour, [1.0], signal * self.still)
+        template = _filtered(self.colour, (pulse * self.still[at]).T).T * inside
+        white = _filtered(self.colour, signal * self.still)
         product = np.sum(template * white[at], axis=1)
         power = np.maximum(np.sum(template**2, axis=1), 1e-300)
         return np.stack([product / np.sqrt(power), product / power])
+
+
+def _filtered(colour: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Samples (T, ...) through a filter without feedback, zeros before the first."""
+    found = np.zeros(x.shape)
+    for lag, weight in enumerate(colour[: len(x)]):
+        found[lag:] += weight * x[: len(x) - lag]
+    return found
 
 
 def scanned(one: Changes, width: float) -> np.ndarray:
@@ -162,8 +170,8 @@ def scanned(one: Changes, width: float) -> np.ndarray:
     for lag, both in enumerate(mixed[: len(pulse)]):
         product = (1.0 if lag == 0 else 2.0) * both * pulse[: len(pulse) - lag] * pulse[lag:]
         kernels[1 + lag, np.arange(lag - half, half + 1)] = product[::-1]
-    turned = spectra * scipy.fft.rfft(kernels, axis=1)
-    product, power = scipy.fft.irfft([turned[0], turned[1:].sum(axis=0)], size, axis=1)[:, :rows]
+    turned = spectra * fft.rfft(kernels, axis=1)
+    product, power = fft.irfft([turned[0], turned[1:].sum(axis=0)], size, axis=1)[:, :rows]
     return product / np.sqrt(np.maximum(power, 1e-300))
 
 

@@ -16,7 +16,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-import scipy
 
 from dynident.criteria import StickingCriteria
 from dynident.evidence.columns import Evidence
@@ -24,6 +23,7 @@ from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.runs import Run
 from dynident.fitting.sampling import Sampled
 from dynident.recording.filters import butterworth
+from dynident.recording.sections import response
 from dynident.recording.white_noise import encoder_noise_std
 from dynident.tables import percent
 
@@ -195,7 +195,6 @@ def speed_noise(sampled: Sampled) -> np.ndarray:
     gain = np.sin(angle) * rate
     cutoff = sampled.parallel.filter.position_cutoff_hz
     if cutoff:
-        _, response = scipy.signal.sosfreqz(butterworth(rate, cutoff), angle)
-        gain = gain * np.abs(response) ** 2
+        gain = gain * np.abs(response(butterworth(rate, cutoff), angle)) ** 2
     share = float(np.sqrt(np.trapezoid(gain**2, angle) / np.pi))
     return encoder_noise_std(sampled.recording.q) * share

@@ -7,10 +7,10 @@ that it has passed are known: of its spectrum only the shape before them has to 
 from __future__ import annotations
 
 import numpy as np
-import scipy
 
 from dynident.fitting.sampling import Sampled
 from dynident.recording.filters import butterworth
+from dynident.recording.sections import response
 
 _BANDS = 4
 """Of constant density before the filters. Taste: fewer average over more of the spectrum, more
@@ -73,4 +73,4 @@ def filter_power(sampled: Sampled, f: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def _response(sections: np.ndarray, f: np.ndarray, rate: float) -> np.ndarray:
-    return np.abs(scipy.signal.sosfreqz(sections, f, fs=rate)[1])
+    return np.abs(response(sections, 2 * np.pi * f / rate))

@@ -1,6 +1,6 @@
 """CSV files in: a header line, where there is one, then one line of numbers a sample.
 
-Pandas reads a large file in which nothing is odd. It forgives a missing cell, a comment, text that
+Pandas reads a large file in which nothing is odd, NumPy a small one. Pandas forgives a missing cell, a comment, text that
 is no number, and does not say in which line: so what it may not forgive is looked for first, and a
 file that it cannot read is read again by lines, for an error that names line and column.
 """
@@ -27,7 +27,7 @@ from dynident.recording.formats.limits import (
 )
 
 _SMALL = 1 << 18
-"""Bytes that are read by lines sooner than pandas is loaded, which takes a third of a second."""
+"""Bytes that NumPy has read sooner than pandas is loaded, which takes a third of a second."""
 
 
 def open_csv(data: bytes, file: str, layout: FileLayout) -> ColumnTable:
@@ -68,7 +68,7 @@ def open_csv(data: bytes, file: str, layout: FileLayout) -> ColumnTable:
     def load(wanted: Sequence[str]) -> dict[str, np.ndarray]:
         require_unpacked(8 * lines.count(b"\n") * len(wanted), TEXT, file)
         at = [places[name] for name in wanted]
-        columns = _fast(lines, separator, len(names), at) if len(lines) > _SMALL else None
+        columns = _fast(lines, separator, len(names), at)
         if columns is None:
             above = 1 if is_header else 0
             columns = list(_careful(lines, separator, names, at, file, lines_above=above).T)
@@ -154,31 +154,44 @@ def _fast(data: bytes, separator: str, width: int, places: list[int]) -> list[np
     rows = _regular_rows(data, separator, width)
     if rows is None:
         return None
+    read = _by_numpy if len(data) <= _SMALL else _by_pandas
+    try:
+        columns = read(data.partition(b"\n")[2], separator, width, places)
+    except (ValueError, OverflowError):  # of text that is no number; a ParserError is one, too
+        return None
+    return columns if all(len(x) == rows and np.isfinite(x).all() for x in columns) else None
+
+
+def _by_numpy(body: bytes, separator: str, width: int, places: list[int]) -> list[np.ndarray]:
+    body = body.rstrip(b"\n ")
+    if not body:
+        raise ValueError("no rows")
+    columns = np.loadtxt(
+        io.BytesIO(body), delimiter=separator, comments=None, usecols=places, ndmin=2
+    )
+    return list(columns.T)
+
+
+def _by_pandas(body: bytes, separator: str, width: int, places: list[int]) -> list[np.ndarray]:
     import pandas as pd
 
-    stream = io.BytesIO(data)
-    stream.readline()
     # Since 3.1 pandas rounds every number as Python does, and warns who asks for it.
     version = tuple(int(part) for part in pd.__version__.split(".")[:2])
     exact: dict[str, Any] = {} if version >= (3, 1) else {"float_precision": "round_trip"}
-    try:
-        frame = pd.read_csv(
-            stream,
-            sep=separator,
-            header=None,
-            names=list(range(width)),
-            usecols=sorted(set(places)),
-            index_col=False,
-            dtype=np.float64,
-            engine="c",
-            keep_default_na=False,
-            skipinitialspace=b" " in data,
-            **exact,
-        )
-    except (ValueError, OverflowError):  # of text that is no number; a ParserError is one, too
-        return None
-    columns = [frame[place].to_numpy() for place in places]
-    return columns if all(len(x) == rows and np.isfinite(x).all() for x in columns) else None
+    frame = pd.read_csv(
+        io.BytesIO(body),
+        sep=separator,
+        header=None,
+        names=list(range(width)),
+        usecols=sorted(set(places)),
+        index_col=False,
+        dtype=np.float64,
+        engine="c",
+        keep_default_na=False,
+        skipinitialspace=b" " in body,
+        **exact,
+    )
+    return [frame[place].to_numpy() for place in places]
 
 
 def _regular_rows(data: bytes, separator: str, width: int) -> int | None:

@@ -1,0 +1,79 @@
+"""Filters as second-order sections: the Butterworth low-pass, and what is asked of any filter.
+
+The same as in `scipy.signal`, which is not loaded for it: with all of statistics, which it loads in
+turn, it takes longer than most fits.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def butterworth_sections(share: float, order: int) -> np.ndarray:
+    """Return a digital Butterworth low-pass, as `scipy.signal.butter`.
+
+    Parameters
+    ----------
+    share : its cut-off in half the sampling rate, between 0 and 1.
+    order : even.
+
+    Returns
+    -------
+    (order / 2, 6) rows b0 b1 b2 1 a1 a2, the gain in the first, the slowest poles in the last.
+    """
+    # Of each pair of poles of the analogue filter one, through the bilinear transform.
+    angles = np.pi * np.arange(1, order, 2) / (2 * order)
+    poles = -np.tan(np.pi * share / 2) * np.exp(1j * angles)
+    digital = (1 + poles) / (1 - poles)
+    sections = np.zeros((order // 2, 6))
+    sections[:, :3] = 1.0, 2.0, 1.0
+    sections[:, 3:] = np.stack([np.ones(len(poles)), -2 * digital.real, np.abs(digital) ** 2], 1)
+    sections[0, :3] *= np.prod(np.abs(poles) ** 2 / np.abs(1 - poles) ** 2)
+    return sections
+
+
+def response(sections: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Return what a filter makes of harmonic signals, as `scipy.signal.sosfreqz`.
+
+    Parameters
+    ----------
+    sections : (s, 6)
+    angle : (F,) rad from sample to sample.
+
+    Returns
+    -------
+    (F,) complex.
+    """
+    back = np.exp(-1j * angle)
+    powers = np.stack([np.ones_like(back), back, back**2])
+    return np.prod((sections[:, :3] @ powers) / (sections[:, 3:] @ powers), axis=0)
+
+
+def state_at_rest(sections: np.ndarray) -> np.ndarray:
+    """Return the state of each section after a long time at one, as `scipy.signal.sosfilt_zi`.
+
+    Parameters
+    ----------
+    sections : (s, 6)
+
+    Returns
+    -------
+    (s, 2) of direct form II transposed.
+    """
+    forward, backward = sections[:, :3], sections[:, 3:]
+    into = forward[:, 1:] - backward[:, 1:] * forward[:, :1]
+    first = into.sum(axis=1) / backward.sum(axis=1)
+    second = (1.0 + backward[:, 1]) * first - into[:, 0]
+    gains = forward.sum(axis=1) / backward.sum(axis=1)
+    enters = np.cumprod(np.append(1.0, gains[:-1]))
+    return np.stack([first, second], axis=1) * enters[:, None]
+
+
+def slowest_pole(sections: np.ndarray) -> float:
+    """Return by how much a filter's slowest part fades from sample to sample.
+
+    Parameters
+    ----------
+    sections : (s, 6)
+    """
+    return max(float(np.abs(np.roots(section[3:])).max()) for section in sections)
