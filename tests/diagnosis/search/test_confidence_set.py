@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
+from arch.bootstrap import MCS
 
 from dynident.criteria import DEFAULTS
-from dynident.diagnosis.search.selection import confidence_set
+from dynident.diagnosis.search import confidence_set as module
+from dynident.diagnosis.search.confidence_set import confidence_set
 
 BLOCKS = 20
 
@@ -34,3 +37,25 @@ def test_one_model_or_identical_ones_are_all_kept() -> None:
     one = losses((0.0,), 0)
     assert confidence_set(one, DEFAULTS.search) == (0,)
     assert confidence_set(np.hstack([one, one]), DEFAULTS.search) == (0, 1)
+
+
+@pytest.mark.parametrize("models", [2, 3, 6])
+def test_it_is_that_of_arch_to_the_last_draw(models: int) -> None:
+    """Sets of all sizes: differences are from nothing to much of what varies."""
+    criteria, sizes = DEFAULTS.search, set()
+    for seed in range(6):
+        excess = np.random.default_rng(seed).uniform(0.0, 12.0, models)
+        some = losses(tuple(excess), seed)
+        theirs = MCS(
+            some,
+            size=criteria.set_level,
+            reps=criteria.set_draws,
+            block_size=criteria.set_block,
+            method="max",
+            seed=module._SEED,
+        )
+        theirs.compute()
+        found = confidence_set(some, criteria)
+        assert found == tuple(sorted(int(str(i)) for i in theirs.included))
+        sizes.add(len(found))
+    assert len(sizes) > 1

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import fft
+import scipy
 from scipy.special import stdtr, stdtrit
 
 from dynident.criteria import ContactCriteria, Criteria
@@ -80,7 +80,7 @@ class Changes:
         backward, and of the scales' products at each lag; and the filter's own products (lags,).
         """
         rows, lags = len(self.change), range(min(len(self.colour), len(self.change)))
-        size = int(fft.next_fast_len(2 * rows, real=True))
+        size = int(scipy.fft.next_fast_len(2 * rows, real=True))
         white = _filtered(self.colour, self.change * self.still)
         signals = np.zeros((1 + len(lags), rows))
         back = _filtered(self.colour, white[::-1])[::-1]
@@ -88,7 +88,7 @@ class Changes:
         for lag in lags:
             signals[1 + lag, : rows - lag] = self.still[: rows - lag] * self.still[lag:]
         mixed = [self.colour[: len(self.colour) - lag] @ self.colour[lag:] for lag in lags]
-        return size, fft.rfft(signals, size, axis=1), np.array(mixed)
+        return size, scipy.fft.rfft(signals, size, axis=1), np.array(mixed)
 
     def certainty(self, row: float, width: float) -> float:
         """Share of a pulse's z value that is left for two doubts.
@@ -170,8 +170,8 @@ def scanned(one: Changes, width: float) -> np.ndarray:
     for lag, both in enumerate(mixed[: len(pulse)]):
         product = (1.0 if lag == 0 else 2.0) * both * pulse[: len(pulse) - lag] * pulse[lag:]
         kernels[1 + lag, np.arange(lag - half, half + 1)] = product[::-1]
-    turned = spectra * fft.rfft(kernels, axis=1)
-    product, power = fft.irfft([turned[0], turned[1:].sum(axis=0)], size, axis=1)[:, :rows]
+    turned = spectra * scipy.fft.rfft(kernels, axis=1)
+    product, power = scipy.fft.irfft([turned[0], turned[1:].sum(axis=0)], size, axis=1)[:, :rows]
     return product / np.sqrt(np.maximum(power, 1e-300))
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from dynident.criteria import SearchCriteria
 from dynident.diagnosis.details import Withdrawn
+from dynident.diagnosis.search.confidence_set import confidence_set
 from dynident.diagnosis.search.ranking import Ranking, rank
 from dynident.diagnosis.search.scoring import Score
 from dynident.effects import Effect
@@ -22,8 +23,6 @@ from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import on_recordings
 from dynident.model import Model
 from dynident.tables import percent
-
-_SEED = 20_110  # of the bootstrap
 
 
 @dataclass(frozen=True)
@@ -228,43 +227,6 @@ def indistinguishable(
         for k, other in enumerate(rivals, 1)
         if k in kept or abs(winner.drop - other.drop) <= criteria.alike * winner.drop
     )
-
-
-def confidence_set(losses: np.ndarray, criteria: SearchCriteria) -> tuple[int, ...]:
-    """Return the columns that may be the best: the model confidence set.
-
-    Models are taken out of the set, the worst first, as long as the differences between their
-    held-out losses are more than chance (Hansen, Lunde and Nason 2011). What stays contains the
-    best model with the confidence asked for.
-
-    Parameters
-    ----------
-    losses : (B, k)
-        Held-out loss of each model in each block of time.
-    criteria : chance that the best one is left out, and the bootstrap.
-
-    Returns
-    -------
-    Indices of columns, ascending.
-    """
-    if losses.shape[1] < 2 or losses.shape[0] < 3:
-        return tuple(range(losses.shape[1]))
-    # Loaded where two effects compete: it takes a second.
-    from arch.bootstrap import MCS
-
-    varied = losses - losses.mean(axis=1, keepdims=True)
-    if not np.any(varied):
-        return tuple(range(losses.shape[1]))
-    found = MCS(
-        losses,
-        size=criteria.set_level,
-        reps=criteria.set_draws,
-        block_size=criteria.set_block,
-        method="max",
-        seed=_SEED,
-    )
-    found.compute()
-    return tuple(sorted(int(str(i)) for i in found.included))
 
 
 # --- what is dropped again -----------------------------------------------------------------------

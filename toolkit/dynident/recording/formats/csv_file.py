@@ -1,8 +1,9 @@
 """CSV files in: a header line, where there is one, then one line of numbers a sample.
 
-Pandas reads a large file in which nothing is odd, NumPy a small one. Pandas forgives a missing cell, a comment, text that
-is no number, and does not say in which line: so what it may not forgive is looked for first, and a
-file that it cannot read is read again by lines, for an error that names line and column.
+Pandas reads a large file in which nothing is odd, NumPy a small one. Pandas forgives a missing
+cell, a comment, text that is no number, and neither says in which line: so what may not be forgiven
+is looked for first, and a file that they cannot read is read again by lines, for an error that
+names line and column.
 """
 
 from __future__ import annotations
