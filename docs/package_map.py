@@ -24,6 +24,7 @@ FLOORS = (
     ("recording",),
     ("robot", "formulas"),
     ("effects",),
+    ("effect_modules",),
     ("model",),
     ("constraints",),
     ("nlp", "regression"),

@@ -54,10 +54,10 @@ def module(folder: Path, name: str, text: str):
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(tmp_path))
-    before = set(sys.modules)
     yield tmp_path
-    for name in set(sys.modules) - before:
-        del sys.modules[name]
+    for name, one in list(sys.modules.items()):
+        if str(getattr(one, "__file__", "")).startswith(str(tmp_path)):
+            del sys.modules[name]
 
 
 def test_a_class_joins_when_it_is_defined_and_can_be_added(folder):

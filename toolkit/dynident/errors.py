@@ -53,6 +53,22 @@ class StudyError(DynidentError):
     """A study or experiment file is unusable."""
 
 
+class UntrustedError(StudyError):
+    """A study names files that are code, and nobody has said yet that they may be run.
+
+    Parameters
+    ----------
+    modules : path and SHA-256 of each.
+    where : the key that names them.
+    """
+
+    def __init__(self, modules: tuple[tuple[str, str], ...], where: str) -> None:
+        self.modules = modules
+        paths = ", ".join(path for path, _ in modules)
+        remedy = 'read what they do, then say --trust (in Python: load(..., modules="run"))'
+        super().__init__(f"would run code that is not trusted yet: {paths}", where, remedy)
+
+
 class CriteriaError(DynidentError):
     """A criterion of the diagnosis is unknown, of the wrong kind or out of its range."""
 

@@ -230,6 +230,40 @@ def write_text(path: str | Path, text: str) -> Path:
     return write_bytes(path, text.encode("utf-8"))
 
 
+def write_private(path: str | Path, data: bytes) -> Path:
+    """Write a file in one step that is its owner's alone to read and write; see `write_bytes`."""
+    path = Path(path)
+    try:
+        path.touch(mode=0o600)
+        path.chmod(0o600)
+    except OSError as error:
+        raise FileError(f"cannot be written ({error.strerror or error})", str(path)) from None
+    return write_bytes(path, data)  # which keeps the permissions
+
+
+def others_may_write(path: Path) -> str:
+    """Why what is in a file or folder may not be its user's own words; empty where it is.
+
+    Where there are no owners, as on Windows, it is taken to be.
+
+    Raises
+    ------
+    FileError
+        If it is not there, or cannot be looked at.
+    """
+    if not hasattr(os, "geteuid"):
+        return ""
+    try:
+        status = path.stat()
+    except OSError as error:
+        raise FileError(f"cannot be read ({error.strerror or error})", str(path)) from None
+    if status.st_uid != os.geteuid():
+        return "belongs to another user"
+    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        return "may be written by other users"
+    return ""
+
+
 def sha256(path: str | Path) -> str:
     """Return the SHA-256 of a file's content as hexadecimal digits; a file of any size.
 

@@ -20,6 +20,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
+from dynident.errors import FileError
+from dynident.files import others_may_write
+
 _OPTIONS = ("-ffp-contract=off", "-fPIC", "-shared", "-w", "-x", "c")
 _LIBRARIES = ("-lm",)
 _NATIVE = "-march=native"
@@ -108,15 +111,14 @@ def _loaded(place: Path, entry: str) -> Any:
 def _refuse_what_others_write(path: Path) -> None:
     """Raise `NotCompiled` if a file or folder is not this user's alone to write.
 
-    To load a library is to run it. Where there are no such owners, as on Windows, all is accepted.
+    To load a library is to run it.
     """
-    if not hasattr(os, "geteuid"):
-        return
-    status = path.stat()
-    if status.st_uid != os.geteuid():
-        raise NotCompiled(f"{path} belongs to another user")
-    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        raise NotCompiled(f"{path} may be written by other users")
+    try:
+        reason = others_may_write(path)
+    except FileError as error:
+        raise NotCompiled(str(error)) from None
+    if reason:
+        raise NotCompiled(f"{path} {reason}")
 
 
 def _compile(source: str, place: Path, level: Level) -> None:

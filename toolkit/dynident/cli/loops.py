@@ -13,7 +13,14 @@ from dynident import files
 from dynident.cli.group import CommandAnswer, answered, commands
 from dynident.cli.methods import Chosen, method_options, require_rate
 from dynident.cli.output import progress
-from dynident.cli.work import command_line, load_study, require_picture, require_places
+from dynident.cli.work import (
+    TRUST,
+    command_line,
+    load_study,
+    permitted,
+    require_picture,
+    require_places,
+)
 from dynident.errors import StudyError
 
 if TYPE_CHECKING:
@@ -30,6 +37,7 @@ _OF_STUDIES = {"filter", "noise", "columns"}
 
 @commands.command()
 @click.argument("file", metavar="STUDY|EXPERIMENT", type=_PATH)
+@TRUST
 @click.option("--estimate", type=_PATH, help="Simulate this saved estimate; default: fit.")
 @click.option("--recording", help="Only this one; default: those for testing.")
 @click.option("--report", type=_PATH, help="Also write this HTML report.")
@@ -93,7 +101,7 @@ def _make(file: Path, out: Path) -> CommandAnswer:
     """Make virtual measurements."""
     from dynident.closed_loop import load_experiment, write_experiment
 
-    loaded = load_experiment(file)
+    loaded = permitted(lambda modules: load_experiment(file, modules=modules))
     with progress("simulating") as show_progress:
         written = write_experiment(loaded, out, progress=show_progress)
     paths = tuple(map(str, written))

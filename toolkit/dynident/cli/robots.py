@@ -11,6 +11,7 @@ import click
 from dynident import files
 from dynident.cli.group import CommandAnswer, answered, collected, commands
 from dynident.cli.output import progress
+from dynident.cli.work import TRUST, load_study
 
 if TYPE_CHECKING:
     from dynident.fitting import Prior
@@ -56,9 +57,8 @@ class _Inputs:
         """Return the given parameters, the recordings, and the description that is the prior."""
         from dynident.refitting import aligned, read_subject
         from dynident.robot import Robot
-        from dynident.study import load
 
-        loaded = load(self.study) if self.study else None
+        loaded = load_study(self.study) if self.study else None
         prior = Robot.from_file(self.robot) if self.robot else None
         if prior and loaded:
             prior = aligned(prior, loaded.robot, str(self.robot))
@@ -89,6 +89,7 @@ class _Problem:
 @click.argument("what", metavar="ROBOT|ESTIMATE|CSV", type=_PATH)
 @click.option("--out", type=_PATH, required=True, help="The robot description to write.")
 @click.option("--study", type=_PATH, help="Recordings: move what they do not mind.")
+@TRUST
 @click.option("--robot", type=_PATH, help="Prior; also the description whose parameters a CSV has.")
 @click.option("--order", help="Of a CSV without names: dynident or paper.")
 @click.option(
@@ -122,8 +123,7 @@ def refit(what: Path, out: Path, inputs: _Inputs, problem: _Problem) -> CommandA
     from dynident.robot.verify import require_format
 
     files.require_place(out)
-    with progress("reading"):
-        subject, loaded, centre = inputs.read(what)
+    subject, loaded, centre = inputs.read(what)
     require_format(subject.robot, out)
     with progress("refitting"):
         within = Within(problem.consistency)

@@ -3,24 +3,42 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from dynident import files
 from dynident.cli.group import CommandAnswer
 from dynident.cli.output import progress
-from dynident.errors import FileError
+from dynident.errors import FileError, UntrustedError
+from dynident.tables import printable
 
 if TYPE_CHECKING:
     from dynident.diagnosis import Diagnosis
+    from dynident.effect_modules import Permission
     from dynident.evidence import Comparison
     from dynident.study import Study
 
+_TRUST = "dynident.trust"
 _PICTURES = (".png", ".svg", ".pdf")
-STUDY = click.argument("study", type=click.Path(path_type=Path))
+TRUST = click.option(
+    "--trust",
+    is_flag=True,
+    expose_value=False,
+    callback=lambda context, _, given: context.meta.update({_TRUST: given}),
+    help="Run the study's effect_modules, which are code, without asking.",
+)
+
+
+def _with_study(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command its study, and what a user says of the code in it."""
+    return click.argument("study", type=click.Path(path_type=Path))(TRUST(command))
+
+
+STUDY = _with_study
 
 
 def require_places(study: Path, *paths: Path | None) -> None:
@@ -41,11 +59,38 @@ def require_picture(path: Path | None) -> None:
 
 
 def load_study(path: Path) -> Study:
-    """Read a study and everything that it names."""
+    """Read a study and everything that it names, if need be after a question; see `permitted`."""
     from dynident.study import load
 
+    return permitted(lambda modules: load(path, modules=modules))
+
+
+Loaded = TypeVar("Loaded")
+
+
+def permitted(read: Callable[[Permission], Loaded]) -> Loaded:
+    """Read a file that may name code, with the permission that the command was given.
+
+    Without --trust, code that is not trusted yet is asked for on a terminal, and an error
+    elsewhere. A yes is remembered, by the content that it was said of.
+    """
+    given = click.get_current_context().meta.get(_TRUST)
+    try:
+        with progress("reading"):
+            return read("run" if given else "trusted")
+    except UntrustedError as error:
+        if not (sys.stdin.isatty() and sys.stderr.isatty()):
+            raise
+        for path, _ in error.modules:
+            click.echo(f"code, not trusted yet: {printable(path)}", err=True)
+        if not click.confirm("run it, now and whenever it is the same?", err=True):
+            raise
+        sums = [one for _, one in error.modules]
+    from dynident.effect_modules import remember
+
+    remember(sums)
     with progress("reading"):
-        return load(path)
+        return read("trusted")
 
 
 def with_drives(study: Study, answer: CommandAnswer) -> CommandAnswer:

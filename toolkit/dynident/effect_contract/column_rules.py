@@ -20,6 +20,7 @@ from dynident.effect_contract.crane import (
 )
 from dynident.effect_contract.disagreement import differs
 from dynident.effects import Effect, Needs, effects_of
+from dynident.effects.soundness import unsound_columns
 from dynident.model import Model
 
 _VARIANTS = 3
@@ -40,17 +41,7 @@ def columns_are_finite(effect: Effect) -> Iterator[str]:
     """Double precision, one for each parameter, at every joint and sample."""
     block = block_of(effect, 0)
     for samples in (block, warm(block)):
-        columns = effect.columns(samples)
-        if not isinstance(columns, np.ndarray):
-            yield f"columns() returns a {type(columns).__name__}, not an array"
-            return
-        due = (*block.q.shape, len(effect.parameters(crane())))
-        if columns.shape != due:
-            yield f"columns() has the shape {columns.shape} where {due} is due"
-        elif columns.dtype != np.float64:
-            yield f"columns() is of {columns.dtype} where float64 is due"
-        elif bad := np.count_nonzero(~np.isfinite(columns)):
-            yield f"{bad} of {columns.size} entries of columns() are not finite"
+        yield from unsound_columns(effect, samples, crane())
 
 
 def one_sample_is_as_many(effect: Effect) -> Iterator[str]:

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from dynident.effect_contract.crane import block_of, crane, places
-from dynident.effects import Effect, Needs, Parameter, ShapeParameter, catalogue, effects_of
+from dynident.effects import Effect, Needs, catalogue, effects_of
+from dynident.effects.soundness import unsound_parameters
 from dynident.errors import EffectError
 from dynident.model import Model
 
@@ -80,15 +81,4 @@ def has_words_for_its_place(effect: Effect) -> Iterator[str]:
 
 def has_parameters(effect: Effect) -> Iterator[str]:
     """At least one, of the right class, of different names."""
-    parameters, shapes = effect.parameters(crane()), effect.shape_parameters(crane())
-    if not parameters:
-        yield "parameters() has none"
-    if not all(isinstance(one, Parameter) for one in parameters):
-        yield "parameters() holds what is no Parameter"
-    elif not all(isinstance(one, ShapeParameter) for one in shapes):
-        yield "shape_parameters() holds what is no ShapeParameter"
-    else:
-        for found in (parameters, shapes):
-            names = [one.name for one in found]
-            if len(set(names)) < len(names) or not all(names):
-                yield f"its parameters are named {', '.join(names)}"
+    yield from unsound_parameters(effect, crane())

@@ -72,6 +72,12 @@ def join(kind: type) -> None:
     _KNOWN[name] = fresh
 
 
+def forget_module(module: str) -> None:
+    """Take a module's effects out of the catalogue, before it is run again."""
+    for name in [name for name, one in _KNOWN.items() if one.kind.__module__ == module]:
+        del _KNOWN[name]
+
+
 @contextmanager
 def unchanged() -> Iterator[None]:
     """Leave the catalogue as it was before."""

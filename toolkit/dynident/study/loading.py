@@ -9,6 +9,7 @@ import numpy as np
 
 from dynident.closed_loop import Controller
 from dynident.criteria import DEFAULTS, Criteria
+from dynident.effect_modules import Permission, import_effects, require_sound
 from dynident.effects import FRICTION_WIDTH, effects_of, law_effect, laws_of
 from dynident.errors import DynidentError, EffectError, StudyError
 from dynident.fitting.drive_gains import (
@@ -63,11 +64,19 @@ class Study:
         return self.model.robot
 
 
-def load(path: str | Path) -> Study:
+def load(path: str | Path, *, modules: Permission = "trusted") -> Study:
     """Read a study file and everything that it names.
+
+    Parameters
+    ----------
+    path : the file.
+    modules : what may be run of its `effect_modules`: "trusted", those that the user has said yes
+        to before or that this process has imported already; "run", all of them.
 
     Raises
     ------
+    UntrustedError
+        If an effect module would have to be run that is not trusted.
     StudyError
         If the file is not a study: it names the key, and the remedy.
     DynidentError
@@ -77,7 +86,9 @@ def load(path: str | Path) -> Study:
     said = read_toml(path, StudyFile)
     if not said.recordings:
         raise StudyError("no [[recordings]]", str(path), "add at least one")
+    brought = import_effects(said.effect_modules, path, modules)
     robot = robot_of(said, path)
+    require_sound(brought, robot)
     laws = laws_of(said.laws, path)
     try:
         for law in laws:

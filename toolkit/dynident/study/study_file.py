@@ -111,6 +111,9 @@ class StudyFile(SettingsTable):
     robot : its description (URDF, SDF, MJCF), a path from the folder of the study.
     joints : names, the order of columns; by default every joint that moves.
     effects : that the robot is said to have, `name` or `name@joint`.
+    effect_modules : Python files with effects of one's own, as `["my_effects.py"]`, paths from the
+        folder of the study. To read the study is to run them: what nobody has said yes to before
+        is asked for on a terminal, and refused elsewhere without --trust.
     torque : "measured", or "held_command" where a command acts from its sample to the next.
     torque_unit : "N m" (and N, of prismatic joints), or the unit of the drives, "A" or "%": then
         each joint's gain is identified, and torques are converted before anything else is done.
@@ -134,6 +137,7 @@ class StudyFile(SettingsTable):
     robot: str
     joints: list[str] | None = None
     effects: list[str] = Field(default_factory=list)
+    effect_modules: list[str] = Field(default_factory=list)
     torque: Literal["measured", "held_command"] = "measured"
     torque_unit: Literal["N m", "A", "%"] = "N m"
     drive_gains: dict[str, float] = Field(default_factory=dict)

@@ -13,6 +13,7 @@ from dynident.closed_loop.rollout import LEAD_IN
 from dynident.closed_loop.sensors import Sensors
 from dynident.closed_loop.trajectories import Fourier
 from dynident.closed_loop.true_effects import TrueEffect
+from dynident.effect_modules import Permission, import_effects, require_sound
 from dynident.effects import FRICTION_WIDTH, LawsEntry, laws_of
 from dynident.errors import DynidentError, StudyError
 from dynident.robot import Robot
@@ -62,6 +63,7 @@ class _ExperimentFile(SettingsTable):
     friction_width: float = Field(default=FRICTION_WIDTH, gt=0)
     torque: Literal["held_command", "measured"] = "held_command"
     lead_in: float = Field(default=LEAD_IN, ge=0)
+    effect_modules: list[str] = Field(default_factory=list)
     effects: list[_EffectEntry] = Field(default_factory=list)
     laws: LawsEntry = Field(default_factory=dict)
     controller: ControllerFile
@@ -69,19 +71,28 @@ class _ExperimentFile(SettingsTable):
     recordings: list[_ExperimentRecordingEntry]
 
 
-def load_experiment(path: str | Path) -> Experiment:
+def load_experiment(path: str | Path, *, modules: Permission = "trusted") -> Experiment:
     """Read an experiment file and the robots that it names.
 
     Keys: `robot` (the true one; paths are relative to the file), `nominal` (given to the user;
-    default the true one), `joints`, `gravity`, `seed`, `friction_width`, `torque`, `lead_in`;
+    default the true one), `joints`, `effect_modules` (as in a study), `gravity`, `seed`,
+    `friction_width`, `torque`, `lead_in`;
     [[effects]] `effect`, `values`, `shape`, `hidden`; [laws] and [controller] as in a study;
     [sensors] `position_std`, `position_resolution`, `torque_std`, `torque_resolution`,
     `temperature_std` (a number, or one per joint; without the last there are no temperatures);
     [[recordings]] `file`, `use`, `duration`, `period`, `start`, `payload`, `trajectory` with
     `harmonics`, `seed`, `amplitude`, `speed`, `acceleration`, `centre`.
 
+    Parameters
+    ----------
+    path : the file.
+    modules : what may be run of its `effect_modules`: "trusted", those that the user has said yes
+        to before or that this process has imported already; "run", all of them.
+
     Raises
     ------
+    UntrustedError
+        If an effect module would have to be run that is not trusted.
     StudyError
         If a key is unknown, missing or out of range: it names the key, and the remedy.
     DynidentError
@@ -89,7 +100,9 @@ def load_experiment(path: str | Path) -> Experiment:
     """
     path = Path(path)
     said = read_toml(path, _ExperimentFile)
+    brought = import_effects(said.effect_modules, path, modules)
     robot = _robot(said, path, said.robot)
+    require_sound(brought, robot)
     nominal = None if said.nominal is None else _robot(said, path, said.nominal)
     controller = said.controller.controller(robot, f"{path}: controller")
     laws = laws_of(said.laws, path)

@@ -9,6 +9,7 @@ import tomlkit
 
 from dynident import files
 from dynident.closed_loop.experiments.experiment import Experiment, Progress
+from dynident.effect_modules import module_file
 from dynident.effects import FRICTION_WIDTH, Effect, Law, LawEffect, laws_table
 from dynident.errors import FileError, SimulationError
 from dynident.recording import write as write_recording
@@ -23,8 +24,9 @@ def write_experiment(
 ) -> list[Path]:
     """Simulate an experiment and write what its user gets.
 
-    That is the recordings, the nominal robot description, and last `study.toml`, which names both
-    and the effects that are not hidden. Each file is written whole or not at all.
+    That is the recordings, the nominal robot description, effect modules of which an effect is not
+    hidden, and last `study.toml`, which names them and the effects that are not hidden. Each file
+    is written whole or not at all.
 
     Parameters
     ----------
@@ -58,7 +60,9 @@ def write_experiment(
     written = [write_recording(one, folder / one.name) for one in recordings]
     description = folder / _description_name(nominal)
     written.append(files.write_text(description, patched(nominal)))
-    text = tomlkit.dumps(_study(experiment, nominal, description.name))
+    modules = _modules(experiment)
+    written += [files.write_text(folder / name, text) for name, text in modules.items()]
+    text = tomlkit.dumps(_study(experiment, nominal, description.name, tuple(modules)))
     written.append(files.write_text(folder / STUDY, text))
     return written
 
@@ -71,10 +75,21 @@ def _description_name(robot: Robot) -> str:
     return name if name.lower().endswith((suffix, ".xml")) else f"robot{suffix}"
 
 
-def _study(experiment: Experiment, nominal: Robot, description: str) -> tomlkit.TOMLDocument:
+def _modules(experiment: Experiment) -> dict[str, str]:
+    """Files of the known effects that came from effect modules, as texts by their names."""
+    kinds = {type(one.effect) for one in experiment.known_effects}
+    paths = sorted({str(path) for path in map(module_file, kinds) if path is not None})
+    return {Path(path).name: files.read_text(path) for path in paths}
+
+
+def _study(
+    experiment: Experiment, nominal: Robot, description: str, modules: tuple[str, ...]
+) -> tomlkit.TOMLDocument:
     document = tomlkit.document()
     document["robot"] = description
     document["joints"] = list(nominal.names)
+    if modules:
+        document["effect_modules"] = list(modules)
     document["effects"] = _multiline(_labels(experiment))
     document["torque"] = experiment.torque
     if experiment.friction_width != FRICTION_WIDTH:
