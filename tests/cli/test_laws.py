@@ -77,6 +77,48 @@ def test_without_the_law_nothing_explains_it(simulated: Path, run) -> None:
     assert done.json["verdict"] == "unexplained"
 
 
+def test_a_law_is_proposed_and_written(simulated: Path, tmp_path: Path, run) -> None:
+    """The hidden c v sin(k q + p), as its expansion; the verdict stays."""
+    study, shared = simulated / "proposed.toml", tmp_path / "lab.toml"
+    study.write_text((simulated / "study.toml").read_text())
+    done = run("explain", study, "--json", "--laws", shared)
+    assert done.status == 0, done.err
+    answer = done.json
+    assert answer["verdict"] == "unexplained"
+    (found,) = answer["proposals"]
+    assert found["joint"] == "elbow"
+    assert found["torque"] == "v*(c1*sin(k*q) + c2*cos(k*q))"
+    assert abs(found["values"]["k"] - 3.3) < 0.1
+    true = {"c1": 0.3 * np.cos(1.1), "c2": 0.3 * np.sin(1.1)}
+    for name, value in true.items():
+        assert abs(found["values"][name] - value) < 0.03
+    assert found["explains"] > 0.85
+    assert found["test_error_after"] < found["test_error_before"]
+
+    done = run("add", study, "--proposal", "1", "--json")
+    assert done.status == 0, done.err
+    assert done.json["added"] == ["law:proposal1@elbow"]
+    assert di.load(study).model.laws[0].torque == found["torque"]
+
+    again = simulated / "again.toml"
+    again.write_text(f'laws = "{shared}"\n' + (simulated / "study.toml").read_text())
+    done = run("explain", again, "--json")
+    assert done.json["verdict"] == "explained"
+    assert [s["effect"] for s in done.json["steps"]] == ["law:proposal1"]
+
+
+def test_nothing_is_proposed_for_a_complete_model(simulated: Path, run) -> None:
+    study = simulated / "complete.toml"
+    text = (simulated / "study.toml").read_text()
+    study.write_text(text.replace("effects = [", 'effects = ["law:wave@elbow", ') + WAVE)
+    done = run("explain", study, "--propose", "--json")
+    assert done.json["verdict"] == "nothing_missing"
+    assert done.json["proposals"] == []
+    done = run("add", study, "--proposal", "1")
+    assert done.status == 2
+    assert "none was made" in done.err
+
+
 def test_the_law_is_found_added_fitted_saved_and_loaded(simulated: Path, tmp_path: Path, run):
     study = simulated / "with_law.toml"
     study.write_text((simulated / "study.toml").read_text() + WAVE)

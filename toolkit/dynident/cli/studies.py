@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -11,16 +13,23 @@ from dynident.cli.group import CommandAnswer, answered, commands
 from dynident.cli.output import progress
 from dynident.cli.work import (
     MOST,
+    PROPOSE,
     STUDY,
     comparison_of,
     diagnosis_of,
     load_study,
+    proposed_laws,
     require_picture,
     require_places,
     with_drives,
+    write_laws,
     write_report,
 )
 from dynident.errors import FileError, StudyError
+
+if TYPE_CHECKING:
+    from dynident.diagnosis.stage import Propose
+    from dynident.effects import Law
 
 _PATH = click.Path(path_type=Path)
 
@@ -29,16 +38,26 @@ _PATH = click.Path(path_type=Path)
 @STUDY
 @answered
 @MOST
+@PROPOSE
 @click.option("--report", type=_PATH, help="Also write this HTML report.")
-def explain(study: Path, most: int | None, report: Path | None) -> CommandAnswer:
+@click.option("--laws", type=_PATH, help="Also write the proposals as a file of laws.")
+def explain(
+    study: Path, most: int | None, propose: Propose, report: Path | None, laws: Path | None
+) -> CommandAnswer:
     """Run the whole loop: compare, diagnose, add, refit, compare. The study stays as it is.
+
+    Where no effect in the catalogue explains what is left, laws are proposed. `dynident add STUDY
+    --proposal 1` writes one into the study; a file of them is named in another study by laws =
+    "laws.toml", and then tried with the catalogue.
 
     Example: dynident explain study.toml --report report.html
     """
-    require_places(study, report)
+    require_places(study, report, laws)
     loaded = load_study(study)
-    diagnosis = diagnosis_of(loaded, most)
+    diagnosis = diagnosis_of(loaded, most, propose)
     write_report(loaded, diagnosis, report)
+    if laws is not None:
+        write_laws(laws, tuple(one.effect.made_of for one in diagnosis.proposals))
     answer = CommandAnswer(
         content=diagnosis.to_dict,
         parts=lambda: (*diagnosis.tables(), diagnosis.after.parameter_table()),
@@ -75,13 +94,14 @@ def show(study: Path, to: Path) -> CommandAnswer:
 @STUDY
 @answered
 @MOST
-def diagnose(study: Path, most: int | None) -> CommandAnswer:
+@PROPOSE
+def diagnose(study: Path, most: int | None, propose: Propose) -> CommandAnswer:
     """Say where the model fails and which effects it lacks.
 
     Example: dynident diagnose study.toml --json
     """
     loaded = load_study(study)
-    diagnosis = diagnosis_of(loaded, most)
+    diagnosis = diagnosis_of(loaded, most, propose)
     answer = CommandAnswer(content=diagnosis.to_dict, parts=diagnosis.tables)
     return with_drives(loaded, answer)
 
@@ -152,18 +172,33 @@ def payload(study: Path) -> CommandAnswer:
 
 @commands.command()
 @STUDY
-@click.argument("labels", metavar="EFFECT[@JOINT[:SOURCE]]...", nargs=-1, required=True)
+@click.argument("labels", metavar="EFFECT[@JOINT[:SOURCE]]...", nargs=-1)
+@click.option("--proposal", type=click.IntRange(min=1), help="Write this proposed law.")
 @answered
-def add(study: Path, labels: tuple[str, ...]) -> CommandAnswer:
+def add(study: Path, labels: tuple[str, ...], proposal: int | None) -> CommandAnswer:
     """Write effects into the study file; print the error before and after.
+
+    A proposal is written with all that it was found beside: the effects that `explain` adds, and
+    the proposals before it.
 
     Example: dynident add study.toml stribeck_friction@elbow
     """
     from dynident.effects import effects_of
     from dynident.study import add_effects
 
+    if bool(labels) == (proposal is not None):
+        raise StudyError("name effects, or --proposal K", str(study), "see `dynident add --help`")
     loaded = load_study(study)
     files.require_place(study)
+    laws: tuple[Law, ...] = ()
+    if proposal is not None:
+        diagnosis = diagnosis_of(loaded, propose="always")
+        laws = proposed_laws(diagnosis, proposal, study)
+        wider = replace(loaded.model, laws=(*loaded.model.laws, *laws))
+        loaded = replace(loaded, model=wider)
+        steps = (one.effect.label for one in diagnosis.steps)
+        new = (one.effect.label for one in diagnosis.proposals[:proposal])
+        labels = (*steps, *new)
     every = (one for label in labels for one in effects_of(label, loaded.robot, loaded.model.laws))
     fresh = tuple(dict.fromkeys(one for one in every if one not in loaded.model))
     if not fresh:
@@ -174,7 +209,7 @@ def add(study: Path, labels: tuple[str, ...]) -> CommandAnswer:
             remedy = "set payload = true in the [[recordings]] that carry it"
             raise StudyError("no recording carries a payload", str(study), remedy)
     comparison = comparison_of(loaded, (labels,))
-    add_effects(study, fresh)
+    add_effects(study, fresh, laws)
     return CommandAnswer(
         content=lambda: {"added": [one.label for one in fresh], **comparison.to_dict()},
         parts=lambda: (*comparison.tables()[:1], f"Written into {study}."),

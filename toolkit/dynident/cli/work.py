@@ -13,12 +13,14 @@ import click
 from dynident import files
 from dynident.cli.group import CommandAnswer
 from dynident.cli.output import progress
-from dynident.errors import FileError, UntrustedError
+from dynident.errors import FileError, StudyError, UntrustedError
 from dynident.tables import printable
 
 if TYPE_CHECKING:
     from dynident.diagnosis import Diagnosis
+    from dynident.diagnosis.stage import Propose
     from dynident.effect_modules import Permission
+    from dynident.effects import Law
     from dynident.evidence import Comparison
     from dynident.study import Study
 
@@ -112,8 +114,28 @@ MOST = click.option(
 )
 
 
-def diagnosis_of(study: Study, most: int | None = None) -> Diagnosis:
-    """Run the search for what the model lacks; `most` effects are added, None for the usual."""
+PROPOSE = click.option(
+    "--propose",
+    type=click.Choice(["unexplained", "always", "never"]),
+    is_flag=False,
+    flag_value="always",
+    default="unexplained",
+    show_default=True,
+    help="When to propose laws for what the catalogue leaves; --propose alone: always.",
+)
+
+
+def diagnosis_of(
+    study: Study, most: int | None = None, propose: Propose = "unexplained"
+) -> Diagnosis:
+    """Run the search for what the model lacks.
+
+    Parameters
+    ----------
+    study : the study.
+    most : effects that are added at most; None for the usual.
+    propose : when laws are proposed for what is left.
+    """
     from dynident.diagnosis import diagnose as search
 
     with progress("diagnosing") as show_progress:
@@ -123,9 +145,41 @@ def diagnosis_of(study: Study, most: int | None = None) -> Diagnosis:
             study.test,
             controller=study.controller,
             most=most,
+            propose=propose,
             criteria=study.criteria,
             progress=show_progress,
         )
+
+
+def proposed_laws(diagnosis: Diagnosis, number: int, study: Path) -> tuple[Law, ...]:
+    """Return the laws of the first proposals.
+
+    Parameters
+    ----------
+    diagnosis : that made them.
+    number : of the last one that is wanted, from 1.
+    study : for the message.
+
+    Raises
+    ------
+    StudyError
+        If there are fewer.
+    """
+    if number > len(diagnosis.proposals):
+        count = len(diagnosis.proposals)
+        what = f"no proposal {number}: " + (f"there are {count}" if count else "none was made")
+        raise StudyError(what, str(study), "`dynident explain --propose` shows them")
+    return tuple(one.effect.made_of for one in diagnosis.proposals[:number])
+
+
+def write_laws(path: Path, laws: tuple[Law, ...]) -> None:
+    """Write a file of laws, which studies name."""
+    import tomlkit
+
+    from dynident.effects import laws_table
+
+    files.write_text(path, tomlkit.dumps({"laws": laws_table(laws)}))
+    click.echo(f"laws: {path}", err=True)
 
 
 def comparison_of(study: Study, additions: tuple[tuple[str, ...], ...]) -> Comparison:

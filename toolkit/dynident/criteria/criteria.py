@@ -19,6 +19,7 @@ from dynident.criteria.judgement_criteria import (
 from dynident.criteria.search_criteria import (
     GateCriteria,
     GlobalSearchCriteria,
+    ProposalCriteria,
     SearchCriteria,
     ShapeCriteria,
 )
@@ -40,6 +41,7 @@ class Criteria:
     gates : what an effect must show to be significant and relevant.
     shapes, global_search : how shape parameters are found, near a grid and among all.
     contacts, nuisances, sticking : what is no missing physics and is allowed for.
+    proposals : which laws are proposed where the catalogue does not explain what is missing.
     verdict : when a model is complete.
     maps : when a picture of the residual shows something.
     advice : which experiments are advised.
@@ -56,6 +58,7 @@ class Criteria:
     contacts: ContactCriteria = field(default_factory=ContactCriteria)
     nuisances: NuisanceCriteria = field(default_factory=NuisanceCriteria)
     sticking: StickingCriteria = field(default_factory=StickingCriteria)
+    proposals: ProposalCriteria = field(default_factory=ProposalCriteria)
     verdict: VerdictCriteria = field(default_factory=VerdictCriteria)
     maps: MapCriteria = field(default_factory=MapCriteria)
     advice: AdviceCriteria = field(default_factory=AdviceCriteria)

@@ -291,3 +291,43 @@ class GlobalSearchCriteria(CriteriaGroup):
     patience: int = criterion(
         6, "generations", "generations after which a search that explains nothing ends", least=1
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProposalCriteria(CriteriaGroup):
+    """Which laws are proposed, and what is said of them."""
+
+    level: float = criterion(
+        0.01, "1", "p value, times the number of terms tried, of a law", over=0, most=1
+    )
+    explains: float = criterion(
+        0.85,
+        "1",
+        "share of the systematic square that a law takes, from which it is said to explain it",
+        "measured: two-link cases whose hidden law no catalogue has; right laws took 0.88 to 1.00, "
+        "wrong ones 0.46 to 0.81",
+        over=0,
+        most=1,
+    )
+    least_share: float = criterion(
+        0.1, "1", "share of the systematic square that a law takes at least", over=0, most=1
+    )
+    rival_level: float = criterion(
+        0.01,
+        "1",
+        "p value of a signed-rank test over blocks of time, below which another law does worse",
+        over=0,
+        most=1,
+    )
+    contenders: int = criterion(12, "laws", "laws of each screening that are looked at", least=1)
+    rounds: int = criterion(3, "1", "screenings, each in the metric of the last law", least=1)
+    most: int = criterion(3, "laws", "laws that are proposed one after the other", least=1)
+    factor_price: float = criterion(
+        2.0, "1", "of the drop, for each factor of a term and each other joint in it", least=0
+    )
+    least_left: float = criterion(
+        0.02, "1", "share of a term's square that must be left beside the model", over=0, most=1
+    )
+    trusted_load: float = criterion(
+        0.3, "1", "relative error above which the predicted load means nothing", over=0, most=1
+    )

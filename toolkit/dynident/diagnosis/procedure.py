@@ -36,6 +36,7 @@ from dynident.diagnosis.nuisances.contacts import Contacts
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.nuisances.quantisation import nothing_but_rounding
 from dynident.diagnosis.nuisances.sticking import left_out_at, without_reversals, without_sticking
+from dynident.diagnosis.proposals.law_search import LawSearch
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.global_search import global_search
 from dynident.diagnosis.search.payload_recordings import (
@@ -55,7 +56,7 @@ from dynident.diagnosis.search.selection import (
 )
 from dynident.diagnosis.search.shaped_fit import refitted, shaped
 from dynident.diagnosis.search.withdrawal import Path, path_of
-from dynident.diagnosis.stage import DiagnosisTask, Stage
+from dynident.diagnosis.stage import DiagnosisTask, Propose, Stage
 from dynident.diagnosis.wiring_answer import answered_by
 from dynident.effects import Effect
 from dynident.evidence.columns import Evidence
@@ -79,6 +80,7 @@ def diagnose(
     *,
     controller: Controller | None = None,
     most: int | None = None,
+    propose: Propose = "unexplained",
     criteria: Criteria = DEFAULTS,
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
@@ -94,6 +96,8 @@ def diagnose(
         loop gives the instruments.
     most : effects that are added at most, one at several joints counting once; None for
         `SearchCriteria.most_effects`.
+    propose : when laws are proposed for what the catalogue leaves: "unexplained", where a residual
+        beyond a known noise remains; "always"; "never".
     criteria : the numbers that decide the answer, see `dynident.criteria`.
     progress : is called with what is being done, for a display; by default a line of the log every
         ten seconds, see `dynident.progress`.
@@ -117,7 +121,7 @@ def diagnose(
     held_out = others[0] if others else None
     faults = check_wiring(given, train, held_out, criteria.wiring)
     most = 0 if faults else most
-    task = DiagnosisTask(train=train, test=held_out, most=most, progress=progress)
+    task = DiagnosisTask(train=train, test=held_out, most=most, progress=progress, propose=propose)
     start = _compare(given, controller, criteria, task)
     extended = _extend(_rank(start, task), task)
     settled, path = _settle(_search_globally(start, extended, task), task)
@@ -307,7 +311,19 @@ def _judge(stage: Stage, path: Path, task: DiagnosisTask) -> Diagnosis:
         notes=stage.loop.notes,
         limit=task.most if reached and stage.rounds[-1].passing else None,
     )
-    return assemble(search, task.train, task.test, held)
+    answer = assemble(search, task.train, task.test, held)
+    if not _asks_for_laws(answer, task):
+        return answer
+    laws = LawSearch(evidence=stage.evidence, held=held, progress=task.progress)
+    return replace(answer, proposals=laws.proposals(path.final))
+
+
+def _asks_for_laws(answer: Diagnosis, task: DiagnosisTask) -> bool:
+    """Whether laws are sought for what is left."""
+    if task.propose == "never" or answer.impossible or not task.most:
+        return False
+    left = answer.verdict == "unexplained" and answer.noise_source != "unknown"
+    return left or task.propose == "always"
 
 
 def _decided(stage: Stage) -> Evidence | None:

@@ -17,6 +17,7 @@ from dynident.diagnosis.details import (
     place,
 )
 from dynident.diagnosis.detection_limits import DetectionLimit, limit_table
+from dynident.diagnosis.proposals.proposal import Proposal
 from dynident.diagnosis.track_record import JOINTS, TrackRecord, track_record
 from dynident.evidence.maps import ResidualMap
 from dynident.fitting.estimate import DataSource, Estimate
@@ -67,6 +68,7 @@ class Diagnosis(Shown):
     withdrawn : effects that passed every gate and were taken back, with the reason.
     rows : of the recordings, training and test, that are used, and why the others are not.
     detection_limits : where nothing is missing, how large each effect could have been unseen.
+    proposals : laws for what the catalogue leaves, one after the other, each beside those before.
     limit : effects that were allowed, where the search ended there; None where it ended by itself.
     """
 
@@ -88,6 +90,7 @@ class Diagnosis(Shown):
     impossible: tuple[str, ...] = ()
     withdrawn: tuple[Withdrawn, ...] = ()
     detection_limits: tuple[DetectionLimit, ...] = ()
+    proposals: tuple[Proposal, ...] = ()
     limit: int | None = None
     rows: RowCount = field(default_factory=RowCount)
 
@@ -216,6 +219,7 @@ class Diagnosis(Shown):
             "rows": self.rows.to_dict(),
             "withdrawn": [one.to_dict() for one in self.withdrawn],
             **self._limits(),
+            "proposals": [one.to_dict() for one in self.proposals],
             "notes": list(self.caveats),
             **({"criteria": self._changed_criteria()} if self.criteria.changed else {}),
         }
@@ -238,8 +242,18 @@ class Diagnosis(Shown):
             self.step_table(),
             self.sentence,
             *((limit_table(self.detection_limits),) if self.detection_limits else ()),
+            *self._proposed(),
             *self.caveats,
         )
+
+    def _proposed(self) -> tuple[Table | str, ...]:
+        """The laws proposed, each a sentence and its parameters."""
+        robot, found = self.after.model.robot, []
+        for number_, one in enumerate(self.proposals, 1):
+            title = f"Proposal {number_}: {one.torque} at {one.effect.joint}"
+            columns = ("parameter", "value", "sigma", "unit")
+            found += [one.sentence, Table(title, columns, one.rows(robot))]
+        return tuple(found)
 
     def joint_table(self) -> Table:
         """Errors per joint."""

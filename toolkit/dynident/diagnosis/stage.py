@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 from dynident.diagnosis.nuisances.contacts import Contacts
 from dynident.diagnosis.search.global_search import RankedModel
@@ -14,6 +15,9 @@ from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.simulated_motion import SimulatedMotion
 from dynident.recording import Dataset
 
+Propose = Literal["unexplained", "always", "never"]
+"""When laws are proposed for what the catalogue leaves."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class DiagnosisTask:
@@ -23,6 +27,7 @@ class DiagnosisTask:
     test: Dataset | None
     most: int
     progress: Callable[[str], None]
+    propose: Propose
 
 
 @dataclass(frozen=True, kw_only=True)

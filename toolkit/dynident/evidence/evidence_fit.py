@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from operator import add
 
@@ -159,6 +159,37 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
         variances=np.array(
             [one.variance or s**2 or 1.0 for one, s in zip(left, torque_std, strict=True)]
         ),
+    )
+
+
+def in_metric_of(evidence: Evidence, fitted: EvidenceFit, wider: EvidenceFit) -> EvidenceFit:
+    """Return a fit whose rows are whitened by the noise that a wider model leaves.
+
+    Where much is missing its own noise holds a part of that, and rivals look alike.
+
+    Parameters
+    ----------
+    evidence : of both.
+    fitted : the model as it fits.
+    wider : the model with what may be missing.
+    """
+    model, reliable = fitted.model, evidence.criteria.noise.reliable
+    columns = [
+        [model_columns(evidence, model, r, j, fitted.values) for j in range(model.robot.n)]
+        for r in range(len(evidence.runs))
+    ]
+    white = _whiten(evidence, columns, wider.noise, fitted.values)
+    summed = _moments(evidence, model, wider.noise, white)
+    solution = regress(summed.pooled(), reliable)
+    return replace(
+        fitted,
+        values=solution.values,
+        covariance=solution.covariance,
+        solution=solution,
+        noise=wider.noise,
+        white=white,
+        moments=summed,
+        error_signal=_signal(evidence, white, solution.values),
     )
 
 

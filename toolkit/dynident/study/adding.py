@@ -11,17 +11,18 @@ from pathlib import Path
 import tomlkit
 
 from dynident import files
-from dynident.effects import Effect
+from dynident.effects import Effect, Law, laws_table
 from dynident.errors import StudyError
 
 
-def add_effects(path: str | Path, effects: tuple[Effect, ...]) -> None:
+def add_effects(path: str | Path, effects: tuple[Effect, ...], laws: tuple[Law, ...] = ()) -> None:
     """Write effects into a study file, comments and order untouched.
 
     Parameters
     ----------
     path : the study file.
     effects : to add to its list.
+    laws : of theirs that it does not have, to be written as tables at its end.
 
     Raises
     ------
@@ -33,7 +34,14 @@ def add_effects(path: str | Path, effects: tuple[Effect, ...]) -> None:
     labels = [effect.label for effect in effects]
     wanted = tomllib.loads(text)
     wanted["effects"] = sorted([*wanted.get("effects", []), *labels])
-    for candidate in _with_effects(text, labels):
+    end = _tables(laws) if laws else ""
+    if laws:
+        held = wanted.get("laws", {})
+        if not isinstance(held, dict):
+            remedy = 'write it as a table, [laws] and lab = "..." below it'
+            raise StudyError("names files of laws, beside which no law fits", str(path), remedy)
+        wanted["laws"] = {**held, **laws_table(laws)}
+    for candidate in (one + end for one in _with_effects(text, labels)):
         try:
             said = tomllib.loads(candidate)
         except tomllib.TOMLDecodeError:
@@ -43,6 +51,11 @@ def add_effects(path: str | Path, effects: tuple[Effect, ...]) -> None:
             return
     remedy = f"write them into it: {', '.join(labels)}"
     raise StudyError("the effects cannot be added to this file", str(path), remedy)
+
+
+def _tables(laws: tuple[Law, ...]) -> str:
+    """The tables of laws, as they follow a file."""
+    return "\n" + tomlkit.dumps({"laws": laws_table(laws)})
 
 
 def _with_effects(text: str, labels: list[str]) -> Iterator[str]:

@@ -159,11 +159,18 @@ def _judged_stages(
             wider = before.model + by_label[so_far[-1]]
             shapes = wider.with_shapes(fitted.model.effects)
             stage = with_friction_width(evidence, fit_evidence(evidence, shapes, before))
-        known[so_far] = stage, _judged(evidence, held, stage)
+        known[so_far] = stage, judged_on(evidence, held, stage)
     return tuple(known[labels[:many]] for many in range(len(labels) + 1))
 
 
-def _judged(evidence: Evidence, held: Evidence | None, stage: EvidenceFit) -> HeldOut:
+def judged_on(evidence: Evidence, held: Evidence | None, stage: EvidenceFit) -> HeldOut:
+    """Return the errors of a fit on test recordings, or on held-out blocks where there are none.
+
+    Parameters
+    ----------
+    evidence, held : of the training and of the test recordings.
+    stage : the fit.
+    """
     if held is None:
         return on_blocks(evidence, stage)
     noise = evidence.criteria.noise

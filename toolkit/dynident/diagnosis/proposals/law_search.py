@@ -1,0 +1,280 @@
+"""The search for laws: screen, confirm, sharpen, refit, compare with rivals; then the next one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import count, islice
+
+import numpy as np
+
+from dynident.diagnosis.proposals.proposal import LawPicture, Proposal
+from dynident.diagnosis.proposals.term_library import Term, centred, library
+from dynident.diagnosis.proposals.term_screen import Screened, screen
+from dynident.diagnosis.search.ranking import judged
+from dynident.diagnosis.search.scoring import Score, candidate_moments, score
+from dynident.diagnosis.search.shaped_fit import refitted
+from dynident.diagnosis.search.withdrawal import judged_on
+from dynident.effects import Effect, LawEffect, law_effect
+from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of
+from dynident.evidence.held_out import HeldOut
+from dynident.fitting.uncertainty.shape_errors import ShapeSlope
+
+_SAME = 1e-9
+_SAME_SHAPE = 0.1
+_AT_BOUND = 1e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class LawSearch:
+    """What is searched.
+
+    Attributes
+    ----------
+    evidence : of the training recordings.
+    held : of the test recordings; None where blocks of time are held out.
+    progress : is called with what is being done.
+    """
+
+    evidence: Evidence
+    held: Evidence | None
+    progress: Callable[[str], None] = lambda _: None
+
+    def proposals(self, fitted: EvidenceFit) -> tuple[Proposal, ...]:
+        """Return laws for what a model leaves, one after the other.
+
+        Parameters
+        ----------
+        fitted : the model with all that the catalogue has for it.
+        """
+        found: list[Proposal] = []
+        before = self._judged(fitted)
+        known = {law.name for law in fitted.model.laws}
+        names = (f"proposal{k}" for k in count(1))
+        free = (name for name in names if name not in known)
+        for name in islice(free, self.evidence.criteria.proposals.most):
+            best = self._best(fitted, before, name)
+            if best is None:
+                break
+            wider = refitted(self.evidence, fitted.model + best.effect, fitted)
+            after = self._judged(wider)
+            proposal = self._proposal(best, (fitted, wider), (before, after))
+            if proposal is None:
+                break
+            found.append(proposal)
+            fitted, before = wider, after
+        return tuple(found)
+
+    # --- one law ------------------------------------------------------------------------------
+
+    def _best(self, fitted: EvidenceFit, before: HeldOut, name: str) -> _Best | None:
+        """Return the best law, confirmed, in the metric that it makes itself."""
+        criteria = self.evidence.criteria.proposals
+        joints = self._joints(fitted, before)
+        terms = {j: self._terms(fitted, before, j) for j in joints}
+        tried = sum(len(some) for some in terms.values())
+        metric, best, seen = fitted, None, None
+        for _ in range(criteria.rounds):
+            looked_at = self._looked_at(metric, terms)
+            passing = self._confirmed(metric, looked_at, tried, name)
+            if not passing:
+                break
+            best = _Best(scores=tuple(passing), tried=tried)
+            first = passing[0].effect
+            if first == seen:
+                break
+            seen = first
+            wider = refitted(self.evidence, fitted.model + first, fitted)
+            metric = in_metric_of(self.evidence, fitted, wider)
+        return best
+
+    def _joints(self, fitted: EvidenceFit, before: HeldOut) -> list[int]:
+        """Joints at which something is left that is worth a law."""
+        n = fitted.model.robot.n
+        if before.least_ratio is None:
+            return list(range(n))
+        verdict = self.evidence.criteria.verdict
+        return [j for j in range(n) if before.least_ratio[j] > verdict.within_noise]
+
+    def _terms(self, fitted: EvidenceFit, before: HeldOut, joint: int) -> tuple[Term, ...]:
+        """The library at one joint, as far as its signals mean something."""
+        robot = fitted.model.robot
+        terms = library(robot, robot.names[joint])
+        trusted = self.evidence.criteria.proposals.trusted_load
+        if before.joint_errors[joint] > trusted:
+            terms = tuple(one for one in terms if not one.of_load)
+        return terms
+
+    def _looked_at(
+        self, metric: EvidenceFit, terms: dict[int, tuple[Term, ...]]
+    ) -> list[tuple[int, Term]]:
+        """The terms that are evaluated as effects are: the best of the screening."""
+        found: list[tuple[float, int, Term]] = []
+        most = self.evidence.criteria.proposals.contenders
+        for joint, some in terms.items():
+            self.progress(f"laws at {metric.model.robot.names[joint]}")
+            repeating = [one for one in some if not one.of_session]
+            kept: tuple[Screened, ...] = screen(self.evidence, metric, joint, repeating)
+            found += [(one.penalised, joint, one.term) for one in kept[:most]]
+        found.sort(key=lambda one: -one[0])
+        session = [(j, one) for j, some in terms.items() for one in some if one.of_session]
+        return [(joint, term) for _, joint, term in found[:most]] + session
+
+    def _confirmed(
+        self, metric: EvidenceFit, looked_at: Sequence[tuple[int, Term]], tried: int, name: str
+    ) -> list[Score]:
+        """Laws that pass the gates of the search, best first."""
+        robot, level = metric.model.robot, self.evidence.criteria.proposals.level
+        passing: list[Score] = []
+        for joint, term in looked_at:
+            effect = law_effect(term.law(name))(robot.names[joint], shape=term.start).on(robot)
+            (parts,) = candidate_moments(self.evidence, metric, [effect])
+            first = score(metric, effect, *parts, grid=tried)
+            if first.not_identifiable or first.p_value * tried >= level:
+                continue
+            self.progress(f"{effect.made_of.torque} at {effect.joint}")
+            one, refusal = judged(self.evidence, metric, first, tried)
+            if not refusal and one.p_value * tried < level:
+                passing.append(one)
+        passing.sort(key=lambda one: -one.penalised)
+        return _each_once(passing)
+
+    def _proposal(
+        self,
+        best: _Best,
+        fits: tuple[EvidenceFit, EvidenceFit],
+        errors: tuple[HeldOut, HeldOut],
+    ) -> Proposal | None:
+        """Return the law with what it does; None where it does not help on held-out data."""
+        (fitted, wider), (before, after) = fits, errors
+        criteria = self.evidence.criteria.proposals
+        missed = fitted.misfit(fitted)
+        explains = 1.0 - wider.misfit(fitted) / missed if missed > 0 else 0.0
+        if after.error >= before.error or explains < criteria.least_share:
+            return None
+        label = best.effect.label
+        effect = next(one for one in wider.model.effects if one.label == label)
+        assert isinstance(effect, LawEffect)
+        own = wider.model.slices[label]
+        sigma, shape_sigma = self._spread(wider, effect)
+        return Proposal(
+            effect=_recentred(effect),
+            values=tuple(wider.values[own].tolist()),
+            sigma=sigma,
+            shape_sigma=shape_sigma,
+            explains=float(explains),
+            is_explanation=explains >= criteria.explains,
+            p_value=min(1.0, best.scores[0].p_value * best.tried),
+            tried=best.tried,
+            test_error_before=before.error,
+            test_error_after=after.error,
+            noise_floor=after.floor,
+            rivals=best.rivals(criteria.rival_level),
+            remark=_remark(effect),
+            picture=_picture(before, after, fitted.model.robot.names.index(str(effect.joint))),
+        )
+
+    def _spread(
+        self, wider: EvidenceFit, effect: LawEffect
+    ) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Standard deviations of a law's coefficients and shapes, estimated together."""
+        model, own = wider.model, wider.model.slices[effect.label]
+        if effect.shape:
+            values = tuple(wider.values[own].tolist())
+            slopes = ShapeSlope(effect.joint, of=effect, values=values)
+            wider = fit_evidence(self.evidence, model + slopes, wider)
+            shapes = effect.shape_parameters(model.robot)
+            scale = [one.slope(x) for one, x in zip(shapes, effect.shape, strict=True)]
+            spread = _sigma(wider, wider.model.slices[slopes.label]) * scale
+        else:
+            spread = np.zeros(0)
+        return tuple(_sigma(wider, own).tolist()), tuple(spread.tolist())
+
+    def _judged(self, fitted: EvidenceFit) -> HeldOut:
+        return judged_on(self.evidence, self.held, fitted)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Best:
+    """The laws that pass, best first, all in one metric.
+
+    Attributes
+    ----------
+    scores : of them.
+    tried : terms behind them.
+    """
+
+    scores: tuple[Score, ...]
+    tried: int
+
+    @property
+    def effect(self) -> LawEffect:
+        """The best of them."""
+        effect = self.scores[0].effect
+        assert isinstance(effect, LawEffect)
+        return effect
+
+    def rivals(self, level: float) -> tuple[LawEffect, ...]:
+        """Return the others that no signed-rank test over the held-out blocks tells from it."""
+        from scipy.stats import wilcoxon
+
+        best, *others = self.scores
+        found = []
+        for other in others:
+            assert best.losses is not None and other.losses is not None
+            worse = other.losses - best.losses
+            same = np.abs(worse).max() <= _SAME * np.abs(best.losses).max()
+            if same or wilcoxon(worse, alternative="greater").pvalue >= level:
+                assert isinstance(other.effect, LawEffect)
+                found.append(other.effect)
+        return tuple(found)
+
+
+def _sigma(fitted: EvidenceFit, own: slice) -> np.ndarray:
+    return np.sqrt(np.clip(np.diag(fitted.covariance)[own], 0.0, None))
+
+
+def _recentred(effect: LawEffect) -> LawEffect:
+    """The law with its frequencies' ranges about what was found, as others will seek them."""
+    law = effect.made_of
+    ranges = tuple(
+        (name, *centred(name, value, (lower, upper)))
+        for (name, lower, upper), value in zip(law.shape, effect.shape, strict=True)
+    )
+    return law_effect(replace(law, shape=ranges))(effect.joint, shape=effect.shape)
+
+
+def _remark(effect: LawEffect) -> str:
+    """Which shape is at the end of its range, in words."""
+    for (name, lower, upper), value in zip(effect.made_of.shape, effect.shape, strict=True):
+        if min(value - lower, upper - value) <= _AT_BOUND * (upper - lower):
+            return f"Its {name} is at the end of what was sought: it may lie beyond."
+    return ""
+
+
+def _each_once(scores: Sequence[Score]) -> list[Score]:
+    """Scores without those of a law that is better with another start of its shapes."""
+    kept: list[Score] = []
+    for one in scores:
+        assert isinstance(one.effect, LawEffect)
+        if not any(_alike(one.effect, other.effect) for other in kept):
+            kept.append(one)
+    return kept
+
+
+def _alike(one: LawEffect, other: Effect) -> bool:
+    """Whether two effects are one law at one joint, with shapes that hardly differ."""
+    assert isinstance(other, LawEffect)
+    same = one.joint == other.joint and one.made_of.torque == other.made_of.torque
+    return same and bool(np.allclose(one.shape, other.shape, rtol=_SAME_SHAPE))
+
+
+def _picture(before: HeldOut, after: HeldOut, joint: int) -> LawPicture:
+    """What the law changes on held-out data, and what was left there without it."""
+    law = [new.predicted - old.predicted for old, new in zip(before.runs, after.runs, strict=True)]
+    left = [one.measured - one.predicted for one in before.runs]
+    return LawPicture(
+        law=np.concatenate([one[:, joint] for one in law]),
+        residual=np.concatenate([one[:, joint] for one in left]),
+    )

@@ -1,0 +1,191 @@
+"""The terms of which laws are proposed: products of one or two factors, at one joint.
+
+Factors are of four sorts: position, motion, load, and the time of the session. Those of one term
+are of different sorts, but for products of two joints' speeds or positions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+from typing import Literal
+
+from dynident.effects import Law
+from dynident.robot import Robot
+
+Sort = Literal["position", "motion", "load", "session"]
+HARMONICS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+"""Frequencies of sines of the position, rad per rad or m; between them they are sought."""
+_REACH = 1.0  # of a frequency, to both sides
+_LOWEST = 0.25
+_DECAY = (0.02, 0.1, 0.5)  # rad/s or m/s, of an exponential of the speed
+_SLOWEST, _FASTEST = 0.005, 3.0
+
+
+@dataclass(frozen=True)
+class Factor:
+    """A function of the motion.
+
+    Attributes
+    ----------
+    sort : of what.
+    texts : formulas of its columns, with "{q}", "{v}" ... for the signals of its joint and the
+        names of its shapes for their values.
+    joint : None for the joint of the law.
+    shape : (name, start, lower, upper) of its one shape parameter; or none.
+    """
+
+    sort: Sort
+    texts: tuple[str, ...]
+    joint: str | None = None
+    shape: tuple[str, float, float, float] | None = None
+
+    def columns(self) -> tuple[str, ...]:
+        """Formulas of its columns, its shape at the start."""
+        return tuple(self._written(text, numeric=True) for text in self.texts)
+
+    def formulas(self) -> tuple[str, ...]:
+        """Formulas of its columns, its shape by name."""
+        return tuple(self._written(text, numeric=False) for text in self.texts)
+
+    def _written(self, text: str, *, numeric: bool) -> str:
+        place = "" if self.joint is None else f'["{self.joint}"]'
+        if self.joint is not None and self.joint.isidentifier():
+            place = f"[{self.joint}]"
+        signals = {name: f"{name}{place}" for name in ("q", "v", "a", "load")}
+        found = text.format(**signals, shape=repr(self.shape[1]) if self.shape else "")
+        if self.shape and not numeric:
+            found = text.format(**signals, shape=self.shape[0])
+        return found
+
+
+@dataclass(frozen=True)
+class Term:
+    """A product of factors.
+
+    Attributes
+    ----------
+    factors : at most one of them has several columns.
+    """
+
+    factors: tuple[Factor, ...]
+
+    @property
+    def size(self) -> int:
+        """Number of columns."""
+        return max(len(one.texts) for one in self.factors)
+
+    @property
+    def price(self) -> int:
+        """Of its factors: one each, and one for each other joint."""
+        return len(self.factors) + sum(one.joint is not None for one in self.factors)
+
+    @property
+    def of_load(self) -> bool:
+        """Whether the predicted torque is in it."""
+        return any(one.sort == "load" for one in self.factors)
+
+    @property
+    def of_session(self) -> bool:
+        """Whether the time is in it: it does not repeat with the motion."""
+        return any(one.sort == "session" for one in self.factors)
+
+    def law(self, name: str) -> Law:
+        """Return the law with a coefficient for each column, its frequencies and decays free."""
+        single = [one.formulas()[0] for one in self.factors if len(one.texts) == 1]
+        several = [one.formulas() for one in self.factors if len(one.texts) > 1]
+        if several:
+            sum_ = " + ".join(f"c{k}*{text}" for k, text in enumerate(several[0], 1))
+            text = "*".join([*single, f"({sum_})" if single else sum_])
+        else:
+            text = "*".join(["c", *single])
+        shapes = [one.shape for one in self.factors if one.shape]
+        return Law(name=name, torque=text, shape=tuple((n, low, up) for n, _, low, up in shapes))
+
+    @property
+    def start(self) -> tuple[float, ...]:
+        """Shapes at which it was screened, in the order of the law's."""
+        return tuple(one.shape[1] for one in self.factors if one.shape)
+
+
+def centred(name: str, value: float, given: tuple[float, float]) -> tuple[float, float]:
+    """Return the range in which a shape is sought when it is near a value.
+
+    Parameters
+    ----------
+    name : of the shape.
+    value : that it has.
+    given : its range by now, kept where it is no frequency.
+    """
+    return (max(value - _REACH, _LOWEST), value + _REACH) if name == "k" else given
+
+
+def library(robot: Robot, joint: str) -> tuple[Term, ...]:
+    """Return every term that may be missing at a joint.
+
+    Parameters
+    ----------
+    robot, joint : of this one, and of others beside it.
+    """
+    others = [name for name in robot.names if name != joint]
+    own, load = _of_joint(None), tuple(_load())
+    terms = [Term((one,)) for one in (*own, *load)]
+    terms += _products(own, own)
+    terms += [Term((one, other)) for one, other in product(own, load)]
+    terms += [Term((one,)) for one in _session()]
+    terms += [Term((one, other)) for one, other in product(own, _session()) if _plain(one)]
+    for name in others:
+        far = _of_joint(name)
+        terms += [Term((one,)) for one in far]
+        terms += [Term((one, other)) for one, other in product(own, far) if _coupled(one, other)]
+        terms += _products(far, far)
+        terms += [Term((one, other)) for one, other in product(far, load) if _plain(one)]
+    return tuple(terms)
+
+
+def _products(some: tuple[Factor, ...], others: tuple[Factor, ...]) -> list[Term]:
+    """Position times motion, of one joint."""
+    pairs = product(some, others)
+    return [Term((b, a)) for a, b in pairs if (a.sort, b.sort) == ("position", "motion")]
+
+
+def _coupled(own: Factor, far: Factor) -> bool:
+    """Whether a product of two joints' factors is one that mechanisms have."""
+    if own.sort != far.sort:
+        return True
+    return _plain(own) and _plain(far)
+
+
+def _plain(one: Factor) -> bool:
+    return one.texts in (("{q}",), ("{v}",), ("sign({v})",), ("abs({v})",), ("{v}^2",))
+
+
+def _of_joint(joint: str | None) -> tuple[Factor, ...]:
+    return (*_position(joint), *_motion(joint))
+
+
+def _position(joint: str | None) -> Iterator[Factor]:
+    yield Factor("position", ("{q}",), joint)
+    yield Factor("position", ("{q}^2",), joint)
+    for k in HARMONICS:
+        shape = ("k", k, *centred("k", k, (0.0, 0.0)))
+        yield Factor("position", ("sin({shape}*{q})", "cos({shape}*{q})"), joint, shape)
+
+
+def _motion(joint: str | None) -> Iterator[Factor]:
+    for text in ("{v}", "sign({v})", "abs({v})", "{v}*abs({v})", "{v}^2", "{v}^3", "{a}"):
+        yield Factor("motion", (text,), joint)
+    yield Factor("motion", ("abs({a})",), joint)
+    for speed in _DECAY:
+        shape = ("w", speed, _SLOWEST, _FASTEST)
+        yield Factor("motion", ("sign({v})*exp(-abs({v})/{shape})",), joint, shape)
+
+
+def _load() -> Iterator[Factor]:
+    for text in ("{load}", "abs({load})", "{load}*abs({load})", "{load}^2", "{load}^3"):
+        yield Factor("load", (text,))
+
+
+def _session() -> Iterator[Factor]:
+    yield Factor("session", ("t",))
