@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import count, islice
+from typing import Any
 
 import numpy as np
 
@@ -225,7 +226,8 @@ class _Best:
             assert best.losses is not None and other.losses is not None
             worse = other.losses - best.losses
             same = np.abs(worse).max() <= _SAME * np.abs(best.losses).max()
-            if same or wilcoxon(worse, alternative="greater").pvalue >= level:
+            told: Any = None if same else wilcoxon(worse, alternative="greater")
+            if same or told.pvalue >= level:
                 assert isinstance(other.effect, LawEffect)
                 found.append(other.effect)
         return tuple(found)
