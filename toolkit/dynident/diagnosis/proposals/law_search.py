@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from dynident.diagnosis.proposals.proposal import LawPicture, Proposal
-from dynident.diagnosis.proposals.term_library import Term, centred, library
+from dynident.diagnosis.proposals.term_library import LibraryTerm, centred, library
 from dynident.diagnosis.proposals.term_screen import Screened, screen
 from dynident.diagnosis.search.ranking import judged
 from dynident.diagnosis.search.scoring import Score, candidate_moments, score
@@ -69,7 +69,7 @@ class LawSearch:
 
     # --- one law ------------------------------------------------------------------------------
 
-    def _best(self, fitted: EvidenceFit, before: HeldOut, name: str) -> _Best | None:
+    def _best(self, fitted: EvidenceFit, before: HeldOut, name: str) -> _BestLaws | None:
         """Return the best law, confirmed, in the metric that it makes itself."""
         criteria = self.evidence.criteria.proposals
         joints = self._joints(fitted, before)
@@ -81,7 +81,7 @@ class LawSearch:
             passing = self._confirmed(metric, looked_at, tried, name)
             if not passing:
                 break
-            best = _Best(scores=tuple(passing), tried=tried)
+            best = _BestLaws(scores=tuple(passing), tried=tried)
             first = passing[0].effect
             if first == seen:
                 break
@@ -98,7 +98,7 @@ class LawSearch:
         verdict = self.evidence.criteria.verdict
         return [j for j in range(n) if before.least_ratio[j] > verdict.within_noise]
 
-    def _terms(self, fitted: EvidenceFit, before: HeldOut, joint: int) -> tuple[Term, ...]:
+    def _terms(self, fitted: EvidenceFit, before: HeldOut, joint: int) -> tuple[LibraryTerm, ...]:
         """The library at one joint, as far as its signals mean something."""
         robot = fitted.model.robot
         terms = library(robot, robot.names[joint])
@@ -108,10 +108,10 @@ class LawSearch:
         return terms
 
     def _looked_at(
-        self, metric: EvidenceFit, terms: dict[int, tuple[Term, ...]]
-    ) -> list[tuple[int, Term]]:
+        self, metric: EvidenceFit, terms: dict[int, tuple[LibraryTerm, ...]]
+    ) -> list[tuple[int, LibraryTerm]]:
         """The terms that are evaluated as effects are: the best of the screening."""
-        found: list[tuple[float, int, Term]] = []
+        found: list[tuple[float, int, LibraryTerm]] = []
         most = self.evidence.criteria.proposals.contenders
         for joint, some in terms.items():
             self.progress(f"laws at {metric.model.robot.names[joint]}")
@@ -123,7 +123,11 @@ class LawSearch:
         return [(joint, term) for _, joint, term in found[:most]] + session
 
     def _confirmed(
-        self, metric: EvidenceFit, looked_at: Sequence[tuple[int, Term]], tried: int, name: str
+        self,
+        metric: EvidenceFit,
+        looked_at: Sequence[tuple[int, LibraryTerm]],
+        tried: int,
+        name: str,
     ) -> list[Score]:
         """Laws that pass the gates of the search, best first."""
         robot, level = metric.model.robot, self.evidence.criteria.proposals.level
@@ -143,7 +147,7 @@ class LawSearch:
 
     def _proposal(
         self,
-        best: _Best,
+        best: _BestLaws,
         fits: tuple[EvidenceFit, EvidenceFit],
         errors: tuple[HeldOut, HeldOut],
     ) -> Proposal | None:
@@ -197,7 +201,7 @@ class LawSearch:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Best:
+class _BestLaws:
     """The laws that pass, best first, all in one metric.
 
     Attributes

@@ -61,7 +61,7 @@ class Factor:
 
 
 @dataclass(frozen=True)
-class Term:
+class LibraryTerm:
     """A product of factors.
 
     Attributes
@@ -121,7 +121,7 @@ def centred(name: str, value: float, given: tuple[float, float]) -> tuple[float,
     return (max(value - _REACH, _LOWEST), value + _REACH) if name == "k" else given
 
 
-def library(robot: Robot, joint: str) -> tuple[Term, ...]:
+def library(robot: Robot, joint: str) -> tuple[LibraryTerm, ...]:
     """Return every term that may be missing at a joint.
 
     Parameters
@@ -130,24 +130,26 @@ def library(robot: Robot, joint: str) -> tuple[Term, ...]:
     """
     others = [name for name in robot.names if name != joint]
     own, load = _of_joint(None), tuple(_load())
-    terms = [Term((one,)) for one in (*own, *load)]
+    terms = [LibraryTerm((one,)) for one in (*own, *load)]
     terms += _products(own, own)
-    terms += [Term((one, other)) for one, other in product(own, load)]
-    terms += [Term((one,)) for one in _session()]
-    terms += [Term((one, other)) for one, other in product(own, _session()) if _plain(one)]
+    terms += [LibraryTerm((one, other)) for one, other in product(own, load)]
+    terms += [LibraryTerm((one,)) for one in _session()]
+    terms += [LibraryTerm((one, other)) for one, other in product(own, _session()) if _plain(one)]
     for name in others:
         far = _of_joint(name)
-        terms += [Term((one,)) for one in far]
-        terms += [Term((one, other)) for one, other in product(own, far) if _coupled(one, other)]
+        terms += [LibraryTerm((one,)) for one in far]
+        terms += [
+            LibraryTerm((one, other)) for one, other in product(own, far) if _coupled(one, other)
+        ]
         terms += _products(far, far)
-        terms += [Term((one, other)) for one, other in product(far, load) if _plain(one)]
+        terms += [LibraryTerm((one, other)) for one, other in product(far, load) if _plain(one)]
     return tuple(terms)
 
 
-def _products(some: tuple[Factor, ...], others: tuple[Factor, ...]) -> list[Term]:
+def _products(some: tuple[Factor, ...], others: tuple[Factor, ...]) -> list[LibraryTerm]:
     """Position times motion, of one joint."""
     pairs = product(some, others)
-    return [Term((b, a)) for a, b in pairs if (a.sort, b.sort) == ("position", "motion")]
+    return [LibraryTerm((b, a)) for a, b in pairs if (a.sort, b.sort) == ("position", "motion")]
 
 
 def _coupled(own: Factor, far: Factor) -> bool:

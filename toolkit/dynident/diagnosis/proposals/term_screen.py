@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from dynident.diagnosis.proposals.term_library import Term
+from dynident.diagnosis.proposals.term_library import LibraryTerm
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, model_columns
 from dynident.evidence.runs import Run
@@ -33,13 +33,13 @@ class Screened:
     penalised : drop less the price of its columns, of the library and of its factors.
     """
 
-    term: Term
+    term: LibraryTerm
     drop: float
     penalised: float
 
 
 def screen(
-    evidence: Evidence, fitted: EvidenceFit, joint: int, terms: Sequence[Term]
+    evidence: Evidence, fitted: EvidenceFit, joint: int, terms: Sequence[LibraryTerm]
 ) -> tuple[Screened, ...]:
     """Return the terms that would bring more than they cost, best first.
 
@@ -55,7 +55,7 @@ def screen(
     With C the columns of a term, X the model's and y the torque: B solves the regression of C on X,
     G = C'C - (C'X) B, m = C'y - B'X'y, and the drop is m' G^-1 m.
     """
-    rows = [_Rows.of(evidence, fitted, r, joint) for r in range(len(evidence.runs))]
+    rows = [_TermRows.of(evidence, fitted, r, joint) for r in range(len(evidence.runs))]
     found = []
     for start in range(0, len(terms), _AT_ONCE):
         found += _screened(evidence, fitted, joint, rows, terms[start : start + _AT_ONCE])
@@ -74,9 +74,9 @@ def _screened(
     evidence: Evidence,
     fitted: EvidenceFit,
     joint: int,
-    rows: Sequence[list[_Rows]],
-    terms: Sequence[Term],
-) -> list[tuple[Term, float]]:
+    rows: Sequence[list[_TermRows]],
+    terms: Sequence[LibraryTerm],
+) -> list[tuple[LibraryTerm, float]]:
     with_model, with_self = [], []
     for r, (run, replicates) in enumerate(zip(evidence.runs, rows, strict=True)):
         signals = [
@@ -111,7 +111,7 @@ def _drop(own: np.ndarray, left: np.ndarray, moment: np.ndarray, least: float) -
 
 
 @dataclass(frozen=True, eq=False)
-class _Rows:
+class _TermRows:
     """The rows of one replicate, of which formulas take their values.
 
     Attributes
@@ -132,7 +132,7 @@ class _Rows:
     known: dict[str, np.ndarray] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, evidence: Evidence, fitted: EvidenceFit, run: int, joint: int) -> list[_Rows]:
+    def of(cls, evidence: Evidence, fitted: EvidenceFit, run: int, joint: int) -> list[_TermRows]:
         columns = model_columns(evidence, fitted.model, run, joint, fitted.values)
         whose = evidence.runs[run]
         return [
@@ -147,7 +147,7 @@ class _Rows:
             for place, one in enumerate(columns)
         ]
 
-    def columns(self, term: Term) -> np.ndarray:
+    def columns(self, term: LibraryTerm) -> np.ndarray:
         """Columns of a term, (T, k)."""
         found = np.ones((1, 1))
         for factor in term.factors:
