@@ -135,6 +135,10 @@ def diagnosis_of(
     study : the study.
     most : effects that are added at most; None for the usual.
     propose : when laws are proposed for what is left.
+
+    Returns
+    -------
+    What the search found.
     """
     from dynident.diagnosis import diagnose as search
 

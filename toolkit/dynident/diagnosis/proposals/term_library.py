@@ -117,6 +117,10 @@ def centred(name: str, value: float, given: tuple[float, float]) -> tuple[float,
     name : of the shape.
     value : that it has.
     given : its range by now, kept where it is no frequency.
+
+    Returns
+    -------
+    Lower and upper bound.
     """
     return (max(value - _REACH, _LOWEST), value + _REACH) if name == "k" else given
 
