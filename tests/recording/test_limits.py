@@ -10,7 +10,8 @@ from scipy.io import savemat
 from dynident import files
 from dynident.errors import DynidentError, FileError, RecordingError
 from dynident.recording import SUFFIXES, open_table, read
-from dynident.recording.formats import binary_files, csv_file, limits
+from dynident.recording.formats import csv_file, limits
+from dynident.recording.formats.arrays import mat_file
 from dynident.robot import Robot
 from dynident.settings import SettingsTable, read_toml
 
@@ -63,8 +64,8 @@ def test_only_regular_recordings_are_read(tmp_path, suffix):
     refused("NUL", read, tmp_path / f"a\0{suffix}")
     large = tmp_path / f"large{suffix}"
     with large.open("wb") as stream:
-        stream.truncate(20_000 * MB)  # a hole: it takes no place on the disk
-    told = refused("holds 19.53 GB, and . GB is the limit", read, large)
+        stream.truncate(100_000 * MB)  # a hole: it takes no place on the disk
+    told = refused("holds 97.66 GB, and 64 GB is the limit", read, large)
     assert told.remedy and "cut it" in told.remedy
 
 
@@ -78,7 +79,7 @@ def test_an_archive_is_not_unpacked_to_see_that_it_is_too_large(tmp_path, monkey
     path, samples = tmp_path / "bomb.npz", 5 * MB
     np.savez_compressed(path, **{name: np.zeros(samples) for name in ("t", "q.a", "tau.a")})  # pyright: ignore
     assert path.stat().st_size < MB
-    monkeypatch.setattr(binary_files, "ARRAYS", limits.SizeLimit(2 << 30, 100 * MB))
+    monkeypatch.setattr(limits, "ARRAYS", limits.SizeLimit(2 << 30, 100 * MB))
     monkeypatch.setattr(np.lib.format, "read_array", lambda *_, **__: pytest.fail("unpacked"))
     told = refused("unpacks to 120 MB, and 100 MB is the limit", read, path)
     assert told.remedy == limits.CUT
@@ -89,9 +90,9 @@ def test_what_a_matlab_file_says_of_its_size_is_not_trusted(tmp_path, monkeypatc
     savemat(path, {"t": x, "q_a": x, "tau_a": x}, do_compression=True)
     data = path.read_bytes()
     assert len(data) < MB
-    monkeypatch.setattr(binary_files, "ARRAYS", limits.SizeLimit(1 << 30, 10 * MB))
+    monkeypatch.setattr(mat_file, "ARRAYS", limits.SizeLimit(1 << 30, 10 * MB))
     refused("unpacks to 48 MB, and 10 MB is the limit", read, path)
-    assert 10 * MB < binary_files._unpacked_mat(data) <= 26 * MB  # it stops where it is too much
+    assert 10 * MB < mat_file._unpacked_mat(data) <= 26 * MB  # it stops where it is too much
 
 
 def test_many_columns_are_refused_at_once(tmp_path):

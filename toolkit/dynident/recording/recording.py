@@ -38,6 +38,7 @@ class Provenance:
     columns : (ours, the file's name of it, scale) of each column that was read; empty likewise.
     skipped : what else the file holds that was not read, in words each.
     first_line : line of the first sample in a text file, from 1.
+    place : where the samples were put if they were too many for the memory, in words.
     """
 
     file: str = ""
@@ -48,6 +49,7 @@ class Provenance:
     columns: tuple[tuple[str, str, float], ...] = ()
     skipped: tuple[str, ...] = ()
     first_line: int = 2
+    place: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from dynident.errors import RecordingError
 from dynident.recording import ColumnTable, FileLayout, open_table
-from dynident.recording.formats.binary_files import COLUMNS, pick
+from dynident.recording.formats.arrays.records import COLUMNS, pick
 
 MOST_COLUMNS = 2000
 """Columns of a file that are looked at."""

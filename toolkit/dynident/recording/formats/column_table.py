@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 
 from dynident.errors import RecordingError
+from dynident.recording.formats.limits import AT_ONCE
 
 SLOWEST_HZ, FASTEST_HZ = 1e-3, 1e7
 """Sampling rates of a robot: beyond them the number is in another unit."""
@@ -67,7 +68,9 @@ class ColumnTable:
     ----------
     file : for messages.
     names : what the file holds, in its order; "" for a column without a name.
-    load : (names) -> arrays of these names, as they are in the file.
+    load : (names) -> arrays of these names, as they are in the file, whole.
+    parts : (names) -> the same some rows at a time, each part a row or more and with as many rows
+        under each name; None where the file can only be loaded.
     skipped : (names) -> what else the file holds that is not read with them, in words each; what
         is skipped of the columns themselves, `left_of` says.
     sha256 : hexadecimal digits of the file's content.
@@ -80,6 +83,7 @@ class ColumnTable:
     names: tuple[str, ...]
     load: Callable[[Sequence[str]], dict[str, np.ndarray]]
     _: KW_ONLY
+    parts: Callable[[Sequence[str]], Iterator[dict[str, np.ndarray]]] | None = None
     skipped: Callable[[Sequence[str]], tuple[str, ...]] = _nothing_more
     sha256: str = ""
     first_line: int = 0
@@ -89,6 +93,73 @@ class ColumnTable:
     def there(self) -> frozenset[str]:
         """The names, for looking them up."""
         return frozenset(self.names)
+
+    def in_parts(self, names: Sequence[str]) -> Iterator[dict[str, np.ndarray]]:
+        """Yield arrays of these names some rows at a time; as one part if it cannot be otherwise.
+
+        Raises
+        ------
+        FileError, RecordingError
+            As `load`.
+        """
+        if self.parts is None:
+            yield self.load(names)
+        else:
+            yield from self.parts(names)
+
+
+class RowReader(Protocol):
+    """Rows of an array in a file as they come.
+
+    Attributes
+    ----------
+    rows : how many there are.
+    row_size : bytes of one.
+    """
+
+    @property
+    def rows(self) -> int: ...
+
+    @property
+    def row_size(self) -> int: ...
+
+    def take(self, count: int) -> np.ndarray:
+        """Return the next rows, (count,) or (count, n); there are as many."""
+        ...
+
+
+def rows_together(readers: Mapping[str, RowReader]) -> Iterator[dict[str, np.ndarray]]:
+    """Yield rows of arrays of as many rows, some at a time; never one alone at the end.
+
+    One row of a table would look like a vector.
+
+    Parameters
+    ----------
+    readers : of each array, by its name, at the beginning.
+    """
+    rows = next(iter(readers.values())).rows
+    at_once = rows_at_once(sum(one.row_size for one in readers.values()))
+    left = rows
+    while left:
+        count = left if left <= at_once + 1 else at_once
+        yield {name: one.take(count) for name, one in readers.items()}
+        left -= count
+
+
+def rows_at_once(row_size: int) -> int:
+    """How many rows of so many bytes are read at a time."""
+    return max(16, AT_ONCE // max(1, row_size))
+
+
+def is_lying(shape: Sequence[int]) -> bool:
+    """Whether an array is a vector that lies in one row of a table, as MATLAB's may."""
+    return len(shape) == 2 and shape[0] == 1 and shape[1] > 1
+
+
+def joined(parts: Iterator[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """Return whole arrays of what comes in parts, one at least."""
+    whole = [*parts]
+    return {name: np.concatenate([one[name] for one in whole]) for name in whole[0]}
 
 
 def left_of(table: ColumnTable, used: Sequence[str]) -> tuple[str, ...]:

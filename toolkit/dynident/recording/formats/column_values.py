@@ -2,34 +2,81 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
 from dynident.errors import RecordingError
 from dynident.recording.formats.column_names import ColumnTable, LocatedColumn
+from dynident.recording.formats.limits import CUT
+from dynident.recording.spooled import Spool
 
 
-def load(table: ColumnTable, columns: Mapping[str, LocatedColumn]) -> dict[str, np.ndarray]:
-    """Read columns as doubles in our units, (T,) each.
+def gather(
+    table: ColumnTable,
+    columns: Mapping[str, LocatedColumn],
+    signals: Callable[[Mapping[str, np.ndarray]], dict[str, np.ndarray]],
+) -> tuple[dict[str, Any], str]:
+    """Read columns some rows at a time, and gather the signals that are made of them.
+
+    Parameters
+    ----------
+    table : to read from.
+    columns : ours -> where it is in the table; `t` is among them.
+    signals : (ours -> (k,) next values) -> signals of these rows, (k,) or (k, n) each.
+
+    Returns
+    -------
+    Each signal, read-only, and where they lie if they are too many for the memory, in words
 
     Raises
     ------
+    FileError, RecordingError
+        As `load`; if there is no room for them in memory or on the disk.
+    """
+    try:
+        with Spool(table.file) as spool:
+            for part in load(table, columns):
+                spool.add(signals(part))
+            return spool.arrays(), spool.words
+    except MemoryError:
+        raise RecordingError("does not fit into memory", table.file, CUT) from None
+
+
+def load(
+    table: ColumnTable, columns: Mapping[str, LocatedColumn]
+) -> Iterator[dict[str, np.ndarray]]:
+    """Read columns as doubles in our units, some rows at a time.
+
+    Parameters
+    ----------
+    table : to read from.
+    columns : ours -> where it is in the table; `t` is among them.
+
+    Yields
+    ------
+    ours -> (k,) its next values, as many in each column; one part at least
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read to its end, or changes meanwhile.
     RecordingError
         If one does not hold real numbers, is not one-dimensional, or is longer than another.
     """
     names = dict.fromkeys(term.name for one in columns.values() for term in one.terms)
-    arrays = table.load(list(names))
-    found = {ours: _combined(ours, one, arrays, table.file) for ours, one in columns.items()}
-    lengths = {ours: len(x) for ours, x in found.items()}
-    odd = [ours for ours, length in lengths.items() if length != lengths["t"]]
-    if odd:
-        raise RecordingError(
-            f"{odd[0]} has {lengths[odd[0]]} samples where t has {lengths['t']}",
-            table.file,
-            "is the file complete?",
-        )
-    return found
+    for arrays in table.in_parts(list(names)):
+        found = {ours: _combined(ours, one, arrays, table.file) for ours, one in columns.items()}
+        lengths = {ours: len(x) for ours, x in found.items()}
+        odd = [ours for ours, length in lengths.items() if length != lengths["t"]]
+        if odd:
+            raise RecordingError(
+                f"{odd[0]} has {lengths[odd[0]]} samples where t has {lengths['t']}",
+                table.file,
+                "is the file complete?",
+            )
+        yield found
 
 
 def _combined(

@@ -8,97 +8,113 @@ names line and column.
 
 from __future__ import annotations
 
-import codecs
 import csv
 import io
 import re
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
-from dynident.errors import FileError, RecordingError
-from dynident.recording.formats.column_table import UNWANTED, ColumnTable, FileLayout
+from dynident.errors import RecordingError
+from dynident.recording.formats.column_table import UNWANTED, ColumnTable, FileLayout, joined
+from dynident.recording.formats.file_source import FileSource
 from dynident.recording.formats.limits import (
     TEXT,
     require_distinct,
     require_few,
     require_unpacked,
 )
+from dynident.recording.formats.text_pieces import text_pieces
 
+_NUMPY_HEADER = b"# "
+"""How NumPy marks the line of a header."""
 _SMALL = 1 << 18
 """Bytes that NumPy has read sooner than pandas is loaded, which takes a third of a second."""
 
 
-def open_csv(data: bytes, file: str, layout: FileLayout) -> ColumnTable:
-    """Return the table that the bytes of a CSV file hold.
+def open_csv(source: FileSource, file: str, layout: FileLayout) -> ColumnTable:
+    """Return the table that a CSV file holds.
 
     Commas, semicolons, tabs or blanks separate the columns; numbers have a decimal point.
 
     Parameters
     ----------
-    data : content of the file.
+    source : the file.
     file : for messages.
     layout : names of the columns, where no header line names them.
 
     Raises
     ------
     FileError
-        If the bytes are not UTF-8 text.
+        If the bytes are not UTF-8 text; of those after the first pieces, `ColumnTable.parts` and
+        `ColumnTable.load` raise it.
     RecordingError
         If neither a header nor the layout names the columns, or both do, a name is there twice,
-        or there are too many. `ColumnTable.load` raises it for a line with too few or too many
-        columns, for a cell that is not a finite number, and if there are too many of them.
+        or there are too many. `ColumnTable.parts` raises it for a line with too few or too many
+        columns, and for a cell that is not a finite number; `ColumnTable.load` also if there are
+        too many of them.
     """
-    data = _text(data, file)
-    if not data or data.isspace():
+    with source.open() as stream:
+        start = next(text_pieces(stream, file), b"")
+    if not start or start.isspace():
         raise RecordingError("is empty", file, "the first line names the columns: t, q.<joint> ...")
-    data = _without_blanks(data)
-    first, second = (line.decode() for line in _two_lines(data))
+    blanks = _has_blanks(start)
+    start = _commas(start.removeprefix(_NUMPY_HEADER)) if blanks else start
+    first, second = (line.decode() for line in _two_lines(start))
     separator = _separator(first, second)
     require_few(1 + first.count(separator), "columns", file)
     cells = _cells(first, separator, file)
     is_header = not all(is_number(cell) for cell in cells)
     names = _names(cells, layout, file) if is_header else _named(len(cells), layout, file)
     require_distinct([name for name in names if name], "column", f"{file}, line 1")
-    # The readers below skip the line of the header.
-    lines = data if is_header else b"\n" + data
     places = {name: place for place, name in reversed([*enumerate(names)])}
 
+    def parts(wanted: Sequence[str]) -> Iterator[dict[str, np.ndarray]]:
+        at, above = [places[name] for name in wanted], 0
+        with source.open() as stream:
+            for piece in text_pieces(stream, file):
+                if blanks:
+                    piece = _commas(piece if above else piece.removeprefix(_NUMPY_HEADER))
+                # The readers below skip the line of the header.
+                lines = piece if is_header and not above else b"\n" + piece
+                above = above or int(is_header)
+                columns = _fast(lines, separator, len(names), at)
+                if columns is None:
+                    kind = "header" if is_header else "first line"
+                    rows = _careful(
+                        lines, separator, names, at, file, lines_above=above, names_in=kind
+                    )
+                    columns = list(rows.T)
+                yield dict(zip(wanted, columns, strict=True))
+                above += lines.count(b"\n") - 1
+
     def load(wanted: Sequence[str]) -> dict[str, np.ndarray]:
-        require_unpacked(8 * lines.count(b"\n") * len(wanted), TEXT, file)
-        at = [places[name] for name in wanted]
-        columns = _fast(lines, separator, len(names), at)
-        if columns is None:
-            above = 1 if is_header else 0
-            columns = list(_careful(lines, separator, names, at, file, lines_above=above).T)
-        return dict(zip(wanted, columns, strict=True))
+        return joined(_few_enough(parts(wanted), file))
 
-    return ColumnTable(file, names, load, first_line=2 if is_header else 1)
+    return ColumnTable(file, names, load, parts=parts, first_line=2 if is_header else 1)
 
 
-def _text(data: bytes, file: str) -> bytes:
-    """Bytes of UTF-8 text, with line feeds between the lines; no copy where it is so already."""
-    try:
-        if not data.isascii():
-            data.decode()
-    except UnicodeDecodeError as error:
-        what = f"is not UTF-8 text (byte {error.start})"
-        raise FileError(what, file, "is it the right file?") from None
-    if b"\0" in data:
-        raise FileError("is not text (it holds NUL bytes)", file, "is it the right file?")
-    data = data.removeprefix(codecs.BOM_UTF8)
-    return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
+def _few_enough(
+    parts: Iterator[dict[str, np.ndarray]], file: str
+) -> Iterator[dict[str, np.ndarray]]:
+    """Parts as they come, until they are too much for the memory."""
+    size = 0
+    for part in parts:
+        size += sum(x.nbytes for x in part.values())
+        require_unpacked(size, TEXT, file)
+        yield part
 
 
-def _without_blanks(data: bytes) -> bytes:
-    """Commas in the place of blanks, where nothing but blanks separates the columns."""
+def _has_blanks(data: bytes) -> bool:
+    """Whether nothing but blanks separates the columns."""
     first = data.partition(b"\n")[0].strip()
-    if b" " not in first or any(mark in first for mark in (b",", b";", b"\t", b'"')):
-        return data
-    # NumPy marks the line of a header by a sign and a blank.
-    data = data.removeprefix(b"# ")
+    return b" " in first and not any(mark in first for mark in (b",", b";", b"\t", b'"'))
+
+
+def _commas(data: bytes) -> bytes:
+    """Lines with commas in the place of blanks."""
     return re.sub(rb" +", b",", re.sub(rb"^ +| +$", b"", data, flags=re.MULTILINE))
 
 
@@ -214,6 +230,7 @@ def _careful(
     file: str,
     *,
     lines_above: int = 1,
+    names_in: str = "header",
 ) -> np.ndarray:
     """Values (T, k), line by line, with an error that names the line and the column."""
     body = data.decode().partition("\n")[2].rstrip("\n ")
@@ -232,7 +249,7 @@ def _careful(
             if len(cells) != len(names):
                 raise RecordingError(
                     f"{len(cells)} column{'s' * (len(cells) != 1)} where the "
-                    f"{'header' if lines_above else 'first line'} has {len(names)}",
+                    f"{names_in} has {len(names)}",
                     where,
                     "is the file complete?" if len(cells) < len(names) else "name every column",
                 )

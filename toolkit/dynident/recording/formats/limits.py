@@ -26,11 +26,19 @@ class SizeLimit:
     unpacked: int
 
 
-TEXT = SizeLimit(1 * _GB, 1 * _GB)
+STREAMED = SizeLimit(64 * _GB, 64 * _GB)
+"""Of files that are read some rows at a time."""
+TEXT = SizeLimit(64 * _GB, 1 * _GB)
 ARRAYS = SizeLimit(2 * _GB, 1 * _GB)
+"""Of arrays that are made as a whole, in memory."""
 BAG = SizeLimit(16 * _GB, 16 * _GB)
 LARGEST_CHUNK = 256 * _MB
-"""Bytes of one compressed chunk of a bag, unpacked."""
+"""Bytes of one compressed chunk of a bag or of an HDF5 file, unpacked."""
+AT_ONCE = 4 * _MB
+"""Bytes of columns that are read at a time, from files that are read so."""
+_PACKED = 100
+"""Bytes that one byte on disk may become beyond what is unpacked anyway: measurements become ten at
+the most, and a file that is made to fill the disk a thousand."""
 MOST_COLUMNS = 4096
 """Columns of a table, arrays of a file, and signals of all joints in a bag."""
 
@@ -59,6 +67,24 @@ def require_unpacked(size: int, limit: SizeLimit, file: str) -> None:
             "is the limit"
         )
         raise RecordingError(what, file, CUT)
+
+
+def require_streamed(size: int, stored: int, file: str) -> None:
+    """Refuse columns that are read some rows at a time and would take too much of the disk.
+
+    Parameters
+    ----------
+    size : bytes that they would take.
+    stored : bytes of the file.
+    file : for the message.
+
+    Raises
+    ------
+    RecordingError
+        If they are more than the limit, or far more than any measurements in a file of its size.
+    """
+    allowed = min(STREAMED.unpacked, _PACKED * stored)
+    require_unpacked(size, SizeLimit(stored, max(ARRAYS.unpacked, allowed)), file)
 
 
 def require_few(count: int, kind: str, file: str) -> None:

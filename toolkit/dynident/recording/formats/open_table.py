@@ -2,41 +2,38 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from dynident import files
 from dynident.errors import FileError, RecordingError
-from dynident.recording.formats.binary_files import open_mat, open_npz, open_parquet, pick
+from dynident.recording.formats.arrays.hdf5_file import open_hdf5
+from dynident.recording.formats.arrays.mat_file import open_mat
+from dynident.recording.formats.arrays.npz_file import open_npz
+from dynident.recording.formats.arrays.parquet_file import open_parquet
+from dynident.recording.formats.arrays.records import pick
 from dynident.recording.formats.column_table import ColumnTable, FileLayout
 from dynident.recording.formats.csv_file import open_csv
-from dynident.recording.formats.hdf5_file import open_hdf5
-from dynident.recording.formats.limits import ARRAYS, CUT, TEXT, SizeLimit
+from dynident.recording.formats.file_source import FileSource, open_source
+from dynident.recording.formats.limits import CUT, STREAMED
 from dynident.recording.formats.ros_bag import SUFFIXES as BAGS
 from dynident.recording.formats.ros_bag import is_bag, open_bag
 
 DEFAULT_LAYOUT = FileLayout()
 
 
-@dataclass(frozen=True)
-class _Format:
-    """How files of a format are opened: (content, name for messages, layout) -> table."""
+_Open = Callable[[FileSource, str, FileLayout], ColumnTable]
+"""(content, name for messages, layout) -> table"""
 
-    open: Callable[[bytes, str, FileLayout], ColumnTable]
-    limit: SizeLimit
-
-
-_FORMATS = {
-    ".csv": _Format(open_csv, TEXT),
-    ".npz": _Format(lambda data, file, _: open_npz(data, file), ARRAYS),
-    ".mat": _Format(lambda data, file, _: open_mat(data, file), ARRAYS),
-    ".parquet": _Format(lambda data, file, _: open_parquet(data, file), ARRAYS),
-    ".h5": _Format(lambda data, file, _: open_hdf5(data, file), ARRAYS),
-    ".hdf5": _Format(lambda data, file, _: open_hdf5(data, file), ARRAYS),
+_FORMATS: dict[str, _Open] = {
+    ".csv": open_csv,
+    ".npz": lambda source, file, _: open_npz(source, file),
+    ".mat": lambda source, file, _: open_mat(source, file),
+    ".parquet": lambda source, file, _: open_parquet(source, file),
+    ".h5": lambda source, file, _: open_hdf5(source, file),
+    ".hdf5": lambda source, file, _: open_hdf5(source, file),
 }
 READABLE = (*_FORMATS, *BAGS)
 """Suffixes of the files that are read."""
@@ -77,7 +74,7 @@ def open_table(
 
 
 def _opened(path: Path, layout: FileLayout) -> ColumnTable:
-    """The table of a file that is read as a whole."""
+    """The table of a file that is no bag."""
     where, suffix = str(path), path.suffix.lower()
     form = _FORMATS.get(suffix)
     if form is None and path.is_dir():
@@ -90,10 +87,11 @@ def _opened(path: Path, layout: FileLayout) -> ColumnTable:
     if suffix != ".csv" and layout.names not in ((), "numbered"):
         what, remedy = "columns are named by position", "only text files without a header need that"
         raise RecordingError(what, where, remedy)
-    data = files.read_bytes(path, form.limit.stored, CUT)
-    if not data:
+    source = open_source(path, STREAMED.stored, CUT)
+    if not source.size:
         raise RecordingError("is empty", where, "is the file complete?")
-    return replace(form.open(data, where, layout), sha256=hashlib.sha256(data).hexdigest())
+    # What is of no use is not hashed first, which takes long where it is large.
+    return replace(form(source, where, layout), sha256=source.sha256())
 
 
 def _with_clock(table: ColumnTable, rate_hz: float) -> ColumnTable:
@@ -107,11 +105,29 @@ def _with_clock(table: ColumnTable, rate_hz: float) -> ColumnTable:
         found = table.load(others or table.names[:1])
         if "t" not in wanted:
             return found
-        x = next(iter(found.values()), np.empty(0))
-        samples = x.size if x.ndim < 2 or 1 in x.shape else len(x)
-        return {**{name: found[name] for name in others}, "t": np.arange(samples) / rate_hz}
+        return _clocked(found, others, range(_samples(found)))
 
-    return replace(table, names=("t", *table.names), load=load)
+    def parts(wanted: Sequence[str]) -> Iterator[dict[str, np.ndarray]]:
+        others = [name for name in wanted if name != "t"]
+        seen = 0
+        for found in table.in_parts(others or table.names[:1]):
+            rows = range(seen, seen + _samples(found))
+            yield _clocked(found, others, rows) if "t" in wanted else found
+            seen = rows.stop
+
+    def _clocked(
+        found: Mapping[str, np.ndarray], others: Sequence[str], rows: range
+    ) -> dict[str, np.ndarray]:
+        t = np.arange(rows.start, rows.stop) / rate_hz
+        return {**{name: found[name] for name in others}, "t": t}
+
+    return replace(table, names=("t", *table.names), load=load, parts=parts)
+
+
+def _samples(found: Mapping[str, np.ndarray]) -> int:
+    """How many samples columns have, by the first of them."""
+    x = next(iter(found.values()), np.empty(0))
+    return x.size if x.ndim < 2 or 1 in x.shape else len(x)
 
 
 def unknown_suffix(path: Path, known: Sequence[str]) -> RecordingError:

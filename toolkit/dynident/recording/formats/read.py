@@ -18,9 +18,8 @@ from dynident.recording.formats.column_names import (
     resolve,
 )
 from dynident.recording.formats.column_table import ColumnTable, FileLayout, left_of
-from dynident.recording.formats.column_values import load
+from dynident.recording.formats.column_values import gather
 from dynident.recording.formats.joint_state_table import prefixed
-from dynident.recording.formats.limits import CUT
 from dynident.recording.formats.open_table import DEFAULT_LAYOUT, open_table
 from dynident.recording.plausibility import warn_of_units
 from dynident.recording.recording import Provenance, Recording, _joint_names
@@ -61,14 +60,17 @@ def read(
     -------
     Recording
         Named after the record, else the file; period, use and so on are set with
-        `Recording.replace`.
+        `Recording.replace`. CSV, NPZ, Parquet and HDF5 files are read some rows at a time, and what
+        is larger than `spooled.IN_MEMORY` never is in memory as a whole: it is mapped from files
+        that are there for as long as the recording is. The provenance then says so.
 
     Raises
     ------
     FileError
         If the file is not there, is no regular file, cannot be read or is too large.
     RecordingError
-        If its content is not a recording: see `Recording` and the readers of each format.
+        If its content is not a recording: see `Recording` and the readers of each format; if there
+        is no room for it.
 
     Warns
     -----
@@ -82,13 +84,9 @@ def read(
     if kinds is not None and len(kinds) != len(names):
         raise RecordingError(f"{len(kinds)} kinds for {len(names)} joints", where)
     located = resolve(table, names, named_otherwise(table, names, columns, layout))
-    try:
-        found = load(table, located)
-    except MemoryError:
-        raise RecordingError("does not fit into memory", where, CUT) from None
+    found, place = gather(table, located, lambda part: _signals(part, names))
     used = [term.name for one in located.values() for term in one.terms]
     recording = Recording(
-        t=found["t"],
         joints=names,
         name=record or path.stem,
         provenance=Provenance(
@@ -98,17 +96,19 @@ def read(
             columns=tuple((ours, one.name, one.scale) for ours, one in located.items()),
             skipped=left_of(table, used),
             first_line=table.first_line,
+            place=place,
         ),
-        **_signals(found, names),
+        **found,
     )
     warn_of_units(recording, kinds)
     return recording
 
 
 def _signals(found: Mapping[str, np.ndarray], joints: Sequence[str]) -> dict[str, Any]:
-    """Signals (T, n) of all joints, from their columns."""
-    signals: dict[str, Any] = {
-        signal: _stacked([found[f"{signal}.{joint}"] for joint in joints])
+    """Time stamps (k,) and some rows (k, n) of each signal of all joints, from their columns."""
+    signals: dict[str, Any] = {"t": found["t"]}
+    signals |= {
+        signal: np.column_stack([found[f"{signal}.{joint}"] for joint in joints])
         for signal in (*REQUIRED, *OPTIONAL)
         if f"{signal}.{joints[0]}" in found
     }
@@ -116,15 +116,8 @@ def _signals(found: Mapping[str, np.ndarray], joints: Sequence[str]) -> dict[str
     for signal in PARTIAL:
         parts = [found.get(f"{signal}.{joint}", missing) for joint in joints]
         if any(part is not missing for part in parts):
-            signals[signal] = _stacked(parts)
+            signals[signal] = np.column_stack(parts)
     return signals
-
-
-def _stacked(columns: list[np.ndarray]) -> np.ndarray:
-    """Return columns side by side, read-only: the recording then shares the array."""
-    array = np.column_stack(columns)
-    array.setflags(write=False)
-    return array
 
 
 def named_otherwise(

@@ -11,7 +11,7 @@ import numpy as np
 
 from dynident.recording.formats.column_names import Column, locate
 from dynident.recording.formats.column_table import FileLayout
-from dynident.recording.formats.column_values import load
+from dynident.recording.formats.column_values import gather
 from dynident.recording.formats.open_table import DEFAULT_LAYOUT, open_table
 from dynident.recording.formats.read import named_otherwise
 from dynident.recording.recording import Provenance, Recording
@@ -101,13 +101,15 @@ def read_wrench(
     joints, names = wanted.joints, wanted.names
     mapping = named_otherwise(table, joints, wanted.columns, layout)
     located = locate(table, ["t", *(f"q.{joint}" for joint in joints), *names], mapping)
-    found = load(table, located)
-    q = np.column_stack([found[f"q.{joint}"] for joint in joints])
-    wrench = np.column_stack([found[name] for name in names])
+
+    def signals(part: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        q = np.column_stack([part[f"q.{joint}"] for joint in joints])
+        wrench = np.column_stack([part[name] for name in names])
+        tau = np.hstack([np.zeros_like(q), wrench])
+        return {"t": part["t"], "q": np.hstack([q, np.zeros_like(wrench)]), "tau": tau}
+
+    found, place = gather(table, located, signals)
     return Recording(
-        t=found["t"],
-        q=np.hstack([q, np.zeros_like(wrench)]),
-        tau=np.hstack([np.zeros_like(q), wrench]),
         joints=(*joints, *names),
         name=record or path.stem,
         provenance=Provenance(
@@ -116,5 +118,7 @@ def read_wrench(
             record=record or "",
             columns=tuple((ours, one.name, one.scale) for ours, one in located.items()),
             first_line=table.first_line,
+            place=place,
         ),
+        **found,
     )

@@ -9,7 +9,7 @@ import numpy as np
 
 from dynident import files
 from dynident.errors import RecordingError
-from dynident.recording.formats.binary_files import pyarrow_parquet
+from dynident.recording.formats.arrays.parquet_file import pyarrow_parquet
 from dynident.recording.formats.column_names import plain
 from dynident.recording.formats.open_table import unknown_suffix
 from dynident.recording.recording import SIGNALS, Recording

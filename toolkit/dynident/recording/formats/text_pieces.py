@@ -1,0 +1,83 @@
+"""Text of any length in pieces of whole lines."""
+
+from __future__ import annotations
+
+import codecs
+from collections.abc import Iterator
+from typing import BinaryIO
+
+from dynident.errors import FileError, RecordingError
+from dynident.recording.formats.limits import AT_ONCE
+
+LONGEST_LINE = 1 << 24
+"""Bytes of a line, of a stretch of empty ones, or of lines between two quotation marks."""
+_BREAKS = b"\r\n"
+
+
+def text_pieces(stream: BinaryIO, file: str) -> Iterator[bytes]:
+    """Yield UTF-8 text in pieces of whole lines, with line feeds between the lines.
+
+    Empty lines are at the beginning of a piece, and in it, but not at its end; those at the end of
+    a long text are left out. Quotation marks are closed in the piece in which they are opened.
+
+    Parameters
+    ----------
+    stream : of the text, at its beginning.
+    file : for messages.
+
+    Raises
+    ------
+    FileError
+        If it is no UTF-8 text, or cannot be read.
+    RecordingError
+        If a line is longer than any of numbers.
+    """
+    rest, place = b"", 0
+    while True:
+        try:
+            block = stream.read(AT_ONCE)
+        except OSError as error:
+            raise FileError(f"cannot be read ({error.strerror or error})", file) from None
+        raw = rest + block
+        end = _end(raw) if block else len(raw)
+        if block and end < len(raw) and raw.count(b'"', 0, end) % 2:
+            end = 0
+        if b"\0" in block:
+            _text(raw, place, file)  # which says what it is
+        if not end and len(raw) > LONGEST_LINE:
+            end = _end(raw)  # a mark that is never closed is for who reads the lines
+            if not end:
+                what = f"holds a line, or empty lines, of more than {LONGEST_LINE >> 20} MB"
+                raise RecordingError(what, file, "is it the right file?")
+        if end and not (place and raw[:end].isspace()):
+            yield _text(raw[:end], place, file)
+        rest, place = raw[end:], place + end
+        if not block:
+            return
+
+
+def _end(raw: bytes) -> int:
+    """Where the last line that is not empty and complete ends; 0 if there is none."""
+    # A carriage return at the very end may be half of a line's end.
+    last = max(raw.rfind(one, 0, len(raw) - 1) for one in (b"\r", b"\n")) + 1
+    last = len(raw) if raw.endswith(b"\n") else last
+    filled = len(raw[:last].rstrip(b" " + _BREAKS))
+    if not filled:
+        return 0
+    end = filled + len(raw[filled:last]) - len(raw[filled:last].lstrip(b" ")) + 1
+    return end + 1 if raw[end - 1 : end + 1] == _BREAKS else end
+
+
+def _text(raw: bytes, place: int, file: str) -> bytes:
+    """Lines of UTF-8 text; no copy where they are as they are wanted."""
+    try:
+        if not raw.isascii():
+            raw.decode()
+    except UnicodeDecodeError as error:
+        what = f"is not UTF-8 text (byte {place + error.start})"
+        raise FileError(what, file, "is it the right file?") from None
+    if b"\0" in raw:
+        what = "is not text (it holds NUL bytes)"
+        raise FileError(what, file, "is it the right file?")
+    raw = raw if place else raw.removeprefix(codecs.BOM_UTF8)
+    return raw.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in raw else raw
