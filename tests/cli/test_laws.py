@@ -81,7 +81,8 @@ def test_a_law_is_proposed_and_written(simulated: Path, tmp_path: Path, run) -> 
     """The hidden c v sin(k q + p), as its expansion; the verdict stays."""
     study, shared = simulated / "proposed.toml", tmp_path / "lab.toml"
     study.write_text((simulated / "study.toml").read_text())
-    done = run("explain", study, "--json", "--laws", shared)
+    page = tmp_path / "report.html"
+    done = run("explain", study, "--json", "--laws", shared, "--report", page)
     assert done.status == 0, done.err
     answer = done.json
     assert answer["verdict"] == "unexplained"
@@ -92,6 +93,9 @@ def test_a_law_is_proposed_and_written(simulated: Path, tmp_path: Path, run) -> 
     true = {"c1": 0.3 * np.cos(1.1), "c2": 0.3 * np.sin(1.1)}
     for name, value in true.items():
         assert abs(found["values"][name] - value) < 0.03
+    assert 0 < found["sigma"]["k"] < 0.05
+    assert "Laws that no catalogue has" in page.read_text()
+    assert "add STUDY --proposal 1" in page.read_text()
     assert found["explains"] > 0.85
     assert found["test_error_after"] < found["test_error_before"]
 

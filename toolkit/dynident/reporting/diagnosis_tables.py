@@ -14,6 +14,7 @@ from dynident import files
 from dynident.batch import evaluations
 from dynident.closed_loop import loop_evaluations
 from dynident.diagnosis.details import Candidate, Step
+from dynident.diagnosis.proposals.proposal import Proposal
 from dynident.diagnosis.result import Diagnosis
 from dynident.reporting.content import first_set
 from dynident.reporting.joint_states import states
@@ -96,6 +97,12 @@ def _values(diagnosis: Diagnosis, step: Step) -> str:
     linear = zip(step.effect.parameters(robot), step.values, strict=True)
     shapes = zip(step.effect.shape_parameters(robot), step.effect.shape, strict=True)
     return ", ".join(f"{p.name} = {number(x)} {p.unit}" for p, x in (*linear, *shapes))
+
+
+def proposal_table(proposal: Proposal, diagnosis: Diagnosis) -> Table:
+    """Parameters of a proposed law."""
+    rows = proposal.rows(diagnosis.after.model.robot)
+    return Table("Its parameters", ("parameter", "value", "sigma", "unit"), rows)
 
 
 def candidate_table(diagnosis: Diagnosis, shown: tuple[Candidate, ...]) -> Table:

@@ -18,6 +18,7 @@ from dynident.reporting.diagnosis_tables import (
     candidate_table,
     joint_table,
     not_identifiable_table,
+    proposal_table,
     provenance,
     remaining_table,
     step_table,
@@ -147,6 +148,9 @@ def _diagnosis_page(
             # The page has one legend for all of them.
             figures[name] = pictures.residual_map(diagnosis, one).update_layout(showlegend=False)
     figures |= dict(closed.figures) if closed else {}
+    laws = [f"law-{k}" for k, one in enumerate(diagnosis.proposals) if one.picture]
+    for name, one in zip(laws, (p for p in diagnosis.proposals if p.picture), strict=True):
+        figures[name] = pictures.law_picture(one)
     place = {one.joint.name: i for i, one in enumerate(states(diagnosis))}
     order = sorted(range(len(names)), key=lambda i: place[diagnosis.traces[i].joint])
     known = diagnosis.noise_source != "unknown"
@@ -162,6 +166,9 @@ def _diagnosis_page(
         added=after_name(diagnosis) if diagnosis.steps else "",
         summary=summary(diagnosis),
         advice=next_steps(diagnosis),
+        proposals=[
+            (f"law-{k}", p, proposal_table(p, diagnosis)) for k, p in enumerate(diagnosis.proposals)
+        ],
         joints=joint_table(diagnosis),
         steps=step_table(diagnosis),
         torques=[(names[i], diagnosis.traces[i]) for i in order],

@@ -38,7 +38,7 @@ def next_steps(diagnosis: Diagnosis) -> tuple[Advice, ...]:
     """What to do, the most useful first."""
     if diagnosis.wiring:
         return tuple(_to_mend(fault) for fault in diagnosis.wiring)
-    found = [*_to_add(diagnosis), *_to_separate(diagnosis)]
+    found = [*_to_add(diagnosis), *_to_separate(diagnosis), *_to_try(diagnosis)]
     if diagnosis.verdict == "unexplained":
         found.append(_unexplained(diagnosis))
     if diagnosis.noise_source != "replicates":
@@ -103,6 +103,19 @@ def _to_separate(diagnosis: Diagnosis) -> list[Advice]:
         for step in diagnosis.steps
         if step.indistinguishable
     ]
+
+
+def _to_try(diagnosis: Diagnosis) -> list[Advice]:
+    """Proposed laws, of which a robot knows nothing yet."""
+    found = []
+    for number, one in enumerate(diagnosis.proposals, 1):
+        what = f"Ask yourself whether {one.effect.joint} can have the torque {one.torque}."
+        why = (
+            "It was found among many terms and fits: a mechanism that makes it is what would make "
+            "it a finding. So would another recording, of which it takes as much."
+        )
+        found.append(Advice(what, why, (f"dynident add STUDY --proposal {number}",)))
+    return found
 
 
 def _either(effects: tuple[Effect, ...]) -> str:

@@ -25,6 +25,7 @@ from dynident.fitting.uncertainty.shape_errors import ShapeSlope
 _SAME = 1e-9
 _SAME_SHAPE = 0.1
 _AT_BOUND = 1e-3
+_CLASS = 10  # rows of a class in the picture, at least
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -177,7 +178,7 @@ class LawSearch:
             noise_floor=after.floor,
             rivals=best.rivals(criteria.rival_level),
             remark=_remark(effect),
-            picture=_picture(before, after, fitted.model.robot.names.index(str(effect.joint))),
+            picture=_picture(before, after, fitted, str(effect.joint)),
         )
 
     def _spread(
@@ -276,11 +277,25 @@ def _alike(one: LawEffect, other: Effect) -> bool:
     return same and bool(np.allclose(one.shape, other.shape, rtol=_SAME_SHAPE))
 
 
-def _picture(before: HeldOut, after: HeldOut, joint: int) -> LawPicture:
+def _picture(before: HeldOut, after: HeldOut, fitted: EvidenceFit, joint: str) -> LawPicture:
     """What the law changes on held-out data, and what was left there without it."""
-    law = [new.predicted - old.predicted for old, new in zip(before.runs, after.runs, strict=True)]
-    left = [one.measured - one.predicted for one in before.runs]
+    robot = fitted.model.robot
+    j = robot.names.index(joint)
+    kept = np.concatenate([one.certain[:, j] for one in before.runs])
+    law = np.concatenate(
+        [
+            new.predicted[:, j] - old.predicted[:, j]
+            for old, new in zip(before.runs, after.runs, strict=True)
+        ]
+    )[kept]
+    left = np.concatenate([one.measured[:, j] - one.predicted[:, j] for one in before.runs])[kept]
+    order = np.argsort(law)
+    classes = np.array_split(order, max(1, min(fitted.criteria.maps.bins, len(order) // _CLASS)))
+    noise = float("nan") if after.noise_std is None else float(after.noise_std[j])
+    spread = 2.0 * noise * np.sqrt(after.inflation[j])
     return LawPicture(
-        law=np.concatenate([one[:, joint] for one in law]),
-        residual=np.concatenate([one[:, joint] for one in left]),
+        law=np.array([law[rows].mean() for rows in classes]),
+        residual=np.array([left[rows].mean() for rows in classes]),
+        band=np.array([spread / np.sqrt(len(rows)) for rows in classes]),
+        torque_unit=robot.torque_units[j],
     )

@@ -8,21 +8,27 @@ from typing import Any
 import numpy as np
 
 from dynident.effects import LawEffect
-from dynident.tables import number, percent
+from dynident.tables import finite, number, percent
 
 
 @dataclass(frozen=True, eq=False)
 class LawPicture:
-    """What the law is to explain, against its own value, on held-out data.
+    """What the model leaves on held-out data, where the law says this much or that.
+
+    Where the law is right, its means lie on the diagonal, within the noise band.
 
     Attributes
     ----------
-    law : (T,) N m or N, the torque of the law.
-    residual : (T,) what the model leaves without it.
+    law : (b,) N m or N, mean torque of the law in classes of as many rows each, ascending.
+    residual : (b,) mean of what the model leaves there without the law.
+    band : (b,) two standard errors of that by the noise; NaN where it is unknown.
+    torque_unit : N m or N.
     """
 
     law: np.ndarray
     residual: np.ndarray
+    band: np.ndarray
+    torque_unit: str
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -114,6 +120,13 @@ class Proposal:
             "joint": self.effect.joint,
             "shape": {name: [low, high] for name, low, high in law.shape},
             "values": self.named_values,
+            "sigma": dict(
+                zip(
+                    self.named_values,
+                    (finite(one) for one in (*self.sigma, *self.shape_sigma)),
+                    strict=True,
+                )
+            ),
             "explains": self.explains,
             "p_value": self.p_value,
             "tried": self.tried,

@@ -122,7 +122,9 @@ def centred(name: str, value: float, given: tuple[float, float]) -> tuple[float,
     -------
     Lower and upper bound.
     """
-    return (max(value - _REACH, _LOWEST), value + _REACH) if name == "k" else given
+    if name != "k":
+        return given
+    return round(max(value - _REACH, _LOWEST), 2), round(value + _REACH, 2)
 
 
 def library(robot: Robot, joint: str) -> tuple[LibraryTerm, ...]:

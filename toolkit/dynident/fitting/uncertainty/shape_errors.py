@@ -63,9 +63,6 @@ class ShapeSlope(Effect):
     def parameters(self, robot) -> tuple[Parameter, ...]:
         return tuple(Parameter(s.name, "1") for s in self.effect.shape_parameters(robot))
 
-    def acting_at(self, robot) -> tuple[int, ...]:
-        return self.effect.acting_at(robot)
-
     def columns(self, block: Block) -> np.ndarray:
         slopes = self.effect.sensitivities(block)
         assert slopes is not None

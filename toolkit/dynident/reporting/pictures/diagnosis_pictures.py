@@ -7,6 +7,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from dynident.diagnosis.details import Trace
+from dynident.diagnosis.proposals.proposal import Proposal
 from dynident.diagnosis.result import Diagnosis
 from dynident.evidence.maps import ResidualMap
 from dynident.reporting.content import (
@@ -138,6 +139,37 @@ def residual_map(diagnosis: Diagnosis, one: ResidualMap) -> go.Figure:
     y = {"title": {"text": y_title(one)}, **_map_zero(one)}
     layout = {"xaxis": {"title": {"text": x_title(one)}}, "yaxis": y, "dragmode": False}
     return dressed(go.Figure(_map_traces(diagnosis, one), layout), 300, top=22)
+
+
+def law_picture(proposal: Proposal) -> go.Figure:
+    """What the model leaves against what a proposed law says, with the noise band.
+
+    Parameters
+    ----------
+    proposal : with its picture.
+    """
+    one = proposal.picture
+    assert one is not None
+    x, unit = single_precision(one.law), one.torque_unit
+    figure = go.Figure()
+    if np.isfinite(one.band).all():
+        edge = np.concatenate([one.law + one.band, (one.law - one.band)[::-1]])
+        figure.add_trace(_band(np.concatenate([one.law, one.law[::-1]]), edge, BAND))
+    line = {"color": AFTER_COLOUR, "width": 2}
+    figure.add_trace(go.Scatter(x=x, y=x, mode="lines", line=line, name=plain("the law")))
+    figure.add_trace(
+        go.Scatter(
+            x=x,
+            y=single_precision(one.residual),
+            mode="markers",
+            name="left by the model",
+            marker=mark(BEFORE_COLOUR, "circle-open"),
+            hovertemplate="%{x:.4g}: %{y:.4g}<extra></extra>",
+        )
+    )
+    figure.update_xaxes(title=f"torque of the law ({unit})", fixedrange=True)
+    figure.update_yaxes(title=f"mean residual ({unit})", zeroline=True, fixedrange=True)
+    return dressed(figure, 340, top=22)
 
 
 def measured_and_predicted(diagnosis: Diagnosis, trace: Trace, points: int = 4000) -> go.Figure:

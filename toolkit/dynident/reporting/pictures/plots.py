@@ -10,7 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dynident import files
+from dynident.diagnosis.proposals.proposal import Proposal
 from dynident.diagnosis.result import Diagnosis
+from dynident.errors import DynidentError
 from dynident.evidence.maps import ResidualMap
 from dynident.reporting.content import (
     AFTER_COLOUR,
@@ -101,6 +103,33 @@ def residual_maps(diagnosis: Diagnosis, joint: str, given: str = GIVEN) -> Figur
         draw_residual_map(axes, diagnosis, one, given)
     handles, labels = grid[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper left", ncols=3, frameon=False)
+    return figure
+
+
+def law_picture(proposal: Proposal) -> Figure:
+    """What the model leaves on held-out data, against what a proposed law says.
+
+    Raises
+    ------
+    DynidentError
+        If the proposal has no picture.
+    """
+    one = proposal.picture
+    if one is None:
+        raise DynidentError("has no picture", f"the proposal {proposal.torque}")
+    figure = Picture(figsize=(4.6, 3.4), layout="constrained")
+    axes = figure.subplots()
+    if np.isfinite(one.band).all():
+        limits = one.law - one.band, one.law + one.band
+        axes.fill_between(one.law, *limits, color=GREY, alpha=0.25, label=BAND)
+    axes.plot(one.law, one.law, color=AFTER_COLOUR, label="the law")
+    axes.plot(
+        one.law, one.residual, "o", mfc="none", color=BEFORE_COLOUR, label="left by the model"
+    )
+    axes.set_xlabel(f"torque of {plain(proposal.torque)} ({one.torque_unit})")
+    axes.set_ylabel(f"mean residual ({one.torque_unit})")
+    axes.legend(frameon=False)
+    axes.spines[["top", "right"]].set_visible(False)
     return figure
 
 
