@@ -350,13 +350,15 @@ class Evidence:
         known, key = self.cache.along(sampled.motion), (self.model.robot, "full rate")
         if key not in known:
             whole = model.robot.regressor(block.q, block.v, block.a)
-            known[key] = whole[:, :, [*base, *range(tip, tip + 10)]]
+            wanted = [*base, *range(tip, tip + 10)]
+            # Samples side by side, as products with values are quickest.
+            known[key] = np.ascontiguousarray(whole.transpose(1, 2, 0)[:, wanted])
         rigid = known[key]
-        torque = rigid[:, :, : len(base)] @ values[: len(base)]
+        torque = (values[: len(base)] @ rigid[:, : len(base)]).T
         for one in model.effects:
             own = values[model.slices[one.label]]
             if one.is_payload:
-                torque = torque + rigid[:, :, len(base) :] @ own * float(block.carries_payload)
+                torque = torque + (own @ rigid[:, len(base) :]).T * float(block.carries_payload)
             elif not one.needs_torque:
                 torque = torque + one.columns(block) @ own
         return torque

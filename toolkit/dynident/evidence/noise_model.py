@@ -74,9 +74,9 @@ class NoiseModel:
         local = np.interp(np.abs(speed), self.speeds, self.scales) * self.std
         scaled = signals / local[:, None]
         # Few coefficients and many short columns: quicker than a general filter.
-        white = self.colour[0] * scaled
+        white, part = self.colour[0] * scaled, np.empty_like(scaled)
         for lag, coefficient in enumerate(self.colour[1:], start=1):
-            white[lag:] += coefficient * scaled[:-lag]
+            white[lag:] += np.multiply(scaled[:-lag], coefficient, out=part[lag:])
         return white
 
 

@@ -38,23 +38,24 @@ def replicate_moments(
     -------
     (B, a, b); noisy copies do not count as rows
     """
-    free, total = [], []
-    for start, stop in pairwise(edges):
-        one, two = left[:, start:stop], right[:, start:stop]
-        if kind == "noise_augmented":
-            plain = one[0].T @ two[0]
-            noise = sum(
-                (a - one[0]).T @ (b - two[0]) for a, b in zip(one[1:], two[1:], strict=True)
-            ) / (len(one) - 1)
-            free.append(plain - noise)
-        else:
-            plain = one.reshape(-1, one.shape[2]).T @ two.reshape(-1, two.shape[2])
-            if kind == "repeated":
-                together = one.sum(axis=0).T @ two.sum(axis=0)
-                free.append((together - plain) / (len(one) - 1))
-        total.append(plain)
-    count = np.diff(edges) * (1 if kind == "noise_augmented" else len(left))
-    return SecondMoments(np.array(total), count, None, np.array(free) if free else None)
+    blocks = [slice(start, stop) for start, stop in pairwise(edges.tolist())]
+    if kind == "noise_augmented":
+        total = _block_products(left[:1], right[:1], blocks)
+        noise = _block_products(left[1:] - left[0], right[1:] - right[0], blocks)
+        free = total - noise / (len(left) - 1)
+        return SecondMoments(total, np.diff(edges), None, free)
+    total, free = _block_products(left, right, blocks), None
+    if kind == "repeated":
+        one = left.sum(axis=0, keepdims=True)
+        two = one if right is left else right.sum(axis=0, keepdims=True)
+        free = (_block_products(one, two, blocks) - total) / (len(left) - 1)
+    return SecondMoments(total, np.diff(edges) * len(left), None, free)
+
+
+def _block_products(left: np.ndarray, right: np.ndarray, blocks: list[slice]) -> np.ndarray:
+    """Products of columns over instants and replicates, block by block, (B, a, b)."""
+    turned = left.transpose(0, 2, 1)
+    return np.array([(turned[:, :, some] @ right[:, some]).sum(axis=0) for some in blocks])
 
 
 @dataclass(frozen=True)

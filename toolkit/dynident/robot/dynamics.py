@@ -20,8 +20,9 @@ from dynident.robot.tree import Array, Joint
 pin: Any = lazy_loader.load("pinocchio")
 
 # Samples of one call for which a function of many samples pays. Measured: making it takes as long
-# as 3000 (30 or 60 joints) to 30 000 (2 joints) samples through Pinocchio, once for all calls.
-_MANY, _MANY_JOINTS = 1000, 14000  # the second divided by the number of joints
+# as 3000 (30 or 60 joints) to 7000 (2 joints) samples through Pinocchio, once for all calls, and
+# whoever asks for a recording asks again. Not by what was asked before: the last digits would be.
+_MANY = 1000
 
 
 def _kinematics(joints: Sequence[Joint], gravity: Array) -> tuple[Any, list[int]]:
@@ -207,7 +208,7 @@ class Dynamics:
 
     def _is_many(self, q: Array) -> bool:
         """Whether a function of many samples pays."""
-        return len(q) >= _MANY + _MANY_JOINTS / self.n
+        return len(q) >= _MANY
 
     def _hold(self, phi: Array) -> None:
         """Give the model these inertias, and note whether it holds them with all their digits."""
