@@ -20,6 +20,7 @@ from dynident.effects import (
     JointEffect,
     Needs,
     Parameter,
+    ResidualPicture,
     ShapeParameter,
     Term,
     catalogue,
@@ -103,6 +104,21 @@ def torque_without_need():
 @breaks("words", "needs = 'torque'")
 def needs_in_words():
     return {"needs": "torque"}
+
+
+@breaks("pictures", "which is no ResidualPicture")
+def pictures_in_words():
+    return {"pictures": ("a slope",)}
+
+
+@breaks("pictures", "is against 'speed', and may be velocity, ")
+def a_picture_of_no_map():
+    return {"pictures": (ResidualPicture("speed", "a slope", lambda x, s: x),)}  # type: ignore[arg-type]
+
+
+@breaks("pictures", "'a pole' at 0 times is nan where -0 is due (sample 0)")
+def a_picture_that_is_not_finite():
+    return {"pictures": (ResidualPicture("position", "a pole", lambda x, s: np.log(x)),)}
 
 
 @breaks("places refused", "on() accepts the joints (None,)")

@@ -46,6 +46,7 @@ _COPY = "copy what is to be changed"
 _UNITS = "state the unit with which column times parameter is a torque"
 RULES = (
     ContractRule("words", "class", word_rules.says_what_it_is, "say it as a class attribute"),
+    ContractRule("pictures", "class", word_rules.pictures_can_be_drawn),
     ContractRule("places refused", "class", word_rules.refuses_wrong_places),
     ContractRule("parameters", "place", word_rules.has_parameters),
     ContractRule("finite columns", "place", column_rules.columns_are_finite),
@@ -105,7 +106,8 @@ def check_effect(kind: type[Effect]) -> None:
 
 
 def _broken(rule: ContractRule, where: str, complaint: str, remedy: str) -> EffectError:
-    return EffectError(f"breaks the rule '{rule.name}': {complaint}", where, remedy)
+    what = f"breaks the rule '{rule.name}': {' '.join(complaint.split())}"
+    return EffectError(what, where, remedy)
 
 
 def _said(error: BaseException, kind: type[Effect]) -> str:

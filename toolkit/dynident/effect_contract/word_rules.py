@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import get_args
 
 import numpy as np
 
 from dynident.effect_contract.crane import block_of, crane, places
+from dynident.effect_contract.disagreement import differs
 from dynident.effects import Effect, Needs, catalogue, effects_of
+from dynident.effects.residual_picture import Quantity, ResidualPicture
 from dynident.effects.soundness import unsound_parameters
 from dynident.errors import EffectError
 from dynident.model import Model
@@ -30,6 +33,18 @@ def says_what_it_is(kind: type[Effect]) -> Iterator[str]:
         yield f"needs = {kind.needs!r}, which is no Needs"
     elif kind.linear_in_torque and Needs.TORQUE not in kind.needs:
         yield "it is linear in the torque, and does not say that it needs it"
+
+
+def pictures_can_be_drawn(kind: type[Effect]) -> Iterator[str]:
+    """Each is finite wherever a residual map has a bin."""
+    at, quantities = np.linspace(-1.0, 1.0, 9), get_args(Quantity)
+    for one in kind.pictures:
+        if not isinstance(one, ResidualPicture):
+            yield f"pictures holds a {type(one).__name__}, which is no ResidualPicture"
+        elif one.against not in quantities:
+            yield f"a picture is against {one.against!r}, and may be {', '.join(quantities)}"
+        else:
+            yield from differs(f"'{one.words}' at 0 times", 0.0 * one.of(at, 1.0), 0.0 * at)
 
 
 def can_be_somewhere(kind: type[Effect]) -> Iterator[str]:

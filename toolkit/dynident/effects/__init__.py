@@ -3,7 +3,8 @@
 A new effect is a subclass of `Effect` and nothing else: with a name of its own it joins the
 catalogue when it is defined, wherever that is, and with it the fits, the diagnosis, the simulator,
 the report and the tests. Those that dynident brings are files in the folders here: `friction`,
-`drives`, `transmissions` and `bodies` say where an effect sits.
+`drives`, `transmissions` and `bodies` say where an effect sits. docs/your_own_effects.md has an
+example of one's own.
 """
 
 from dynident.effects.block import FRICTION_WIDTH, Block
@@ -17,8 +18,10 @@ from dynident.effects.laws import (
     laws_of,
     laws_table,
 )
+from dynident.effects.origin import Origin, origin_of
 from dynident.effects.parameter import Parameter, ShapeParameter
 from dynident.effects.registry import catalogue, effects_of
+from dynident.effects.residual_picture import ResidualPicture
 from dynident.effects.terms import Term
 from dynident.effects.traits import Needs
 from dynident.effects.transmission import Transmission
@@ -33,7 +36,9 @@ __all__ = [
     "LawEntry",
     "LawsEntry",
     "Needs",
+    "Origin",
     "Parameter",
+    "ResidualPicture",
     "ShapeParameter",
     "Term",
     "Transmission",
@@ -44,4 +49,5 @@ __all__ = [
     "laws_of",
     "laws_table",
     "motion_unit",
+    "origin_of",
 ]

@@ -24,6 +24,7 @@ import numpy as np
 from dynident.effects.block import Block
 from dynident.effects.known_effects import join
 from dynident.effects.parameter import Parameter, ShapeParameter
+from dynident.effects.residual_picture import ResidualPicture
 from dynident.effects.simulated import SimulatedEffect
 from dynident.effects.terms import Term
 from dynident.effects.traits import EffectTraits
@@ -77,6 +78,10 @@ class Effect(EffectTraits, SimulatedEffect, ABC):
     """The torque as a formula, for tables."""
     sign_of: ClassVar[str]
     """What it looks like in the residual, one clause."""
+    meaning: ClassVar[str] = ""
+    """What it is, as a clause for a reader who has never heard its name."""
+    pictures: ClassVar[tuple[ResidualPicture, ...]] = ()
+    """What it draws in residual maps, where that is a plain shape."""
     confounded_with: ClassVar[tuple[str, ...]] = ()
     experiment: ClassVar[str]
     """The experiment that shows it: a sentence in which {joint} and {source} are filled in."""
@@ -93,6 +98,9 @@ class Effect(EffectTraits, SimulatedEffect, ABC):
     def __init_subclass__(cls, **keywords: Any) -> None:
         """Join the catalogue, unless the class is internal; see `known_effects.join`."""
         super().__init_subclass__(**keywords)
+        if "name" in vars(cls):  # another effect than the one that it derives from: other words
+            cls.meaning = vars(cls).get("meaning", "")
+            cls.pictures = vars(cls).get("pictures", ())
         join(cls)
 
     # --- what it is ---------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,6 +10,7 @@ import numpy as np
 from scipy import special
 
 from dynident.criteria import DEFAULTS, MapCriteria
+from dynident.effects import catalogue
 from dynident.evidence.held_out import HeldOut
 from dynident.model import Model
 from dynident.robot import Robot
@@ -44,55 +45,6 @@ class ResidualMap:
     after: np.ndarray
     band: np.ndarray
     sentence: str
-
-
-@dataclass(frozen=True)
-class _Shape:
-    """What an effect looks like in a map: `of(x, largest x)`."""
-
-    effect: str
-    words: str
-    of: Callable[[np.ndarray, float], np.ndarray]
-
-
-def _spikes(width: float) -> _Shape:
-    words = "spikes beside zero velocity: Stribeck friction, or presliding"
-    return _Shape(
-        "stribeck_friction", words, lambda x, s: np.sign(x) * np.exp(-((x / (width * s)) ** 2))
-    )
-
-
-_SHAPES: dict[str, tuple[_Shape, ...]] = {
-    "velocity": (
-        _Shape(
-            "coulomb_friction",
-            "a step at zero velocity: dry (Coulomb) friction",
-            lambda x, s: np.tanh(x / (0.02 * s)),
-        ),
-        _Shape("viscous_friction", "a slope against velocity: viscous friction", lambda x, s: x),
-        _spikes(0.05),
-        _spikes(0.15),
-        _Shape("quadratic_drag", "a curve, steeper at speed: drag", lambda x, s: x * np.abs(x)),
-        _Shape(
-            "asymmetric_friction",
-            "slopes that differ between the directions: asymmetric friction",
-            lambda x, s: np.abs(x),
-        ),
-        _Shape(
-            "torque_offset", "a constant at all velocities: an offset", lambda x, s: np.ones_like(x)
-        ),
-    ),
-    "position": (_Shape("joint_spring", "a ramp against position: a spring", lambda x, s: x),),
-    "acceleration": (
-        _Shape(
-            "rotor_inertia",
-            "a slope against acceleration: an inertia (of a rotor, say)",
-            lambda x, s: x,
-        ),
-    ),
-    "load": (_Shape("drive_gain", "a tilted line against load: a drive gain", lambda x, s: x),),
-    "time": (_Shape("torque_drift", "a ramp over time: a drift", lambda x, s: x),),
-}
 
 
 def residual_maps(
@@ -203,20 +155,25 @@ def _sentence(
     if special.chdtrc(len(at), power) > criteria.level:
         return ""
     scale = float(np.abs(at).max()) or 1.0
-    shapes = _SHAPES[against]
+    pictures = [
+        (name, picture)
+        for name, kind in catalogue().items()
+        for picture in kind.pictures
+        if picture.against == against
+    ]
     # The fit has taken out of the map what its own columns can explain: out of the shapes too.
-    known = [shape.of(at, scale) * weight for shape in shapes if shape.effect in fitted]
+    known = [one.of(at, scale) * weight for name, one in pictures if name in fitted]
     clear = _clearing(np.array(known).T) if known else np.eye(len(at))
     seen = clear @ (mean * weight)
     best, share = "", 0.0
-    for shape in shapes:
-        if shape.effect in fitted:
+    for name, picture in pictures:
+        if name in fitted:
             continue
-        column = clear @ (shape.of(at, scale) * weight)
+        column = clear @ (picture.of(at, scale) * weight)
         norm = float(column @ column)
         explained = float(column @ seen) ** 2 / (norm * power) if norm > 0 else 0.0
         if explained > share:
-            best, share = shape.words, explained
+            best, share = picture.words, explained
     return f"{best} ({100 * share:.0f} % of what is seen here)" if share >= criteria.share else ""
 
 

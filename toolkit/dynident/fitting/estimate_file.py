@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from dynident import files
-from dynident.effects import Law, catalogue, law_effect
+from dynident.effects import Law, Origin, catalogue, law_effect
 from dynident.errors import DynidentError, EffectError, FitError
 from dynident.fitting.estimate import DataSource, Estimate, ShapeValue
 from dynident.fitting.estimate_schema import BasisPart, EstimateFile, ModelPart
@@ -127,6 +127,9 @@ def _model(given: ModelPart, where: str) -> Model:
         raise _refusal("model.laws", str(error), where) from None
     known = {**catalogue(), **{law.label: law_effect(law) for law in laws}}
     for number, one in enumerate(given.effects):
+        if one.effect not in known and one.origin is not None:
+            origin = Origin(one.origin.module[:40], one.origin.file[:80], one.origin.package[:80])
+            raise FitError(origin.missing(one.effect[:40]), where)
         if one.effect not in known:
             what = f"no effect is named '{one.effect[:40]}'"
             raise _refusal(f"model.effects.{number}.effect", what, where)

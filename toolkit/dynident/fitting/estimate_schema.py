@@ -7,10 +7,12 @@ to say, which knows the model.
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
+from dynident.effects import Effect, origin_of
 from dynident.inertia import LARGEST
 from dynident.model import Model
 from dynident.robot import BaseParameters
@@ -70,12 +72,19 @@ class _Recording(_Part):
     filter: str
 
 
+class _Origin(_Part):
+    module: str
+    file: str
+    package: str
+
+
 class _Effect(_Part):
     effect: str
     joint: str | None
     source: str | None
     shape: list[_Number]
     point: list[_Number] = []
+    origin: _Origin | None = None
 
 
 class _Range(_Part):
@@ -151,6 +160,12 @@ def _width(width: float | tuple[float, ...]) -> float | list[float]:
     return list(width) if isinstance(width, tuple) else width
 
 
+def _origin_part(effect: Effect) -> dict[str, Any]:
+    """Where an effect of one's own came from; nothing of the package's."""
+    origin = origin_of(type(effect))
+    return {} if origin is None else {"origin": asdict(origin)}
+
+
 def model_part(model: Model) -> dict[str, Any]:
     """Return a model as JSON holds it, with the robot description in it."""
     description = model.robot.description
@@ -166,6 +181,7 @@ def model_part(model: Model) -> dict[str, Any]:
                 "source": effect.source,
                 "shape": list(effect.shape),
                 "point": list(effect.point),
+                **_origin_part(effect),
             }
             for effect in model.effects
         ],

@@ -26,6 +26,10 @@ class BaseTilt(Forceless):
     place = "robot"
     law = "Y(q, 0, 0; turned gravity) theta"
     sign_of = "a residual like the robot's own weight, but sideways"
+    meaning = (
+        "the robot does not stand upright, so gravity pulls in another direction than the "
+        "model says"
+    )
     confounded_with = ("joint_zero", "joint_spring")
     shown_by = "position range"
     experiment = (

@@ -18,6 +18,10 @@ class Contact(JointEffect):
     name = "contact"
     law = "A exp(-((t - time)/width)^2/2), in one recording"
     sign_of = "a burst in one repetition only"
+    meaning = (
+        "something pushed the robot for a moment in one recording: it touched an obstacle, or "
+        "someone touched it"
+    )
     shown_by = "repetition"
     experiment = "record {joint} once more, over several periods, with nothing in its way"
     needs = Needs.NUMBER

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.effects.effect import Block, JointEffect, Parameter, force_unit, motion_unit
+from dynident.effects.residual_picture import ResidualPicture
 from dynident.effects.terms import Term
 
 
@@ -14,6 +15,11 @@ class JointSpring(JointEffect):
     name = "joint_spring"
     law = "k q + c"
     sign_of = "a ramp against position"
+    meaning = (
+        "something pulls the joint towards one position like a spring: a balancer, a hose, a "
+        "bundle of cables"
+    )
+    pictures = (ResidualPicture("position", "a ramp against position: a spring", lambda x, s: x),)
     confounded_with = ("torque_ripple", "torque_offset")
     shown_by = "position range"
     experiment = "move {joint} slowly over its whole range"

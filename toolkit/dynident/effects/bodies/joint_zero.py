@@ -21,6 +21,10 @@ class JointZero(Forceless):
     name = "joint_zero"
     law = "tau(q + offset) - tau(q)"
     sign_of = "a residual that follows the weight as if the joint stood elsewhere"
+    meaning = (
+        "the encoder's zero is not where the robot description has it, so that the joint "
+        "stands at another angle than it reports"
+    )
     confounded_with = ("base_tilt", "joint_spring", "torque_offset")
     shown_by = "position range"
     experiment = (

@@ -24,6 +24,7 @@ class Payload(Forceless):
     place = "robot"
     law = "Y_last(q, v, a) [mass, mx, ...]"
     sign_of = "a residual like gravity and inertia of the last link, in some recordings only"
+    meaning = "the robot carries something that the model does not know of"
     confounded_with = ("drive_gain",)
     shown_by = "payload"
     experiment = "repeat one recording with the payload and one without"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.effects.effect import Block, Forceless, JointEffect, Parameter
+from dynident.effects.residual_picture import ResidualPicture
 from dynident.effects.traits import Needs
 from dynident.errors import EffectError
 
@@ -19,6 +20,10 @@ class DriveGain(Forceless, JointEffect):
     name = "drive_gain"
     law = "e tau"
     sign_of = "a tilted line against load"
+    meaning = "the drive gives more or less torque than it reports, in a fixed proportion"
+    pictures = (
+        ResidualPicture("load", "a tilted line against load: a drive gain", lambda x, s: x),
+    )
     confounded_with = ("payload", "rotor_inertia")
     shown_by = "load"
     experiment = "move {joint} through loads that the other joints feel too, or weigh a known mass"

@@ -20,6 +20,9 @@ class JointCoupling(JointEffect):
     place = "pair"
     law = "cv v_i + cc sign(v_i) + ca a_i + cs sign(v_i + v_j)"
     sign_of = "a residual that follows another joint's motion"
+    meaning = (
+        "moving one joint loads the drive of another, as belts, cables and differential gears do"
+    )
     confounded_with = ("rotor_inertia", "viscous_friction", "coulomb_friction")
     shown_by = "source alone"
     experiment = "move {source} with {joint} still, slowly and fast"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.effects.effect import Block, Forceless, JointEffect, Parameter, motion_unit
+from dynident.effects.residual_picture import ResidualPicture
 
 
 class RotorInertia(Forceless, JointEffect):
@@ -14,6 +15,17 @@ class RotorInertia(Forceless, JointEffect):
     at_every_joint = True
     law = "Ia a"
     sign_of = "a slope against the joint's own acceleration"
+    meaning = (
+        "the motor's spinning rotor must be accelerated too; seen from the link it is an "
+        "inertia of its own"
+    )
+    pictures = (
+        ResidualPicture(
+            "acceleration",
+            "a slope against acceleration: an inertia (of a rotor, say)",
+            lambda x, s: x,
+        ),
+    )
     shown_by = "acceleration"
     experiment = (
         "accelerate {joint} hard together with the other joints (at the first joint of an arm it "

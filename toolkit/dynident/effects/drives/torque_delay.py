@@ -26,6 +26,7 @@ class TorqueDelay(Forceless):
     place = "joint or robot"
     law = "tau(t - d) - tau(t)"
     sign_of = "a residual like the rate at which the torque changes"
+    meaning = "the torque is recorded a moment later than the motion"
     confounded_with = ("joint_elasticity", "rotor_inertia", "viscous_friction")
     shown_by = "acceleration"
     experiment = "move fast, so that the torque changes much within the delay"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.effects.effect import Block, JointEffect, Parameter, force_unit
+from dynident.effects.residual_picture import ResidualPicture
 
 
 class TorqueDrift(JointEffect):
@@ -14,6 +15,8 @@ class TorqueDrift(JointEffect):
     time_varying = True
     law = "rate t"
     sign_of = "a ramp against the time of the session, whatever the joint does"
+    meaning = "the reading of the torque creeps away from zero as time goes by"
+    pictures = (ResidualPicture("time", "a ramp over time: a drift", lambda x, s: x),)
     confounded_with = ("torque_offset", "thermal_friction")
     shown_by = "session"
     experiment = "repeat one recording of {joint} early and late in a long session"

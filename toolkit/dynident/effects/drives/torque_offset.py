@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.effects.effect import Block, JointEffect, Parameter, force_unit
+from dynident.effects.residual_picture import ResidualPicture
 from dynident.effects.terms import Term
 
 
@@ -15,6 +16,14 @@ class TorqueOffset(JointEffect):
     at_every_joint = True
     law = "offset"
     sign_of = "a constant, whatever the joint does"
+    meaning = "the torque reads a constant too much or too little"
+    pictures = (
+        ResidualPicture(
+            "velocity",
+            "a constant at all velocities: an offset",
+            lambda x, s: np.ones_like(x),
+        ),
+    )
     confounded_with = ("asymmetric_friction", "joint_spring")
     shown_by = "position range"
     experiment = "move {joint} over a wide range in both directions, so that gravity changes"

@@ -23,6 +23,10 @@ class TorqueRipple(JointEffect):
     name = "torque_ripple"
     law = "As sin(k q) + Ac cos(k q)"
     sign_of = "a comb against position, one line in cycles per revolution"
+    meaning = (
+        "the torque swells and fades with the position, as the teeth of a gear and the "
+        "magnets of a motor make it"
+    )
     confounded_with = ("joint_spring",)
     shown_by = "slow"
     experiment = "sweep {joint} slowly over its whole range"

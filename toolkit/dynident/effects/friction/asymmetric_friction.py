@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.effects.effect import Block, JointEffect, Parameter, force_unit, motion_unit
+from dynident.effects.residual_picture import ResidualPicture
 from dynident.effects.terms import Term
 
 
@@ -19,6 +20,14 @@ class AsymmetricFriction(JointEffect):
     name = "asymmetric_friction"
     law = "dFv |v| + dFc"
     sign_of = "slopes against velocity that differ between the two directions"
+    meaning = "the joint resists differently in its two directions of motion"
+    pictures = (
+        ResidualPicture(
+            "velocity",
+            "slopes that differ between the directions: asymmetric friction",
+            lambda x, s: np.abs(x),
+        ),
+    )
     confounded_with = ("torque_offset", "quadratic_drag")
     shown_by = "speed"
     experiment = "move {joint} at several constant speeds in both directions"

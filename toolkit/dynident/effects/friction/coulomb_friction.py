@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.effects.effect import Block, JointEffect, Parameter, force_unit
+from dynident.effects.residual_picture import ResidualPicture
 from dynident.effects.terms import Term
 
 
@@ -16,6 +17,14 @@ class CoulombFriction(JointEffect):
     at_every_joint = True
     law = "Fc sign(v)"
     sign_of = "a step at zero velocity"
+    meaning = "dry friction, the same at any speed, that changes sign with the direction of motion"
+    pictures = (
+        ResidualPicture(
+            "velocity",
+            "a step at zero velocity: dry (Coulomb) friction",
+            lambda x, s: np.tanh(x / (0.02 * s)),
+        ),
+    )
     confounded_with = ("viscous_friction", "stribeck_friction")
     shown_by = "reversals"
     experiment = "reverse {joint} many times and move it at several speeds"

@@ -19,6 +19,7 @@ class LoadFriction(Forceless, JointEffect):
     name = "load_friction"
     law = "mu |tau| tanh(v/w)"
     sign_of = "a fan against load: a step at zero velocity that grows with the load"
+    meaning = "the joint's friction grows with the load that its gears and bearings carry"
     confounded_with = ("coulomb_friction", "drive_gain")
     shown_by = "load"
     experiment = "move {joint} slowly in both directions under several loads, both signs of them"

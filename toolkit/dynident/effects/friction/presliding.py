@@ -27,6 +27,10 @@ class Presliding(JointEffect):
     name = "presliding"
     law = "Fp (z - sign(v)), z' = (v - abs(v) z)/distance"
     sign_of = "loops after each reversal"
+    meaning = (
+        "before it slips the joint gives a little, so that friction builds up over a small "
+        "distance after each reversal"
+    )
     confounded_with = ("coulomb_friction", "stribeck_friction", "backlash")
     shown_by = "tiny reversals"
     experiment = "move {joint} to and fro by less than 0.01 rad (or 1 mm)"

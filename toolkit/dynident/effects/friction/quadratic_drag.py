@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.effects.effect import Block, JointEffect, Parameter, force_unit, motion_unit
+from dynident.effects.residual_picture import ResidualPicture
 
 
 class QuadraticDrag(JointEffect):
@@ -14,6 +15,10 @@ class QuadraticDrag(JointEffect):
     opposes_motion = True
     law = "Fq v |v|"
     sign_of = "a curve against velocity, steeper at speed"
+    meaning = "the resistance grows with the square of the speed, as in oil or air"
+    pictures = (
+        ResidualPicture("velocity", "a curve, steeper at speed: drag", lambda x, s: x * np.abs(x)),
+    )
     confounded_with = ("viscous_friction", "coulomb_friction")
     shown_by = "speed"
     experiment = "move {joint} from slow to its highest speed in both directions"

@@ -12,6 +12,14 @@ from dynident.effects.effect import (
     force_unit,
     motion_unit,
 )
+from dynident.effects.residual_picture import ResidualPicture
+
+
+def _spikes(width: float) -> ResidualPicture:
+    words = "spikes beside zero velocity: Stribeck friction, or presliding"
+    return ResidualPicture(
+        "velocity", words, lambda x, s: np.sign(x) * np.exp(-((x / (width * s)) ** 2))
+    )
 
 
 class StribeckFriction(JointEffect):
@@ -21,6 +29,13 @@ class StribeckFriction(JointEffect):
     opposes_motion = True
     law = "Fs sign(v) exp(-(v/vs)^2)"
     sign_of = "spikes on both sides of zero velocity"
+    meaning = (
+        "the joint resists more when it creeps than when it glides: friction falls as motion starts"
+    )
+    pictures = (
+        _spikes(0.05),
+        _spikes(0.15),
+    )
     confounded_with = ("coulomb_friction", "viscous_friction")
     shown_by = "slow"
     experiment = "move {joint} slowly, at speeds below 0.1 rad/s (or 0.01 m/s), in both directions"

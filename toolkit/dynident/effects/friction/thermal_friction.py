@@ -36,6 +36,7 @@ class ThermalFriction(JointEffect):
     stands_in_for = ("viscous_friction", "coulomb_friction")
     law = "h (Fvt v + Fct sign(v)), h = exp(-t/T) or (temperature - 25 C)/10 K"
     sign_of = "slopes and steps against velocity that change in the course of the session"
+    meaning = "friction changes as the joint warms up"
     confounded_with = ("viscous_friction", "coulomb_friction", "torque_drift")
     shown_by = "session"
     experiment = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.effects.effect import Block, JointEffect, Parameter, force_unit, motion_unit
+from dynident.effects.residual_picture import ResidualPicture
 from dynident.effects.terms import Term
 
 
@@ -16,6 +17,10 @@ class ViscousFriction(JointEffect):
     at_every_joint = True
     law = "Fv v"
     sign_of = "a slope against velocity"
+    meaning = "a resistance in proportion to the speed, as from grease"
+    pictures = (
+        ResidualPicture("velocity", "a slope against velocity: viscous friction", lambda x, s: x),
+    )
     confounded_with = ("coulomb_friction", "quadratic_drag")
     shown_by = "speed"
     experiment = "move {joint} at several constant speeds in both directions"

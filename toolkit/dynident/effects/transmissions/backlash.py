@@ -31,6 +31,10 @@ class Backlash(FlexibleJoint):
     name = "backlash"
     law = "response of the link in a dead zone"
     sign_of = "bursts where the load reverses"
+    meaning = (
+        "there is play in the transmission: when the load changes sides, the motor turns a "
+        "little before the link follows"
+    )
     confounded_with = ("joint_elasticity", "presliding", "coulomb_friction")
     shown_by = "load"
     experiment = "move {joint} so that its load changes sign slowly, many times"

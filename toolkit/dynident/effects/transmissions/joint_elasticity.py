@@ -12,6 +12,10 @@ class JointElasticity(FlexibleJoint):
     name = "joint_elasticity"
     law = "c (driven response of the link behind the spring)"
     sign_of = "an error that grows with acceleration and rings after jerks"
+    meaning = (
+        "the transmission gives like a spring between motor and link, so that the link swings "
+        "after the motor"
+    )
     confounded_with = ("backlash", "torque_delay", "rotor_inertia")
     shown_by = "acceleration"
     experiment = "move {joint} with high accelerations and sudden stops, other joints still"
