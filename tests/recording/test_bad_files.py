@@ -68,8 +68,11 @@ def test_path(tmp_path):
     assert isinstance(refused(tmp_path / "none.csv", "no such file"), FileError)
     (tmp_path / "folder.npz").mkdir()
     refused(tmp_path / "folder.npz", "is a folder")
-    (tmp_path / "run.txt").touch()
-    refused(tmp_path / "run.txt", "'.txt' names no format. formats: .csv, .npz, .mat, .parquet")
+    (tmp_path / "run.doc").touch()
+    refused(
+        tmp_path / "run.doc",
+        "'.doc' names no format. formats: .csv, .txt, .dat, .tsv, .npz, .mat, .parquet",
+    )
     (tmp_path / "run").touch()
     refused(tmp_path / "run", "has no suffix")
 

@@ -12,7 +12,7 @@ import dynident as di
 from dynident.errors import DynidentError, RecordingError
 from dynident.recording import Recording
 from dynident.recording.formats.write import write
-from dynident.study_draft import Decision, draft_study
+from dynident.study_draft import Decision, LogFacts, draft_study
 from study_files import recording
 from synthetic import ARM
 
@@ -92,11 +92,11 @@ def test_gears_that_are_given_bring_columns_to_the_joints_side(arm: Path) -> Non
     columns = {"time": one.t, "m_pos_1": q[:, 0], "m_pos_2": q[:, 1]}
     columns |= {"m_trq_1": tau[:, 0], "m_trq_2": tau[:, 1]}
     data = written(arm.parent / "run.csv", columns)
-    draft = draft_study(arm, [data], gears=ratios.tolist())
+    draft = draft_study(arm, [data], facts=LogFacts(gears=ratios.tolist()))
     assert "rotor_inertia" in draft.effects
     assert_same(di.load(draft.write(arm.parent / "study.toml")), one)
     with pytest.raises(RecordingError, match="one number for each of shoulder, elbow"):
-        draft_study(arm, [data], gears=[32.0])
+        draft_study(arm, [data], facts=LogFacts(gears=[32.0]))
 
 
 def test_held_commands_are_told_from_measured_torques(arm: Path) -> None:
@@ -189,7 +189,7 @@ def test_files_without_a_header_are_told_by_their_numbers(arm: Path) -> None:
     study = di.load(draft_study(arm, [data]).write(arm.parent / "study.toml"))
     assert_same(study, one)
     np.savetxt(data, x[:, 1:], delimiter=",", fmt="%.17g")
-    draft = draft_study(arm, [data], rate_hz=100.0)
+    draft = draft_study(arm, [data], facts=LogFacts(rate_hz=100.0))
     assert_same(di.load(draft.write(arm.parent / "study.toml")), one)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -16,7 +16,7 @@ from dynident.errors import FileError
 from dynident.tables import printable
 
 if TYPE_CHECKING:
-    from dynident.study_draft import Decision
+    from dynident.study_draft import CarriedLoad, Decision, LogFacts
 
 _PATH = click.Path(path_type=Path)
 
@@ -28,14 +28,20 @@ class _Told:
     joints: str | None
     gears: str | None
     rate_hz: float | None
+    topic: str
+    loads: tuple[str, ...]
 
-    def read(self) -> dict[str, Any]:
+    def read(self) -> LogFacts:
         """As `draft_study` takes it."""
-        return {
-            "joints": self.joints and [name.strip() for name in self.joints.split(",")],
-            "gears": self.gears and _numbers(self.gears),
-            "rate_hz": self.rate_hz,
-        }
+        from dynident.study_draft import LogFacts
+
+        return LogFacts(
+            joints=[name.strip() for name in self.joints.split(",")] if self.joints else None,
+            gears=_numbers(self.gears) if self.gears else None,
+            rate_hz=self.rate_hz,
+            topic=self.topic,
+            loads=tuple(_load(one) for one in self.loads),
+        )
 
 
 @commands.command()
@@ -45,6 +51,14 @@ class _Told:
 @click.option("--joints", help="Joints that were recorded, in order, with commas between them.")
 @click.option("--rate", "rate_hz", type=float, help="Hz, of files without a column of time.")
 @click.option("--gears", help="Ratios, where columns are of the motors' side: 32,32,45,-48,45,32.")
+@click.option("--topic", default="", help="Of bags that hold joint states on several.")
+@click.option(
+    "--load",
+    "loads",
+    multiple=True,
+    metavar="FILES[=KG]",
+    help="Files that carry a load, and its mass: 'run_load_*=2.8'; may be repeated.",
+)
 @answered
 @collected(told=_Told)
 def init(robot: Path, data: tuple[str, ...], out: Path, told: _Told) -> CommandAnswer:
@@ -63,10 +77,10 @@ def init(robot: Path, data: tuple[str, ...], out: Path, told: _Told) -> CommandA
         raise FileError("is there already", str(out), "name another file with --out, or remove it")
     ask = _ask if sys.stdin.isatty() and sys.stderr.isatty() else None
     if ask is not None:  # a bar would be drawn over the questions
-        draft = draft_study(robot, data, ask=ask, **told.read())
+        draft = draft_study(robot, data, facts=told.read(), ask=ask)
     else:
         with progress("reading"):
-            draft = draft_study(robot, data, **told.read())
+            draft = draft_study(robot, data, facts=told.read())
     draft.write(out)
     return CommandAnswer(
         content=lambda: {"out": str(out), **draft.to_dict()},
@@ -85,6 +99,19 @@ def _numbers(text: str) -> list[float]:
         raise click.BadParameter(
             f"'{text}' holds what is no number", param_hint="--gears"
         ) from None
+
+
+def _load(text: str) -> CarriedLoad:
+    """A load, of `FILES=KG` or `FILES`."""
+    from dynident.study_draft import CarriedLoad
+
+    pattern, given, mass = text.rpartition("=")
+    if not given:
+        return CarriedLoad(pattern=text)
+    try:
+        return CarriedLoad(pattern=pattern, mass=float(mass))
+    except ValueError:
+        raise click.BadParameter(f"'{mass}' is no mass in kg", param_hint="--load") from None
 
 
 def _ask(decision: Decision) -> int:

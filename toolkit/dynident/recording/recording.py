@@ -18,6 +18,8 @@ from dynident.settings import LONGEST_TIME
 
 USES = ("train", "test")
 TORQUES = ("measured", "held_command")
+TEXTS = (".csv", ".txt", ".dat", ".tsv")
+"""Suffixes of tables of text, whose lines can be counted."""
 LARGEST = 1e100
 """Magnitude beyond which a number can be no measurement, and squares overflow."""
 _AT_ONCE = 1 << 18  # time stamps that are looked at
@@ -179,7 +181,7 @@ class Recording:
         """How messages call a sample, given its index from 0: file and row (and line, in CSV)."""
         line = (
             f" (line {index + self.provenance.first_line})"
-            if self.where.lower().endswith(".csv")
+            if self.where.lower().endswith(TEXTS)
             else ""
         )
         return f"{self.where}, row {index + 1}{line}"

@@ -21,6 +21,7 @@ _SAMPLES = 6000  # of a file that are looked at
 _UNIFORM = 0.5  # steps of a clock over the usual one, of nine in ten
 _DERIVATIVE = 0.9  # correlation of a speed with the difference of its position
 _SAME = 0.99  # correlation of a position with its reference
+_EXACT = 1e-9  # share that counts as explained in full
 _SLOPES = (0.5, 2.0)  # of a speed against that difference
 
 
@@ -175,7 +176,10 @@ def _is_same(x: np.ndarray, one: int, other: int, n: int) -> bool:
 
 
 def _explained(x: np.ndarray, t: np.ndarray, q: int, tau: int, robot: Robot) -> float:
-    """Logarithmic likelihood per row of a block of columns as torques."""
+    """Logarithmic likelihood per row of a block of columns as torques, over that of constants.
+
+    A temperature is nearly a constant, which friction explains as far as it goes.
+    """
     n, criteria = robot.n, DEFAULTS.wiring
     torque = x[:, tau : tau + n]
     if not np.ptp(torque, axis=0).all():
@@ -186,4 +190,5 @@ def _explained(x: np.ndarray, t: np.ndarray, q: int, tau: int, robot: Robot) -> 
     except RecordingError:
         return -np.inf
     found = WiringRegression.of(Model(robot), rows).fit(np.arange(n), np.ones(n))
-    return found.fit_score
+    varies = np.var(rows.tau, axis=0) / np.mean(rows.tau**2, axis=0)
+    return -0.5 * float(np.sum(np.log(np.maximum(found.unexplained / varies, _EXACT))))

@@ -28,6 +28,7 @@ class DraftedRecording:
     file, record : where it is; `record` is empty where the file holds one.
     layout : names of its columns by position, and its rate, where the file says neither.
     use, period : as in a study.
+    load : name of the load that it carries; empty for none.
     remark : rate, repetitions and idle stretches, in words.
     """
 
@@ -36,6 +37,7 @@ class DraftedRecording:
     layout: FileLayout
     use: Literal["train", "test"]
     period: float | None
+    load: str
     remark: str
 
 
@@ -49,6 +51,7 @@ class StudyDraft:
     joints : that were recorded; None for all that move.
     columns : ours -> theirs, also where both are called the same.
     recordings : entries of the study.
+    loads : name -> mass, kg, or None.
     torque : "measured" or "held_command".
     torque_unit : "N m", or "A" of drives.
     effects : that the model starts with.
@@ -65,6 +68,7 @@ class StudyDraft:
     joints: tuple[str, ...] | None
     columns: dict[str, Column]
     recordings: tuple[DraftedRecording, ...]
+    loads: dict[str, float | None]
     torque: Literal["measured", "held_command"]
     torque_unit: Literal["N m", "A"]
     effects: tuple[str, ...]
@@ -88,6 +92,7 @@ class StudyDraft:
             self._model() if self.has_torques else "",
             self._columns(),
             self._filter(),
+            self._loads(),
             *(self._recording(one, folder) for one in self.recordings),
             self._optional(),
         ]
@@ -203,6 +208,14 @@ class StudyDraft:
             ]
         )
 
+    def _loads(self) -> str:
+        lines = []
+        for name, mass in self.loads.items():
+            lines += ["", "# What is left out is identified: centre = [x, y, z] (m), inertia.",
+                      f"[loads.{name}]"]  # fmt: skip
+            lines += [] if mass is None else [f"mass = {float(mass)!r}  # kg"]
+        return _lines(lines)
+
     def _recording(self, one: DraftedRecording, folder: Path) -> str:
         lines = ["", *_comment(f"{one.remark}."), "[[recordings]]"]
         lines.append(f"file = {_quoted(_relative(one.file, folder))}")
@@ -214,6 +227,10 @@ class StudyDraft:
         if one.layout.rate_hz is not None:
             lines.append(f"rate_hz = {one.layout.rate_hz!r}")
         lines.append(f'use = "{one.use}"')
+        if one.layout.topic:
+            lines.append(f"topic = {_quoted(one.layout.topic)}")
+        if one.load:
+            lines.append(f"payload = {_quoted(one.load)}")
         if one.period is not None:
             lines.append(f"period = {one.period!r}")
         return _lines(lines)

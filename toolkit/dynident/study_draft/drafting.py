@@ -26,8 +26,10 @@ from dynident.study_draft.amendments import Reading, amended
 from dynident.study_draft.by_numbers import named_by_numbers
 from dynident.study_draft.decision import Ask, Decision, decided
 from dynident.study_draft.draft import StudyDraft
+from dynident.study_draft.drive_unit import drive_sizes
 from dynident.study_draft.entries import drafted_recordings
 from dynident.study_draft.log import Log, logs_of, same_columns
+from dynident.study_draft.log_facts import LogFacts
 from dynident.study_draft.matching import Group, Matched, match
 from dynident.study_draft.motor_side import joint_side, require_ratios
 from dynident.study_draft.timing import clock_from_speeds, clock_scale
@@ -35,7 +37,10 @@ from dynident.study_draft.torque_timing import samples_late
 from dynident.study_draft.wrench_groups import in_radians, wrench_columns, wrench_groups
 from dynident.threads import single_threaded
 
+_NOTHING = LogFacts()
 _FRICTION = ("viscous_friction", "coulomb_friction", "torque_offset")
+_ANYTHING = ("effort", "efforts")
+"""What drivers of ROS report under these names is often a current."""
 _FOLLOWS = 0.7
 """Correlation of a position with the reference that it follows, be it late."""
 
@@ -45,9 +50,7 @@ def draft_study(
     robot: str | Path,
     data: Sequence[str | Path],
     *,
-    joints: Sequence[str] | None = None,
-    gears: Sequence[float] | None = None,
-    rate_hz: float | None = None,
+    facts: LogFacts = _NOTHING,
     ask: Ask | None = None,
 ) -> StudyDraft:
     """Draft a study of recordings that nobody has described yet.
@@ -61,10 +64,7 @@ def draft_study(
     robot : description (URDF, SDF or MJCF).
     data : files of measurements with the same columns, or patterns of their names, in the order of
         the study.
-    joints : of the robot that were recorded, in order; by default all that move.
-    gears : ratio of each joint's gear, where the files are of the motors' side; negative where the
-        joint turns the other way.
-    rate_hz : of the samples, where the files have no clock.
+    facts : what somebody knows: joints, gears, rate, topic of bags, loads that files carry.
     ask : called with each decision that the files leave open; by default the likeliest is taken.
 
     Returns
@@ -81,36 +81,38 @@ def draft_study(
         If a file holds no positions and time of every joint, neither torques nor a wrench sensor,
         or files differ in their columns.
     """
-    described = Robot.from_file(robot, joints)
+    described = Robot.from_file(robot, facts.joints)
     notes = _Notes(ask)
-    logs = _named(data, described, rate_hz, notes)
+    logs = _named(data, described, facts, notes)
     sensors = wrench_groups(list(logs[0].columns), described)
     matched = match(logs[0], described, ("q",) if sensors else ("q", "tau"))
     chosen = _chosen(matched, notes)
     wrench = wrench_columns(sensors, notes.take)
     columns = matched.columns(described, chosen)
     columns = _with_clock(columns, logs[0], matched, notes)
-    files = _Sources(robot, joints, logs)
+    files = _Sources(robot, facts, logs)
     if "tau" not in matched.groups:
         return _of_sensor(files, described, columns | wrench, notes)
-    ratios = require_ratios(gears, described)
+    ratios = require_ratios(facts.gears, described)
     if ratios is not None:
         columns = joint_side(columns, described, ratios)
         notes.take("gears", ["on the motors' side"], "the ratios were given")
     torque = matched.groups["tau"][chosen["tau"]]
-    unit = _unit(torque, notes)
-    reading = Reading(robot=described, columns=columns, torque_unit=unit)
+    reading = Reading(robot=described, columns=columns)
+    unit = _unit(torque, logs, reading, notes)
+    reading = replace(reading, torque_unit=unit)
     reading = replace(reading, columns=_without_strangers(reading, logs, notes))
     reading = amended(reading, lambda one: _read(logs, one), notes.take)
     recordings = _read(logs, reading)
     held = _is_held(reading.robot, recordings, torque.origin == "command", notes)
-    behind_gears = reading.geared or ratios is not None or torque.is_current
+    behind_gears = reading.geared or ratios is not None or unit == "A"
     mounted = not np.array_equal(reading.robot.gravity, described.gravity)
     return StudyDraft(
         robot=files.robot,
         joints=files.joints,
         columns=reading.columns | wrench,
-        recordings=drafted_recordings(logs, recordings, notes.take),
+        recordings=drafted_recordings(logs, recordings, facts, notes.take),
+        loads=files.loads,
         torque="held_command" if held else "measured",
         torque_unit=unit,
         effects=(*_FRICTION, "rotor_inertia") if behind_gears else _FRICTION,
@@ -128,7 +130,7 @@ class _Sources:
     """What was named by whoever asks for a draft."""
 
     path: str | Path
-    chosen: Sequence[str] | None
+    facts: LogFacts
     logs: tuple[Log, ...]
 
     @property
@@ -137,7 +139,12 @@ class _Sources:
 
     @property
     def joints(self) -> tuple[str, ...] | None:
-        return None if self.chosen is None else tuple(self.chosen)
+        return None if self.facts.joints is None else tuple(self.facts.joints)
+
+    @property
+    def loads(self) -> dict[str, float | None]:
+        loads = self.facts.carried([(log.file, log.record) for log in self.logs])
+        return {name: one.mass for name, one in loads.items()}
 
 
 def _of_sensor(
@@ -155,7 +162,8 @@ def _of_sensor(
         robot=files.robot,
         joints=files.joints,
         columns={ours: one for ours, one in columns.items() if not ours.startswith("v.")},
-        recordings=drafted_recordings(files.logs, recordings, notes.take),
+        recordings=drafted_recordings(files.logs, recordings, files.facts, notes.take),
+        loads=files.loads,
         torque="measured",
         torque_unit="N m",
         effects=(),
@@ -183,13 +191,14 @@ class _Notes:
 
 
 def _named(
-    data: Sequence[str | Path], robot: Robot, rate_hz: float | None, notes: _Notes
+    data: Sequence[str | Path], robot: Robot, facts: LogFacts, notes: _Notes
 ) -> tuple[Log, ...]:
     """Every record of every file, whose columns have names, if only ours."""
-    logs = _opened(data, FileLayout(names="numbered", rate_hz=rate_hz))
+    layout = FileLayout(names="numbered", rate_hz=facts.rate_hz, topic=facts.topic)
+    logs = _opened(data, layout)
     if logs[0].is_unnamed:
-        names = _by_numbers(logs[0], robot, rate_hz, notes)
-        logs = _opened(data, FileLayout(names=names, rate_hz=rate_hz))
+        names = _by_numbers(logs[0], robot, facts.rate_hz, notes)
+        logs = _opened(data, replace(layout, names=names))
     return logs
 
 
@@ -295,13 +304,24 @@ def _without_strangers(reading: Reading, logs: Sequence[Log], notes: _Notes) -> 
     return {ours: one for ours, one in columns.items() if not ours.startswith("q_ref.")}
 
 
-def _unit(torque: Group, notes: _Notes) -> Literal["N m", "A"]:
+def _unit(
+    torque: Group, logs: Sequence[Log], reading: Reading, notes: _Notes
+) -> Literal["N m", "A"]:
     """The unit of what stands for torques."""
-    if not torque.is_current:
+    identified = "the gain of each joint is identified with the rest"
+    if torque.is_current:
+        why = f"the columns are called currents: {identified}"
+        choices = ["A, the drives' own", "N m, although the columns are called currents"]
+        return "A" if notes.take("torque_unit", choices, why) == 0 else "N m"
+    unnamed = logs[0].layout.names not in ((), "numbered")
+    if not (unnamed or torque.roles[0].word in _ANYTHING):
         return "N m"
-    why = "the columns are called currents: the gain of each joint is identified with the rest"
-    choices = ["A, the drives' own", "N m, although the columns are called currents"]
-    return "A" if notes.take("torque_unit", choices, why) == 0 else "N m"
+    sizes = drive_sizes(reading.robot, _read(logs, reading))
+    if sizes.are_newton_metres:
+        return "N m"
+    choices = ["A, or another unit of the drives", "N m"]
+    taken = notes.take("torque_unit", choices, f"{sizes.reason}: {identified}")
+    return "A" if taken == 0 else "N m"
 
 
 def _is_held(robot: Robot, recordings: tuple[Recording, ...], named: bool, notes: _Notes) -> bool:

@@ -8,12 +8,14 @@ from dataclasses import replace
 from dynident.recording import Recording, usable
 from dynident.study_draft.draft import DraftedRecording
 from dynident.study_draft.log import Log
+from dynident.study_draft.log_facts import LogFacts, carried_by
 from dynident.study_draft.timing import period_of, uses_of
 
 
 def drafted_recordings(
     logs: Sequence[Log],
     recordings: Sequence[Recording],
+    facts: LogFacts,
     take: Callable[[str, list[str], str], int],
 ) -> tuple[DraftedRecording, ...]:
     """Return the entries of a study.
@@ -22,13 +24,23 @@ def drafted_recordings(
     ----------
     logs : of the files.
     recordings : read from them.
+    facts : loads that files carry.
     take : takes a decision: (subject, choices, reason) -> which of them.
 
     Returns
     -------
     One for each log.
     """
+    pairs = [(log.file, log.record) for log in logs]
+    loads = facts.carried(pairs)
+    carried = [carried_by(pair, loads) for pair in pairs]
     uses, why = uses_of([log.record or log.file.stem for log in logs])
+    uses = _with_each_load(uses, carried)
+    for name in loads:
+        files = ", ".join(
+            log.file.name for log, one in zip(logs, carried, strict=True) if one == name
+        )
+        take(f"load '{name}'", [files], "so it was said")
     take("use", [", ".join(dict.fromkeys(uses))], why)
     periods = [period_of(one) for one in recordings]
     if any(periods):
@@ -45,10 +57,23 @@ def drafted_recordings(
             layout=log.layout,
             use="test" if use == "test" else "train",
             period=period,
+            load=load,
             remark=_remark(one, period),
         )
-        for log, use, period, one in zip(logs, uses, periods, recordings, strict=True)
+        for log, use, period, load, one in zip(
+            logs, uses, periods, carried, recordings, strict=True
+        )
     )
+
+
+def _with_each_load(uses: Sequence[str], carried: Sequence[str]) -> list[str]:
+    """Uses of recordings, at least one with each load, and one without, among those to fit."""
+    found = list(uses)
+    for load in dict.fromkeys(carried):
+        own = [k for k, one in enumerate(carried) if one == load]
+        if all(found[k] == "test" for k in own):
+            found[own[0]] = "train"
+    return found
 
 
 def _remark(recording: Recording, period: float | None) -> str:

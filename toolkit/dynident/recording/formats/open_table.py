@@ -20,6 +20,7 @@ from dynident.recording.formats.file_source import FileSource, open_source
 from dynident.recording.formats.limits import CUT, STREAMED
 from dynident.recording.formats.ros_bag import SUFFIXES as BAGS
 from dynident.recording.formats.ros_bag import is_bag, open_bag
+from dynident.recording.recording import TEXTS
 
 DEFAULT_LAYOUT = FileLayout()
 
@@ -28,7 +29,7 @@ _Open = Callable[[FileSource, str, FileLayout], ColumnTable]
 """(content, name for messages, layout) -> table"""
 
 _FORMATS: dict[str, _Open] = {
-    ".csv": open_csv,
+    **dict.fromkeys(TEXTS, open_csv),
     ".npz": lambda source, file, _: open_npz(source, file),
     ".mat": lambda source, file, _: open_mat(source, file),
     ".parquet": lambda source, file, _: open_parquet(source, file),
@@ -84,7 +85,7 @@ def _opened(path: Path, layout: FileLayout) -> ColumnTable:
         raise unknown_suffix(path, READABLE)
     if layout.topic:
         raise RecordingError(f"topic = {layout.topic!r} is of a bag", where, "leave it out")
-    if suffix != ".csv" and layout.names not in ((), "numbered"):
+    if suffix not in TEXTS and layout.names not in ((), "numbered"):
         what, remedy = "columns are named by position", "only text files without a header need that"
         raise RecordingError(what, where, remedy)
     source = open_source(path, STREAMED.stored, CUT)

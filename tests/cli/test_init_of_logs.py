@@ -1,0 +1,84 @@
+"""`dynident init`, then the commands that follow, of logs as robots write them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rosbags", reason="bags need the extra `ros`, which is a part of `test`")
+
+import ampere_logs
+import dynident as di
+from chains import chain_text
+from dynident.recording import Recording, write
+from ros_bags import messages_of, write_bag
+from synthetic import smooth_motion
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("logs")
+    ampere_logs.write_logs(folder, 30.0, 2)
+    return folder
+
+
+def test_loads_are_said_on_the_command_line(run, logs: Path) -> None:
+    log = logs / "run_load_1.csv"
+    for said, message in (
+        ("run_load_*=heavy", "'heavy' is no mass in kg"),
+        ("run_load_*=-2", "a load of -2 kg"),
+        ("crate_*=2.8", "no file is called 'crate_*'"),
+    ):
+        done = run("init", logs / "arm.urdf", log, "--out", "new.toml", "--load", said)
+        assert done.status == 2
+        assert message in done.err
+        assert not Path("new.toml").exists()
+    done = run("init", logs / "arm.urdf", log, "--out", "new.toml", "--load", "run*=2.8", "--json")
+    assert done.status == 0, done.err
+    assert 'payload = "load"' in Path("new.toml").read_text()
+    assert json.loads(done.out)["out"] == "new.toml"
+
+
+def seven_joints(seed: int) -> Recording:
+    """Two periods of a seven-joint arm with more friction at low speed in one joint."""
+    model = di.Model(di.Robot.from_text(chain_text(7, 2)))
+    for name in ("viscous_friction", "coulomb_friction", "stribeck_friction@j3"):
+        model = model + name
+    values = model.given_values()
+    values[model.base.rank :] = [*(7 * [0.4]), *(7 * [0.3]), 0.8]
+    t, q, v, a = smooth_motion(7, seed, 100.0, 16.0, 8.0, 0.5)
+    tau = model.torque(model.block(t, q, v, a), values)
+    tau = tau + 0.02 * np.random.default_rng(seed).normal(size=tau.shape)
+    return Recording(t, q, tau, model.robot.names, v=v)
+
+
+@pytest.mark.slow
+def test_seven_joints_in_bags_are_explained_as_in_a_csv_file(run, tmp_path: Path) -> None:
+    """`init`, then `explain`, with nothing edited between them."""
+    (tmp_path / "arm.urdf").write_text(chain_text(7, 2))
+    recordings = [seven_joints(1), seven_joints(2)]
+    answers = {}
+    for kind in ("csv", "mcap", "bag", "db3"):
+        files = []
+        for number, one in enumerate(recordings):
+            (tmp_path / f"{kind}_{number}").mkdir()
+            if kind == "csv":
+                files.append(write(one, tmp_path / f"{kind}_{number}" / "run.csv"))
+            else:
+                messages = messages_of(one)
+                files.append(write_bag(tmp_path / f"{kind}_{number}", kind, messages))
+        study = tmp_path / f"{kind}.toml"
+        done = run("init", tmp_path / "arm.urdf", *files, "--out", study)
+        assert done.status == 0, done.err
+        answers[kind] = run("explain", study, "--most", "1", "--json").json
+    first = answers.pop("csv")
+    assert [(one["effect"], one["joint"]) for one in first["steps"]] == [
+        ("stribeck_friction", "j3")
+    ]
+    for other in answers.values():
+        assert other["verdict"] == first["verdict"]
+        assert [one["effect"] for one in other["steps"]] == ["stribeck_friction"]
+        assert other["test_error"] == pytest.approx(first["test_error"], rel=1e-6)
