@@ -10,7 +10,7 @@ import pytest
 import ampere_logs
 from dynident.study import load
 from dynident.study_draft import CarriedLoad, LogFacts, draft_study
-from dynident.study_draft.drive_unit import drive_sizes
+from dynident.study_draft.guesses.drive_unit import drive_sizes
 from study_files import recording
 from synthetic import arm
 
@@ -40,6 +40,7 @@ def test_the_draft_tells_what_the_study_by_hand_does(logs: Path) -> None:
         np.testing.assert_allclose(one.drives.gains, ampere_logs.GAINS, rtol=0.05)
         (crate,) = one.drives.loads
         np.testing.assert_allclose(crate.values[1:4], [0.01, -0.03, 0.09], atol=0.005)
+    assert drafted.drives is not None and by_hand.drives is not None
     np.testing.assert_allclose(drafted.drives.gains, by_hand.drives.gains, rtol=2e-3)
 
 

@@ -22,18 +22,18 @@ from dynident.recording import (
     read_wrench,
 )
 from dynident.robot import Robot
-from dynident.study_draft.amendments import Reading, amended
 from dynident.study_draft.by_numbers import named_by_numbers
 from dynident.study_draft.decision import Ask, Decision, decided
 from dynident.study_draft.draft import StudyDraft
-from dynident.study_draft.drive_unit import drive_sizes
 from dynident.study_draft.entries import drafted_recordings
+from dynident.study_draft.guesses.amendments import Reading, amended
+from dynident.study_draft.guesses.drive_unit import drive_sizes
+from dynident.study_draft.guesses.motor_side import joint_side, require_ratios
+from dynident.study_draft.guesses.torque_timing import samples_late
 from dynident.study_draft.log import Log, logs_of, same_columns
 from dynident.study_draft.log_facts import LogFacts
 from dynident.study_draft.matching import Group, Matched, match
-from dynident.study_draft.motor_side import joint_side, require_ratios
 from dynident.study_draft.timing import clock_from_speeds, clock_scale
-from dynident.study_draft.torque_timing import samples_late
 from dynident.study_draft.wrench_groups import in_radians, wrench_columns, wrench_groups
 from dynident.threads import single_threaded
 

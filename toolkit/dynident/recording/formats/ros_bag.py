@@ -285,6 +285,6 @@ def _topic(counts: dict[tuple[str, str], int], topic: str, file: str) -> str:
         remedy = f"its topics: {shown}" if names else "it holds no topic at all"
         raise RecordingError("holds no message sensor_msgs/JointState", file, remedy)
     if len(held) > 1:
-        remedy = f'name one: topic = "{held[0]}" beside the file, or --topic of `init`'
+        remedy = f'name one beside the file: topic = "{held[0]}" (`init`: --topic {held[0]})'
         raise RecordingError(f"holds joint states on {', '.join(held[:10])}", file, remedy)
     return held[0]

@@ -17,9 +17,9 @@ from dynident.errors import DynidentError, RecordingError
 from dynident.model import Model
 from dynident.recording import Column, Dataset, Recording
 from dynident.robot import Robot
-from dynident.study_draft.motor_side import turned
-from dynident.study_draft.wiring_guess import guess_wiring
-from dynident.study_draft.zeros import guess_zeros
+from dynident.study_draft.guesses.motor_side import turned
+from dynident.study_draft.guesses.wiring_guess import guess_wiring
+from dynident.study_draft.guesses.zeros import guess_zeros
 from dynident.tables import percent
 from dynident.wiring.wiring_regression import TorqueFit, WiringRegression
 from dynident.wiring.wiring_rows import WiringRows, rows_of
