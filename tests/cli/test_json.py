@@ -44,6 +44,7 @@ def check_diagnosis(said: dict[str, Any], source: str) -> None:
         "withdrawn",
         "rows",
         *(("detection_limits",) if said["verdict"] == "nothing_missing" else ()),
+        *(("residual_dependence",) if said["verdict"] == "unexplained" else ()),
     }
     assert said["wiring"] == []
     assert said["verdict"] in VERDICTS

@@ -9,6 +9,7 @@ The way of data is `compare -> rank -> add -> refit -> judge`; `procedure` is th
 
 - `search`: ranks effects and chooses among them. `nuisances`: what is allowed for. `advice`: which
   experiment would show what this data does not.
+- `dependence`: what a residual that no effect explains depends on.
 - `verdict`: when a model is said to be complete. `track_record`: how often that was right.
 - `assembly`: the search put into words and numbers; `result` and `details` are what comes out.
 """

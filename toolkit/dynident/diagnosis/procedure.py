@@ -18,7 +18,7 @@ it is called, that is the answer, and nothing is added.
 - *judge*: what the others have made superfluous is dropped, and what raises the error on recordings
   (or blocks of time) that were not fitted is withdrawn, with what cannot be told from it. Then the
   search goes on with what is left, a few times at most. Errors before and after, and the verdict,
-  are those on the same data.
+  are those on the same data. A residual that no effect explains is asked what it depends on.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ import numpy as np
 from dynident.closed_loop import Controller
 from dynident.criteria import DEFAULTS, Criteria
 from dynident.diagnosis.assembly import Search, assemble
+from dynident.diagnosis.dependence.residual_dependence import residual_dependence
+from dynident.diagnosis.dependence.residual_record import joined, residual_records
 from dynident.diagnosis.details import Withdrawn
 from dynident.diagnosis.nuisances.contacts import Contacts
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
@@ -61,7 +63,7 @@ from dynident.diagnosis.wiring_answer import answered_by
 from dynident.effects import Effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
-from dynident.evidence.held_out import on_recordings
+from dynident.evidence.held_out import on_blocks, on_recordings
 from dynident.evidence.runs import gather
 from dynident.evidence.simulated_motion import motion_of_loop
 from dynident.fitting.estimate import Estimate
@@ -125,7 +127,9 @@ def diagnose(
     start = _compare(given, controller, criteria, task)
     extended = _extend(_rank(start, task), task)
     settled, path = _settle(_search_globally(start, extended, task), task)
-    return answered_by(faults, _judge(settled, path, task))
+    found = answered_by(faults, _judge(settled, path, task))
+    asked = found.verdict == "unexplained" or propose == "always"
+    return _with_dependence(found, settled, path, task) if asked and not faults else found
 
 
 def _compare(
@@ -324,6 +328,33 @@ def _asks_for_laws(answer: Diagnosis, task: DiagnosisTask) -> bool:
         return False
     left = answer.verdict == "unexplained" and answer.noise_source != "unknown"
     return left or task.propose == "always"
+
+
+def _with_dependence(found: Diagnosis, stage: Stage, path: Path, task: DiagnosisTask) -> Diagnosis:
+    """Return a diagnosis that says what its residual depends on.
+
+    Parameters
+    ----------
+    found : the diagnosis so far.
+    stage, path : the model that was reached, and how.
+    task : what is asked.
+
+    Returns
+    -------
+    With `residual_dependence`.
+    """
+    task.progress("looking for what the residual depends on")
+    held, judged = _decided(stage), path.judged[-1]
+    records = residual_records(judged, (held or stage.evidence).runs)
+    if held is not None:
+        # Of the training recordings blocks of time that the model was not fitted to.
+        of_training = on_blocks(stage.evidence, path.final)
+        records = (*records, *residual_records(of_training, stage.evidence.runs))
+    names = path.final.model.robot.names
+    criteria = stage.evidence.criteria.verdict
+    return replace(
+        found, residual_dependence=residual_dependence(judged, joined(records), names, criteria)
+    )
 
 
 def _decided(stage: Stage) -> Evidence | None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from dynident.criteria import DEFAULTS, Criteria
+from dynident.diagnosis.dependence.residual_dependence import JointDependence, dependence_table
 from dynident.diagnosis.details import (
     Candidate,
     JointResult,
@@ -70,6 +71,8 @@ class Diagnosis(Shown):
     detection_limits : where nothing is missing, how large each effect could have been unseen.
     proposals : laws for what the catalogue leaves, one after the other, each beside those before.
     limit : effects that were allowed, where the search ended there; None where it ended by itself.
+    residual_dependence : where the verdict is "unexplained" (or laws are asked for), what the
+        residual depends on, before any proposal, at each joint at which something is left.
     """
 
     verdict: Verdict
@@ -93,6 +96,7 @@ class Diagnosis(Shown):
     proposals: tuple[Proposal, ...] = ()
     limit: int | None = None
     rows: RowCount = field(default_factory=RowCount)
+    residual_dependence: tuple[JointDependence, ...] = ()
 
     @property
     def best(self) -> Step | None:
@@ -219,6 +223,7 @@ class Diagnosis(Shown):
             "rows": self.rows.to_dict(),
             "withdrawn": [one.to_dict() for one in self.withdrawn],
             **self._limits(),
+            **self._dependence(),
             "proposals": [one.to_dict() for one in self.proposals],
             "notes": list(self.caveats),
             **({"criteria": self._changed_criteria()} if self.criteria.changed else {}),
@@ -227,6 +232,10 @@ class Diagnosis(Shown):
     def _limits(self) -> dict[str, Any]:
         said = [one.to_dict() for one in self.detection_limits]
         return {"detection_limits": said} if said else {}
+
+    def _dependence(self) -> dict[str, Any]:
+        said = [one.to_dict() for one in self.residual_dependence]
+        return {"residual_dependence": said} if said else {}
 
     def _changed_criteria(self) -> dict[str, Any]:
         return {one.name: one.value for one in self.criteria.changed}
@@ -242,6 +251,8 @@ class Diagnosis(Shown):
             self.step_table(),
             self.sentence,
             *((limit_table(self.detection_limits),) if self.detection_limits else ()),
+            *(one.sentence for one in self.residual_dependence),
+            *((dependence_table(self.residual_dependence),) if self.residual_dependence else ()),
             *self._proposed(),
             *self.caveats,
         )

@@ -10,6 +10,7 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from dynident import files
+from dynident.diagnosis.dependence.residual_dependence import dependence_table
 from dynident.diagnosis.detection_limits import limit_table
 from dynident.diagnosis.result import Diagnosis
 from dynident.evidence.maps import ResidualMap
@@ -169,6 +170,7 @@ def _diagnosis_page(
         proposals=[
             (f"law-{k}", p, proposal_table(p, diagnosis)) for k, p in enumerate(diagnosis.proposals)
         ],
+        dependence=dependence_table(diagnosis.residual_dependence),
         joints=joint_table(diagnosis),
         steps=step_table(diagnosis),
         torques=[(names[i], diagnosis.traces[i]) for i in order],

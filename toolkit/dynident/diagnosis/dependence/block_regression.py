@@ -1,0 +1,125 @@
+"""Kernel regressions in which each block of rows is predicted from the others.
+
+Kernels are exp(-distance), those of rough functions: they take jumps and bends as well as smooth
+shapes, and have no width that would have to be right. A held-out block needs no fit of its own:
+what is left of it follows from the inverse of the whole (Rasmussen and Williams, Gaussian Processes
+for Machine Learning, 2006, section 5.4.2, for blocks in place of single rows).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.linalg import get_lapack_funcs, solve
+from scipy.spatial.distance import pdist, squareform
+
+from dynident.diagnosis.dependence.joint_inputs import JointInputs
+from dynident.diagnosis.dependence.motion_blocks import HeldOutUnit
+from dynident.errors import FitError
+
+FINE = 0.3
+"""Width, over the spread of an input, of kernels for what varies fast in that input alone."""
+
+
+def kernel(*columns: np.ndarray, width: float = 1.0) -> np.ndarray:
+    """Similarity of all rows in some inputs, exp(-distance / width), (T, T).
+
+    Parameters
+    ----------
+    columns : (T, k) each, in units of their spread.
+    width : in these units.
+    """
+    return np.exp(squareform(pdist(np.hstack(columns))) / -width)
+
+
+def centred(similarity: np.ndarray) -> np.ndarray:
+    """Return a kernel of functions whose mean over the rows is zero, (T, T)."""
+    mean = similarity.mean(axis=0)
+    return similarity - mean - mean[:, None] + mean.mean()
+
+
+def of_state(x: JointInputs) -> np.ndarray:
+    """Kernel of functions of position and velocity of the joint."""
+    together = kernel(x.position, x.velocity, x.direction)
+    slow = kernel(x.velocity, x.direction, width=FINE)
+    return 0.25 * (1.0 + together + slow + kernel(x.position, width=FINE))
+
+
+def of_acceleration(x: JointInputs) -> np.ndarray:
+    """Kernel of what acceleration and load add, at any velocity."""
+    together = kernel(x.acceleration, x.load)
+    each = kernel(x.acceleration) + kernel(x.load)
+    return _at_any_state(x, (together + each) / 3.0)
+
+
+def of_past(x: JointInputs) -> np.ndarray:
+    """Kernel of what each of the inputs of the past adds, at any velocity."""
+    return _at_any_state(x, _mean([kernel(column[:, None]) for column in x.past.T]))
+
+
+def of_others(x: JointInputs) -> np.ndarray:
+    """Kernel of what the motion of each other joint adds, at any velocity."""
+    found = []
+    for one in x.others:
+        position, velocity, direction, acceleration = np.split(one, 4, axis=1)
+        found += [kernel(position), kernel(velocity, direction), kernel(acceleration)]
+    return _at_any_state(x, _mean(found)) if found else np.zeros((len(x.time),) * 2)
+
+
+def of_time(x: JointInputs) -> np.ndarray:
+    """Kernel of what the time in the session and the recording add, at any velocity.
+
+    Smooth functions of time only: a rough one would follow slow noise across a held-out block.
+    """
+    record = np.equal.outer(x.record, x.record).astype(float)
+    smooth = np.exp(-0.5 * squareform(pdist(x.time, "sqeuclidean")))
+    return _at_any_state(x, 0.5 * (smooth + record))
+
+
+def _mean(kernels: Sequence[np.ndarray]) -> np.ndarray:
+    return sum(kernels[1:], kernels[0]) / len(kernels)
+
+
+def _at_any_state(x: JointInputs, similarity: np.ndarray) -> np.ndarray:
+    """Let what inputs add differ between states of the joint; a function of the state is none."""
+    own = kernel(x.position, x.velocity, x.direction)
+    straight = x.velocity @ x.velocity.T + x.direction @ x.direction.T
+    return 0.25 * (1.0 + own + straight) * centred(similarity)
+
+
+def left_of_each_unit(
+    similarity: np.ndarray, residual: np.ndarray, units: Sequence[HeldOutUnit]
+) -> np.ndarray:
+    """Return what a regression leaves of each unit when it is fitted to the others.
+
+    Parameters
+    ----------
+    similarity : (T, T) kernel, in units of the variance of what it does not predict.
+    residual : (T,) what is to be predicted.
+    units : which rows are held out together; every row is in one of them.
+
+    Returns
+    -------
+    (T,) in the unit of the residual.
+
+    Raises
+    ------
+    FitError
+        If the kernel is not positive definite beside noise.
+    """
+    whole = np.array(similarity, order="F")
+    whole[np.diag_indices_from(whole)] += 1.0
+    factorised, inverted = get_lapack_funcs(("potrf", "potri"), (whole,))
+    inverse, status = factorised(whole, lower=1, overwrite_a=1)
+    if status == 0:
+        inverse, status = inverted(inverse, lower=1, overwrite_c=1)
+    if status != 0:
+        raise FitError("a kernel regression on the residual is singular")
+    inverse = np.tril(inverse) + np.tril(inverse, -1).T
+    weights, left = inverse @ residual, np.empty_like(residual)
+    for unit in units:
+        out = unit.left_out
+        predicted = solve(inverse[np.ix_(out, out)], weights[out], assume_a="pos")
+        left[unit.rows] = predicted[np.searchsorted(out, unit.rows)]
+    return left

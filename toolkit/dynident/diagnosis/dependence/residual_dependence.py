@@ -1,0 +1,220 @@
+"""What the residual at each joint depends on, in words, as a table and as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from dynident.criteria import VerdictCriteria
+from dynident.diagnosis.dependence.explained_shares import (
+    INPUTS,
+    ExplainedShares,
+    Share,
+    explained_shares,
+)
+from dynident.diagnosis.dependence.joint_inputs import joint_inputs
+from dynident.diagnosis.dependence.motion_blocks import motion_blocks
+from dynident.diagnosis.dependence.residual_record import ResidualRecord
+from dynident.evidence.held_out import HeldOut
+from dynident.tables import Table, percent
+
+ROWS = 750
+"""Rows of a joint in its regressions, at most: time grows with their cube."""
+FEWEST_ROWS = 150
+"""Rows below which nothing is said."""
+FEWEST_UNITS = 8
+"""Held-out units below which nothing is said: their spread would be no standard error."""
+
+Whole = Literal["systematic", "all"]
+"""What shares are of: the systematic residual, or all of it, noise included."""
+
+_WORDS = {
+    "position and velocity": "position and velocity of this joint",
+    "acceleration and load": "its acceleration and load",
+    "past": "its past",
+    "other joints": "the other joints",
+    "time": "time",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointDependence:
+    """What a flexible regression explains of the residual at a joint, on held-out blocks.
+
+    Attributes
+    ----------
+    joint : its name.
+    whole : what shares are of.
+    shares : None where nothing can be said.
+    why : the reason; empty otherwise.
+    """
+
+    joint: str
+    whole: Whole
+    shares: ExplainedShares | None
+    why: str = ""
+
+    @property
+    def told(self) -> dict[str, Share]:
+        """Shares that can be told from nothing."""
+        return {} if self.shares is None else {k: s for k, s in self.shares.by.items() if s.told}
+
+    @property
+    def sentence(self) -> str:
+        """What it depends on, in plain words."""
+        if self.shares is None:
+            return f"What is left at {self.joint} is not asked what it depends on: {self.why}."
+        what = "what is left beyond the noise"
+        if self.whole == "all":
+            what = "what is left, noise included,"
+        told, others = self.told, [_WORDS[k] for k, s in self.shares.by.items() if not s.told]
+        if not told:
+            return (
+                f"At {self.joint}, on blocks of time that it was not fitted to, a flexible "
+                f"regression explains nothing that can be told of {what} by "
+                f"{_listed(others, 'or')}."
+            )
+        (first, share), *more = told.items()
+        parts = [
+            f"{_rounded(share.value)} (standard error {_rounded(share.error)}) of {what} by "
+            f"{_WORDS[first]}",
+            *(f"{_rounded(s.value)} ({_rounded(s.error)}) more by {_WORDS[k]}" for k, s in more),
+        ]
+        nothing = f" Of {_listed(others, 'and')} nothing can be told." if others else ""
+        rest = self.shares.rest
+        left = f" {_rounded(rest.value)} ({_rounded(rest.error)}) is explained by none of them."
+        return (
+            f"At {self.joint}, on blocks of time that it was not fitted to, a flexible regression "
+            f"explains {_listed(parts, 'and')}.{nothing}{left if rest.told else ''}"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """As `--json` has it."""
+        found: dict[str, Any] = {"joint": self.joint, "of": self.whole}
+        if self.shares is None:
+            return {**found, "blocks": None, "inputs": [], "rest": None, "why": self.why}
+        inputs = [
+            {"name": name, **one.to_dict(), "distinguishable": one.told}
+            for name, one in self.shares.by.items()
+        ]
+        rest = self.shares.rest.to_dict()
+        return {**found, "blocks": self.shares.units, "inputs": inputs, "rest": rest, "why": None}
+
+
+def residual_dependence(
+    judged: HeldOut, records: Sequence[ResidualRecord], names: Sequence[str], c: VerdictCriteria
+) -> tuple[JointDependence, ...]:
+    """Ask what is left at each joint what it depends on.
+
+    Parameters
+    ----------
+    judged : what the final model misses on held-out data: which joints have something left.
+    records : that residual in each recording; with more recordings more can be learnt.
+    names : of the joints.
+    c : when something is left.
+
+    Returns
+    -------
+    One for each joint at which something is left.
+    """
+    joints = _joints_with_a_residual(judged, c)
+    if not joints:
+        return ()
+    records = tuple(one for one in records if len(one.t) > 1)
+    blocks = motion_blocks(records, joints)
+    found = []
+    for j in joints:
+        power = np.concatenate([one.noise_power[:, j] for one in records])
+        known = bool(np.isfinite(power).all())
+        rows = _evenly([one.certain[:, j] for one in records])
+        units = blocks.units(rows)
+        shares, why = None, _too_little(len(rows), len(units))
+        if not why:
+            x = joint_inputs(records, j).rows(rows)
+            residual = np.concatenate([one.residual[:, j] for one in records])[rows]
+            noise = power[rows] if known else np.zeros(len(rows))
+            shares = explained_shares(x, residual, noise, units)
+            why = "" if shares else "there is no more than noise"
+        whole: Whole = "systematic" if known else "all"
+        found.append(JointDependence(joint=names[j], whole=whole, shares=shares, why=why))
+    return tuple(found)
+
+
+def _joints_with_a_residual(judged: HeldOut, c: VerdictCriteria) -> list[int]:
+    """Joints with more than noise, or than what nothing resolves, where noise is unknown."""
+    left = judged.residual_rms
+    if judged.ratio is not None and judged.noise_std is not None:
+        left = np.where(judged.ratio > c.within_noise, judged.ratio * judged.noise_std, 0.0)
+    return np.flatnonzero(left > c.resolution * judged.torque_rms).tolist()
+
+
+def _evenly(certain: Sequence[np.ndarray]) -> np.ndarray:
+    """Rows (N,) among all of several records, (T,) masks: as many of each as it has, evenly."""
+    share = min(ROWS / max(sum(int(one.sum()) for one in certain), 1), 1.0)
+    found, first = [], 0
+    for one in certain:
+        rows = np.flatnonzero(one)
+        kept = np.linspace(0, len(rows) - 1, round(share * len(rows))).round().astype(int)
+        found.append(first + rows[kept])
+        first += len(one)
+    return np.concatenate(found)
+
+
+def _too_little(rows: int, units: int) -> str:
+    """Why nothing can be said; empty where something can."""
+    if rows < FEWEST_ROWS:
+        return f"{rows} rows are too few"
+    if units < FEWEST_UNITS:
+        return (
+            f"the motion comes again and again, and leaves {units} parts to hold out one after "
+            f"another, where {FEWEST_UNITS} are needed; record motions that differ"
+        )
+    return ""
+
+
+def dependence_table(found: Sequence[JointDependence]) -> Table:
+    """Shares at each joint, in %, with their standard errors."""
+    rows = tuple(
+        (
+            one.joint,
+            *(_cell(one.shares.by.get(name) if one.shares else None) for name in INPUTS),
+            _cell(one.shares.rest if one.shares else None),
+        )
+        for one in found
+    )
+    noise = (
+        "Shares are of the systematic residual: the noise is taken off."
+        if all(one.whole == "systematic" for one in found)
+        else "Shares are of all that is left, noise included: nothing tells it from the rest."
+    )
+    return Table(
+        "What is left, by what a flexible regression explains on held-out blocks of time",
+        ("joint", *INPUTS, "none of these"),
+        rows,
+        (
+            f"{noise} Each with its standard error over the blocks; told from nothing at the level "
+            "of 5 % over all sets of inputs.",
+            "Each share is what inputs add to those before them that are told: what two sets "
+            "explain alike counts for the earlier. The past (elasticity, hysteresis) comes before "
+            "acceleration and load where it explains more. Negative shares are shown as 0 %.",
+            "An estimate of what laws in these quantities could explain. A regression on more data "
+            "may explain more; that it explains something does not say that the cause is there.",
+        ),
+    )
+
+
+def _cell(share: Share | None) -> str:
+    if share is None:
+        return "-"
+    return f"{_rounded(max(share.value, 0.0))} \u00b1 {_rounded(share.error)}"
+
+
+def _rounded(value: float) -> str:
+    return percent(round(value, 2) + 0.0, 0)
+
+
+def _listed(names: Sequence[str], last: str) -> str:
+    return f" {last} ".join([*([", ".join(names[:-1])] if names[1:] else []), *names[-1:]])
