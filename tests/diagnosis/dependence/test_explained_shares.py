@@ -59,7 +59,7 @@ def test_two_laws_are_told_apart_and_add_up() -> None:
 
 @pytest.mark.parametrize("correlation_s", [0.0, 0.2, 1.0])
 def test_noise_of_any_colour_depends_on_nothing(correlation_s: float) -> None:
-    made = [shares_of(record(seed, {}, correlation_s=correlation_s), rows=400) for seed in SEEDS]
+    made = [shares_of(record(seed, {}, correlation_s=correlation_s), rows=300) for seed in SEEDS]
     claimed = sum(any(s.told for s in one.by.values()) for one in made)
     assert claimed <= 1
 
@@ -72,7 +72,7 @@ def test_a_motion_that_repeats_is_no_way_to_look_up_noise_that_repeats() -> None
         period = round(8.0 * 50.0)
         noise = np.convolve(one.residual[:period, 0], np.ones(10) / 3, mode="same")
         one.residual[:, 0] = np.tile(noise, 4)
-        claimed += any(s.told for s in shares_of(one, rows=400).by.values())
+        claimed += any(s.told for s in shares_of(one, rows=300).by.values())
     assert claimed <= 1
 
 

@@ -137,7 +137,8 @@ def residual_dependence(
             residual = np.concatenate([one.residual[:, j] for one in records])[rows]
             noise = power[rows] if known else np.zeros(len(rows))
             shares = explained_shares(x, residual, noise, units)
-            why = "" if shares else "there is no more than noise"
+            if shares is None:
+                continue  # over all recordings there is no more than noise
         whole: Whole = "systematic" if known else "all"
         found.append(JointDependence(joint=names[j], whole=whole, shares=shares, why=why))
     return tuple(found)
