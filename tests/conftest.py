@@ -30,6 +30,7 @@ LONGEST = (
     "regression/test_estimators.py",
     "nlp/test_chains.py",
     "fitting/uncertainty/test_row_errors.py",
+    "diagnosis/dependence/test_explained_shares.py",
     "problems/test_emps.py",
     "fitting/instrumental/test_simulated_loop.py",
     "diagnosis/search/test_withdrawal.py",

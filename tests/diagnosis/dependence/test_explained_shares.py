@@ -16,6 +16,8 @@ STATE, MOTION, PAST, OTHERS, TIME = (
 )
 SEEDS = range(20)
 
+pytestmark = pytest.mark.slow  # twenty regressions a test
+
 
 @pytest.mark.parametrize(
     ("law", "inputs", "found"),
