@@ -99,7 +99,8 @@ def diagnose(
     most : effects that are added at most, one at several joints counting once; None for
         `SearchCriteria.most_effects`.
     propose : when laws are proposed for what the catalogue leaves: "unexplained", where a residual
-        beyond a known noise remains; "always"; "never".
+        beyond a known noise remains; "always", and what the residual depends on is looked for
+        whatever the verdict; "never".
     criteria : the numbers that decide the answer, see `dynident.criteria`.
     progress : is called with what is being done, for a display; by default a line of the log every
         ten seconds, see `dynident.progress`.
