@@ -47,8 +47,9 @@ def test_another_recording_of_the_same_motion_is_a_repetition() -> None:
     )
     blocks = motion_blocks((one, again), [0])
     first, second = blocks.unit[: len(one.t)], blocks.unit[len(one.t) :]
-    # But for the edges of blocks, which need not be in the same places.
-    assert set(second) <= set(first)
+    assert len(np.unique(blocks.unit)) >= 16
+    # But for a few rows at the edges of blocks.
+    assert np.mean(second == first[437:]) > 0.99
 
 
 def test_two_motions_are_not_one() -> None:

@@ -75,3 +75,16 @@ def test_where_nothing_is_missing_nothing_is_asked() -> None:
     healthy = diagnose(MODEL, Dataset(runs[:1]), Dataset(runs[1:]), most=0)
     assert healthy.residual_dependence == ()
     assert "residual_dependence" not in healthy.to_dict()
+
+
+def test_where_laws_are_asked_for_it_is_looked_for_whatever_the_verdict() -> None:
+    """Nothing repeats, so that the noise is unknown: of everything that is left."""
+    truth = true_values(MODEL, **FRICTION)
+    runs = tuple(
+        with_cable(synthetic(MODEL, truth, seed, rate_hz=100.0, torque_std=0.1, period=None))
+        for seed in range(4)
+    )
+    found = diagnose(MODEL, Dataset(runs[:3]), Dataset(runs[3:]), most=0, propose="always")
+    assert found.noise_source == "unknown"
+    elbow = next(one for one in found.residual_dependence if one.joint == "elbow")
+    assert elbow.whole == "all" and "position and velocity" in elbow.told

@@ -24,9 +24,11 @@ GAP_SHARE = 0.25
 NEAR = 0.05
 """Distance of two states, in units of their spread, within which they are one state."""
 SAME_MOTION = 0.3
-"""Part of a block's rows whose states another block has as well, from which they are one motion."""
+"""Part of a block's rows whose states were seen before it, from which its motion comes again."""
 _STATES = 20_000
 """Rows in which states are looked for, at most."""
+_ASKED = 2000
+"""Rows whose states are looked for, about."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +86,7 @@ class MotionBlocks:
 
 
 def motion_blocks(records: tuple[ResidualRecord, ...], joints: list[int]) -> MotionBlocks:
-    """Cut records into blocks, and put together those that show one motion.
+    """Cut records into blocks, and put together what shows one motion.
 
     Parameters
     ----------
@@ -95,6 +97,29 @@ def motion_blocks(records: tuple[ResidualRecord, ...], joints: list[int]) -> Mot
     gap = max((_correlation_time(one, j) for one in records for j in joints), default=0.0)
     wanted = sum(lengths) / max(gap / GAP_SHARE, 1e-12)
     count = int(np.clip(wanted, FEWEST_BLOCKS, MOST_BLOCKS))
+    block = _cut(records, lengths, count)
+    unit = _earliest_of_motion(records, block)
+    if (many := len(np.unique(unit))) < FEWEST_BLOCKS:
+        # Most is repetition: as many blocks of what is none.
+        count = -(-count * FEWEST_BLOCKS // many)
+        unit = _earliest_of_motion(records, _cut(records, lengths, count))
+    return MotionBlocks(
+        unit=unit,
+        record=np.concatenate([np.full(len(one.t), i) for i, one in enumerate(records)]),
+        t=np.concatenate([one.t for one in records]),
+        gap=min(gap, GAP_SHARE * sum(lengths) / count),
+    )
+
+
+def _cut(records: tuple[ResidualRecord, ...], lengths: list[float], count: int) -> np.ndarray:
+    """Number of the block of each row; a period is cut once, for all its repetitions.
+
+    Parameters
+    ----------
+    records : all records.
+    lengths : of each, s, or of its period.
+    count : of blocks, about.
+    """
     length = sum(lengths) / count
     blocks, first = [], 0
     for one, own in zip(records, lengths, strict=True):
@@ -103,13 +128,7 @@ def motion_blocks(records: tuple[ResidualRecord, ...], joints: list[int]) -> Mot
         phase = np.mod(passed, one.period) if one.period else passed
         blocks.append(first + np.minimum((phase / max(own, 1e-12) * many).astype(int), many - 1))
         first += many
-    block = np.concatenate(blocks)
-    return MotionBlocks(
-        unit=_one_motion(records, block)[block],
-        record=np.concatenate([np.full(len(one.t), i) for i, one in enumerate(records)]),
-        t=np.concatenate([one.t for one in records]),
-        gap=min(gap, GAP_SHARE * length),
-    )
+    return np.concatenate(blocks)
 
 
 def _correlation_time(one: ResidualRecord, joint: int) -> float:
@@ -124,29 +143,27 @@ def _correlation_time(one: ResidualRecord, joint: int) -> float:
     return float(lag * np.median(np.diff(one.t))) if len(e) > 1 else 0.0
 
 
-def _one_motion(records: tuple[ResidualRecord, ...], block: np.ndarray) -> np.ndarray:
-    """Number of the unit of each block: blocks whose joints go through the same states are one.
+def _earliest_of_motion(records: tuple[ResidualRecord, ...], block: np.ndarray) -> np.ndarray:
+    """Number of the block (T,) in which the motion of each row was seen first.
 
-    A single joint comes back to its states whatever it does: only its period is then a repetition.
+    A motion comes again where all joints go through the same states for a while. A single joint
+    comes back to its states whatever it does: only its period is then a repetition.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import KDTree
 
-    count = int(block.max()) + 1
     state = np.concatenate([np.hstack([one.q, one.v]) for one in records])
     size, spread = np.abs(state).max(axis=0), state.std(axis=0)
     moving = spread > 1e-6 * size
     if moving.sum() <= 2:
-        return np.arange(count)
+        return block
     state = state[:, moving] / spread[moving]
     kept = np.linspace(0, len(state) - 1, min(len(state), _STATES)).round().astype(int)
-    asked = kept[:: max(len(kept) // 2000, 1)]
-    within = NEAR * np.sqrt(state.shape[1])
-    tree = KDTree(state[kept])
-    seen = np.zeros((count, count))
-    for row, near in zip(asked, tree.query_ball_point(state[asked], within), strict=True):
-        seen[block[row], np.unique(block[kept[near]])] += 1.0
-    own = np.maximum(np.diag(seen), 1.0)
-    linked = coo_array(seen >= SAME_MOTION * own[:, None])
-    return connected_components(linked, directed=False)[1]
+    asked = kept[:: max(len(kept) // _ASKED, 1)]
+    near = KDTree(state[kept]).query_ball_point(state[asked], NEAR * np.sqrt(state.shape[1]))
+    first = block[kept[[min(rows) for rows in near]]]
+    before = np.bincount(block[asked], weights=first != block[asked], minlength=block.max() + 1)
+    again = before >= SAME_MOTION * np.bincount(block[asked], minlength=block.max() + 1)
+    first = np.where(again[block[asked]], first, block[asked])
+    nearest = np.searchsorted(asked, np.arange(len(block))).clip(max=len(asked) - 1)
+    # Of a block that was never seen before, every row is its own.
+    return np.where(first[nearest] == block[asked[nearest]], block, first[nearest])
