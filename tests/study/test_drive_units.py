@@ -208,3 +208,19 @@ def test_payload_weighs_the_loads_that_are_not_known(tmp_path: Path) -> None:
     path.write_text(nothing)
     done = CliRunner().invoke(commands, ["payload", str(path)])
     assert done.exit_code != 0 and "[loads.crate]" in str(done.exception)
+
+
+def test_links_are_trusted_by_their_names(tmp_path: Path) -> None:
+    plain = STUDY.partition("[loads.tool]")[0] + '[[recordings]]\nfile = "empty.csv"\n'
+    text = plain.replace('torque_unit = "A"', 'torque_unit = "A"\ntrusted = ["forearm"]')
+    path = written(tmp_path)
+    path.write_text(text)
+    links = [link.name for link in arm().links]
+    with pytest.raises(StudyError, match="no moving link 'forearm'"):
+        load(path)
+    path.write_text(text.replace("forearm", links[-1]))
+    drives = load(path).drives
+    assert drives is not None and not drives.is_scaled
+    path.write_text(text.replace('torque_unit = "A"\n', "").replace("forearm", links[-1]))
+    with pytest.raises(StudyError, match="trusted links, and torques in N m"):
+        load(path)

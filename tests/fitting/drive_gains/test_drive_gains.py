@@ -17,7 +17,8 @@ from dynident.inertia import from_com, to_com
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
 from dynident.robot import Robot
-from synthetic import smooth_motion
+from study_files import recording
+from synthetic import arm, smooth_motion
 
 N = 3
 GAINS = np.array([11.0, -7.5, 3.2])
@@ -244,3 +245,39 @@ def test_what_the_model_lacks_is_said_and_widens_the_errors() -> None:
     assert "lacks something" in lacking.doubts[0]
     off = np.abs(np.log(lacking.gains / GAINS)) / lacking.relative_sigma
     assert np.all(lacking.relative_sigma > 2 * whole.relative_sigma) and off.max() < 10
+
+
+def test_trusted_links_fix_the_scale() -> None:
+    """The last link as it truly is, the others as described: a third off."""
+    model, values, found = recordings()
+    true = chain(N, 5)
+    robot = model.robot.with_theta(np.append(model.robot.theta[:20], true.theta[20:]))
+    told = replace(model, robot=robot)
+    data = Dataset((found[""],))
+    open_ = fit_drive_gains(GainProblem(told, data))
+    assert open_.is_scaled
+    fixed = fit_drive_gains(GainProblem(told, data, trusted=("l2",)))
+    assert fixed.findings == ("identified",) * N
+    assert np.all(np.abs(np.log(fixed.gains / GAINS)) < 3 * fixed.relative_sigma)
+    np.testing.assert_allclose(fixed.gains, GAINS, rtol=0.01)
+    np.testing.assert_allclose(fixed.values, values, atol=0.02 * np.abs(values).max())
+    # What is trusted stays as it is described.
+    held = GainProblem(told, data, trusted=("l2",)).held
+    np.testing.assert_array_equal(fixed.values[held], told.given_values()[held])
+    every = fit_drive_gains(
+        GainProblem(replace(model, robot=true), data, trusted=("l0", "l1", "l2"))
+    )
+    assert np.all(every.relative_sigma < fixed.relative_sigma)
+
+
+def test_trust_in_a_link_that_others_hang_on_says_nothing() -> None:
+    """What the upper arm makes shows only with the mass of the forearm at its end."""
+    one, theta = recording(1), np.array(arm().theta)
+    theta[2] = 0.0  # its first moment across, which shows alone
+    model = Model(arm().with_theta(theta))
+    first, last = (link.name for link in arm().links if link.joint >= 0)
+    assert GainProblem(model, Dataset((one,)), trusted=(last,)).held.any()
+    with pytest.raises(StudyError, match=f"trusting {first} fixes nothing"):
+        fit_drive_gains(GainProblem(model, Dataset((one,)), trusted=(first,)))
+    with pytest.raises(StudyError, match="no moving link 'hand'"):
+        fit_drive_gains(GainProblem(model, Dataset((one,)), trusted=("hand",)))

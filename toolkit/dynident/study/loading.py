@@ -123,11 +123,13 @@ def load(path: str | Path, *, modules: Permission = "trusted") -> Study:
     if said.controller:
         controller = said.controller.controller(robot, f"{path}: controller")
     drives = None
-    if said.torque_unit != "N m" or said.drive_gains or loads:
+    if said.torque_unit != "N m" or said.drive_gains or said.trusted or loads:
         known = said.drive_gains
         if said.torque_unit == "N m":
             known = dict.fromkeys(robot.names, 1.0)
-        drives = _drives(said, path, GainProblem(model, sets["train"], known, loads))
+        drives = _drives(
+            said, path, GainProblem(model, sets["train"], known, loads, trusted=tuple(said.trusted))
+        )
         sets = {use: in_newton_metres(one, drives, robot) for use, one in sets.items()}
     return Study(
         path=path,
@@ -156,6 +158,9 @@ def _drives(said: StudyFile, path: Path, problem: GainProblem) -> DriveGains:
     if said.torque_unit == "N m" and said.drive_gains:
         what, remedy = "gains of drives, and torques in N m", 'state torque_unit = "A" or "%"'
         raise StudyError(what, f"{path}: drive_gains", remedy)
+    if said.torque_unit == "N m" and said.trusted:
+        what, remedy = "trusted links, and torques in N m", 'state torque_unit = "A" or "%"'
+        raise StudyError(what, f"{path}: trusted", remedy)
     trained = {recording.load for recording in problem.dataset.recordings}
     for load in problem.loads:
         if load.name not in trained and not load.is_known:

@@ -118,6 +118,9 @@ class StudyFile(SettingsTable):
     torque_unit : "N m" (and N, of prismatic joints), or the unit of the drives, "A" or "%": then
         each joint's gain is identified, and torques are converted before anything else is done.
     drive_gains : joint -> its gain where that is known, N m (or N) per unit; one fixes the scale.
+    trusted : links whose mass, centre and inertia in the description are right, as of a hand that
+        was weighed; with torque_unit = "A" they fix the scale, as far as what they weigh shows
+        without that of links that are not trusted.
     loads : name -> a load that recordings carry; a known one fixes the scale.
     friction_width : speed (rad/s or m/s) within which dry friction turns over; one, or by joint.
     gravity : m/s^2, in the axes of the description's base.
@@ -141,6 +144,7 @@ class StudyFile(SettingsTable):
     torque: Literal["measured", "held_command"] = "measured"
     torque_unit: Literal["N m", "A", "%"] = "N m"
     drive_gains: dict[str, float] = Field(default_factory=dict)
+    trusted: list[str] = Field(default_factory=list)
     loads: dict[str, LoadEntry] = Field(default_factory=dict)
     friction_width: float | dict[str, float] = FRICTION_WIDTH
     gravity: tuple[_Gravity, _Gravity, _Gravity] | None = None

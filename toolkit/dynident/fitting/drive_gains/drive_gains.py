@@ -125,7 +125,8 @@ class DriveGains(Shown):
             return ""
         return (
             "The values shown are those at which the description's torque fits best. A known load "
-            "in some recordings, or the gain of one joint in [drive_gains], fixes the scale."
+            "in some recordings, the gain of one joint in [drive_gains], or links that the "
+            "description is trusted for (trusted) fix the scale."
         )
 
     @property

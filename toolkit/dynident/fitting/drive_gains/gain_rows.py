@@ -7,7 +7,7 @@ the model's columns those of what is unknown of each load, and the torque of wha
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +19,9 @@ from dynident.fitting.sampling import Sampled, sample
 from dynident.inertia import frame_change
 from dynident.model import Model
 from dynident.recording import Dataset
+from dynident.settings import nearest
+
+_ROUNDING = 1e-9  # of the largest entry of a combination of parameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,12 +34,16 @@ class GainProblem:
     dataset : its torques are in the unit of the drives.
     known : gain of each joint whose gain is known, N m (or N) per unit.
     loads : that the recordings name.
+    trusted : links whose mass, centre and inertia in the description are right; what they alone
+        make of the model's parameters is known.
     """
 
     model: Model
     dataset: Dataset
     known: Mapping[str, float] = field(default_factory=dict)
     loads: tuple[Load, ...] = ()
+    _: KW_ONLY
+    trusted: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         robot = self.model.robot
@@ -58,6 +65,39 @@ class GainProblem:
             if effect.is_payload and self.loads:
                 what = "a load under study and loads by their names exclude one another"
                 raise StudyError(what, effect.label, "leave the effect out: name the load instead")
+
+    @cached_property
+    def held(self) -> np.ndarray:
+        """Which of the model's parameters trusted links make alone, (p,) bool.
+
+        Raises
+        ------
+        StudyError
+            If the robot has no such link, or what they make shows only together with others.
+        """
+        robot, found = self.model.robot, np.zeros(self.model.size, dtype=bool)
+        if not self.trusted:
+            return found
+        names = [link.name for link in robot.links if link.joint != -1]
+        for name in self.trusted:
+            if name not in names:
+                remedy = nearest(name, names, "links")
+                raise StudyError(f"the robot has no moving link '{name}'", "trusted", remedy)
+        others = {
+            link.joint
+            for link in robot.links
+            if link.joint != -1 and link.name not in self.trusted and np.any(link.phi)
+        }
+        combination = self.model.base.combination
+        columns = [k for j in sorted(others) for k in range(10 * j, 10 * j + 10)]
+        size = np.abs(combination).max(axis=1)
+        alone = np.all(np.abs(combination[:, columns]) <= _ROUNDING * size[:, None], axis=1)
+        found[: len(alone)] = alone & (self.given_values()[: len(alone)] != 0.0)
+        if not found.any():
+            what = f"trusting {', '.join(self.trusted)} fixes nothing"
+            remedy = "what a link weighs shows only with all links behind it: trust these too"
+            raise StudyError(what, "trusted", remedy)
+        return found
 
     @property
     def free(self) -> np.ndarray:
@@ -116,7 +156,8 @@ class GainProblem:
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Yield blocks (T, n, size + 1) of a recording, and the currents (T, n).
 
-        The columns are the torque per unit of parameters, and that of what is known of the load.
+        The columns are the torque per unit of parameters, and that of what is known of loads and
+        trusted links.
 
         Parameters
         ----------
@@ -124,6 +165,7 @@ class GainProblem:
         values : (size,) at which columns that depend on the fitted model are taken.
         """
         p, load = self.model.size, sampled.recording.load
+        given = self.model.given_values()
         if values is not None:
             values = np.append(values[:p], np.zeros(10 if self.loads else 0))
         for found, current in sampled.rows(self._carrying, values):
@@ -133,6 +175,9 @@ class GainProblem:
                 parts = self.splits[load]
                 block[:, :, self.slices[load]] = found[:, :, p:] @ parts.unknown
                 block[:, :, -1] = found[:, :, p:] @ parts.given
+            # A column of zeros is none that is solved for: its parameter stays as described.
+            block[:, :, -1] += block[:, :, :p] @ np.where(self.held, given, 0.0)
+            block[:, :, :p][:, :, self.held] = 0.0
             yield block, current
 
     def rows(self, values: np.ndarray | None = None) -> Iterator[tuple[np.ndarray, np.ndarray]]:
