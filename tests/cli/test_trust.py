@@ -14,7 +14,7 @@ import pytest
 
 from dynident.effect_modules import remember
 from study_files import CONTROLLER, STUDY, listing
-from user_effects import HOSTILE, PLACES, SAG, UNSOUND, own_settings, put, put_place
+from user_effects import HOSTILE, PLACES, SAG, UNSOUND, own_settings, put, put_place, with_columns
 
 WITH_MODULE = STUDY.replace(
     'effects = ["viscous_friction"]',
@@ -148,6 +148,28 @@ def test_hostile_modules_are_one_line(run, study, tmp_path, kind):
     assert done.err.startswith("error: ") and done.err.count("\n") == 1, done.err
     assert re.search(words, done.err) and "\x1b" not in done.err
     assert sorted(one.name for one in tmp_path.iterdir()) == before
+
+
+LATE = {
+    "raises": ("return {}['speed']", r"mine.py:\d+: KeyError: 'speed'"),
+    "not finite": ("return np.log(0.0 * block.v[:, j])", r"cable_sag@.* not finite, first at q = "),
+    "too short": ("return block.v[:-1, j]", r"cable_sag@.*at_joint\(\) has the shape"),
+}
+
+
+@pytest.mark.parametrize("kind", LATE)
+@pytest.mark.parametrize("command", [("diagnose",), ("compare", "--with", "cable_sag@elbow")])
+@pytest.mark.filterwarnings("ignore:divide by zero")
+def test_effects_that_fail_in_the_work_are_one_line(run, study, tmp_path, kind, command):
+    """Sound on the samples that are tried when they are read, and not on recordings."""
+    line, words = LATE[kind]
+    late = with_columns("if len(block.t) <= 25:\n            return block.v[:, j]")
+    put(tmp_path / "mine.py", f"{late}        {line}\n")
+    path = study(WITH_MODULE.replace(', "cable_sag@elbow"', ""))
+    done = run(command[0], path, *command[1:], "--trust")
+    assert done.status == 2 and done.out == ""
+    assert done.err.startswith("error: ") and done.err.count("\n") == 1, done.err
+    assert re.search(words, done.err), done.err
 
 
 @pytest.mark.parametrize("hidden", ["true", "false"])

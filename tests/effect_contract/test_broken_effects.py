@@ -170,12 +170,12 @@ def changes_the_block():
     return columns_of(doubled)
 
 
-@breaks("finite columns", "25 of 75 entries of columns() are not finite")
+@breaks("finite columns", "25 of 25 of its columns' rows are not finite, first at q = ")
 def not_a_number():
     return columns_of(lambda self, block, right: right * np.nan)
 
 
-@breaks("finite columns", "entries of columns() are not finite")
+@breaks("finite columns", "of 25 of its columns' rows are not finite, first at q = ")
 def infinite_at_some():
     return columns_of(lambda self, block, right: np.where(block.t[:, None] > 50, np.inf, right))
 
@@ -284,7 +284,7 @@ def a_grid_downwards():
     return with_shape(grid=(4.0, 2.0, 1.0))
 
 
-@breaks("bounds", "not finite at w = 0.1")
+@breaks("bounds", "at w = 0.1 m: 25 of 25 of its columns' rows are not finite")
 def not_finite_at_the_bound():
     return columns_of(
         lambda self, block, right: right if self.shape[0] > 0.1 else right / np.zeros(1)

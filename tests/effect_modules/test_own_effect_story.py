@@ -35,8 +35,8 @@ def study(folder: Path, module: str, text: str, label: str, value: float = 0.6) 
     values = true_values(model, **HIDDEN)
     values[model.slices[label]] = value
     for seed, name in enumerate(("train.csv", "test.csv")):
-        noisy = {"rate_hz": 100.0, "position_std": 1e-5, "torque_std": 0.05}
-        write(synthetic(model, values, seed, **noisy), folder / name)
+        made = synthetic(model, values, seed, rate_hz=100.0, position_std=1e-5, torque_std=0.05)
+        write(made, folder / name)
     path = folder / "study.toml"
     named = f'effects = ["viscous_friction"]\neffect_modules = ["{module}"]'
     path.write_text(STUDY.replace('effects = ["viscous_friction"]', named))

@@ -69,6 +69,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         except Exception as error:
             if os.environ.get(TRACEBACK):
                 raise
+            from dynident.effect_modules import line_of_a_module
+
+            if line := line_of_a_module(error):
+                said = f"{line}: {type(error).__name__}: {error}"
+                _fail(f"{said}. correct the class; dynident.check_effect tells more")
             where = f"{TRACEBACK}=1 shows where; please report it with the input"
             _fail(f"unexpected {type(error).__name__}: {error}. {where}")
 

@@ -19,7 +19,7 @@ from dynident.effect_contract import (
 )
 from dynident.effect_contract.crane import places
 from dynident.effects import Effect
-from dynident.errors import EffectError
+from dynident.errors import DynidentError, EffectError
 
 _CORRECT = "correct the class"
 
@@ -114,6 +114,9 @@ def _said(error: BaseException, kind: type[Effect]) -> str:
     """What went wrong and where, in the file of the class if it was there."""
     frames = traceback.extract_tb(error.__traceback__)
     file = getattr(sys.modules.get(kind.__module__), "__file__", None)
-    own = [one for one in frames if one.filename == file] or frames
-    at = f" ({own[-1].filename}:{own[-1].lineno})" if own else ""
-    return " ".join(f"{type(error).__name__}: {error}{at}".split())
+    own = [one for one in frames if one.filename == file]
+    if isinstance(error, DynidentError):
+        said = error.what
+    else:
+        said, own = f"{type(error).__name__}: {error}", own or list(frames)
+    return said + (f" ({own[-1].filename}:{own[-1].lineno})" if own else "")

@@ -49,8 +49,14 @@ def bounds_leave_room(effect: Effect) -> Iterator[str]:
     for k, shape in enumerate(shapes):
         for value in (shape.lower, shape.upper):
             values = [*effect.shape[:k], value, *effect.shape[k + 1 :]]
-            if not np.isfinite(effect.shaped(*values).on(robot).columns(block)).all():
-                yield f"columns are not finite at {shape.name} = {value:g} {shape.unit}"
+            at = f"at {shape.name} = {value:g} {shape.unit}"
+            try:
+                columns = effect.shaped(*values).on(robot).columns(block)
+            except EffectError as error:
+                yield f"{at}: {error.what}"
+            else:
+                if not np.isfinite(columns).all():
+                    yield f"{at}: columns are not finite"
 
 
 def shapes_outside_are_refused(effect: Effect) -> Iterator[str]:

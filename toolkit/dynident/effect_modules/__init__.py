@@ -7,6 +7,13 @@ by its content (`trust`).
 
 from dynident.effect_modules.import_effects import Permission, import_effects, require_sound
 from dynident.effect_modules.trust import remember
-from dynident.effect_modules.user_module import module_file
+from dynident.effect_modules.user_module import line_of_a_module, module_file
 
-__all__ = ["Permission", "import_effects", "module_file", "remember", "require_sound"]
+__all__ = [
+    "Permission",
+    "import_effects",
+    "line_of_a_module",
+    "module_file",
+    "remember",
+    "require_sound",
+]

@@ -141,6 +141,17 @@ def module_file(kind: type[Effect]) -> Path | None:
     return loader.path if isinstance(loader, _ContentLoader) else None
 
 
+def line_of_a_module(error: BaseException) -> str:
+    """Return `file:line` in an effect module that an error came through last; empty for none."""
+    found, step = "", error.__traceback__
+    while step is not None:
+        loader = step.tb_frame.f_globals.get("__loader__")
+        if isinstance(loader, _ContentLoader):
+            found = f"{loader.path}:{step.tb_lineno}"
+        step = step.tb_next
+    return found
+
+
 class _ContentLoader(SourceLoader):
     """Loads what was read; nothing compiled is kept beside the file."""
 

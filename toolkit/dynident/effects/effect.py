@@ -31,6 +31,7 @@ from dynident.effects.traits import EffectTraits
 from dynident.errors import EffectError
 from dynident.robot import Robot
 
+_OWN = f"{__name__.partition('.')[0]}."
 Motion = Literal[
     "speed",
     "slow",
@@ -284,14 +285,32 @@ class JointEffect(Effect):
         return (robot.names.index(str(self.joint)),)
 
     def acting_columns(self, block: Block) -> np.ndarray:
-        return self.at_joint(block)[:, None, :]
+        return self._here(block)[:, None, :]
 
     def columns(self, block: Block) -> np.ndarray:
-        here = self.at_joint(block)
+        here = self._here(block)
         # Of the same type, so that the columns can also be taken of symbols (see closed_loop).
         full = np.zeros((len(block.t), len(block.names), here.shape[1]), dtype=here.dtype)
         full[:, block.index(self.joint)] = here
         return full
+
+    def _here(self, block: Block) -> np.ndarray:
+        """Columns at `joint`; those of a class from elsewhere only if they are numbers."""
+        here = self.at_joint(block)
+        if type(self).__module__.startswith(_OWN) or here.dtype == object:  # or symbols
+            return here
+        if here.ndim != 2 or len(here) != len(block.t):
+            what = f"at_joint() has the shape {here.shape} for {len(block.t)} samples"
+            raise EffectError(what, self.label, "return (samples, parameters)")
+        bad = ~np.isfinite(here).all(axis=1)
+        if bad.any():  # a motion that is not finite itself is no fault of the law
+            bad &= np.isfinite(block.q).all(axis=1) & np.isfinite(block.v).all(axis=1)
+        if bad.any():
+            j, row = block.index(self.joint), int(np.argmax(bad))
+            at = f"first at q = {block.q[row, j]:.4g}, v = {block.v[row, j]:.4g}"
+            rows = f"{np.count_nonzero(bad)} of {len(here)} of its columns' rows"
+            raise EffectError(f"{rows} are not finite, {at}", self.label, "correct the class")
+        return here
 
 
 def motion_unit(robot: Robot, joint: str | None) -> str:
