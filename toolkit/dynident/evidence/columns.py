@@ -330,7 +330,13 @@ class Evidence:
         whole = sampled.block(model) if whole is None else whole
         block = whole
         if effect in model and effect.needs_torque:
-            block = replace(block, torque=self._own_torque(sampled, block, model, values))
+            # The same for all effects that scale it, whatever else they need.
+            torque = kept.get(("own torque", recorded))
+            if torque is None:
+                torque = self._own_torque(sampled, block, model, values)
+            if sampled.motion.samples <= _SHARED:
+                kept["own torque", recorded] = torque
+            block = replace(block, torque=torque)
         block = model.ready(effect, block, values)
         if sampled.motion.samples <= _SHARED:
             kept[key], kept[recorded] = block, whole

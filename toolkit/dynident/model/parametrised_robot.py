@@ -77,7 +77,11 @@ class ParametrisedRobot:
 
     def __contains__(self, effect: Effect | str) -> bool:
         label = effect if isinstance(effect, str) else effect.label
-        return any(one.label == label for one in self.effects)
+        return label in self._labels
+
+    @cached_property
+    def _labels(self) -> frozenset[str]:
+        return frozenset(effect.label for effect in self.effects)
 
     def with_shapes(self, effects: tuple[Effect, ...]) -> Self:
         """Return the model with these effects in place of those of the same labels."""

@@ -61,8 +61,8 @@ def _derivatives(robot: Robot, block: Block) -> tuple[np.ndarray, ...]:
         return by.by_q, by.by_v, by.by_a
     from scipy.interpolate import make_interp_spline
 
-    at = np.arange(len(block.t))
-    return tuple(make_interp_spline(rows, x, k=3)(at) for x in (by.by_q, by.by_v, by.by_a))
+    every = np.stack([by.by_q, by.by_v, by.by_a], axis=1)
+    return tuple(make_interp_spline(rows, every, k=3)(np.arange(len(block.t))).swapaxes(0, 1))
 
 
 def mean_inertia(robot: Robot, joint: int) -> float:
