@@ -19,7 +19,7 @@ FLOORS = (
     ("errors",),
     ("files", "tables"),
     ("progress", "settings", "data_files", "places", "threads"),
-    ("criteria",),
+    ("criteria", "clusters"),
     ("inertia", "moments", "batch"),
     ("recording",),
     ("robot", "formulas"),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -150,18 +149,6 @@ def test_bad_fleets_are_one_line() -> None:
         fit_fleet(model(), {name: data[name] for name in NAMES[:2]})
     with pytest.raises(FitError, match=r"robot 'bob': .*no recording"):
         fit_fleet(model(), {**data, "bob": Dataset(())})
-
-
-@pytest.fixture(scope="module")
-def client() -> Iterator:
-    distributed = pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
-    with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
-        ) as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        yield client
 
 
 @pytest.mark.filterwarnings("default")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import ClassVar, Protocol
 
+from dynident.clusters import Cluster, working_on
 from dynident.errors import FitError
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import LeastSquares
@@ -42,7 +43,13 @@ class Method(Protocol):
 
 
 @single_threaded
-def fit(model: Model, data: Dataset | Recording, method: Method | None = None) -> Estimate:
+def fit(
+    model: Model,
+    data: Dataset | Recording,
+    method: Method | None = None,
+    *,
+    client: Cluster | None = None,
+) -> Estimate:
     """Identify the parameters of a model.
 
     Shape parameters of effects are refined first, by variable projection; the linear parameters
@@ -54,6 +61,9 @@ def fit(model: Model, data: Dataset | Recording, method: Method | None = None) -
     data : recordings with their filter; a single recording takes the default filter.
     method : an estimator: `LeastSquares`, `Constrained`, `IV`, `Regression`, or any other class
         with their `fit`; default: least squares, weighted per joint.
+    client : of dask.distributed, whose workers make the passes of least squares over recordings:
+        each recording is sent to one of them, once, and sums come back. What else a method does,
+        and the refinement of shape parameters, is done here. Without it all is.
 
     Returns
     -------
@@ -62,13 +72,14 @@ def fit(model: Model, data: Dataset | Recording, method: Method | None = None) -
     Raises
     ------
     FitError
-        If the data cannot carry the model, or memory does not suffice.
+        If the data cannot carry the model, memory does not suffice, or the cluster fails.
     RecordingError
         If a recording does not suit its filter.
     """
     try:
         dataset = Dataset((data,)) if isinstance(data, Recording) else data
-        return _fitted(model, dataset, method or LeastSquares())
+        with working_on(client):
+            return _fitted(model, dataset, method or LeastSquares())
     except MemoryError:
         where = data.where if isinstance(data, Recording) else None
         remedy = "use fewer or shorter recordings, or a lower rate"

@@ -7,13 +7,14 @@ estimated from the others alone, so that an odd robot cannot hide in a spread th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from scipy.special import stdtrit
 
+from dynident.clusters import Cluster, spread
 from dynident.errors import DynidentError, FitError
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.fit_model import Method, fit
@@ -35,16 +36,6 @@ LEVEL = 0.05
 
 LEAST_ROBOTS = 3
 """Two robots may differ, but none of them from the others: there is no spread between others."""
-
-
-class Cluster(Protocol):
-    """What works elsewhere: the `Client` of dask.distributed, or what has its two methods."""
-
-    def map(self, function: Callable[..., Any], /, *iterables: Iterable[Any]) -> Any:
-        """Start a function on each tuple of arguments."""
-
-    def gather(self, futures: Any, /) -> Any:
-        """Return what they came to, in their order."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -219,18 +210,14 @@ def fit_fleet(
     ------
     FitError
         If there are fewer than three robots, the data of one cannot carry the model, the method
-        has no covariance, or no combination of parameters is identified by all.
+        has no covariance, no combination of parameters is identified by all, or the cluster fails.
     """
     if len(data) < LEAST_ROBOTS:
         what = f"{len(data)} robots, where one is compared with at least two others"
         raise FitError(what, remedy="fit each of them with `fit`")
     names, datasets = list(data), list(data.values())
     many = len(names)
-    tasks = (names, [model] * many, datasets, [method] * many)
-    if client is None:
-        estimates = list(map(_fit_one, *tasks))
-    else:
-        estimates = client.gather(client.map(_fit_one, *tasks))
+    estimates = list(spread(client, _fit_one, names, [model] * many, datasets, [method] * many))
     return compare_robots(dict(zip(names, estimates, strict=True)))
 
 

@@ -7,20 +7,23 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from dynident.clusters import over_recordings
 from dynident.errors import FitError
 from dynident.fitting.estimate import DataSource, Estimate
 from dynident.fitting.fixed_point import FixedPoint, not_converged
 from dynident.fitting.linear_solution import LinearSolution, solve_factors
-from dynident.fitting.sampling import rows
+from dynident.fitting.sampling import sample
 from dynident.fitting.uncertainty.expected_bias import held
 from dynident.fitting.uncertainty.input_bias import InputBias, input_bias
 from dynident.fitting.uncertainty.lack_of_fit import lack_of_fit, scattered, widened
-from dynident.fitting.uncertainty.lagged_rows import lagged_columns, watched
+from dynident.fitting.uncertainty.lagged_rows import factors_with_columns, lagged_columns
 from dynident.fitting.uncertainty.row_errors import row_errors
 from dynident.model import Model
-from dynident.moments.factors import TriangularFactors, factorise
+from dynident.moments.factors import TriangularFactors, combine, factorise
 from dynident.recording import (
     Dataset,
+    Filter,
+    Recording,
     RowCount,
     count_rows,
     default_filter,
@@ -65,9 +68,9 @@ class LeastSquares:
         columns = None
         if self.errors == "correlated" and not model.needs_values:
             columns = lagged_columns(dataset)
-            factors = factorise(watched(model, dataset, None, columns))
+            factors = factors_with_columns(model, dataset, columns)
         else:
-            factors = factorise(rows(model, dataset))
+            factors = _factors(model, dataset)
         solution = solve_factors(model, factors, self.weighting)
         if model.needs_values:
             model, factors, solution = self._iterate(model, dataset, solution.values)
@@ -94,7 +97,7 @@ class LeastSquares:
         fixed_point = FixedPoint()
         for _ in range(_ROUNDS):
             model = model.at(values)
-            factors = factorise(rows(model, dataset, values))
+            factors = _factors(model, dataset, values)
             solution = solve_factors(model, factors, self.weighting)
             change = np.linalg.norm(solution.values - values) / np.linalg.norm(values)
             if change <= _TOLERANCE:
@@ -103,6 +106,20 @@ class LeastSquares:
         else:
             solution = replace(solution, notes=(*solution.notes, not_converged(float(change))))
         return model.at(solution.values), factors, solution
+
+
+def _factors(model: Model, dataset: Dataset, values: np.ndarray | None = None) -> TriangularFactors:
+    """Factors of all rows, with columns that depend on the fitted model at values (p,)."""
+    return combine(
+        [*over_recordings(dataset.recordings, _factors_of, model, dataset.filter, values)]
+    )
+
+
+def _factors_of(
+    recording: Recording, model: Model, settings: Filter | None, values: np.ndarray | None
+) -> TriangularFactors:
+    """Factors of a recording's rows."""
+    return factorise(sample(recording, settings).rows(model, values))
 
 
 def _with_bias(estimate: Estimate, bias: InputBias) -> Estimate:

@@ -175,6 +175,8 @@ class _Fold:
 
 def combine(parts: Sequence[TriangularFactors]) -> TriangularFactors:
     """Return the factors of all parts' rows together, group by group."""
+    if len(parts) == 1:
+        return parts[0]
     R = np.stack([_triangle(np.vstack(group)) for group in zip(*(p.R for p in parts), strict=True)])
     return TriangularFactors(R, np.sum([p.counts for p in parts], axis=0), parts[0].instruments)
 

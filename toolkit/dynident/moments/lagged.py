@@ -111,7 +111,7 @@ class LaggedColumns:
     """
 
     def __init__(self, lags: int, share: float = 1.0) -> None:
-        self.lags, self.complete = lags, share >= 1.0
+        self.lags, self.share, self.complete = lags, share, share >= 1.0
         self._length = _STRETCH
         self._spacing = max(_STRETCH, round(_STRETCH / share))
         self._joints: list[_Joint] = []
@@ -126,6 +126,19 @@ class LaggedColumns:
     def pairs(self) -> np.ndarray:
         """Number of pairs behind them, (K + 1,)."""
         return self._pairs
+
+    def like(self) -> LaggedColumns:
+        """Return what gathers alike and has seen nothing yet."""
+        return LaggedColumns(self.lags, self.share)
+
+    def join(self, other: LaggedColumns) -> None:
+        """Take in what another one, that gathers alike, has seen of other recordings."""
+        if not self._joints:
+            self._joints = other._joints
+        else:
+            for mine, theirs in zip(self._joints, other._joints, strict=True):
+                mine.sums += theirs.sums
+        self._pairs = self._pairs + other._pairs
 
     def add(self, first: int, columns: np.ndarray) -> None:
         """Add rows (T, n, p) of a recording, the first of which is its row number `first`."""

@@ -68,6 +68,10 @@ class BlockScores:
         for block in np.unique(blocks):
             self._sums[first + block] += scores[blocks == block].sum(axis=0)
 
+    def join(self, other: BlockScores) -> None:
+        """Take in the blocks of other recordings."""
+        self._sums += other._sums
+
     @property
     def count(self) -> int:
         """Number of blocks so far."""

@@ -15,16 +15,17 @@ Crainiceanu, "Measurement Error in Nonlinear Models" (2006), chapters 3 and 4.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dynident.clusters import over_recordings
 from dynident.errors import RecordingError
 from dynident.fitting.linear_solution import LinearSolution
 from dynident.fitting.uncertainty.expected_bias import listed, reported
 from dynident.fitting.uncertainty.noisy_part import NoisyPart
 from dynident.model import Model
-from dynident.recording import Dataset, default_filter
+from dynident.recording import Dataset, Recording, default_filter
 from dynident.tables import number
 
 _MOST = 16384
@@ -140,11 +141,12 @@ def input_bias(
     """
     most = _MOST // len(dataset.recordings)
     sums, stds = _NoiseProducts(model, values, solution), []
+    settings = replace(dataset, recordings=())
+    arguments = (model, settings, values, solution, most)
     try:
-        for recording in dataset.recordings:
-            part = NoisyPart.of(model, dataset, values, recording, most)
-            sums.add(part)
-            stds.append(part.position_std)
+        for one, std in over_recordings(dataset.recordings, _products_of_recording, *arguments):
+            sums.join(one)
+            stds.append(std)
     except RecordingError:
         return None
     kept = list(solution.basis.independent)
@@ -160,6 +162,21 @@ def input_bias(
         position_std=np.sqrt(np.mean(np.square(stds), axis=0)),
         filtered=settings.position_cutoff_hz is not None,
     )
+
+
+def _products_of_recording(
+    recording: Recording,
+    model: Model,
+    settings: Dataset,
+    values: np.ndarray,
+    solution: LinearSolution,
+    most: int,
+) -> tuple[_NoiseProducts, np.ndarray]:
+    """Products of a recording's noisy columns, and the noise of its positions (n,)."""
+    part = NoisyPart.of(model, settings, values, recording, most)
+    sums = _NoiseProducts(model, values, solution)
+    sums.add(part)
+    return sums, part.position_std
 
 
 class _NoiseProducts:
@@ -186,6 +203,11 @@ class _NoiseProducts:
                 self._noise[places] += factor * (mean @ (mean - seen).T + half @ half.T)
                 if true:
                     self._hidden[places] += factor * (mean @ (seen - true[0]).T)
+
+    def join(self, other: _NoiseProducts) -> None:
+        """Take in the rows of other recordings."""
+        self._noise += other._noise
+        self._hidden += other._hidden
 
     def _used(self, every: list[np.ndarray]) -> list[int]:
         """Numbers of the independent columns that are not zero in all of some rows (T, p) each."""

@@ -14,12 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dynident.clusters import over_recordings
 from dynident.errors import RecordingError
 from dynident.fitting.linear_solution import LinearSolution
 from dynident.fitting.sampling import sample
 from dynident.fitting.uncertainty.cluster_sandwich import BlockScores, time_blocks
 from dynident.model import Model
-from dynident.recording import Dataset, periods
+from dynident.recording import Dataset, Filter, Recording, periods
 from dynident.tables import number
 
 _REJECTED = 4.0
@@ -86,15 +87,8 @@ def lack_of_fit(
     """
     if not any(recording.period for recording in dataset.recordings):
         return None
-    found = []
-    for recording in dataset.recordings:
-        if recording.period:
-            sampled = sample(recording, dataset.filter)
-            left = np.concatenate([one for one, _ in sampled.residuals(model, values)])
-            # Less than two periods tell nothing, and are no mistake here.
-            with suppress(RecordingError):
-                folded = periods(len(left), sampled.rate_hz, recording.period, recording.where)
-                found.append(_apart(folded.fold(left)))
+    passes = over_recordings(dataset.recordings, _of_recording, model, dataset.filter, values)
+    found = [one for one in passes if one is not None]
     if not found:
         return None
     systematic, noise, spread, rows = (np.sum(one, axis=0) for one in zip(*found, strict=True))
@@ -105,6 +99,21 @@ def lack_of_fit(
         noise=np.sqrt(noise / rows),
         excess=systematic / np.sqrt(np.maximum(spread, np.finfo(float).tiny)),
     )
+
+
+def _of_recording(
+    recording: Recording, model: Model, settings: Filter | None, values: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, int] | None:
+    """What `_apart` says of a recording; None where it does not repeat."""
+    if not recording.period:
+        return None
+    sampled = sample(recording, settings)
+    left = np.concatenate([one for one, _ in sampled.residuals(model, values)])
+    # Less than two periods tell nothing, and are no mistake here.
+    with suppress(RecordingError):
+        folded = periods(len(left), sampled.rate_hz, recording.period, recording.where)
+        return _apart(folded.fold(left))
+    return None
 
 
 def scattered(
@@ -122,22 +131,37 @@ def scattered(
     -------
     (r, r) of the independent parameters, from the scatter of scores between blocks of time.
     """
-    kept, weights = list(solution.basis.independent), solution.weights**2
-    scores = BlockScores(len(kept))
-    for recording in dataset.recordings:
-        sampled = sample(recording, dataset.filter)
-        blocks, first, start = time_blocks(sampled, len(dataset.recordings)), scores.count, 0
-        for columns, torque in sampled.rows(model, values):
-            left = (torque - columns @ values) * weights
-            part = np.einsum("tjr,tj->tr", columns[:, :, kept], left)
-            scores.add(blocks[start : start + len(part)], part, first)
-            start += len(part)
+    scores = BlockScores(len(solution.basis.independent))
+    count = len(dataset.recordings)
+    arguments = (model, dataset.filter, values, solution, count)
+    for one in over_recordings(dataset.recordings, _scores_of, *arguments):
+        scores.join(one)
     meat = solution.inverse.T @ scores.meat @ solution.inverse
     words = (
         f"sigma holds the lack of fit as {scores.count} blocks of time tell it (cluster "
         "sandwich), and at least the noise. A bias that is the same in every block is not in it."
     )
     return solution.inverse @ meat @ solution.inverse.T, words
+
+
+def _scores_of(
+    recording: Recording,
+    model: Model,
+    settings: Filter | None,
+    values: np.ndarray,
+    solution: LinearSolution,
+    recordings: int,
+) -> BlockScores:
+    """Scores of a recording, of so many, by blocks of time."""
+    kept, weights = list(solution.basis.independent), solution.weights**2
+    sampled, scores, start = sample(recording, settings), BlockScores(len(kept)), 0
+    blocks = time_blocks(sampled, recordings)
+    for columns, torque in sampled.rows(model, values):
+        left = (torque - columns @ values) * weights
+        part = np.einsum("tjr,tj->tr", columns[:, :, kept], left)
+        scores.add(blocks[start : start + len(part)], part, 0)
+        start += len(part)
+    return scores
 
 
 def _apart(folded: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:

@@ -10,11 +10,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from dynident.clusters import over_recordings
 from dynident.fitting.linear_solution import LinearSolution
-from dynident.fitting.sampling import sample
+from dynident.fitting.sampling import Sampled, sample
 from dynident.model import Model
+from dynident.moments.factors import TriangularFactors, combine, factorise
 from dynident.moments.lagged import LaggedColumns
-from dynident.recording import Dataset
+from dynident.recording import Dataset, Filter, Recording
 
 LAGS = 12
 """Rows up to which errors count as correlated: the low-pass of the default filter forgets to 2 %
@@ -42,23 +44,76 @@ def lagged_columns(dataset: Dataset) -> LaggedColumns:
     return LaggedColumns(lags, min(1.0, most / rows))
 
 
-def watched(
-    model: Model, dataset: Dataset, values: np.ndarray | None, columns: LaggedColumns
-) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield rows, as `sampling.rows` does, whose lagged products are gathered on the way.
+def factors_with_columns(
+    model: Model, dataset: Dataset, columns: LaggedColumns
+) -> TriangularFactors:
+    """Factorise all rows, and gather the lagged products of their columns on the way.
 
     Parameters
     ----------
-    model, dataset, values : as of `sampling.rows`.
+    model, dataset : what is fitted.
+    columns : that gathers them.
+
+    Returns
+    -------
+    Factors of the rows of all recordings.
+    """
+    parts = []
+    passes = over_recordings(dataset.recordings, _factors_of, model, dataset.filter, columns.like())
+    for factors, gathered in passes:
+        parts.append(factors)
+        columns.join(gathered)
+    return combine(parts)
+
+
+def gather_columns(
+    model: Model, dataset: Dataset, values: np.ndarray | None, columns: LaggedColumns
+) -> None:
+    """Gather the lagged products of the columns of all rows, in a pass of their own.
+
+    Parameters
+    ----------
+    model, dataset : what is fitted.
+    values : (p,) parameters at which columns that depend on the fitted model are taken.
     columns : that gathers them.
     """
-    for recording in dataset.recordings:
-        first = 0
-        for block, torque in sample(recording, dataset.filter).rows(model, values):
-            columns.add(first, block)
-            first += len(torque)
-            yield block, torque
-            del block  # whose memory is used for the next one
+    arguments = (model, dataset.filter, values, columns.like())
+    for gathered in over_recordings(dataset.recordings, _columns_of, *arguments):
+        columns.join(gathered)
+
+
+def _factors_of(
+    recording: Recording, model: Model, settings: Filter | None, columns: LaggedColumns
+) -> tuple[TriangularFactors, LaggedColumns]:
+    """Factors of a recording's rows, and the products of their columns."""
+    columns = columns.like()
+    return factorise(_watched(model, sample(recording, settings), None, columns)), columns
+
+
+def _columns_of(
+    recording: Recording,
+    model: Model,
+    settings: Filter | None,
+    values: np.ndarray | None,
+    columns: LaggedColumns,
+) -> LaggedColumns:
+    """Products of the columns of a recording's rows."""
+    columns = columns.like()
+    for _ in _watched(model, sample(recording, settings), values, columns):
+        pass
+    return columns
+
+
+def _watched(
+    model: Model, sampled: Sampled, values: np.ndarray | None, columns: LaggedColumns
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yield the rows of a recording, whose lagged products are gathered on the way."""
+    first = 0
+    for block, torque in sampled.rows(model, values):
+        columns.add(first, block)
+        first += len(torque)
+        yield block, torque
+        del block  # whose memory is used for the next one
 
 
 def of_all_rows(

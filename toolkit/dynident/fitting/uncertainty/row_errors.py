@@ -17,13 +17,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import nnls
 
+from dynident.clusters import over_recordings
 from dynident.fitting.linear_solution import LinearSolution, solve_factors
 from dynident.fitting.sampling import rows, sample
 from dynident.fitting.uncertainty.lagged_rows import (
     LAGS,
+    gather_columns,
     lagged_columns,
     of_all_rows,
-    watched,
 )
 from dynident.fitting.uncertainty.noise_shapes import noise_shapes
 from dynident.model import Model
@@ -35,7 +36,7 @@ from dynident.moments.lagged import (
     lagged_products,
     lagged_residuals,
 )
-from dynident.recording import Dataset
+from dynident.recording import Dataset, Filter, Recording
 from dynident.tables import number
 
 _EXACT = 1e-10
@@ -88,41 +89,46 @@ def row_errors(
     dataset : what was fitted.
     values : (p,) the estimate, and where columns that depend on it are taken.
     solution : its weights and independent columns.
-    columns : lagged products of all columns, from `lagged_columns` and `watched`, where the rows
+    columns : lagged products of all columns, from `factors_with_columns`, where the rows
         have passed by already; else they are gathered here.
 
     Returns
     -------
     Their covariance, and that of the estimate.
     """
-    samples = [sample(recording, dataset.filter) for recording in dataset.recordings]
     if columns is None:
         columns = lagged_columns(dataset)
-        for _ in watched(model, dataset, values, columns):
-            pass
-    squares = np.zeros(model.robot.n)
-
-    def residuals() -> Iterator[tuple[bool, np.ndarray, np.ndarray]]:
-        for sampled in samples:
-            begins = True
-            for left, torque in sampled.residuals(model, values):
-                squares[:] += np.sum(torque**2, axis=0)
-                yield begins, left, np.ones(left.shape, dtype=bool)
-                begins = False
-
-    residual, pairs = lagged_residuals(residuals(), columns.lags)
-    shapes = noise_shapes(samples[0], columns.lags)
+        gather_columns(model, dataset, values, columns)
+    arguments = (model, dataset.filter, values, columns.lags)
+    passes = over_recordings(dataset.recordings, _residuals_of, *arguments)
+    residual, pairs, squares = (np.sum(one, axis=0) for one in zip(*passes, strict=True))
+    shapes = noise_shapes(sample(dataset.recordings[0], dataset.filter), columns.lags)
     kept = list(solution.basis.independent)
     products = columns.columns[:, :, kept][:, :, :, kept]
     if not columns.complete:
         products = of_all_rows(products, columns.pairs, pairs, solution)
         if products is None:  # what is left out shows more than its share
             columns = LaggedColumns(columns.lags)
-            for _ in watched(model, dataset, values, columns):
-                pass
+            gather_columns(model, dataset, values, columns)
             products = columns.columns[:, :, kept][:, :, :, kept]
     found = LaggedProducts(columns=products, residual=residual, pairs=pairs)
     return errors_of(found, shapes, solution, squares)
+
+
+def _residuals_of(
+    recording: Recording, model: Model, settings: Filter | None, values: np.ndarray, lags: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lagged sums of a recording's residuals (n, K + 1), their pairs, and torque squares (n,)."""
+    squares = np.zeros(model.robot.n)
+
+    def residuals() -> Iterator[tuple[bool, np.ndarray, np.ndarray]]:
+        begins = True
+        for left, torque in sample(recording, settings).residuals(model, values):
+            squares[:] += np.sum(torque**2, axis=0)
+            yield begins, left, np.ones(left.shape, dtype=bool)
+            begins = False
+
+    return *lagged_residuals(residuals(), lags), squares
 
 
 def masked_row_errors(
