@@ -487,7 +487,7 @@ def test_what_a_terminal_would_obey_is_spelt_out(run, study, tmp_path):
 def test_what_nobody_foresaw_is_one_line_too(run, study, capfd, monkeypatch):
     path = study()
 
-    def broken(*_: object) -> None:
+    def broken(*_: object, **__: object) -> None:
         raise ValueError("two\nlines")
 
     monkeypatch.setattr("dynident.study.load", broken)
