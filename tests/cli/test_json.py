@@ -51,7 +51,9 @@ def check_diagnosis(said: dict[str, Any], source: str) -> None:
     assert said["noise"] == {"source": source}
     assert [joint["name"] for joint in said["joints"]] == ["shoulder", "elbow"]
     for joint in said["joints"]:
-        assert set(joint) == {"name", "error_before", "error_after", "noise_rms"}
+        torques = {"noise_rms", "torque_rms", "torque_unit"}
+        assert set(joint) == {"name", "error_before", "error_after", *torques}
+        assert joint["torque_unit"] == "N m" and number(joint["torque_rms"], 0)
         assert number(joint["error_before"], 0) and number(joint["error_after"], 0)
         known = joint["noise_rms"] is None if source == "unknown" else number(joint["noise_rms"], 0)
         assert known
@@ -171,7 +173,7 @@ def test_compare(run, study, tmp_path):
         assert [set(joint) for joint in model["joints"]] == [{"name", "error"}] * 2
         assert all(number(joint["error"], 0) for joint in model["joints"])
     for joint in said["joints"]:
-        assert set(joint) == {"name", "noise_rms", "torque_rms"}
+        assert set(joint) == {"name", "noise_rms", "torque_rms", "torque_unit"}
         assert number(joint["noise_rms"], 0) and number(joint["torque_rms"], 0)
     study_error, with_friction, with_spring = (m["error"] for m in said["models"])
     assert with_friction < 0.1 * study_error < with_spring

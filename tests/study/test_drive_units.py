@@ -224,3 +224,18 @@ def test_links_are_trusted_by_their_names(tmp_path: Path) -> None:
     path.write_text(text.replace('torque_unit = "A"\n', "").replace("forearm", links[-1]))
     with pytest.raises(StudyError, match="trusted links, and torques in N m"):
         load(path)
+
+
+@pytest.mark.parametrize("unit", ["A", "%"])
+def test_torques_and_noise_are_said_in_the_unit_of_the_drives(tmp_path: Path, unit: str) -> None:
+    path = written(tmp_path, STUDY.replace('"A"', f'"{unit}"'))
+    current, _ = recorded(4, "tool")
+    for command in ("diagnose", "compare"):
+        found = json.loads(CliRunner().invoke(commands, [command, str(path), "--json"]).stdout)
+        for joint in found["joints"]:
+            assert joint["torque_unit"] == unit
+            # Stated of a raw sample; the low-pass leaves less than half of it.
+            assert 0.003 < joint["noise_rms"] < 0.02
+            assert joint["torque_rms"] < 2 * np.abs(current.tau).max()
+    shown = CliRunner().invoke(commands, ["fit", str(path)]).stdout
+    assert f" {unit} " in shown.partition("Load")[0]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -123,7 +123,15 @@ def compare(study: Path, additions: tuple[str, ...]) -> CommandAnswer:
     """
     loaded = load_study(study)
     comparison = comparison_of(loaded, tuple((label,) for label in additions))
-    return with_drives(loaded, CommandAnswer(content=comparison.to_dict, parts=comparison.tables))
+    drives = loaded.drives
+
+    def content() -> dict[str, Any]:
+        found = comparison.to_dict()
+        if drives is not None:
+            found["joints"] = [drives.recorded(one) for one in found["joints"]]
+        return found
+
+    return with_drives(loaded, CommandAnswer(content=content, parts=comparison.tables))
 
 
 @commands.command()

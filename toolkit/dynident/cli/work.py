@@ -138,12 +138,13 @@ def diagnosis_of(
 
     Returns
     -------
-    What the search found.
+    What the search found, torques in the unit in which they were recorded.
     """
     from dynident.diagnosis import diagnose as search
+    from dynident.diagnosis.recorded_units import in_recorded_units
 
     with progress("diagnosing") as show_progress:
-        return search(
+        found = search(
             study.model,
             study.train,
             study.test,
@@ -153,6 +154,7 @@ def diagnosis_of(
             criteria=study.criteria,
             progress=show_progress,
         )
+    return in_recorded_units(found, study.drives)
 
 
 def proposed_laws(diagnosis: Diagnosis, number: int, study: Path) -> tuple[Law, ...]:

@@ -113,10 +113,10 @@ class JointResult:
 
     Attributes
     ----------
-    name, torque_unit : the joint, and N m or N.
+    name, torque_unit : the joint; and N m or N, or the unit of the drives.
     error_before, error_after : norm of the residual over norm of the torque; NaN without torque.
-    torque_rms : N m or N.
-    noise_rms : N m or N; None where the noise is unknown.
+    torque_rms : in that unit.
+    noise_rms : likewise; None where the noise is unknown.
     ratio_before, ratio_after : systematic residual over noise (RNR); None likewise.
     """
 
@@ -148,7 +148,10 @@ class TestError:
 
 @dataclass(frozen=True, kw_only=True)
 class Trace:
-    """Measured and predicted torque of one joint in one test recording, (T,) each, SI units."""
+    """Measured and predicted torque of one joint in one test recording, (T,) each.
+
+    Time in s, torque in `torque_unit`.
+    """
 
     recording: str
     joint: str

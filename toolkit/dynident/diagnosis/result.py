@@ -192,6 +192,8 @@ class Diagnosis(Shown):
                     "error_before": finite(j.error_before),
                     "error_after": finite(j.error_after),
                     "noise_rms": j.noise_rms,
+                    "torque_rms": finite(j.torque_rms),
+                    "torque_unit": j.torque_unit,
                 }
                 for j in self.joints
             ],

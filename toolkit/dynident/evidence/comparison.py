@@ -73,6 +73,7 @@ class Comparison(Shown):
                     "name": joint,
                     "noise_rms": None if last.noise_std is None else float(last.noise_std[j]),
                     "torque_rms": float(last.torque_rms[j]),
+                    "torque_unit": robot.torque_units[j],
                 }
                 for j, joint in enumerate(robot.names)
             ],

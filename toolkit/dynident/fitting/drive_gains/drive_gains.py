@@ -155,9 +155,15 @@ class DriveGains(Shown):
     def table(self) -> Table:
         """A row for each joint."""
         rows = tuple(
-            (name, number(gain), number(sigma, 2), unit, finding)
-            for name, gain, sigma, unit, finding in zip(
-                self.joints, self.gains, self.sigma, self.units, self.findings, strict=True
+            (name, number(gain), number(sigma, 2), unit, finding, f"{number(left, 3)} {self.unit}")
+            for name, gain, sigma, unit, finding, left in zip(
+                self.joints,
+                self.gains,
+                self.sigma,
+                self.units,
+                self.findings,
+                self.residual_std,
+                strict=True,
             )
         )
         notes = [self.sentence, *filter(None, [self.remedy])]
@@ -168,7 +174,7 @@ class DriveGains(Shown):
             names = [n for n, gain in zip(self.joints, self.gains, strict=True) if gain < 0]
             what = "the recorded sign is opposite to the joint's"
             notes.append(f"A negative gain ({', '.join(names)}): {what}.")
-        columns = ("joint", "gain", "sigma", "unit", "found")
+        columns = ("joint", "gain", "sigma", "unit", "found", "left (std)")
         return Table("Gains of the drives", columns, rows, tuple(notes))
 
     def tables(self) -> tuple[Table | str, ...]:
@@ -185,6 +191,7 @@ class DriveGains(Shown):
             self.units,
             self.findings,
             self.intervals,
+            self.residual_std,
             strict=True,
         )
         return {
@@ -197,14 +204,26 @@ class DriveGains(Shown):
                     "interval": None if np.isnan(interval).any() else interval.tolist(),
                     "unit": unit,
                     "finding": finding,
+                    "residual_std": float(left),
                 }
-                for name, gain, sigma, unit, finding, interval in shown
+                for name, gain, sigma, unit, finding, interval, left in shown
             ],
             "common_scales": [list(group) for group in self.groups],
             "sentence": self.sentence,
             "doubts": list(self.doubts),
             "loads": [load.to_dict() for load in self.loads],
         }
+
+    def recorded(self, joint: dict[str, Any]) -> dict[str, Any]:
+        """Return torque and noise of a joint, as JSON has them in N m, in the recorded unit."""
+        if self.unit == "N m":
+            return joint
+        size = abs(float(self.gains[self.joints.index(joint["name"])]))
+        torques = {
+            key: None if joint[key] is None else joint[key] / size
+            for key in ("noise_rms", "torque_rms")
+        }
+        return {**joint, **torques, "torque_unit": self.unit}
 
     @property
     def words(self) -> str:

@@ -1,0 +1,54 @@
+"""Torques, residuals and noise of a diagnosis in the unit in which the drives record them.
+
+Effects, laws and what could have been seen stay in N m: they are physics, not currents.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from dynident.diagnosis.details import JointResult, Trace
+from dynident.diagnosis.result import Diagnosis
+from dynident.evidence.maps import ResidualMap
+from dynident.fitting.drive_gains import DriveGains
+
+
+def in_recorded_units(diagnosis: Diagnosis, drives: DriveGains | None) -> Diagnosis:
+    """Return a diagnosis whose torques, residuals and noise are in amperes or percent.
+
+    Parameters
+    ----------
+    diagnosis : of recordings that `in_newton_metres` made.
+    drives : by which it did; None, or in N m, and nothing changes.
+    """
+    if drives is None or drives.unit == "N m":
+        return diagnosis
+    gains = dict(zip(drives.joints, drives.gains, strict=True))
+    unit = drives.unit
+
+    def of_joint(one: JointResult) -> JointResult:
+        size = abs(float(gains[one.name]))
+        noise = None if one.noise_rms is None else one.noise_rms / size
+        return replace(one, torque_unit=unit, torque_rms=one.torque_rms / size, noise_rms=noise)
+
+    def of_map(one: ResidualMap) -> ResidualMap:
+        gain = float(gains[one.joint])
+        # An amplitude has no sign, and neither has the width of a band.
+        spectrum = one.against == "cycles per revolution"
+        by = abs(gain) if spectrum else gain
+        before, after, band = one.before / by, one.after / by, one.band / abs(gain)
+        return replace(one, torque_unit=unit, before=before, after=after, band=band)
+
+    def of_trace(one: Trace) -> Trace:
+        parts = {name: getattr(one, name) / gains[one.joint] for name in _OF_TRACE}
+        return replace(one, torque_unit=unit, **parts)
+
+    return replace(
+        diagnosis,
+        joints=tuple(map(of_joint, diagnosis.joints)),
+        maps=tuple(map(of_map, diagnosis.maps)),
+        traces=tuple(map(of_trace, diagnosis.traces)),
+    )
+
+
+_OF_TRACE = ("measured", "before", "after")
