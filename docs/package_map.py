@@ -34,6 +34,7 @@ FLOORS = (
     ("wiring",),
     ("evidence",),
     ("diagnosis",),
+    ("design",),
     ("study",),
     ("effect_contract",),
     ("study_draft",),

@@ -85,6 +85,10 @@ class ProgramError(DynidentError):
     """A nonlinear program is posed wrongly, or started from an impossible point."""
 
 
+class DesignError(DynidentError):
+    """No recording can be designed: limits leave no motion, or none shows what is asked for."""
+
+
 class SimulationError(DynidentError):
     """A closed loop cannot be simulated.
 

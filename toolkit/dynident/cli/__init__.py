@@ -15,6 +15,7 @@ from typing import NoReturn
 import click
 
 from dynident.cli import (  # which add their commands to the group
+    designs,
     fits,
     loops,
     robots,
@@ -26,7 +27,7 @@ from dynident.cli.output import ReaderGone
 from dynident.errors import DynidentError, DynidentWarning
 from dynident.tables import printable
 
-__all__ = ["commands", "fits", "loops", "main", "robots", "starting", "studies"]
+__all__ = ["commands", "designs", "fits", "loops", "main", "robots", "starting", "studies"]
 
 
 TRACEBACK = "DYNIDENT_TRACEBACK"

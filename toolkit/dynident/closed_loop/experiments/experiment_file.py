@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 from pydantic import Field
 
 from dynident.closed_loop.controllers import ControllerFile
@@ -15,7 +16,7 @@ from dynident.closed_loop.trajectories import Fourier
 from dynident.closed_loop.true_effects import TrueEffect
 from dynident.effect_modules import Permission, import_effects, require_sound
 from dynident.effects import FRICTION_WIDTH, LawsEntry, laws_of
-from dynident.errors import DynidentError, StudyError
+from dynident.errors import DynidentError, SimulationError, StudyError
 from dynident.robot import Robot
 from dynident.settings import Duration, SettingsTable, Time, read_toml
 
@@ -42,6 +43,23 @@ class _TrajectoryEntry(SettingsTable):
     speed: float | list[float] | None = None
     acceleration: float | list[float] | None = None
     centre: float | list[float] | None = None
+    sine: list[list[float]] | None = None
+    cosine: list[list[float]] | None = None
+
+    def trajectory(self, robot: Robot, period: float, seed: object) -> Fourier:
+        """Return the series that is stated, or a random one."""
+        settings = self.model_dump(exclude={"seed", "sine", "cosine"})
+        if self.sine is None and self.cosine is None:
+            return Fourier.random(robot, period, seed, **settings)  # type: ignore[arg-type]
+        if self.sine is None or self.cosine is None or not isinstance(self.centre, list):
+            remedy = "state centre, sine and cosine, or none of them"
+            raise SimulationError("half of a series", "trajectory", remedy)
+        rows = {len(row) for row in (*self.sine, *self.cosine)}
+        if len(rows) != 1 or not len(self.sine) == len(self.cosine) == len(self.centre) == robot.n:
+            remedy = f"give {robot.n} rows of as many amplitudes"
+            raise SimulationError("its series do not fit the robot", "trajectory", remedy)
+        arrays = (np.array(one) for one in (self.centre, self.sine, self.cosine))
+        return Fourier(period, *arrays)
 
 
 class _ExperimentRecordingEntry(SettingsTable):
@@ -81,7 +99,8 @@ def load_experiment(path: str | Path, *, modules: Permission = "trusted") -> Exp
     [sensors] `position_std`, `position_resolution`, `torque_std`, `torque_resolution`,
     `temperature_std` (a number, or one per joint; without the last there are no temperatures);
     [[recordings]] `file`, `use`, `duration`, `period`, `start`, `payload`, `trajectory` with
-    `harmonics`, `seed`, `amplitude`, `speed`, `acceleration`, `centre`.
+    `harmonics`, `seed`, `amplitude`, `speed`, `acceleration`, `centre`, or with `centre`, `sine`
+    and `cosine`, rows of amplitudes of each joint.
 
     Parameters
     ----------
@@ -139,12 +158,11 @@ def _robot(said: _ExperimentFile, path: Path, file: str) -> Robot:
 def _run(
     entry: _ExperimentRecordingEntry, said: _ExperimentFile, path: Path, robot: Robot, number: int
 ) -> ExperimentRun:
-    settings = entry.trajectory.model_dump()
-    seed = settings.pop("seed")
+    seed = entry.trajectory.seed
     # Recordings that name no seed differ from each other all the same.
     seeds = (said.seed, number) if seed is None else seed
     try:
-        trajectory = Fourier.random(robot, entry.period, seeds, **settings)
+        trajectory = entry.trajectory.trajectory(robot, entry.period, seeds)
         return ExperimentRun(
             trajectory=trajectory,
             duration=entry.duration,

@@ -8,6 +8,7 @@ from pathlib import Path, PurePath
 import tomlkit
 
 from dynident import files
+from dynident.closed_loop.controllers import Controller
 from dynident.closed_loop.experiments.experiment import Experiment, Progress
 from dynident.effect_modules import module_file
 from dynident.effects import FRICTION_WIDTH, Effect, Law, LawEffect, laws_table
@@ -111,7 +112,7 @@ def _study(
     document["recordings"] = entries
     if laws := _laws(experiment):
         document["laws"] = laws_table(laws)
-    document["controller"] = _controller(experiment)
+    document["controller"] = controller_table(experiment.controller)
     return document
 
 
@@ -141,9 +142,8 @@ def _multiline(labels: list[str]):
     return array.multiline(len(labels) > 3)
 
 
-def _controller(experiment: Experiment):
+def controller_table(controller: Controller):
     """The table of a controller; what has its default is left out."""
-    controller = experiment.controller
     table = tomlkit.table()
     for part in fields(controller):
         value = getattr(controller, part.name)

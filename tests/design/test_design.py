@@ -1,0 +1,251 @@
+"""Designed recordings: limits hold, columns are the model's, more is told than by chance."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chains import chain
+from dynident.design import DesignTask, MotionLimits, design
+from dynident.design.column_function import ColumnFunction
+from dynident.design.information import Information
+from dynident.design.motion_program import FINER, MotionProgram, instants_of
+from dynident.design.periodic import PeriodicMotions
+from dynident.effects import effects_of
+from dynident.errors import DesignError
+from dynident.model import Model
+from dynident.recording import Dataset
+from synthetic import arm, synthetic, true_values
+
+ROBOT = arm()
+MODEL = Model(ROBOT) + "viscous_friction" + "coulomb_friction"
+EVERY_INSTANT = (
+    "viscous_friction@elbow",
+    "coulomb_friction@shoulder",
+    "stribeck_friction@elbow",
+    "joint_spring@elbow",
+    "torque_ripple@elbow",
+    "quadratic_drag@elbow",
+    "drive_gain@elbow",
+    "load_friction@elbow",
+    "joint_zero@shoulder",
+    "base_tilt",
+    "rotor_inertia@elbow",
+    "joint_coupling@elbow:shoulder",
+)
+
+
+def recorded(model: Model = MODEL) -> Dataset:
+    values = true_values(model)
+    return Dataset((synthetic(model, values, 1, torque_std=0.05),))
+
+
+def motions(harmonics: int = 5) -> PeriodicMotions:
+    limits = MotionLimits.of(ROBOT)
+    return PeriodicMotions(limits=limits, period=10.0, harmonics=harmonics)
+
+
+@pytest.mark.parametrize("harmonics", [2, 5, 12])
+def test_motions_begin_and_end_at_rest(harmonics: int) -> None:
+    some = motions(harmonics)
+    variables = some.random(3)
+    q, v, a = some.fourier(variables).at(np.array([0.0, 10.0, 20.0]))
+    assert np.ptp(q, axis=0).max() < 1e-12
+    assert np.abs(v).max() < 1e-12 and np.abs(a).max() < 1e-10
+    t = some.times(300)
+    for basis, found in zip(some.bases(t), some.fourier(variables).at(t), strict=True):
+        linear = some.limits.speed * (basis @ variables.T)
+        found = found - (some.centre(variables) if basis is some.bases(t)[0] else 0.0)
+        moved = found - found[0] + linear[0]
+        np.testing.assert_allclose(moved, linear, atol=1e-10)
+
+
+@pytest.mark.parametrize("label", EVERY_INSTANT)
+def test_columns_are_those_of_the_model(label: str) -> None:
+    base = Model(ROBOT)
+    values = true_values(MODEL)[: base.size]
+    (effect,) = effects_of(label, ROBOT)
+    columns = ColumnFunction.of(base, values, (effect,))
+    q, v, a = ROBOT.random_motion(4, 30)
+    t = np.linspace(0, 3, 30)
+    block = base.block(t, q, v, a)
+    expected = np.concatenate(
+        [base.columns(block), effect.columns(base.ready(effect, block, values))], axis=2
+    )
+    scale = np.abs(expected).max()
+    np.testing.assert_allclose(columns.along(t, q, v, a), expected, atol=2e-7 * scale)
+    torque = columns.torque_along(t, q, v, a)
+    np.testing.assert_allclose(torque, base.torque(block, values), atol=1e-9 * scale)
+
+
+def test_the_symbolic_loss_is_the_loss() -> None:
+    import casadi
+
+    columns = ColumnFunction.of(MODEL, true_values(MODEL))
+    count, some = columns.count, motions()
+    rng = np.random.default_rng(0)
+    prior = np.diag(rng.uniform(0.1, 2.0, count))
+    for objective, last in (("D", count), ("D", 3), ("A", 4)):
+        information = Information(
+            columns=columns,
+            mix=np.eye(count),
+            last=last,
+            weight=np.array([2.0, 5.0]),
+            prior=prior,
+            scale=rng.uniform(0.5, 2.0, count),
+            objective=objective,
+        )
+        t = some.times(40)
+        q, v, a = some.fourier(some.random(1) * 0.2).at(t)
+        wide = columns.function(np.hstack([q, v, a, t[:, None]]).T)
+        given = casadi.MX.sym("columns", *wide.shape)
+        function = casadi.Function("loss", [given], [information.symbolic_loss(given, 40)])
+        symbolic = float(function(wide))
+        plain = information.loss(information.matrix(t, (q, v, a)))
+        assert symbolic == pytest.approx(plain, rel=1e-6)
+
+
+def test_predicted_sigma_is_that_of_the_regression() -> None:
+    task = DesignTask(duration=8.0, repeat=2, harmonics=4, starts=1)
+    found = design(MODEL, recorded(), task)
+    program = found.program
+    nothing = replace(program.information, prior=np.zeros_like(program.information.prior))
+    t = program.motions.times(program.instants)
+    motion = found.trajectory.at(t)
+    columns = MODEL.columns(MODEL.block(t, *motion)) * np.sqrt(nothing.weight)[None, :, None]
+    rows = columns.reshape(-1, MODEL.size)
+    expected = np.sqrt(np.diag(np.linalg.inv(rows.T @ rows)))
+    alone = replace(found, program=MotionProgram(nothing, program.motions))
+    np.testing.assert_allclose(alone.sigma(found.motion.variables), expected, rtol=1e-3)
+
+
+def test_it_tells_more_than_many_random_motions_within_the_limits() -> None:
+    task = DesignTask(duration=10.0, repeat=1, harmonics=5, starts=2)
+    found = design(MODEL, recorded(), task)
+    program = found.program
+    some = (program.within(program.motions.random(500 + k)) for k in range(200))
+    losses = [program.loss(one) for one in some if one is not None]
+    assert found.motion.loss < min(losses)
+    count = program.information.last
+    # Geometric mean of the standard deviations against the best and the median of them.
+    assert np.exp((found.motion.loss - min(losses)) / (2 * count)) < 0.9
+    assert np.exp((found.motion.loss - np.median(losses)) / (2 * count)) < 0.8
+
+
+@pytest.mark.parametrize(
+    ("pair", "times"),
+    [
+        (("torque_offset@shoulder", "base_tilt"), 1.5),
+        (("joint_zero@shoulder", "joint_spring@shoulder"), 1.2),
+        (("stribeck_friction@elbow", "viscous_friction@elbow"), 1.2),
+    ],
+)
+def test_pairs_are_told_apart_better_than_by_any_of_many_motions(pair, times: float) -> None:
+    base = Model(ROBOT) + "coulomb_friction"
+    (first,), (second,) = (effects_of(label, ROBOT) for label in pair)
+    truth = base + first
+    data = recorded(truth)
+    task = DesignTask(duration=10.0, repeat=1, tell=(first, second), starts=2)
+    found = design(base, data, task)
+    one, program = found.separation, found.program
+    assert one is not None
+    t = program.motions.times(program.instants)
+
+    def phi(variables: np.ndarray) -> float:
+        motion = program.motions.fourier(variables).at(t)
+        return float(program.information.about(program.information.matrix(t, motion))[0, 0])
+
+    some = (program.within(program.motions.random(900 + k)) for k in range(100))
+    best = max(phi(each) for each in some if each is not None)
+    assert phi(found.motion.variables) > best
+    assert one.worth > times
+    assert one.designed > one.recorded
+    assert "standard deviations" in found.sentence
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_limit_is_exceeded_on_a_fine_grid(seed: int) -> None:
+    robot = chain(1 + seed % 4, seed)
+    rng = np.random.default_rng(seed)
+    plain = MotionLimits.of(robot)
+    limits = replace(
+        plain,
+        speed=plain.speed * rng.uniform(0.2, 1.0, robot.n),
+        acceleration=plain.acceleration * rng.uniform(0.2, 1.0, robot.n),
+        torque=np.full(robot.n, np.inf),
+    )
+    model = Model(robot)
+    values = model.given_values()
+    data = Dataset((synthetic(model, values, seed, torque_std=0.01),))
+    task = DesignTask(duration=6.0, repeat=1, harmonics=4, starts=1)
+    found = design(model, data, task, limits=limits)
+    some = found.program.motions
+    t = np.linspace(0, 6.0, 10 * FINER * instants_of(some))
+    q, v, a = found.trajectory.at(t)
+    small = 1e-4  # between the instants of the check
+    span = limits.upper - limits.lower
+    assert np.all(q >= limits.lower - small * span) and np.all(q <= limits.upper + small * span)
+    assert np.all(np.abs(v) <= (1 + small) * limits.speed)
+    assert np.all(np.abs(a) <= (1 + small) * limits.acceleration)
+
+
+def test_torque_limits_hold() -> None:
+    plain = MotionLimits.of(ROBOT)
+    limits = replace(plain, torque=np.array([45.0, 12.0]))
+    task = DesignTask(duration=8.0, repeat=1, harmonics=4, starts=1)
+    found = design(MODEL, recorded(), task, limits=limits)
+    t = np.linspace(0, 8.0, 20_000)
+    torque = found.program.information.columns.torque_along(t, *found.trajectory.at(t))
+    assert np.all(np.abs(torque).max(axis=0) <= limits.torque * 1.001)
+    assert np.abs(torque).max() > 10.0
+
+
+def test_the_next_recording_complements_those_so_far() -> None:
+    """What is known already counts: without it the sigmas are larger."""
+    task = DesignTask(duration=8.0, repeat=1, harmonics=3, starts=1)
+    found = design(MODEL, recorded(), task)
+    so_far, together = found.sigma(None), found.sigma(found.motion.variables)
+    assert np.all(together < so_far)
+
+
+@pytest.mark.parametrize(
+    ("task", "says"),
+    [
+        ({"duration": 0.0}, "duration"),
+        ({"duration": float("nan")}, "duration"),
+        ({"duration": 1e9}, "duration"),
+        ({"harmonics": 1}, "at rest"),
+        ({"repeat": 0}, "repeat"),
+        ({"starts": 0}, "starts"),
+    ],
+)
+def test_impossible_tasks_are_refused(task, says: str) -> None:
+    with pytest.raises(DesignError, match=says):
+        design(MODEL, recorded(), DesignTask(**task))
+
+
+def test_effects_of_the_past_are_refused_by_name() -> None:
+    (first,) = effects_of("backlash@elbow", ROBOT)
+    with pytest.raises(DesignError, match="backlash@elbow"):
+        design(MODEL, recorded(), DesignTask(show=first))
+
+
+def test_limits_without_a_motion_are_refused() -> None:
+    limits = replace(MotionLimits.of(ROBOT), torque=np.array([1e-3, 1e-3]))
+    with pytest.raises(DesignError, match="within the limits"):
+        design(MODEL, recorded(), DesignTask(starts=1, harmonics=2), limits=limits)
+
+
+def test_limits_by_file(tmp_path) -> None:
+    path = tmp_path / "limits.toml"
+    path.write_text("[joints.elbow]\nlower = -0.5\nupper = 0.25\ntorque = 9.0\n")
+    limits = MotionLimits.from_file(path, ROBOT)
+    assert (limits.lower[1], limits.upper[1], limits.torque[1]) == (-0.5, 0.25, 9.0)
+    path.write_text("[joints.elbw]\nlower = -0.5\n")
+    with pytest.raises(DesignError, match="did you mean 'elbow'"):
+        MotionLimits.from_file(path, ROBOT)
+    path.write_text("[joints.elbow]\nlower = 2.0\nupper = 1.0\n")
+    with pytest.raises(DesignError, match="lower below upper"):
+        MotionLimits.from_file(path, ROBOT)

@@ -1,0 +1,12 @@
+"""The recording to make: motions within a robot's limits that tell the most.
+
+`design` is the verb. `limits` says what a motion may do, `periodic` which motions there are,
+`column_function` what their instants tell, `information` how much that is, `motion_program` which
+motion tells the most, and `recording_design` what comes of it.
+"""
+
+from dynident.design.designing import DesignTask, design
+from dynident.design.limits import MotionLimits
+from dynident.design.recording_design import RecordingDesign
+
+__all__ = ["DesignTask", "MotionLimits", "RecordingDesign", "design"]

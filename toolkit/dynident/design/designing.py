@@ -1,0 +1,259 @@
+"""The verb `design`: from a model, its fit and what was recorded to the next recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynident.design.column_function import ColumnFunction
+from dynident.design.information import Information, Objective
+from dynident.design.limits import MotionLimits
+from dynident.design.motion_program import MotionProgram, instants_of
+from dynident.design.periodic import PeriodicMotions
+from dynident.design.recording_design import RecordingDesign, Separation
+from dynident.effects import Effect
+from dynident.errors import DesignError
+from dynident.fitting.estimate import Estimate
+from dynident.fitting.fit_model import fit
+from dynident.fitting.sampling import sample
+from dynident.model import Model
+from dynident.progress import logged
+from dynident.recording import Dataset
+from dynident.threads import single_threaded
+
+_USUAL = 20  # random motions, whose median a design is compared with
+_SIZES = 5  # random motions by which columns are scaled
+_UNSEEN = 1e-9  # of the size of the others: it makes no torque
+_RIVAL_SHAPES = 3  # of a rival, beside its own
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignTask:
+    """What the next recording is for.
+
+    Attributes
+    ----------
+    duration : s, of one repetition.
+    repeat : how many repetitions: two or more measure the noise.
+    harmonics : of the series of each joint.
+    objective : "D", the volume of the confidence region, or "A", the sum of the variances.
+    tell : effects of which the recording is to tell which one it is; the first is taken for true.
+    show : an effect that the recordings so far could not show.
+    starts, seed : of the search.
+    """
+
+    duration: float = 10.0
+    repeat: int = 3
+    harmonics: int = 8
+    objective: Objective = "D"
+    tell: tuple[Effect, ...] = ()
+    show: Effect | None = None
+    starts: int = 2
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if len(self.tell) == 1:
+            raise DesignError("one effect to tell apart", remedy="name two, or use show")
+        if self.tell and self.show:
+            raise DesignError("tell and show together", remedy="design a recording for each")
+        if self.repeat < 1 or self.starts < 1:
+            what = f"repeat = {self.repeat}, starts = {self.starts}"
+            raise DesignError(what, remedy="choose 1 or more of each")
+
+
+@single_threaded
+def design(
+    model: Model,
+    recorded: Dataset,
+    task: DesignTask | None = None,
+    *,
+    limits: MotionLimits | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> RecordingDesign:
+    """Design the recording that tells the most of what is asked.
+
+    The model is fitted to what was recorded: its values, the size of its noise, and what is known
+    already, which the next recording complements.
+
+    Parameters
+    ----------
+    model : the robot and its effects.
+    recorded : recordings so far, with their filter.
+    task : what for; default: all parameters.
+    limits : of the motion; default: nine tenths of the description's.
+    progress : is called with what is being done, for a display.
+
+    Returns
+    -------
+    The motion, what it is predicted to tell, and how that compares with a usual motion.
+
+    Raises
+    ------
+    DesignError
+        If no motion within the limits can be found, an effect depends on the past, or nothing that
+        the robot can do shows what is asked.
+    """
+    task = task or DesignTask()
+    progress = progress or logged("designing")
+    limits = limits or MotionLimits.of(model.robot)
+    rivals = task.tell or (() if task.show is None else (task.show,))
+    asked = tuple(one.on(model.robot) for one in rivals)
+    bare = model
+    for one in asked:
+        bare = bare - one.label if one in bare else bare
+    progress("fitting what was recorded")
+    wide = bare + asked[:1] if task.tell else bare
+    estimate = fit(wide, recorded)
+    asked = tuple(_shaped_as(one, estimate) for one in asked)
+    start = _values(estimate, bare)
+    progress("writing the columns out")
+    motions = PeriodicMotions(limits=limits, period=task.duration, harmonics=task.harmonics)
+    extra = _beside(asked, bare, task)
+    columns = ColumnFunction.of(bare, start, extra)
+    mix, last, labels = _mix(bare, columns, extra, estimate, task)
+    std = np.where(estimate.torque_std > 0, estimate.torque_std, np.inf)
+    size = _sizes(mix, columns, motions, std)
+    kept = size > _UNSEEN * np.median(size[size > 0]) if np.any(size > 0) else size > 0
+    last = int(np.sum(kept[len(kept) - last :]))
+    if last == 0:
+        named = asked[0].title if asked else "the model"
+        raise DesignError(f"no motion of this robot makes a torque of {named}")
+    mix, labels = mix[:, kept], tuple(np.array(labels)[kept].tolist())
+    prior, rate = _recorded(columns, mix, recorded, std)
+    rows = rate * task.duration * task.repeat
+    information = Information(
+        columns=columns,
+        mix=mix,
+        last=last,
+        weight=rows / instants_of(motions) / std**2,
+        prior=prior,
+        scale=size[kept] * np.sqrt(rows * len(std)),
+        objective=task.objective,
+    )
+    program = MotionProgram(information, motions)
+    found = program.solved(task.starts, task.seed, progress)
+    progress("comparing with usual motions")
+    usual = [program.within(motions.random(10_000 + k)) for k in range(_USUAL)]
+    losses = sorted((program.loss(one), k) for k, one in enumerate(usual) if one is not None)
+    if not losses:
+        raise DesignError("no usual motion is within the limits", remedy="widen them")
+    _, middle = losses[len(losses) // 2]
+    median = usual[middle]
+    assert median is not None
+    return RecordingDesign(
+        task=task,
+        model=bare,
+        limits=limits,
+        program=program,
+        motion=found,
+        usual=median,
+        values=start,
+        labels=labels,
+        separation=_separation(program, found.variables, median, task, asked),
+    )
+
+
+def _shaped_as(effect: Effect, estimate: Estimate) -> Effect:
+    same = [one for one in estimate.model.effects if one.label == effect.label]
+    return same[0] if same else effect
+
+
+def _values(estimate: Estimate, model: Model) -> np.ndarray:
+    """Values of a model that has fewer effects than the one that was fitted."""
+    known = dict(zip(estimate.names, estimate.values, strict=True))
+    return np.array([known[name] for name in model.names])
+
+
+def _beside(asked: Sequence[Effect], model: Model, task: DesignTask) -> tuple[Effect, ...]:
+    """Rivals, with the other shapes that they may have, then the effect that is asked for."""
+    if not task.tell:
+        return tuple(asked)
+    first, *others = asked
+    found: list[Effect] = []
+    for rival in others:
+        shapes = [one.shape for one in rival.variants(model.robot)]
+        step = max(1, len(shapes) // _RIVAL_SHAPES)
+        kept = dict.fromkeys((rival.shape, *shapes[step // 2 :: step]))
+        found += [rival.shaped(*shape) for shape in kept]
+    return (*found, first)
+
+
+def _mix(
+    model: Model,
+    columns: ColumnFunction,
+    extra: Sequence[Effect],
+    estimate: Estimate,
+    task: DesignTask,
+) -> tuple[np.ndarray, int, tuple[str, ...]]:
+    """Combinations of columns, how many of them are of interest, and their names."""
+    count = columns.count
+    if not extra:
+        return np.eye(count), count, columns.labels
+    own = len(extra[-1].parameters(model.robot))
+    if task.show is not None:
+        return np.eye(count), own, columns.labels
+    label = extra[-1].label
+    values = estimate.effect_values(label)
+    if not np.any(values):
+        raise DesignError("has no size in the recordings so far", label)
+    mix = np.zeros((count, count - own + 1))
+    mix[: count - own, : count - own] = np.eye(count - own)
+    mix[count - own :, -1] = values
+    return mix, 1, (*columns.labels[: count - own], f"torque of {label}")
+
+
+def _recorded(
+    columns: ColumnFunction, mix: np.ndarray, recorded: Dataset, std: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Information of the recordings so far, (k, k), and their rows per second."""
+    total, rates = np.zeros((mix.shape[1],) * 2), []
+    for recording in recorded.recordings:
+        rows = sample(recording, recorded.filter)
+        found = columns.along(rows.t, rows.q, rows.v, rows.a) @ mix
+        weighted = (found / std[None, :, None]).reshape(-1, mix.shape[1])
+        total += weighted.T @ weighted
+        rates.append((len(rows.t) - 1) / float(rows.t[-1] - rows.t[0]))
+    return total, float(np.median(rates))
+
+
+def _sizes(
+    mix: np.ndarray, columns: ColumnFunction, motions: PeriodicMotions, std: np.ndarray
+) -> np.ndarray:
+    """Whitened size of each combination on random motions, (k,)."""
+    t = motions.times(100)
+    sizes = []
+    for k in range(_SIZES):
+        found = columns.along(t, *motions.fourier(motions.random(k) * 0.3).at(t)) @ mix
+        sizes.append(np.sqrt(np.mean((found / std[None, :, None]) ** 2, axis=(0, 1))))
+    return np.mean(sizes, axis=0)
+
+
+def _separation(
+    program: MotionProgram,
+    best: np.ndarray,
+    usual: np.ndarray,
+    task: DesignTask,
+    asked: Sequence[Effect],
+) -> Separation | None:
+    """How far the effects are apart: so far, with the design, with a usual motion."""
+    if not task.tell:
+        return None
+    information = program.information
+    t = program.motions.times(program.instants)
+
+    def sigma(variables: np.ndarray | None) -> float:
+        nothing = np.zeros_like(information.prior)
+        found = nothing
+        if variables is not None:
+            found = information.matrix(t, program.motions.fourier(variables).at(t))
+        return float(np.sqrt(max(information.about(found)[0, 0], 0.0)))
+
+    return Separation(
+        first=asked[0].title,
+        others=tuple(one.title for one in asked[1:]),
+        recorded=sigma(None),
+        designed=sigma(best),
+        usual=sigma(usual),
+    )

@@ -1,0 +1,146 @@
+"""What a motion may do: limits of position, speed, acceleration and torque of each joint."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from pydantic import Field
+
+from dynident.errors import DesignError
+from dynident.robot import Robot
+from dynident.settings import SettingsTable, nearest, read_toml
+
+MARGIN = 0.9
+"""Share of the description's limits that a motion uses."""
+UNLIMITED = {"revolute": (1.0, 2.0, 10.0), "prismatic": (0.3, 0.5, 3.0)}
+"""Half range (rad, m), speed and acceleration where nothing is stated."""
+
+
+class _JointLimits(SettingsTable):
+    """Limits of a joint; what is left out is as the description has it.
+
+    Attributes
+    ----------
+    lower, upper : rad or m.
+    speed, acceleration : rad/s or m/s, and per s.
+    torque : N m or N.
+    """
+
+    lower: float | None = None
+    upper: float | None = None
+    speed: float | None = Field(default=None, gt=0)
+    acceleration: float | None = Field(default=None, gt=0)
+    torque: float | None = Field(default=None, gt=0)
+
+
+class _LimitsFile(SettingsTable):
+    """A file of limits: a table for each joint."""
+
+    joints: dict[str, _JointLimits]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MotionLimits:
+    """Limits of a motion, each (n,).
+
+    Attributes
+    ----------
+    lower, upper : rad or m.
+    speed, acceleration : rad/s or m/s, and per s.
+    torque : N m or N; infinite where none is known.
+    """
+
+    lower: np.ndarray
+    upper: np.ndarray
+    speed: np.ndarray
+    acceleration: np.ndarray
+    torque: np.ndarray
+
+    @classmethod
+    def of(cls, robot: Robot, margin: float = MARGIN) -> MotionLimits:
+        """Return a share of the limits that a robot's description states, else usual ones.
+
+        The acceleration, which descriptions do not state, is what takes a third of a second to
+        full speed.
+
+        Raises
+        ------
+        DesignError
+            If the margin is not between 0 and 1.
+        """
+        if not 0 < margin <= 1:
+            raise DesignError(f"margin = {margin:g}", remedy="choose it above 0, and at most 1")
+        usual = np.array([UNLIMITED[joint.kind] for joint in robot.joints])
+        lower = np.array([joint.lower for joint in robot.joints])
+        upper = np.array([joint.upper for joint in robot.joints])
+        ranged = np.isfinite(lower) & np.isfinite(upper)
+        middle = np.where(ranged, (np.where(ranged, lower, 0) + np.where(ranged, upper, 0)) / 2, 0)
+        half = np.where(ranged, margin * (upper - middle), usual[:, 0])
+        stated = np.array([joint.velocity for joint in robot.joints])
+        speed = np.where(np.isfinite(stated), margin * stated, usual[:, 1])
+        effort = np.array([joint.effort for joint in robot.joints])
+        acceleration = np.where(np.isfinite(stated), 3.0 * speed, usual[:, 2])
+        return cls(
+            lower=middle - half,
+            upper=middle + half,
+            speed=speed,
+            acceleration=acceleration,
+            torque=margin * effort,
+        )
+
+    @classmethod
+    def from_file(cls, path: str | Path, robot: Robot) -> MotionLimits:
+        """Read limits: `[joints.elbow]` with `lower`, `upper`, `speed`, `acceleration`, `torque`.
+
+        Raises
+        ------
+        DynidentError
+            If the file cannot be read, names a joint that the robot has not, or leaves no room.
+        """
+        said = read_toml(path, _LimitsFile).joints
+        found = cls.of(robot).changed(
+            {name: one.model_dump(exclude_none=True) for name, one in said.items()},
+            robot,
+            str(path),
+        )
+        return found
+
+    def changed(
+        self, values: Mapping[str, Mapping[str, float]], robot: Robot, where: str = "limits"
+    ) -> MotionLimits:
+        """Return the limits with other values: joint -> name of a limit -> value.
+
+        Parameters
+        ----------
+        values : those that differ.
+        robot : whose joints they are.
+        where : for messages.
+
+        Returns
+        -------
+        All limits.
+
+        Raises
+        ------
+        DesignError
+            If a joint is unknown, or its lower limit is not below its upper one.
+        """
+        arrays = {name: np.array(getattr(self, name)) for name in _NAMES}
+        for joint, own in values.items():
+            if joint not in robot.names:
+                remedy = nearest(joint, robot.names, "joints")
+                raise DesignError(f"the robot has no joint '{joint}'", where, remedy)
+            for name, value in own.items():
+                arrays[name][robot.names.index(joint)] = value
+        found = replace(self, **arrays)
+        for j, joint in enumerate(robot.names):
+            if not found.lower[j] < found.upper[j]:
+                what = f"the range of {joint} is {found.lower[j]:g} to {found.upper[j]:g}"
+                raise DesignError(what, where, "give lower below upper")
+        return found
+
+
+_NAMES = ("lower", "upper", "speed", "acceleration", "torque")

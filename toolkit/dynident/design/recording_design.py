@@ -1,0 +1,209 @@
+"""A designed recording: the motion, what it is predicted to tell, margins, and its files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dynident.closed_loop import Fourier
+from dynident.design.limits import MotionLimits
+from dynident.design.motion_program import FINER, DesignedMotion, MotionProgram
+from dynident.model import Model
+from dynident.tables import Shown, Table, number, percent
+
+if TYPE_CHECKING:
+    from dynident.design.designing import DesignTask
+
+
+@dataclass(frozen=True, kw_only=True)
+class Separation:
+    """How far an effect stands from what the model with its rivals can imitate.
+
+    Attributes
+    ----------
+    first, others : the effect that is taken for true, and its rivals.
+    recorded, designed, usual : standard deviations, by the recordings so far; by these and the
+        designed recording; by these and a usual motion of the same length.
+    """
+
+    first: str
+    others: tuple[str, ...]
+    recorded: float
+    designed: float
+    usual: float
+
+    @property
+    def worth(self) -> float:
+        """Length of usual motion that separates as far, over that of the design."""
+        gained = self.designed**2 - self.recorded**2
+        usual = self.usual**2 - self.recorded**2
+        return gained / usual if usual > 0 else float("inf")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecordingDesign(Shown):
+    """The answer of `design`.
+
+    Attributes
+    ----------
+    task : what it is for.
+    model : whose parameters it tells.
+    limits : that it keeps.
+    program : that was solved.
+    motion : what came out.
+    usual : a random motion within the same limits, the median of twenty.
+    values : (p,) of the model, as fitted to the recordings so far.
+    labels : of what is told, those of interest last.
+    separation : of the effects to be told apart; None for another task.
+    """
+
+    task: DesignTask
+    model: Model
+    limits: MotionLimits
+    program: MotionProgram
+    motion: DesignedMotion
+    usual: np.ndarray
+    values: np.ndarray
+    labels: tuple[str, ...]
+    separation: Separation | None = None
+
+    @property
+    def trajectory(self) -> Fourier:
+        """One repetition."""
+        return self.program.motions.fourier(self.motion.variables)
+
+    def sigma(self, variables: np.ndarray | None) -> np.ndarray:
+        """Standard deviations of what is of interest, with those of the recordings so far.
+
+        Parameters
+        ----------
+        variables : of a motion; None for the recordings so far alone.
+
+        Returns
+        -------
+        (last,) in units of the parameters; infinite where nothing shows one.
+        """
+        information = self.program.information
+        t = self.program.motions.times(self.program.instants)
+        found = np.zeros_like(information.prior)
+        if variables is not None:
+            found = information.matrix(t, self.program.motions.fourier(variables).at(t))
+        about = information.about(found)
+        values = np.linalg.eigvalsh(about)
+        if values[0] <= 0:
+            return np.full(len(about), np.inf)
+        return np.sqrt(np.diag(np.linalg.inv(about)))
+
+    @property
+    def sentence(self) -> str:
+        """What the recording is worth, in plain words."""
+        length = self.task.duration * self.task.repeat
+        if self.separation is not None:
+            one = self.separation
+            others = " and ".join(one.others)
+            words = (
+                f"{length:g} s of this tell {one.first} from {others} by {number(one.designed, 2)} "
+                f"standard deviations; the recordings so far by {number(one.recorded, 2)}"
+            )
+            if np.isfinite(one.worth):
+                words += f"; a usual motion needs {length * one.worth:.0f} s"
+            return f"{words}.{self._enough(one)}"
+        before, after, usual = (self.sigma(x) for x in (None, self.motion.variables, self.usual))
+        shares = after / usual
+        told = (
+            f"With {length:g} s of this the standard deviations are {percent(_mean(shares), 0)} of "
+            f"those with a usual motion of that length (geometric mean; the worst "
+            f"{percent(float(shares.max()), 0)})"
+        )
+        if np.all(np.isfinite(before)):
+            told += f", and {percent(_mean(after / before), 0)} of what they are now"
+        return f"{told}."
+
+    def _enough(self, one: Separation) -> str:
+        """What follows where the effects are not told apart."""
+        if one.designed >= _DECIDES:
+            return ""
+        if one.designed < _NEVER:
+            advice = self.first_advice
+            return (
+                " No motion within the limits tells them apart: another experiment might"
+                f"{f', {advice}' if advice else ''}, or a load, another base, a sensor."
+            )
+        more = (_DECIDES / one.designed) ** 2
+        return f" That does not decide: {_DECIDES:g} take {more:.0f} times as long."
+
+    @property
+    def first_advice(self) -> str:
+        """The experiment that shows the effect that is asked for, in words."""
+        return self.task.tell[0].advice if self.task.tell else ""
+
+    def sigma_table(self) -> Table:
+        """Standard deviations: so far, with the design, with a usual motion."""
+        last = self.program.information.last
+        columns = [self.sigma(x) for x in (None, self.motion.variables, self.usual)]
+        rows = tuple(
+            (name, *(number(float(one[k]), 3) for one in columns))
+            for k, name in enumerate(self.labels[-last:])
+        )
+        heads = ("parameter", "sigma so far", "with this", "with a usual motion")
+        return Table("Predicted standard deviations", heads, rows)
+
+    def limit_table(self) -> Table:
+        """Largest share of each limit that the motion uses, on a fine grid."""
+        program, limits = self.program, self.limits
+        t = program.motions.times(FINER * program.instants)
+        q, v, a = self.trajectory.at(t)
+        torque = program.information.columns.torque_along(t, q, v, a)
+        rows = []
+        for j, (name, unit) in enumerate(
+            zip(self.model.robot.names, self.model.robot.units, strict=True)
+        ):
+            span = limits.upper[j] - limits.lower[j]
+            room = min(q[:, j].min() - limits.lower[j], limits.upper[j] - q[:, j].max())
+            ends = (number(float(one), 3) for one in (q[:, j].min(), q[:, j].max()))
+            rows.append(
+                (
+                    name,
+                    f"{' to '.join(ends)} {unit}",
+                    percent(float(room / span), 0),
+                    percent(float(np.abs(v[:, j]).max() / limits.speed[j]), 0),
+                    percent(float(np.abs(a[:, j]).max() / limits.acceleration[j]), 0),
+                    percent(float(np.abs(torque[:, j]).max() / limits.torque[j]), 0),
+                )
+            )
+        heads = ("joint", "moves", "room left", "speed", "acceleration", "torque")
+        return Table("Shares of the limits that the motion uses", heads, tuple(rows))
+
+    def tables(self) -> tuple[Table | str, ...]:
+        """Everything that `show` prints, in its order."""
+        tail = (f"Ipopt: {self.motion.status}, {self.motion.iterations} iterations.",)
+        told = () if self.separation is not None else (self.sigma_table(),)
+        return (self.sentence, *told, self.limit_table(), *tail)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The design as JSON has it."""
+        series, one = self.trajectory, self.separation
+        return {
+            "sentence": self.sentence,
+            "duration": self.task.duration,
+            "repeat": self.task.repeat,
+            "joints": list(self.model.robot.names),
+            "centre": series.centre.tolist(),
+            "sine": series.sine.tolist(),
+            "cosine": series.cosine.tolist(),
+            "separation": None
+            if one is None
+            else {"recorded": one.recorded, "designed": one.designed, "usual": one.usual},
+            "status": self.motion.status,
+        }
+
+
+_DECIDES = 3.0  # standard deviations that tell two effects apart
+_NEVER = 0.1
+
+
+def _mean(ratios: np.ndarray) -> float:
+    known = ratios[np.isfinite(ratios) & (ratios > 0)]
+    return float(np.exp(np.mean(np.log(known)))) if len(known) else float("nan")
