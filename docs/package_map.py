@@ -34,7 +34,7 @@ FLOORS = (
     ("wiring",),
     ("evidence",),
     ("diagnosis",),
-    ("design",),
+    ("experiment_design",),
     ("study",),
     ("effect_contract",),
     ("study_draft",),

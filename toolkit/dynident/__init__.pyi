@@ -6,6 +6,7 @@ from . import effect_contract as effect_contract
 from . import effects as effects
 from . import errors as errors
 from . import evidence as evidence
+from . import experiment_design as experiment_design
 from . import fitting as fitting
 from . import inertia as inertia
 from . import model as model
@@ -28,6 +29,7 @@ from .effects.registry import effects_of as effects_of
 from .errors import DynidentError as DynidentError
 from .errors import DynidentWarning as DynidentWarning
 from .evidence.comparison import compare as compare
+from .experiment_design.designing import design as design
 from .fitting.consistent.constrained import Constrained as Constrained
 from .fitting.consistent.prior import Prior as Prior
 from .fitting.consistent.projection import project as project

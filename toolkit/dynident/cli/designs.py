@@ -35,10 +35,10 @@ def design(study: Path, limits: Path | None, out: Path | None, **settings) -> Co
 
     Example: dynident design study.toml --tell joint_zero@joint4 joint_spring@joint4 --out next
     """
-    from dynident.design import DesignTask, MotionLimits
-    from dynident.design import design as designed
-    from dynident.design.design_files import write_design
     from dynident.effects import Effect, effects_of
+    from dynident.experiment_design import DesignTask, MotionLimits
+    from dynident.experiment_design import design as designed
+    from dynident.experiment_design.design_files import write_design
 
     loaded = load_study(study)
     if out is not None:

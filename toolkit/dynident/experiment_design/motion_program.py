@@ -14,10 +14,10 @@ from typing import Any
 import lazy_loader
 import numpy as np
 
-from dynident.design.information import Information
-from dynident.design.limits import MotionLimits
-from dynident.design.periodic import PeriodicMotions
 from dynident.errors import DesignError
+from dynident.experiment_design.information import Information
+from dynident.experiment_design.motion_limits import MotionLimits
+from dynident.experiment_design.periodic import PeriodicMotions
 
 ca: Any = lazy_loader.load("casadi")
 _PER_HARMONIC = 22  # instants
@@ -164,7 +164,7 @@ class MotionProgram:
             return variables * _START
         return np.hstack([largest[:, :1], _START * largest[:, 1:] / max(_START, 1.0) * 10])
 
-    def _from(self, solver: Any, rows: _Rows, start: np.ndarray) -> DesignedMotion | None:
+    def _from(self, solver: Any, rows: _LimitRows, start: np.ndarray) -> DesignedMotion | None:
         from dynident.nlp.ipopt import interruptible
 
         bound = np.full(start.shape, np.inf)
@@ -191,7 +191,7 @@ class MotionProgram:
             iterations=int(stats["iter_count"]),
         )
 
-    def _solver(self) -> tuple[Any, _Rows]:
+    def _solver(self) -> tuple[Any, _LimitRows]:
         motions, limits, count = self.motions, self.limits, self.instants
         n, size = motions.n, motions.size
         t = motions.times(count)
@@ -207,7 +207,7 @@ class MotionProgram:
         columns = self.information.columns
         wide = columns.function.map(count)(inputs)
         loss = self.information.symbolic_loss(wide, count)
-        rows = _Rows()
+        rows = _LimitRows()
         rows.add(q / ca.repmat(ca.DM(half).T, count, 1), limits.lower / half, limits.upper / half)
         ones = np.ones(n)
         rows.add(v / ca.repmat(ca.DM(limits.speed).T, count, 1), -ones, ones)
@@ -233,7 +233,7 @@ class MotionProgram:
         return ca.nlpsol("design", "ipopt", program, options), rows
 
 
-class _Rows:
+class _LimitRows:
     """Rows of limits: expressions, and their bounds."""
 
     def __init__(self) -> None:

@@ -46,6 +46,10 @@ class ColumnFunction:
         values : (p,) its parameters, for the torque and for columns that depend on it.
         more : effects beside it, at their shapes.
 
+        Returns
+        -------
+        Functions of an instant of the motion.
+
         Raises
         ------
         DesignError

@@ -11,9 +11,9 @@ import tomlkit
 from dynident import files
 from dynident.closed_loop import Controller
 from dynident.closed_loop.experiments.virtual_study import controller_table
-from dynident.design.recording_design import RecordingDesign
 from dynident.effects import LawEffect, laws_table
 from dynident.errors import DesignError, FileError
+from dynident.experiment_design.recording_design import RecordingDesign
 from dynident.robot.patching import write
 
 REFERENCE, EXPERIMENT = "reference.csv", "experiment.toml"
@@ -30,7 +30,7 @@ def write_design(
 
     Parameters
     ----------
-    design : of `dynident.design.design`.
+    design : of `dynident.experiment_design.design`.
     folder : made if it is missing.
     rate_hz : of the reference.
     controller : of the robot.

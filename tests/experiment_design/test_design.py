@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from chains import chain
-from dynident.design import DesignTask, MotionLimits, design
-from dynident.design.column_function import ColumnFunction
-from dynident.design.information import Information
-from dynident.design.motion_program import FINER, MotionProgram, instants_of
-from dynident.design.periodic import PeriodicMotions
 from dynident.effects import effects_of
 from dynident.errors import DesignError
+from dynident.experiment_design import DesignTask, MotionLimits, design
+from dynident.experiment_design.column_function import ColumnFunction
+from dynident.experiment_design.information import Information
+from dynident.experiment_design.motion_program import FINER, MotionProgram, instants_of
+from dynident.experiment_design.periodic import PeriodicMotions
 from dynident.model import Model
 from dynident.recording import Dataset
 from synthetic import arm, synthetic, true_values

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynident.design.column_function import ColumnFunction
-from dynident.design.information import Information, Objective
-from dynident.design.limits import MotionLimits
-from dynident.design.motion_program import MotionProgram, instants_of
-from dynident.design.periodic import PeriodicMotions
-from dynident.design.recording_design import RecordingDesign, Separation
 from dynident.effects import Effect
 from dynident.errors import DesignError
+from dynident.experiment_design.column_function import ColumnFunction
+from dynident.experiment_design.design_task import DesignTask
+from dynident.experiment_design.information import Information
+from dynident.experiment_design.motion_limits import MotionLimits
+from dynident.experiment_design.motion_program import MotionProgram, instants_of
+from dynident.experiment_design.periodic import PeriodicMotions
+from dynident.experiment_design.recording_design import RecordingDesign, Separation
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.fit_model import fit
 from dynident.fitting.sampling import sample
@@ -23,44 +24,11 @@ from dynident.progress import logged
 from dynident.recording import Dataset
 from dynident.threads import single_threaded
 
+_FIRST_USUAL = 10_000  # seed
 _USUAL = 20  # random motions, whose median a design is compared with
 _SIZES = 5  # random motions by which columns are scaled
 _UNSEEN = 1e-9  # of the size of the others: it makes no torque
 _RIVAL_SHAPES = 3  # of a rival, beside its own
-
-
-@dataclass(frozen=True, kw_only=True)
-class DesignTask:
-    """What the next recording is for.
-
-    Attributes
-    ----------
-    duration : s, of one repetition.
-    repeat : how many repetitions: two or more measure the noise.
-    harmonics : of the series of each joint.
-    objective : "D", the volume of the confidence region, or "A", the sum of the variances.
-    tell : effects of which the recording is to tell which one it is; the first is taken for true.
-    show : an effect that the recordings so far could not show.
-    starts, seed : of the search.
-    """
-
-    duration: float = 10.0
-    repeat: int = 3
-    harmonics: int = 8
-    objective: Objective = "D"
-    tell: tuple[Effect, ...] = ()
-    show: Effect | None = None
-    starts: int = 2
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        if len(self.tell) == 1:
-            raise DesignError("one effect to tell apart", remedy="name two, or use show")
-        if self.tell and self.show:
-            raise DesignError("tell and show together", remedy="design a recording for each")
-        if self.repeat < 1 or self.starts < 1:
-            what = f"repeat = {self.repeat}, starts = {self.starts}"
-            raise DesignError(what, remedy="choose 1 or more of each")
 
 
 @single_threaded
@@ -98,72 +66,110 @@ def design(
     task = task or DesignTask()
     progress = progress or logged("designing")
     limits = limits or MotionLimits.of(model.robot)
-    rivals = task.tell or (() if task.show is None else (task.show,))
-    asked = tuple(one.on(model.robot) for one in rivals)
-    bare = model
-    for one in asked:
-        bare = bare - one.label if one in bare else bare
     progress("fitting what was recorded")
-    wide = bare + asked[:1] if task.tell else bare
-    estimate = fit(wide, recorded)
-    asked = tuple(_shaped_as(one, estimate) for one in asked)
-    start = _values(estimate, bare)
+    question = _Question.of(model, recorded, task)
     progress("writing the columns out")
     motions = PeriodicMotions(limits=limits, period=task.duration, harmonics=task.harmonics)
-    extra = _beside(asked, bare, task)
-    columns = ColumnFunction.of(bare, start, extra)
-    mix, last, labels = _mix(bare, columns, extra, estimate, task)
-    std = np.where(estimate.torque_std > 0, estimate.torque_std, np.inf)
-    size = _sizes(mix, columns, motions, std)
-    kept = size > _UNSEEN * np.median(size[size > 0]) if np.any(size > 0) else size > 0
-    last = int(np.sum(kept[len(kept) - last :]))
-    if last == 0:
-        named = asked[0].title if asked else "the model"
-        raise DesignError(f"no motion of this robot makes a torque of {named}")
-    mix, labels = mix[:, kept], tuple(np.array(labels)[kept].tolist())
-    prior, rate = _recorded(columns, mix, recorded, std)
-    rows = rate * task.duration * task.repeat
-    information = Information(
-        columns=columns,
-        mix=mix,
-        last=last,
-        weight=rows / instants_of(motions) / std**2,
-        prior=prior,
-        scale=size[kept] * np.sqrt(rows * len(std)),
-        objective=task.objective,
-    )
+    information, labels = question.information(recorded, motions)
     program = MotionProgram(information, motions)
     found = program.solved(task.starts, task.seed, progress)
     progress("comparing with usual motions")
-    usual = [program.within(motions.random(10_000 + k)) for k in range(_USUAL)]
-    losses = sorted((program.loss(one), k) for k, one in enumerate(usual) if one is not None)
-    if not losses:
-        raise DesignError("no usual motion is within the limits", remedy="widen them")
-    _, middle = losses[len(losses) // 2]
-    median = usual[middle]
-    assert median is not None
+    usual = _usual(program)
     return RecordingDesign(
         task=task,
-        model=bare,
+        model=question.bare,
         limits=limits,
         program=program,
         motion=found,
-        usual=median,
-        values=start,
+        usual=usual,
+        values=question.values,
         labels=labels,
-        separation=_separation(program, found.variables, median, task, asked),
+        separation=_separation(program, found.variables, usual, question),
     )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Question:
+    """What is asked, of which model.
+
+    Attributes
+    ----------
+    task : what for.
+    bare : the model without the effects that are asked for.
+    asked : these, with the shapes that were fitted.
+    estimate : of the recordings so far, with the first of them where two are to be told apart.
+    """
+
+    task: DesignTask
+    bare: Model
+    asked: tuple[Effect, ...]
+    estimate: Estimate
+
+    @classmethod
+    def of(cls, model: Model, recorded: Dataset, task: DesignTask) -> _Question:
+        """Fit what was recorded."""
+        rivals = task.tell or (() if task.show is None else (task.show,))
+        asked = tuple(one.on(model.robot) for one in rivals)
+        bare = model
+        for one in asked:
+            bare = bare - one.label if one in bare else bare
+        estimate = fit(bare + asked[:1] if task.tell else bare, recorded)
+        asked = tuple(_shaped_as(one, estimate) for one in asked)
+        return cls(task=task, bare=bare, asked=asked, estimate=estimate)
+
+    @property
+    def values(self) -> np.ndarray:
+        """Of the bare model, (p,)."""
+        known = dict(zip(self.estimate.names, self.estimate.values, strict=True))
+        return np.array([known[name] for name in self.bare.names])
+
+    @property
+    def std(self) -> np.ndarray:
+        """Size of the torque's residual, (n,); infinite where there is no torque."""
+        found = self.estimate.torque_std
+        return np.where(found > 0, found, np.inf)
+
+    def information(
+        self, recorded: Dataset, motions: PeriodicMotions
+    ) -> tuple[Information, tuple[str, ...]]:
+        """Return what motions tell, and the names of what they tell of."""
+        task, std = self.task, self.std
+        extra = _beside(self.asked, self.bare, task)
+        columns = ColumnFunction.of(self.bare, self.values, extra)
+        mix, last, labels = _mix(self.bare, columns, extra, self.estimate, task)
+        size = _sizes(mix, columns, motions, std)
+        kept = size > _UNSEEN * np.median(size[size > 0]) if np.any(size > 0) else size > 0
+        last = int(np.sum(kept[len(kept) - last :]))
+        if last == 0:
+            named = self.asked[0].title if self.asked else "the model"
+            raise DesignError(f"no motion of this robot makes a torque of {named}")
+        mix = mix[:, kept]
+        prior, rate = _recorded(columns, mix, recorded, std)
+        rows = rate * task.duration * task.repeat
+        information = Information(
+            columns=columns,
+            mix=mix,
+            last=last,
+            weight=rows / instants_of(motions) / std**2,
+            prior=prior,
+            scale=size[kept] * np.sqrt(rows * len(std)),
+            objective=task.objective,
+        )
+        return information, tuple(np.array(labels)[kept].tolist())
+
+
+def _usual(program: MotionProgram) -> np.ndarray:
+    """Variables of the median of some random motions within the limits."""
+    usual = [program.within(program.motions.random(_FIRST_USUAL + k)) for k in range(_USUAL)]
+    possible = sorted((one for one in usual if one is not None), key=program.loss)
+    if not possible:
+        raise DesignError("no usual motion is within the limits", remedy="widen them")
+    return possible[len(possible) // 2]
 
 
 def _shaped_as(effect: Effect, estimate: Estimate) -> Effect:
     same = [one for one in estimate.model.effects if one.label == effect.label]
     return same[0] if same else effect
-
-
-def _values(estimate: Estimate, model: Model) -> np.ndarray:
-    """Values of a model that has fewer effects than the one that was fitted."""
-    known = dict(zip(estimate.names, estimate.values, strict=True))
-    return np.array([known[name] for name in model.names])
 
 
 def _beside(asked: Sequence[Effect], model: Model, task: DesignTask) -> tuple[Effect, ...]:
@@ -231,28 +237,24 @@ def _sizes(
 
 
 def _separation(
-    program: MotionProgram,
-    best: np.ndarray,
-    usual: np.ndarray,
-    task: DesignTask,
-    asked: Sequence[Effect],
+    program: MotionProgram, best: np.ndarray, usual: np.ndarray, question: _Question
 ) -> Separation | None:
     """How far the effects are apart: so far, with the design, with a usual motion."""
-    if not task.tell:
+    if not question.task.tell:
         return None
     information = program.information
     t = program.motions.times(program.instants)
 
     def sigma(variables: np.ndarray | None) -> float:
-        nothing = np.zeros_like(information.prior)
-        found = nothing
+        found = np.zeros_like(information.prior)
         if variables is not None:
             found = information.matrix(t, program.motions.fourier(variables).at(t))
         return float(np.sqrt(max(information.about(found)[0, 0], 0.0)))
 
+    first, *others = question.asked
     return Separation(
-        first=asked[0].title,
-        others=tuple(one.title for one in asked[1:]),
+        first=first.title,
+        others=tuple(one.title for one in others),
         recorded=sigma(None),
         designed=sigma(best),
         usual=sigma(usual),

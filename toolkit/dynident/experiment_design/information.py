@@ -16,7 +16,7 @@ import lazy_loader
 import numpy as np
 from scipy.linalg import cho_solve, cholesky
 
-from dynident.design.column_function import ColumnFunction
+from dynident.experiment_design.column_function import ColumnFunction
 
 ca: Any = lazy_loader.load("casadi")
 Objective = Literal["D", "A"]

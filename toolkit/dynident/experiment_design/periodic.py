@@ -9,8 +9,8 @@ import numpy as np
 from scipy.linalg import null_space
 
 from dynident.closed_loop import Fourier
-from dynident.design.limits import MotionLimits
 from dynident.errors import DesignError
+from dynident.experiment_design.motion_limits import MotionLimits
 
 LONGEST = 3600.0
 """s, of one period."""

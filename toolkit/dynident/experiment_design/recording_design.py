@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from dynident.closed_loop import Fourier
-from dynident.design.limits import MotionLimits
-from dynident.design.motion_program import FINER, DesignedMotion, MotionProgram
+from dynident.experiment_design.design_task import DesignTask
+from dynident.experiment_design.motion_limits import MotionLimits
+from dynident.experiment_design.motion_program import FINER, DesignedMotion, MotionProgram
 from dynident.model import Model
 from dynident.tables import Shown, Table, number, percent
-
-if TYPE_CHECKING:
-    from dynident.design.designing import DesignTask
 
 
 @dataclass(frozen=True, kw_only=True)

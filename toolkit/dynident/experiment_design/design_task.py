@@ -1,0 +1,43 @@
+"""What the next recording is for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dynident.effects import Effect
+from dynident.errors import DesignError
+from dynident.experiment_design.information import Objective
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignTask:
+    """What the next recording is for.
+
+    Attributes
+    ----------
+    duration : s, of one repetition.
+    repeat : how many repetitions: two or more measure the noise.
+    harmonics : of the series of each joint.
+    objective : "D", the volume of the confidence region, or "A", the sum of the variances.
+    tell : effects of which the recording is to tell which one it is; the first is taken for true.
+    show : an effect that the recordings so far could not show.
+    starts, seed : of the search.
+    """
+
+    duration: float = 10.0
+    repeat: int = 3
+    harmonics: int = 8
+    objective: Objective = "D"
+    tell: tuple[Effect, ...] = ()
+    show: Effect | None = None
+    starts: int = 2
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if len(self.tell) == 1:
+            raise DesignError("one effect to tell apart", remedy="name two, or use show")
+        if self.tell and self.show:
+            raise DesignError("tell and show together", remedy="design a recording for each")
+        if self.repeat < 1 or self.starts < 1:
+            what = f"repeat = {self.repeat}, starts = {self.starts}"
+            raise DesignError(what, remedy="choose 1 or more of each")
