@@ -27,6 +27,7 @@ NAMES = [
     "identification",
     "batch_regressor",
     "least_squares_memory",
+    "files_fitted",
     "joint_count",
     "effect_count",
     "process_count",
