@@ -40,6 +40,7 @@ def is_place(said: dict[str, Any]) -> bool:
 def check_diagnosis(said: dict[str, Any], source: str) -> None:
     assert set(said) == {
         *("verdict", "noise", "joints", "steps", "candidates", "test_error", "notes"),
+        "proposals",
         "wiring",
         "withdrawn",
         "rows",
