@@ -11,11 +11,11 @@ import numpy as np
 from blind_study.foreign import FOREIGN
 from blind_study.strengths import KNOWN
 
-Kind = Literal["healthy", "known", "two", "foreign", "absorbed"]
+Kind = Literal["healthy", "known", "two", "foreign", "absorbed", "law"]
 
 BLOCK = 100
 SHARES: dict[Kind, int] = {"healthy": 30, "known": 45, "two": 10, "foreign": 10, "absorbed": 5}
-"""Cases of each kind in a block."""
+"""Cases of each kind in a block; those with laws are drawn in `law_cases`."""
 JOINTS = {2: 75, 6: 12, 7: 13}
 """Cases of each number of joints in a block."""
 NOT_IDENTIFIABLE = ("rotor_inertia", "joint_zero", "payload")
@@ -56,7 +56,8 @@ class Case:
     stated_width : what the study says of it.
     payload : a known payload in every other recording, or none.
     says_payload : whether the study says which recordings carry one, where it is hidden.
-    variant : "healthy" where what was drawn to be hidden was left out.
+    variant : "healthy" where what was drawn to be hidden was left out; "laws" where laws are asked
+        for.
     """
 
     seed: int
@@ -73,7 +74,7 @@ class Case:
     stated_width: float
     payload: bool
     says_payload: bool
-    variant: Literal["", "healthy"] = ""
+    variant: Literal["", "healthy", "laws"] = ""
 
     @property
     def name(self) -> str:
@@ -119,7 +120,7 @@ def _block(seed: int, block: int, shares: Mapping[int, int]) -> list[Case]:
             names = [next(foreign)]
         elif kinds[k] == "absorbed":
             names = [next(absorbed)]
-        found.append(_case(seed, block * BLOCK + k, str(kinds[k]), int(joints[k]), names))
+        found.append(draw_case(seed, block * BLOCK + k, str(kinds[k]), int(joints[k]), names))
     return found
 
 
@@ -129,7 +130,8 @@ def _cycle(names: tuple[str, ...], count: int, seed: int, block: int) -> list[st
     return [names[order[(block * count + i) % len(names)]] for i in range(count)]
 
 
-def _case(seed: int, number: int, kind: str, joints: int, names: list[str]) -> Case:
+def draw_case(seed: int, number: int, kind: str, joints: int, names: list[str]) -> Case:
+    """Draw one case that hides effects of these names."""
     rng = np.random.default_rng([seed, number, 3])
     hidden = tuple(_hidden(name, kind, joints, rng) for name in names)
     if kind == "absorbed":

@@ -62,10 +62,11 @@ class MujocoCase(Case):
 def draw_mujoco(seed: int, count: int, first: int = 0) -> list[MujocoCase]:
     """Draw cases `first` to `first + count - 1` of a seed, as `draw` does, for MuJoCo."""
     cases = draw(seed, count, first, JOINTS)
-    return [_placed(case) for case in cases]
+    return [placed(case) for case in cases]
 
 
-def _placed(case: Case) -> MujocoCase:
+def placed(case: Case) -> MujocoCase:
+    """Return a case as one whose robot is MuJoCo's."""
     rng = np.random.default_rng([case.seed, case.number, 7])
     low, high = np.log(STOPS_WITHIN)
     constant = float(np.exp(rng.uniform(low, high)))

@@ -8,9 +8,11 @@
 `run` draws the cases of a seed, makes them, asks `dynident explain` about each, and appends what it
 says to answers.jsonl; cases that are in there are not asked again. `table` compares the answers
 with the truth; `report` prints what is right and what is claimed without reason. `--plant mujoco`
-lets MuJoCo move robots of two to seven joints; `--filter` writes a setting of [filter] into the
-studies, or each of six in turn; `--healthy-only` hides nothing. What has no answer within `--limit`
-counts as a case without an answer; 0 waits for as long as it takes.
+lets MuJoCo move robots of two to seven joints; `--plant laws` hides laws drawn at random, which no
+catalogue has, on robots of either simulator, and `laws` prints what was proposed for them.
+`--filter` writes a setting of [filter] into the studies, or each of six in turn; `--healthy-only`
+hides nothing. What has no answer within `--limit` counts as a case without an answer; 0 waits for
+as long as it takes.
 
 With `--backend dask` joblib spreads the cases over the cluster whose scheduler `--scheduler` names
 (its workers need this package and `benchmarks` on their PYTHONPATH, and the folder in common).
@@ -31,14 +33,20 @@ from joblib import Parallel, delayed, parallel_config
 from blind_study.cases import SHARES, Case, draw
 from blind_study.circumstances import draw_mujoco
 from blind_study.filters import FILTERS
+from blind_study.law_cases import draw_laws
+from blind_study.law_table import show_laws
 from blind_study.make import Size
 from blind_study.report import print_report
 from blind_study.table import show
 from blind_study.worker import Place, answer, label
 
 USUAL = Path("blind_study_results")
-PLANTS: dict[str, Callable[[int, int, int], Sequence[Case]]] = {"own": draw, "mujoco": draw_mujoco}
-"""Who moves the robots, and how their cases are drawn."""
+PLANTS: dict[str, Callable[[int, int, int], Sequence[Case]]] = {
+    "own": draw,
+    "mujoco": draw_mujoco,
+    "laws": draw_laws,
+}
+"""Who moves the robots, and how their cases are drawn; of laws, either may."""
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -57,7 +65,7 @@ def main(arguments: list[str] | None = None) -> None:
     run.add_argument("--count", type=int, default=400, help="cases to draw")
     run.add_argument("--first", type=int, default=0, help="number of the first one")
     run.add_argument("--joints", type=int, nargs="*", choices=range(2, 8), help="only these robots")
-    run.add_argument("--kinds", nargs="*", choices=tuple(SHARES), help="only these kinds")
+    run.add_argument("--kinds", nargs="*", choices=(*SHARES, "law"), help="only these kinds")
     run.add_argument("--effects", nargs="*", help="only cases that hide one of these")
     run.add_argument("--numbers", type=int, nargs="*", help="only these cases")
     run.add_argument("--jobs", type=int, default=2)
@@ -71,14 +79,17 @@ def main(arguments: list[str] | None = None) -> None:
     run.add_argument("--runs", type=int, nargs=2, default=(4, 2), metavar=("TRAIN", "TEST"))
     table = commands.add_parser("table", help="compare the answers with the truth")
     report = commands.add_parser("report", help="what is right, and what is claimed without reason")
-    for one in (run, table, report):
+    laws = commands.add_parser("laws", help="what proposed laws are worth")
+    for one in (run, table, report, laws):
         one.add_argument("--out", type=Path, default=USUAL, help="folder of the study")
     options = parser.parse_args(arguments)
     if options.command == "run":
         place = Place(options.out.resolve(), options.data, options.limit)
         size = Size(*options.rates, *options.runs)
         run_study(_chosen(options), place, size, options)
-    if options.command == "report" or (options.command == "run" and _is_wider(options)):
+    if options.command == "laws" or (options.command == "run" and options.plant == "laws"):
+        show_laws(options.out)
+    elif options.command == "report" or (options.command == "run" and _is_wider(options)):
         print_report(options.out)
     else:
         show(options.out)

@@ -13,8 +13,10 @@ import numpy as np
 from blind_study import strengths
 from blind_study.cases import Case, Hidden
 from blind_study.circumstances import MujocoCase
+from blind_study.drawn_laws import NAME, DrawnEffect, draw_law, effect_of
 from blind_study.experiments import PAUSE, PERIOD, Laboratory, Plan, SensorError
 from blind_study.foreign import EFFECTS, SENSOR_ERRORS
+from blind_study.law_cases import family_of
 from blind_study.robots import TWO, specimen
 from blind_study.writing import state_study
 from dynident.closed_loop import TrueEffect, write_experiment
@@ -71,7 +73,7 @@ class _Secret:
 
 def unavailable(case: Case) -> str:
     """Name an effect of a case that the catalogue does not have; empty if it has all."""
-    known = {**catalogue(), **EFFECTS, **dict.fromkeys(SENSOR_ERRORS)}
+    known = {**catalogue(), **EFFECTS, **dict.fromkeys((*SENSOR_ERRORS, NAME))}
     return next((one.effect for one in case.hidden if one.effect not in known), "")
 
 
@@ -120,6 +122,7 @@ def _made(case: Case, folder: Path, size: Size) -> dict[str, Any]:
         "also": [_place(plan, one) for one in _also(case)],
         "ratio": max([floor, *ratios]),
         "ratio_without": floor,
+        "law": next((law for secret in found if (law := _law(secret))), None),
         "noise_rms": [float(x) for x in noise],
     }
 
@@ -169,7 +172,31 @@ def _known(plan: Plan, rng: np.random.Generator) -> tuple[TrueEffect, ...]:
     return tuple(found)
 
 
+def _law(secret: _Secret) -> dict[str, Any] | None:
+    """What a drawn law says, and how many units of it there are."""
+    for one in secret.effects:
+        if isinstance(one.effect, DrawnEffect):
+            return {"drawn": one.effect.drawn.to_dict(), "amount": one.values[0]}
+    return None
+
+
+def _drawn(plan: Plan, hidden: Hidden, rng: np.random.Generator) -> _Secret:
+    """Draw a law; the load is only there where MuJoCo moves the robot."""
+    case, robot = plan.case, plan.made.robot
+    family, width = family_of(case), case.width or case.stated_width
+    law = draw_law(family, plan.made, width, rng)
+    while law.of_load and not isinstance(case, MujocoCase):
+        law = draw_law(family, plan.made, width, rng)
+    effect = effect_of(law)(robot.names[law.joint]).on(robot)
+    amount = 0.2 * float(rng.choice([-1.0, 1.0]))
+    label = replace(hidden, joint=law.joint)
+    # No more than thrice the dry friction, or it would drive the joint.
+    return _Secret(label, (TrueEffect(effect, (amount,), hidden=True),), (), 15.0, 0.0)
+
+
 def _secret(plan: Plan, hidden: Hidden, rng: np.random.Generator) -> _Secret:
+    if hidden.effect == NAME:
+        return _drawn(plan, hidden, rng)
     begin = strengths.start(
         hidden.effect, plan.made, hidden.joint, hidden.source, rng, plan.case.width
     )

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from blind_study.drawn_laws import DrawnEffect, DrawnLaw
 from dynident.closed_loop import TrueEffect
 
 State = list[float]
@@ -45,6 +46,28 @@ class Bristle:
 
 
 @dataclass(eq=False)
+class Drawn:
+    """A law drawn at random, with its internal state.
+
+    Attributes
+    ----------
+    law, amount : the law, and units of it.
+    memory : its state.
+    """
+
+    law: DrawnLaw
+    amount: float
+    memory: float = 0.0
+
+    def torque(self, step: float, q: State, v: State, u: State) -> float:
+        """Go one step of time, and return what it takes from the command, N m."""
+        if self.law.has_memory:
+            self.memory += step * float(self.law.rate(v, self.memory))
+        command = u[self.law.joint]
+        return float(self.law.beside(command, q, v, self.amount, self.memory))
+
+
+@dataclass(eq=False)
 class Laws:
     """What acts besides MuJoCo's own laws, by joint.
 
@@ -55,6 +78,7 @@ class Laws:
     dampings : (joint, function of the session's time): added to the viscosity, N m s/rad.
     bristles : internal states, advanced from step to step.
     both : (joint, source, level) of dry friction that turns with the sum of two joints.
+    drawn : laws drawn at random.
     """
 
     torques: list[tuple[int, Torque]] = field(default_factory=list)
@@ -62,6 +86,7 @@ class Laws:
     dampings: list[tuple[int, Callable[[float], float]]] = field(default_factory=list)
     bristles: list[Bristle] = field(default_factory=list)
     both: list[tuple[int, int, float]] = field(default_factory=list)
+    drawn: list[Drawn] = field(default_factory=list)
 
     def add(self, one: TrueEffect, j: int, i: int, number: int) -> None:
         """Take the law of an effect, if it has one here.
@@ -72,6 +97,8 @@ class Laws:
         j, i : columns of its joint and its source; -1 for none.
         number : of the recording, from 1.
         """
+        if isinstance(one.effect, DrawnEffect):
+            self.drawn.append(Drawn(one.effect.drawn, one.values[0]))
         law = _LAWS.get(one.effect.name)
         if law is not None:
             law(self, one.values, one.effect.shape, j, i, number)

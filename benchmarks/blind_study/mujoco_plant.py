@@ -86,6 +86,7 @@ class Plant:
         """Whether MuJoCo's own laws are all there are."""
         laws = self._built.laws
         more = laws.torques or laws.levels or laws.dampings or laws.bristles or laws.both
+        more = more or laws.drawn
         return not (more or np.any(self._built.dry))
 
     def run(self, loop: Loop, where: str) -> tuple[np.ndarray, np.ndarray]:
@@ -162,6 +163,8 @@ class Plant:
         force = [0.0] * len(q)
         for j, torque in laws.torques:
             force[j] += torque(t, q, v)
+        for one in laws.drawn:
+            force[one.law.joint] -= one.torque(step, q, v, command)
         for bristle in laws.bristles:
             bristle.advance(step, v[bristle.joint])
         levels = list(self._levels)

@@ -14,6 +14,7 @@ from typing import Any
 
 from blind_study.cases import Case
 from blind_study.filters import state
+from blind_study.law_marks import marks
 from blind_study.make import Size, make, unavailable
 from blind_study.time_limit import TimeUp, time_limit
 from blind_study.writing import write_truth
@@ -75,7 +76,10 @@ def answer(
     for said, filter in zip(each, filters, strict=True):
         if filter != "none":
             state(folder / "study.toml", filter, truth["rate_hz"])
-        said |= {"made_s": made, **explain(folder / "study.toml", place.limit_s)}
+        more = ("--propose",) if case.variant == "laws" else ()
+        said |= {"made_s": made, **explain(folder / "study.toml", place.limit_s, more)}
+        if more and "answer" in said:
+            said["laws"] = marks(folder / "study.toml", truth["law"], said["answer"])
     if place.data == "drop":
         shutil.rmtree(folder)
     return each
@@ -86,10 +90,14 @@ def _about(case: Case, filter: str) -> dict[str, Any]:
     return said if filter == "none" else {**said, "case": case.name, "filter": filter}
 
 
-def explain(study: Path, limit_s: float = 0.0) -> dict[str, Any]:
+def explain(study: Path, limit_s: float = 0.0, more: Sequence[str] = ()) -> dict[str, Any]:
     """Run `dynident explain --json`; return its answer and its processor time.
 
-    Where none has come within `limit_s` (0: without limit), that is the error.
+    Parameters
+    ----------
+    study : the file.
+    limit_s : where no answer has come within it (0: without limit), that is the error.
+    more : options.
     """
     from dynident.cli import main
 
@@ -98,7 +106,7 @@ def explain(study: Path, limit_s: float = 0.0) -> dict[str, Any]:
     with redirect_stdout(out), redirect_stderr(err):
         try:
             with time_limit(limit_s):
-                main(["explain", str(study), "--json"])
+                main(["explain", str(study), "--json", *more])
         except TimeUp:
             spent = time.process_time() - started
             return {"cpu_s": spent, "status": -1, "error": f"no answer within {limit_s:g} s"}

@@ -320,6 +320,9 @@ class ProposalCriteria(CriteriaGroup):
         most=1,
     )
     contenders: int = criterion(12, "laws", "laws of each screening that are looked at", least=1)
+    seeds: int = criterion(
+        6, "laws", "products of two factors of each screening that a third is tried with", least=0
+    )
     rounds: int = criterion(3, "1", "screenings, each in the metric of the last law", least=1)
     most: int = criterion(3, "laws", "laws that are proposed one after the other", least=1)
     factor_price: float = criterion(

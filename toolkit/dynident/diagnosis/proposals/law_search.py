@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from dynident.diagnosis.proposals.proposal import LawPicture, Proposal
-from dynident.diagnosis.proposals.term_library import LibraryTerm, centred, library
+from dynident.diagnosis.proposals.term_library import LibraryTerm, centred, extended, library
 from dynident.diagnosis.proposals.term_screen import Screened, screen
 from dynident.diagnosis.search.ranking import judged
 from dynident.diagnosis.search.scoring import Score, candidate_moments, score
 from dynident.diagnosis.search.shaped_fit import refitted
 from dynident.diagnosis.search.withdrawal import judged_on
+from dynident.diagnosis.verdict import within_noise
 from dynident.effects import Effect, LawEffect, law_effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of
@@ -64,6 +65,8 @@ class LawSearch:
             proposal = self._proposal(best, (fitted, wider), (before, after))
             if proposal is None:
                 break
+            # What another law is found after, it did not explain.
+            found = [replace(one, is_explanation=False) for one in found]
             found.append(proposal)
             fitted, before = wider, after
         return tuple(found)
@@ -75,10 +78,9 @@ class LawSearch:
         criteria = self.evidence.criteria.proposals
         joints = self._joints(fitted, before)
         terms = {j: self._terms(fitted, before, j) for j in joints}
-        tried = sum(len(some) for some in terms.values())
         metric, best, seen = fitted, None, None
         for _ in range(criteria.rounds):
-            looked_at = self._looked_at(metric, terms)
+            looked_at, tried = self._looked_at(metric, terms)
             passing = self._confirmed(metric, looked_at, tried, name)
             if not passing:
                 break
@@ -110,18 +112,25 @@ class LawSearch:
 
     def _looked_at(
         self, metric: EvidenceFit, terms: dict[int, tuple[LibraryTerm, ...]]
-    ) -> list[tuple[int, LibraryTerm]]:
-        """The terms that are evaluated as effects are: the best of the screening."""
+    ) -> tuple[list[tuple[int, LibraryTerm]], int]:
+        """The terms that are evaluated as effects are, the best of the screening; of how many."""
         found: list[tuple[float, int, LibraryTerm]] = []
-        most = self.evidence.criteria.proposals.contenders
+        criteria, tried = self.evidence.criteria.proposals, 0
         for joint, some in terms.items():
             self.progress(f"laws at {metric.model.robot.names[joint]}")
             repeating = [one for one in some if not one.of_session]
             kept: tuple[Screened, ...] = screen(self.evidence, metric, joint, repeating)
-            found += [(one.penalised, joint, one.term) for one in kept[:most]]
+            # Whatever a product of three is, some product of two of them is like it.
+            seeds = [one.term for one in kept[: criteria.seeds]]
+            wider = extended(seeds, [one.factors[0] for one in some if len(one.factors) == 1])
+            if wider:
+                kept = (*kept, *screen(self.evidence, metric, joint, wider, beside=len(repeating)))
+            tried += len(some) + len(wider)
+            found += [(one.penalised, joint, one.term) for one in kept]
         found.sort(key=lambda one: -one[0])
         session = [(j, one) for j, some in terms.items() for one in some if one.of_session]
-        return [(joint, term) for _, joint, term in found[:most]] + session
+        best = [(joint, term) for _, joint, term in found[: criteria.contenders]]
+        return best + session, tried
 
     def _confirmed(
         self,
@@ -131,18 +140,19 @@ class LawSearch:
         name: str,
     ) -> list[Score]:
         """Laws that pass the gates of the search, best first."""
-        robot, level = metric.model.robot, self.evidence.criteria.proposals.level
+        robot, criteria = metric.model.robot, self.evidence.criteria.proposals
         passing: list[Score] = []
         for joint, term in looked_at:
             effect = law_effect(term.law(name))(robot.names[joint], shape=term.start).on(robot)
             (parts,) = candidate_moments(self.evidence, metric, [effect])
             first = score(metric, effect, *parts, grid=tried)
-            if first.not_identifiable or first.p_value * tried >= level:
+            if first.not_identifiable or first.p_value * tried >= criteria.level:
                 continue
             self.progress(f"{effect.made_of.torque} at {effect.joint}")
             one, refusal = judged(self.evidence, metric, first, tried)
-            if not refusal and one.p_value * tried < level:
-                passing.append(one)
+            if not refusal and one.p_value * tried < criteria.level:
+                price = criteria.factor_price * term.price
+                passing.append(replace(one, penalised=one.penalised - price))
         passing.sort(key=lambda one: -one.penalised)
         return _each_once(passing)
 
@@ -170,7 +180,7 @@ class LawSearch:
             sigma=sigma,
             shape_sigma=shape_sigma,
             explains=float(explains),
-            is_explanation=explains >= criteria.explains,
+            is_explanation=explains >= criteria.explains and self._nothing_left(after),
             p_value=min(1.0, best.scores[0].p_value * best.tried),
             tried=best.tried,
             test_error_before=before.error,
@@ -196,6 +206,10 @@ class LawSearch:
         else:
             spread = np.zeros(0)
         return tuple(_sigma(wider, own).tolist()), tuple(spread.tolist())
+
+    def _nothing_left(self, after: HeldOut) -> bool:
+        """Whether nothing but noise remains, as far as it is known."""
+        return after.least_ratio is None or within_noise(after, self.evidence.criteria.verdict)
 
     def _judged(self, fitted: EvidenceFit) -> HeldOut:
         return judged_on(self.evidence, self.held, fitted)

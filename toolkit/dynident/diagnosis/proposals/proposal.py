@@ -38,10 +38,11 @@ class Proposal:
     Attributes
     ----------
     effect : the law at its joint, with the shapes found.
-    values, sigma : (k,) coefficients and their standard deviations, shapes taken as they are.
-    shape_sigma : (s,) of the shapes; NaN where they are not known.
+    values, sigma : (k,) coefficients and their standard deviations, the shapes estimated too.
+    shape_sigma : (s,) of the shapes.
     explains : share of the systematic squared residual that it takes off, at all joints.
-    is_explanation : whether that is enough to be called an explanation.
+    is_explanation : whether that is enough to be called an explanation, and nothing but noise is
+        left on held-out data.
     p_value : of the hypothesis that it has no part, times the number of terms tried.
     tried : how many terms that were.
     test_error_before, test_error_after : relative error on held-out data.
@@ -128,6 +129,7 @@ class Proposal:
                 )
             ),
             "explains": self.explains,
+            "is_explanation": self.is_explanation,
             "p_value": self.p_value,
             "tried": self.tried,
             "test_error_before": self.test_error_before,

@@ -1,4 +1,6 @@
-"""The terms of which laws are proposed: products of one or two factors, at one joint.
+"""The terms of which laws are proposed: products of one to three factors, at one joint.
+
+Of three there are too many: they are made of the best products of two.
 
 Factors are of four sorts: position, motion, load, and the time of the session. Those of one term
 are of different sorts, but for products of two joints' speeds or positions.
@@ -6,7 +8,7 @@ are of different sorts, but for products of two joints' speeds or positions.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Literal
@@ -150,6 +152,27 @@ def library(robot: Robot, joint: str) -> tuple[LibraryTerm, ...]:
         terms += _products(far, far)
         terms += [LibraryTerm((one, other)) for one, other in product(far, load) if _plain(one)]
     return tuple(terms)
+
+
+def extended(seeds: Sequence[LibraryTerm], factors: Sequence[Factor]) -> tuple[LibraryTerm, ...]:
+    """Return products of two factors with a third, each once.
+
+    Parameters
+    ----------
+    seeds : some terms; those of two factors are extended.
+    factors : by which they are multiplied, where no factor is of the same sort of the same joint.
+    """
+    found: dict[frozenset[Factor], LibraryTerm] = {}
+    for seed, factor in product(seeds, factors):
+        places = {(one.sort, one.joint) for one in seed.factors}
+        new = (*seed.factors, factor)
+        shapes = [one.shape[0] for one in new if one.shape]
+        several = sum(len(one.texts) > 1 for one in new)
+        if len(seed.factors) != 2 or (factor.sort, factor.joint) in places:
+            continue
+        if several <= 1 and len(set(shapes)) == len(shapes) and factor.sort != "session":
+            found.setdefault(frozenset(new), LibraryTerm(new))
+    return tuple(found.values())
 
 
 def _products(some: tuple[Factor, ...], others: tuple[Factor, ...]) -> list[LibraryTerm]:

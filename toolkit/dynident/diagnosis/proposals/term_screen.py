@@ -39,7 +39,12 @@ class Screened:
 
 
 def screen(
-    evidence: Evidence, fitted: EvidenceFit, joint: int, terms: Sequence[LibraryTerm]
+    evidence: Evidence,
+    fitted: EvidenceFit,
+    joint: int,
+    terms: Sequence[LibraryTerm],
+    *,
+    beside: int = 0,
 ) -> tuple[Screened, ...]:
     """Return the terms that would bring more than they cost, best first.
 
@@ -49,6 +54,7 @@ def screen(
         compared.
     joint : column of the joint at which they act.
     terms : that are tried.
+    beside : terms that were tried before, and led to these.
 
     Notes
     -----
@@ -63,7 +69,7 @@ def screen(
     criteria = evidence.criteria.proposals
     priced = []
     for term, drop in found:
-        price = term.size * np.log(fitted.rows) + 2.0 * np.log(count[term.size])
+        price = term.size * np.log(fitted.rows) + 2.0 * np.log(beside + count[term.size])
         price += criteria.factor_price * term.price
         priced.append(Screened(term=term, drop=drop, penalised=drop - float(price)))
     priced.sort(key=lambda one: -one.penalised)

@@ -1,0 +1,59 @@
+"""Laws proposed for what a model lacks, and none where it lacks nothing."""
+
+from __future__ import annotations
+
+import pytest
+
+from laws_hidden import MODEL, recordings, searched, together, with_law
+
+
+def proposals(torques: dict[str, float], **motion):
+    search, fitted = searched(recordings(torques, **motion))
+    return search.proposals(fitted)
+
+
+def test_a_hidden_law_is_proposed_with_its_coefficient() -> None:
+    (found,) = proposals({"c*v*q": 0.5})
+    assert (found.torque, found.effect.joint) == ("c*v*q", "elbow")
+    assert found.values[0] == pytest.approx(0.5, abs=4 * found.sigma[0])
+    assert found.is_explanation
+    assert found.noise_floor is not None
+    assert found.test_error_after < 1.05 * found.noise_floor
+
+
+def test_a_product_of_three_is_found_by_way_of_products_of_two() -> None:
+    found = proposals({"c*v*q*abs(v[shoulder])": 0.4})[0]
+    factors = set(found.torque.replace("[shoulder]", ".far").split("*"))
+    assert factors == {"c", "v", "q", "abs(v.far)"}
+    assert found.values[0] == pytest.approx(0.4, abs=4 * found.sigma[0])
+
+
+def test_shapes_of_a_law_of_another_joint_have_a_sigma() -> None:
+    found = proposals({"c*v*sin(2.4*q[shoulder])": 0.4})[0]
+    assert found.torque == "v*(c1*sin(k*q[shoulder]) + c2*cos(k*q[shoulder]))"
+    (sigma,) = found.shape_sigma
+    # Least squares with the derivative as a column: 0.11, of a motion of 0.3 rad.
+    assert 0.05 < sigma < 0.4
+    assert found.named_values["k"] == pytest.approx(2.4, abs=4 * sigma)
+
+
+def test_a_law_that_leaves_another_to_be_found_is_no_explanation() -> None:
+    found = proposals({"c*v*q": 0.5, "c*v^2*q[shoulder]": 0.2})
+    assert found[-1].torque == "c*v^2*q[shoulder]"
+    assert [one.is_explanation for one in found] == [False, True]
+
+
+def test_what_cannot_be_told_apart_are_rivals_and_the_truth_is_among_them() -> None:
+    found = proposals({"c*v*q": 0.5}, motion=together)[0]
+    named = {one.made_of.torque for one in (found.effect, *found.rivals)}
+    assert {"c*v*q", "c*q*v[shoulder]", "c*v*q[shoulder]"} & named
+    assert "c*v*q" in named
+
+
+def test_nothing_is_proposed_for_noise() -> None:
+    assert proposals({}) == ()
+
+
+def test_nothing_is_proposed_where_the_law_is_in_the_model() -> None:
+    search, fitted = searched(recordings({"c*v*q": 0.5}), with_law(MODEL, "c*v*q"))
+    assert search.proposals(fitted) == ()
