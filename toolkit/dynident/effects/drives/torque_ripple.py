@@ -38,7 +38,8 @@ class TorqueRipple(JointEffect):
 
     def shape_parameters(self, robot):
         if motion_unit(robot, self.joint) == "m":
-            grid = tuple(float(k) for k in np.geomspace(30.0, 3000.0, 40).round())
+            # As close as lines of a quarter of a metre's travel are wide, 25 rad/m.
+            grid = tuple(float(k) for k in range(30, 3001, 10))
             return (ShapeParameter("k", "rad/m", grid, lower=10.0, upper=1e5),)
         grid = tuple(float(k) for k in (*range(2, 33), *range(34, 62, 2)))
         return (ShapeParameter("k", "1/rev", grid, lower=1.0, upper=500.0),)
