@@ -13,7 +13,10 @@ from pathlib import Path
 from package_map import FLOORS, PACKAGE, first_line, modules, reduced, room_imports
 
 PAGE = Path(__file__).resolve().parent / "architecture.md"
-NOT_DRAWN = {"errors", "files", "tables", "settings", "data_files", "places", "threads", "clusters"}
+NOT_DRAWN = {
+    *("errors", "words", "files", "tables", "settings", "data_files", "places", "threads"),
+    "clusters",
+}
 """Files of the ground floor, which serve every room."""
 
 

@@ -36,7 +36,7 @@ torque_std = [0.02, 0.02]
 [loads.tool]
 mass = 1.5
 centre = [0.1, -0.02, 0.0]
-inertia = [0, 0, 0, 0, 0, 0.004]
+inertia = [0.002, 0, 0, 0.002, 0, 0.004]
 
 [loads.crate]
 
@@ -144,7 +144,7 @@ def test_commands_say_up_to_which_scale_things_are_known(tmp_path: Path, command
 def test_a_gain_that_is_known_fixes_the_scale(study) -> None:
     text = edited(
         ('torque_unit = "A"', 'torque_unit = "A"\ndrive_gains = { elbow = 5.0 }'),
-        ("mass = 1.5\ncentre = [0.1, -0.02, 0.0]\ninertia = [0, 0, 0, 0, 0, 0.004]\n", ""),
+        ("mass = 1.5\ncentre = [0.1, -0.02, 0.0]\ninertia = [0.002, 0, 0, 0.002, 0, 0.004]\n", ""),
         text=STUDY,
     )
     drives = study(text).drives

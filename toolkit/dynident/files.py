@@ -37,7 +37,7 @@ def open_regular(path: str | Path) -> Iterator[BinaryIO]:
     except OSError as error:
         raise FileError(f"cannot be read ({error.strerror or error})", str(path)) from None
     except ValueError:
-        raise FileError("its name holds a NUL character", ascii(str(path))) from None
+        raise _unnamed(path) from None
     mode = os.fstat(number).st_mode
     if not stat.S_ISREG(mode):
         os.close(number)
@@ -131,7 +131,7 @@ def require_place(path: str | Path) -> Path:
     """
     path = Path(path)
     folder = _target(path).parent
-    if not folder.is_dir():
+    if not _is_folder(folder):
         what = "is a file" if folder.exists() else "no such folder"
         raise FileError(what, str(folder), "name a file in a folder that is there")
     _require_writable(folder)
@@ -140,13 +140,15 @@ def require_place(path: str | Path) -> Path:
 
 def _target(path: Path) -> Path:
     """Return the file itself where a path is a link to it; refuse what a file may not replace."""
-    target = Path(os.path.realpath(path)) if path.is_symlink() else path
     try:
+        target = Path(os.path.realpath(path)) if path.is_symlink() else path
         mode = target.stat().st_mode
     except (FileNotFoundError, NotADirectoryError):
         return target
     except OSError as error:
         raise FileError(f"cannot be written ({error.strerror or error})", str(path)) from None
+    except ValueError:
+        raise _unnamed(path) from None
     if stat.S_ISDIR(mode):
         raise FileError("is a folder, not a file", str(path), "name a file in it")
     if not stat.S_ISREG(mode):
@@ -165,11 +167,28 @@ def require_folder(path: str | Path) -> Path:
         If a file is in its place or in its way, or the folder above may not be written.
     """
     path = Path(path)
-    above = next(one for one in (path, *path.absolute().parents) if one.exists())
+    try:
+        above = next(one for one in (path, *path.absolute().parents) if one.exists())
+    except OSError as error:
+        raise FileError(f"cannot be used ({error.strerror or error})", str(path)) from None
+    if "\0" in str(path):
+        raise _unnamed(path)
     if not above.is_dir():
         raise FileError("is a file, not a folder", str(above), "name another folder")
     _require_writable(above)
     return path
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except OSError:  # a name that is too long
+        return False
+
+
+def _unnamed(path: str | Path) -> FileError:
+    what = "a NUL character" if "\0" in str(path) else "a character that no file's name can have"
+    return FileError(f"its name holds {what}", ascii(str(path)))
 
 
 def _require_writable(folder: Path) -> None:

@@ -6,7 +6,6 @@ the key that was meant, which pydantic does not guess.
 
 from __future__ import annotations
 
-import difflib
 import re
 import tomllib
 from pathlib import Path
@@ -16,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from dynident import files
 from dynident.errors import StudyError
+from dynident.words import close_word
 
 
 class SettingsTable(BaseModel):
@@ -36,14 +36,19 @@ Duration = Annotated[float, Field(gt=0, le=LONGEST_TIME)]
 """A time in s, above zero."""
 Rate = Annotated[float, Field(ge=SLOWEST, le=FASTEST)]
 """Samples or cycles a second."""
+Gravity = Annotated[float, Field(ge=-100, le=100)]
+"""m/s^2, of one axis."""
 DEEPEST = 50
 """Levels of tables within tables that a file of settings has at most."""
 
 T = TypeVar("T", bound=SettingsTable)
 _LEVEL = r"(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')\s*+\.\s*+"
-_DEEP = re.compile(rf"(?:{_LEVEL}){{{DEEPEST}}}")
+# From the beginnings of words only: of a long text every letter would be one.
+_DEEP = re.compile(rf"(?<![\w-])(?:{_LEVEL}){{{DEEPEST}}}")
 """A dotted key of very many levels, which takes a parser memory by their square."""
-_TRIED = re.compile(r"str|float|int|bool|list\[\w+\]|_\w+|[A-Z]\w*Entry")
+_TRIED = re.compile(
+    r"str|float|int|bool|(list|tuple|dict|literal)\[.*\]|constrained-\w+|_\w+|[A-Z]\w*Entry"
+)
 
 
 def read_toml(path: str | Path, schema: type[T]) -> T:
@@ -58,16 +63,30 @@ def read_toml(path: str | Path, schema: type[T]) -> T:
         kind; the first such key is named, with the nearest valid one.
     """
     path = Path(path)
+    try:
+        return schema.model_validate(parse_toml(path))
+    except ValidationError as error:
+        raise _complaint(error, path, schema) from None
+
+
+def parse_toml(path: str | Path) -> dict[str, Any]:
+    """Return what a TOML file says, whatever its keys.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read.
+    StudyError
+        If it is not TOML, or is nested beyond `DEEPEST`.
+    """
     text = files.read_text(path)
     deep = StudyError("has tables nested too deeply", str(path), "is it the right file?")
     if _DEEP.search(text):
         raise deep
     try:
-        return schema.model_validate(tomllib.loads(text))
+        return tomllib.loads(text)
     except RecursionError:
         raise deep from None
-    except ValidationError as error:
-        raise _complaint(error, path, schema) from None
     except ValueError as error:  # of TOML, and of whole numbers of thousands of digits
         raise StudyError(f"is not TOML: {error}", str(path)) from None
 
@@ -81,18 +100,23 @@ def nearest(word: str, valid: tuple[str, ...] | list[str], kind: str) -> str:
     valid : words in its place.
     kind : what they are, in the plural.
     """
-    close = difflib.get_close_matches(word, valid, n=1)
-    return f"did you mean '{close[0]}'?" if close else f"{kind}: {', '.join(valid)}"
+    close = close_word(word, valid)
+    return f"did you mean '{close}'?" if close else f"{kind}: {', '.join(valid)}"
 
 
 def _complaint(error: ValidationError, path: Path, schema: type[BaseModel]) -> StudyError:
-    first = error.errors(include_url=False)[0]
+    every = error.errors(include_url=False)
+    # Of a key that takes several types there is a complaint for each: the one that lies deepest
+    # is of the type that was meant.
+    place = _place(every[0])
+    inside = [one for one in every if _place(one)[: len(place)] == place]
+    first = max(inside, key=lambda one: len(_place(one)))
     # Where a key takes several types, pydantic appends the one that it tried first.
-    key = ".".join(str(p) for p in first["loc"] if not _TRIED.fullmatch(str(p)))
+    key = ".".join(map(str, _place(first)))
     if first["type"] == "extra_forbidden":
-        names = _keys_at(schema, first["loc"][:-1])
+        names = _keys_at(schema, _place(first)[:-1])
         return StudyError(
-            f"unknown key '{key}'", str(path), nearest(str(first["loc"][-1]), names, "keys")
+            f"unknown key '{key}'", str(path), nearest(str(_place(first)[-1]), names, "keys")
         )
     if first["type"] == "missing" and isinstance(first["loc"][-1], int):
         return StudyError(f"{key.rpartition('.')[0]}: too few values", str(path), "add the rest")
@@ -103,6 +127,11 @@ def _complaint(error: ValidationError, path: Path, schema: type[BaseModel]) -> S
             f"{key}: a table is needed here", str(path), "write [name] or { key = 1 }"
         )
     return StudyError(f"{key}: {first['msg'][:1].lower()}{first['msg'][1:]}", str(path))
+
+
+def _place(complaint: Any) -> tuple[str | int, ...]:
+    """Where it is in the file, without the types that were tried."""
+    return tuple(one for one in complaint["loc"] if not _TRIED.fullmatch(str(one)))
 
 
 def _keys_at(schema: Any, where: tuple[Any, ...]) -> list[str]:

@@ -26,6 +26,7 @@ from dynident.cli.group import commands
 from dynident.cli.output import ReaderGone
 from dynident.errors import DynidentError, DynidentWarning
 from dynident.tables import printable
+from dynident.words import shortened
 
 __all__ = ["commands", "designs", "fits", "loops", "main", "robots", "starting", "studies"]
 
@@ -45,6 +46,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         warnings.showwarning = _Warnings().show
         warnings.simplefilter("always", DynidentWarning)
         try:
+            if "\0" in "".join(arguments or ()):  # no shell can say that, and no file is called so
+                raise click.UsageError("An argument holds a NUL character")
             # With standalone_mode, click would word and print the errors its own way.
             sys.exit(commands(arguments, "dynident", standalone_mode=False) or 0)
         except click.exceptions.Exit as stop:
@@ -81,7 +84,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _fail(message: str) -> NoReturn:
     """Say on one line why the input is unusable, and end."""
-    click.echo(f"error: {printable(' '.join(message.splitlines()))}", err=True)
+    click.echo(f"error: {printable(shortened(' '.join(message.splitlines())))}", err=True)
     sys.exit(2)
 
 

@@ -143,6 +143,7 @@ def fit(study: Path, chosen: Chosen, kind: _Kind, more: _More, to: _Files) -> Co
     """
     from dynident.fitting import fit as fit_model
     from dynident.fitting.drive_gains import with_gain_errors
+    from dynident.robot.verify import require_format
     from dynident.wiring import check_wiring
 
     kind.require(chosen)
@@ -151,7 +152,9 @@ def fit(study: Path, chosen: Chosen, kind: _Kind, more: _More, to: _Files) -> Co
     if more.identifiability:
         chosen.require_unknown_noise()
     to.require(study)
-    loaded = load_study(study)
+    loaded = load_study(study, to.out, to.robot, to.plot)
+    if to.robot is not None:
+        require_format(loaded.robot, to.robot)
     with progress("fitting") as show_progress:
         method = kind.method(chosen, loaded, show_progress)
         estimate = fit_model(loaded.model, loaded.train, method)

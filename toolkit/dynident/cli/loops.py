@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from dynident import files
 from dynident.cli.group import CommandAnswer, answered, commands
 from dynident.cli.methods import Chosen, method_options, require_rate
 from dynident.cli.output import progress
@@ -83,7 +81,7 @@ def simulate(
     require_picture(plot)
     if estimate is not None and chosen.method != "least-squares":
         raise click.UsageError("--estimate is there already: leave out --method")
-    study = load_study(file)
+    study = load_study(file, report, plot)
     recordings, used = _recordings(study, recording)
     controller = _controller(study, recordings)
     found = _validation(study, _estimate(study, estimate, chosen), recordings, controller)
@@ -110,10 +108,9 @@ def _make(file: Path, out: Path) -> CommandAnswer:
 
 def _kind(path: Path) -> Literal["study", "experiment"]:
     """Tell a study from an experiment by the keys that only one of them has."""
-    try:
-        said = tomllib.loads(files.read_text(path))
-    except tomllib.TOMLDecodeError as error:
-        raise StudyError(f"is not TOML: {error}", str(path)) from None
+    from dynident.settings import parse_toml
+
+    said = parse_toml(path)
     entries = [one for one in _listed(said.get("recordings")) if isinstance(one, dict)]
     effects = _listed(said.get("effects"))
     experiment = _OF_EXPERIMENTS & set(said)

@@ -53,7 +53,7 @@ def explain(
     Example: dynident explain study.toml --report report.html
     """
     require_places(study, report, laws)
-    loaded = load_study(study)
+    loaded = load_study(study, report, laws)
     diagnosis = diagnosis_of(loaded, most, propose)
     write_report(loaded, diagnosis, report)
     if laws is not None:
@@ -78,7 +78,7 @@ def show(study: Path, to: Path) -> CommandAnswer:
     """
     require_picture(to)
     require_places(study, to)
-    loaded = load_study(study)
+    loaded = load_study(study, to)
     from dynident.reporting.record_facts import record_facts, recordings_table, show_recordings
 
     with progress("drawing"):
@@ -235,7 +235,7 @@ def report(study: Path, most: int | None, to: Path) -> CommandAnswer:
     Example: dynident report study.toml --to report.html
     """
     require_places(study, to)
-    loaded = load_study(study)
+    loaded = load_study(study, to)
     diagnosis = diagnosis_of(loaded, most)
     write_report(loaded, diagnosis, to)
     return CommandAnswer(
@@ -253,7 +253,7 @@ def demo(to: Path) -> CommandAnswer:
     """
     study = _demo_study()
     require_places(study, to)
-    loaded = load_study(study)
+    loaded = load_study(study, to)
     diagnosis = diagnosis_of(loaded)
     write_report(loaded, diagnosis, to)
     return CommandAnswer(

@@ -45,12 +45,15 @@ STUDY = _with_study
 
 def require_places(study: Path, *paths: Path | None) -> None:
     """Refuse files that could not be written, before the work that they are to hold is done."""
+    taken = {study.resolve(): "is the study itself"}
     for path in paths:
         if path is None:
             continue
         files.require_place(path)
-        if path.resolve() == study.resolve():
-            raise FileError("is the study itself", str(path), "write to another file")
+        place = path.resolve()
+        if place in taken:
+            raise FileError(taken[place], str(path), "write to another file")
+        taken[place] = "is named for two results"
 
 
 def require_picture(path: Path | None) -> None:
@@ -60,11 +63,23 @@ def require_picture(path: Path | None) -> None:
         raise FileError("is no kind of picture that can be written", str(path), remedy)
 
 
-def load_study(path: Path) -> Study:
-    """Read a study and everything that it names, if need be after a question; see `permitted`."""
+def load_study(path: Path, *results: Path | None) -> Study:
+    """Read a study and everything that it names, none of which a result may replace.
+
+    It may ask before it runs code that the study names; see `permitted`.
+    """
     from dynident.study import load
 
-    return permitted(lambda modules: load(path, modules=modules))
+    study = permitted(lambda modules: load(path, modules=modules))
+    held = {one.provenance.file: "a recording" for one in (study.train + study.test).recordings}
+    if study.robot.description is not None:
+        held[study.robot.description.path] = "the robot"
+    places = {Path(file).resolve(): what for file, what in held.items()}
+    for one in results:
+        if one is not None and one.resolve() in places:
+            what = f"is {places[one.resolve()]} of the study, which would be lost"
+            raise FileError(what, str(one), "write to another file")
+    return study
 
 
 Loaded = TypeVar("Loaded")

@@ -15,6 +15,9 @@ SHARE = 0.8
 UNLIMITED = {"revolute": (1.0, 2.0), "prismatic": (0.3, 0.5)}
 """Amplitude (rad, m) and speed (rad/s, m/s) where the joint states no limits either."""
 
+MOST_HARMONICS = 200
+"""Of a random trajectory; its peaks are looked for among points by the square of that."""
+
 
 @dataclass(frozen=True, eq=False)
 class Fourier:
@@ -87,7 +90,7 @@ class Fourier:
         robot : its joint limits are never exceeded.
         period : s.
         seed : of the amplitudes.
-        harmonics : how many.
+        harmonics : how many, at most `MOST_HARMONICS`.
         amplitude : rad or m, largest distance from the centre; default 80 % of the room.
         speed : rad/s or m/s, largest speed; default 80 % of the joint's limit.
         acceleration : rad/s^2 or m/s^2, largest acceleration; default no limit.
@@ -98,8 +101,9 @@ class Fourier:
         SimulationError
             If a setting is not positive, or beyond a joint's limits.
         """
-        if harmonics < 1:
-            raise SimulationError(f"harmonics = {harmonics}", "trajectory", "choose 1 or more")
+        if not 1 <= harmonics <= MOST_HARMONICS:
+            remedy = f"choose from 1 to {MOST_HARMONICS}"
+            raise SimulationError(f"harmonics = {harmonics}", "trajectory", remedy)
         bounds = _Bounds.of(robot, centre, amplitude, speed, acceleration)
         rng = np.random.default_rng(seed)
         k = np.arange(1, harmonics + 1)

@@ -26,6 +26,7 @@ TITLES = {
 
 # Shapes and centres of mass are written with some digits: relative to the extent.
 _DRAWN = 1e-6
+_SMALLEST = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,7 +109,8 @@ class Body:
     def moment(self) -> float:
         """The moment of inertia to which others are compared, kg m^2: m l^2."""
         mass = abs(float(self.phi[0]))
-        return (mass if mass > 0.0 else self.typical_mass) * self.length**2
+        found = (mass if mass > 0.0 else self.typical_mass) * self.length**2
+        return max(found, _SMALLEST)  # what underflows is no scale
 
 
 @dataclass(frozen=True)

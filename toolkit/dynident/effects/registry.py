@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import pkgutil
 import warnings
@@ -88,8 +87,7 @@ def effects_of(label: str, robot, laws: Sequence[Law] = ()) -> tuple[Effect, ...
         remedy = nearest(name, [law.label for law in laws], "laws") if laws else "none is stated"
         raise EffectError(f"no law is named '{name.removeprefix(PREFIX)}'", remedy=remedy)
     if name not in known:
-        close = difflib.get_close_matches(name, known, n=1)
-        hint = f"did you mean '{close[0]}'?" if close else f"effects: {', '.join(known)}"
+        hint = nearest(name, list(known), "effects")
         raise EffectError(f"no effect is named '{name}'", remedy=hint)
     effect = known[name]
     if not place and effect.place == "joint or robot":

@@ -64,6 +64,13 @@ def load_estimate(path: str | Path) -> Estimate:
         return _estimate(content, model, where)
 
 
+def _is_covariance(square: np.ndarray, std: np.ndarray) -> bool:
+    """Whether the correlations (p, p) of parameters are those of anything, but for rounding."""
+    held = std > 0.0
+    correlations = square[np.ix_(held, held)] / np.outer(std[held], std[held])
+    return not held.any() or float(np.linalg.eigvalsh(correlations)[0]) > -_SKEW * len(square)
+
+
 def _estimate(content: EstimateFile, model: Model, where: str) -> Estimate:
     p, n = model.size, model.robot.n
     names = [parameter.name for parameter in content.parameters]
@@ -73,6 +80,8 @@ def _estimate(content: EstimateFile, model: Model, where: str) -> Estimate:
     skew = np.abs(square - square.T) > _SKEW * np.outer(std, std)
     if np.any(np.diag(square) < 0.0) or np.any(skew):
         raise _refusal("covariance", "is not symmetric with a diagonal of squares", where)
+    if not _is_covariance(square, std):
+        raise _refusal("covariance", "has variances below zero in some directions", where)
     known = {link.name for link in model.robot.links}
     for name, phi in (content.links or {}).items():
         if name not in known:

@@ -10,11 +10,12 @@ from pydantic_core import PydanticCustomError
 from dynident.closed_loop import ControllerFile
 from dynident.effects import FRICTION_WIDTH, LawsEntry
 from dynident.fitting.loads import LoadEntry, PayloadEntry
-from dynident.settings import Duration, Rate, SettingsTable, Time
+from dynident.settings import Duration, Gravity, Rate, SettingsTable, Time
 
 _NARROWEST, _WIDEST = 1e-9, 1e3
 """rad/s or m/s over which dry friction changes its sign."""
-_Gravity = Annotated[float, Field(ge=-100, le=100)]
+_Gain = Annotated[float, Field(ge=-1e9, le=1e9)]
+_Std = Annotated[float, Field(le=1e9)]
 
 
 class RecordingEntry(SettingsTable):
@@ -84,8 +85,8 @@ class NoiseEntry(SettingsTable):
     torque_std : in the unit of the torques.
     """
 
-    position_std: float | list[float]
-    torque_std: float | list[float]
+    position_std: _Std | list[_Std]
+    torque_std: _Std | list[_Std]
 
 
 class ColumnEntry(SettingsTable):
@@ -143,11 +144,11 @@ class StudyFile(SettingsTable):
     effect_modules: list[str] = Field(default_factory=list)
     torque: Literal["measured", "held_command"] = "measured"
     torque_unit: Literal["N m", "A", "%"] = "N m"
-    drive_gains: dict[str, float] = Field(default_factory=dict)
+    drive_gains: dict[str, _Gain] = Field(default_factory=dict)
     trusted: list[str] = Field(default_factory=list)
     loads: dict[str, LoadEntry] = Field(default_factory=dict)
     friction_width: float | dict[str, float] = FRICTION_WIDTH
-    gravity: tuple[_Gravity, _Gravity, _Gravity] | None = None
+    gravity: tuple[Gravity, Gravity, Gravity] | None = None
     recordings: list[RecordingEntry]
     filter: FilterEntry | None = None
     noise: NoiseEntry | None = None

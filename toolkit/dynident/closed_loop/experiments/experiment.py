@@ -51,7 +51,8 @@ class ExperimentRun:
 
     def __post_init__(self) -> None:
         path = PurePosixPath(self.file)
-        if len(path.parts) != 1 or path.suffix.lower() not in _SUFFIXES or "\\" in self.file:
+        is_name = len(path.parts) == 1 and not {"\\", "\0"} & set(self.file)
+        if not is_name or path.suffix.lower() not in _SUFFIXES:
             remedy = f"give a name without folder that ends in {', '.join(_SUFFIXES)}"
             raise SimulationError(f"'{self.file}' cannot be the file of a recording", remedy=remedy)
         if self.use not in ("train", "test"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -12,13 +12,13 @@ from dynident.closed_loop.controllers import ControllerFile
 from dynident.closed_loop.experiments.experiment import Experiment, ExperimentRun
 from dynident.closed_loop.rollout import LEAD_IN
 from dynident.closed_loop.sensors import Sensors
-from dynident.closed_loop.trajectories import Fourier
+from dynident.closed_loop.trajectories import MOST_HARMONICS, Fourier
 from dynident.closed_loop.true_effects import TrueEffect
 from dynident.effect_modules import Permission, import_effects, require_sound
 from dynident.effects import FRICTION_WIDTH, LawsEntry, laws_of
 from dynident.errors import DynidentError, SimulationError, StudyError
 from dynident.robot import Robot
-from dynident.settings import Duration, SettingsTable, Time, read_toml
+from dynident.settings import Duration, Gravity, SettingsTable, Time, read_toml
 
 
 class _EffectEntry(SettingsTable):
@@ -37,7 +37,7 @@ class _SensorsEntry(SettingsTable):
 
 
 class _TrajectoryEntry(SettingsTable):
-    harmonics: int = Field(default=5, ge=1)
+    harmonics: int = Field(default=5, ge=1, le=MOST_HARMONICS)
     seed: int | None = Field(default=None, ge=0)
     amplitude: float | list[float] | None = None
     speed: float | list[float] | None = None
@@ -76,11 +76,11 @@ class _ExperimentFile(SettingsTable):
     robot: str
     nominal: str | None = None
     joints: list[str] | None = None
-    gravity: tuple[float, float, float] | None = None
+    gravity: tuple[Gravity, Gravity, Gravity] | None = None
     seed: int = Field(default=0, ge=0)
-    friction_width: float = Field(default=FRICTION_WIDTH, gt=0)
+    friction_width: float = Field(default=FRICTION_WIDTH, ge=1e-9, le=1e3)
     torque: Literal["held_command", "measured"] = "held_command"
-    lead_in: float = Field(default=LEAD_IN, ge=0)
+    lead_in: Annotated[Time, Field(ge=0)] = LEAD_IN
     effect_modules: list[str] = Field(default_factory=list)
     effects: list[_EffectEntry] = Field(default_factory=list)
     laws: LawsEntry = Field(default_factory=dict)

@@ -13,6 +13,8 @@ from dynident.robot import Robot
 
 SYMMETRIC = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 """The order in which a load's inertia is stated."""
+ROUNDED = 0.01
+"""Of the largest moment, by which stated ones may break a rule: data sheets have two digits."""
 _MASS, _MOMENTS, _INERTIAS = ("m",), ("mx", "my", "mz"), ("Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 
 
@@ -33,7 +35,7 @@ class Load:
     Raises
     ------
     StudyError
-        If its inertia is stated about a centre that is not.
+        If its inertia is stated about a centre that is not, or no rigid body can have it.
     """
 
     name: str
@@ -50,11 +52,26 @@ class Load:
         if self.inertia is not None and len(self.inertia) != len(SYMMETRIC):
             what = f"its inertia has {len(self.inertia)} values"
             raise StudyError(what, where, f"give six: {', '.join(SYMMETRIC)}")
+        if self.inertia is not None:
+            _require_possible(symmetric(self.inertia), where)
 
     @property
     def is_known(self) -> bool:
         """Whether nothing of it is left to identify."""
         return None not in (self.mass, self.centre, self.inertia)
+
+
+def _require_possible(inertia: np.ndarray, where: str) -> None:
+    """Refuse moments about the centre of mass (3, 3) that break the triangle inequality."""
+    if not np.isfinite(inertia).all():
+        raise StudyError("its inertia is not finite", where, "give six numbers in kg m^2")
+    least, middle, largest = np.linalg.eigvalsh(inertia)
+    slack = ROUNDED * max(largest, -least)
+    if least < -slack or least + middle < largest - slack:
+        moments = ", ".join(f"{one:.4g}" for one in (least, middle, largest))
+        what = f"no rigid body has its principal moments, {moments} kg m^2"
+        remedy = f"is it about the centre of mass, and in the order {', '.join(SYMMETRIC)}?"
+        raise StudyError(what, where, remedy)
 
 
 @dataclass(frozen=True, eq=False)

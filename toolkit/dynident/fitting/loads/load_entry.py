@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Annotated
 
 from pydantic import Field
 
@@ -11,6 +12,8 @@ from dynident.fitting.loads.load import Load
 from dynident.settings import SettingsTable, nearest
 
 _LARGEST = 1e6
+_Place = Annotated[float, Field(ge=-1e3, le=1e3)]
+_Moment = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST)]
 UNKNOWN = "unknown"
 """What `payload` says of a recording of which nobody knows whether it carries the load."""
 
@@ -29,8 +32,8 @@ class LoadEntry(SettingsTable):
     """
 
     mass: float | None = Field(default=None, gt=0, le=_LARGEST)
-    centre: tuple[float, float, float] | None = None
-    inertia: tuple[float, float, float, float, float, float] | None = None
+    centre: tuple[_Place, _Place, _Place] | None = None
+    inertia: tuple[_Moment, _Moment, _Moment, _Moment, _Moment, _Moment] | None = None
     link: str = ""
 
     def load(self, name: str) -> Load:

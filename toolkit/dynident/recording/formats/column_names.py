@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -11,6 +10,7 @@ from dataclasses import dataclass
 from dynident.errors import RecordingError
 from dynident.recording.formats.column_expressions import ColumnExpression, may_be_expression, parse
 from dynident.recording.formats.column_table import ColumnTable
+from dynident.words import close_word
 
 REQUIRED = ("q", "tau")
 OPTIONAL = ("v", "a", "q_ref")
@@ -257,5 +257,5 @@ def _there(table: ColumnTable) -> str:
 
 def _close(name: str, names: Sequence[str]) -> str:
     lower = {one.lower(): one for one in reversed(names)}
-    close = difflib.get_close_matches(name.lower(), list(lower), 1, 0.6)
-    return f"; did you mean '{lower[close[0]]}'?" if close else ""
+    close = close_word(name.lower(), lower)
+    return f"; did you mean '{lower[close]}'?" if close else ""

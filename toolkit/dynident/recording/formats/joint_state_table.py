@@ -34,10 +34,14 @@ class _Alike:
     received: array[int] = field(default_factory=lambda: array("q"))
     values: array[float] = field(default_factory=lambda: array("d"))
 
+    def wide(self) -> np.ndarray:
+        """All values, (k, signals, joints)."""
+        shape = (len(self.numbers), len(self.signals), len(self.joints))
+        return np.frombuffer(self.values).reshape(shape)
+
     def column(self, signal: str, joint: str) -> np.ndarray:
         """One signal of one joint, (k,)."""
-        wide = np.frombuffer(self.values).reshape(len(self.numbers), len(self.signals), -1)
-        return wide[:, self.signals.index(signal), self.joints.index(joint)]
+        return self.wide()[:, self.signals.index(signal), self.joints.index(joint)]
 
 
 class JointStates:
@@ -153,8 +157,7 @@ class JointStates:
         """Signals of joints that hold a number in any message, in the order of the joints."""
         held: set[str] = set()
         for one in self._alike.values():
-            wide = np.frombuffer(one.values).reshape(len(one.numbers), len(one.signals), -1)
-            for i, k in np.argwhere(~np.isnan(wide).all(axis=0)):
+            for i, k in np.argwhere(~np.isnan(one.wide()).all(axis=0)):
                 held.add(f"{one.signals[i]}.{one.joints[k]}")
         names = (f"{signal}.{joint}" for signal in FIELDS for joint in self._joints)
         return [name for name in names if name in held]

@@ -7,7 +7,6 @@ share: what a bag says of its own types is not taken, because code would be made
 from __future__ import annotations
 
 import bz2
-import difflib
 import hashlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -31,6 +30,7 @@ from dynident.recording.formats.limits import (
     require_few,
     require_unpacked,
 )
+from dynident.words import close_word
 
 SUFFIXES = (".bag", ".mcap", ".db3")
 METADATA = "metadata.yaml"
@@ -274,8 +274,8 @@ def _topic(counts: dict[tuple[str, str], int], topic: str, file: str) -> str:
         if topic in fitting:
             return topic
         kinds = [kind for name, kind in counts if name == topic]
-        near = difflib.get_close_matches(topic, fitting, 1, 0.4)
-        remedy = f"did you mean '{near[0]}'?" if near else "name another topic"
+        near = close_word(topic, fitting, 0.4)
+        remedy = f"did you mean '{near}'?" if near else "name another topic"
         what = f"has the type {kinds[0]}" if kinds else "is not in it"
         raise RecordingError(f"the topic '{topic}' {what}", file, remedy)
     held = [name for name in fitting if counts[name, _JOINT_STATE]] or fitting

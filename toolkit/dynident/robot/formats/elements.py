@@ -73,14 +73,16 @@ def refuse_closed_chains(joints: Iterable[tuple[str, str, str]], where: str) -> 
                 remedy,
             )
         parents[child] = parent
+    rooted: set[str] = set()  # links from which the way up is known to end
     for name in parents:
-        seen = {name}
-        while name in parents:
+        way: dict[str, None] = {}
+        while name in parents and name not in rooted:
+            way[name] = None
             name = parents[name]
-            if name in seen:
+            if name in way:
                 what = "is its own ancestor: closed chains are not supported"
                 raise UnsupportedError(what, f"{where}: link '{name}'", remedy)
-            seen.add(name)
+        rooted.update(way)
     return parents
 
 

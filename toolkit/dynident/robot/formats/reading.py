@@ -20,11 +20,13 @@ from dynident.robot.formats.tree_assembly import (
     with_geometry,
 )
 from dynident.robot.formats.urdf import URDF
-from dynident.robot.formats.xmltree import Document, Element, parse
+from dynident.robot.formats.xmltree import Document, Element, is_number, parse
 from dynident.robot.tree import Description, Link
 
 FORMATS = {one.name: one for one in (URDF, SDF, MJCF)}
 """The formats that are read and written, by the name that `Description.format` holds."""
+MOST_LINKS = 4096
+"""Links of a robot: far more than any has, few enough to be read in seconds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +48,16 @@ def open_description(text: str, where: str) -> Opened:
     """
     document = parse(text, where)
     format_ = _format_of(document.root, where)
-    return Opened(document, format_, format_.read(document.root, where))
+    return Opened(document, format_, _contents(format_, document.root, where))
+
+
+def _contents(format_: Format, root: Element, where: str) -> Contents:
+    """What a description holds, if it is not of too many links."""
+    contents = format_.read(root, where)
+    if len(contents.elements) > MOST_LINKS:
+        what = f"has {len(contents.elements)} links, and {MOST_LINKS} is the limit"
+        raise RobotError(what, where, "leave out links that do not move, or split the robot")
+    return contents
 
 
 def _format_of(root: Element, where: str) -> Format:
@@ -98,7 +109,7 @@ def lone_links(text: str, where: str) -> tuple[Description, tuple[Link, ...]]:
     root = deepcopy(parse(text, where).root)
     format_ = _format_of(root, where)
     format_.detach(root)
-    contents = format_.read(root, where)
+    contents = _contents(format_, root, where)
     bodies = {}
     if any(one.source == "geometry" for one in contents.inertials.values()):
         bodies = drake_bodies(understood(contents, format_.drake, where))
@@ -161,7 +172,4 @@ def _broken(inertial: Element) -> Iterator[str]:
 
 
 def _is_broken(word: str) -> bool:
-    try:
-        return not np.isfinite(float(word))
-    except ValueError:
-        return False
+    return is_number(word) and not np.isfinite(float(word))

@@ -8,7 +8,6 @@ Namespace prefixes stay part of the tag, so that an undeclared prefix (common in
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynident.errors import RobotError
+from dynident.words import close_word
 
 Element = ElementTree.Element
 
@@ -156,14 +156,24 @@ def reals(text: str | None, count: int, what: str, where: str) -> NDArray[np.flo
     """
     values: list[float] = []
     for word in (text or "").split():
-        try:
-            values.append(float(word))
-        except ValueError:
-            raise RobotError(f"{what} = '{word}' is not a number", where) from None
+        if not is_number(word):
+            raise RobotError(f"{what} = '{word}' is not a number", where)
+        values.append(float(word))
     if len(values) != count:
         needs = "1 number is" if count == 1 else f"{count} numbers are"
         raise RobotError(f"{what} has {len(values)} numbers where {needs} needed", where)
     return np.array(values)
+
+
+def is_number(word: str) -> bool:
+    """Whether a word is a number to every reader of XML; Python's own takes `4_0` for 40."""
+    if "_" in word or not word.isascii():
+        return False
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 def finite(text: str | None, count: int, what: str, where: str) -> NDArray[np.float64]:
@@ -192,7 +202,7 @@ def finite(text: str | None, count: int, what: str, where: str) -> NDArray[np.fl
 def closest(name: str, valid: Iterable[str]) -> str:
     """Return a remedy for a misspelt name: the nearest valid one, and the list."""
     valid = list(valid)
-    near = difflib.get_close_matches(name, valid, n=1)
+    near = close_word(name, valid)
     listed = ", ".join(valid) if valid else "none"
-    hint = f"did you mean '{near[0]}'? " if near else ""
+    hint = f"did you mean '{near}'? " if near else ""
     return f"{hint}Valid names: {listed}"
