@@ -12,7 +12,7 @@ import pytest
 import dynident as di
 from dynident.errors import FileError, FitError
 from dynident.fitting import Estimate, load_estimate
-from hostile import MUTATIONS, changed, estimate_of_arm
+from hostile.estimates import MUTATIONS, changed, estimate_of_arm
 from synthetic import arm
 
 HUGE = 10**400

@@ -1,0 +1,156 @@
+"""Runs hostile cases one after the other, each within its share of memory and processor time.
+
+`python -m hostile.worker FILE` reads kinds and names of cases from standard input, one a line with
+a tab between them, and appends a JSON line for each to FILE. A case beyond its share of time ends
+the process: whoever started it sees where it stopped, and starts another with the rest.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import json
+import os
+import resource
+import sys
+import tempfile
+import warnings
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+from hostile.case import HostileCase
+
+MOST_SECONDS = 10
+"""Of processor time, that a command may take."""
+MOST_BYTES = 1 << 30
+"""That a case may take beside what the libraries have taken."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What one command left behind."""
+
+    status: int
+    out: str = ""
+    err: str = ""
+    changed: list[str] = field(default_factory=list)
+
+
+def main() -> None:
+    """Run what standard input names."""
+    from hostile.corpus import corpus
+
+    asked = [line.split("\t") for line in sys.stdin.read().splitlines()]
+    cases = [corpus(kind)[name] for kind, name in asked]
+    load_libraries()
+    gc.collect()
+    gc.freeze()  # so that looking for garbage costs nothing from here on
+    limit_memory()
+    with open(sys.argv[1], "a") as stream:
+        for case in cases:
+            stream.write(json.dumps([asdict(one) for one in _tried(case)]) + "\n")
+            stream.flush()
+
+
+def load_libraries() -> None:
+    """Import what commands import when they need it: it is no memory of theirs."""
+    import dynident.diagnosis  # noqa: F401
+    import dynident.reporting  # noqa: F401
+    import dynident.study  # noqa: F401
+    import dynident.study_draft
+    import dynident.validation  # noqa: F401
+    from dynident.robot import Robot
+    from synthetic import ARM
+
+    assert dynident.study_draft and Robot.from_text(ARM).n == 2
+
+
+def limit_memory() -> None:
+    """Refuse this process more memory than it has and `MOST_BYTES`."""
+    used = next(
+        int(line.split()[1]) << 10
+        for line in Path("/proc/self/status").read_text().splitlines()
+        if line.startswith("VmData")
+    )
+    resource.setrlimit(resource.RLIMIT_DATA, (used + MOST_BYTES, used + MOST_BYTES))
+
+
+def limit_time() -> None:
+    """End this process when it has used `MOST_SECONDS` from now on, even in native code."""
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    end = int(used.ru_utime + used.ru_stime) + 1 + MOST_SECONDS
+    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    resource.setrlimit(resource.RLIMIT_CPU, (end, hard))
+
+
+def _tried(case: HostileCase) -> Iterator[Outcome]:
+    with tempfile.TemporaryDirectory(prefix="hostile.") as name:
+        folder = Path(name)
+        case.write(folder)
+        before = listing(folder)
+        for arguments in case.commands:
+            gc.collect()  # what the last one left in circles is no memory of this one
+            limit_time()
+            with contextlib.chdir(folder):
+                status, out, err = run(arguments)
+            after = listing(folder)
+            changed = sorted(key for key in before | after if before.get(key) != after.get(key))
+            yield Outcome(status=status, out=out, err=err, changed=changed)
+
+
+def run(arguments: tuple[str, ...]) -> tuple[int, str, str]:
+    """Run a command here; return its status and what it wrote, native code too."""
+    from dynident.cli import main as command
+
+    with _captured() as said, warnings.catch_warnings():
+        try:
+            command(arguments)
+            status = -1
+        except SystemExit as stop:
+            status = int(stop.code or 0)
+        except BaseException as error:
+            print(f"{type(error).__name__}: {error}", file=sys.stderr)
+            status = -2
+    return status, said[0], said[1]
+
+
+@contextlib.contextmanager
+def _captured() -> Iterator[list[str]]:
+    """Collect what goes to standard output and standard error, by whoever."""
+    said: list[str] = []
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        kept = [os.dup(number) for number in (1, 2)]
+        sys.stdout.flush()
+        os.dup2(out.fileno(), 1)
+        os.dup2(err.fileno(), 2)
+        try:
+            yield said
+        finally:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            for number, old in enumerate(kept, start=1):
+                os.dup2(old, number)
+                os.close(old)
+            for stream in (out, err):
+                stream.seek(0)
+                said.append(stream.read(1 << 20).decode(errors="replace"))
+
+
+def listing(folder: Path) -> dict[str, tuple[int, int, int]]:
+    """What is below a folder: kind, size and time of the last change; nothing is followed."""
+    found = {}
+    for path in folder.rglob("*"):
+        entry = path.lstat()
+        # Of folders only that they are there: temporary files change their times.
+        is_file = not path.is_dir()
+        found[str(path.relative_to(folder))] = (
+            entry.st_mode,
+            entry.st_size * is_file,
+            entry.st_mtime_ns * is_file,
+        )
+    return found
+
+
+if __name__ == "__main__":
+    main()
