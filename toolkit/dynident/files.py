@@ -72,7 +72,7 @@ def read_bytes(
             raise too_large(path, size, largest, remedy)
         try:
             # Some files of the system say that they are empty, and are not.
-            data = stream.read(largest + 1) if size == 0 else stream.read(size)
+            data = stream.read(size) if size else _in_blocks(stream, largest)
         except MemoryError:
             raise FileError("does not fit into memory", str(path), remedy) from None
         except OSError as error:
@@ -80,6 +80,14 @@ def read_bytes(
     if len(data) > largest:
         raise too_large(path, len(data), largest, remedy)
     return data
+
+
+def _in_blocks(stream: BinaryIO, largest: int) -> bytes:
+    """Read a stream of unknown length, a little more than it may hold at most."""
+    found = bytearray()  # asked for all at once, room for the largest would be taken
+    while len(found) <= largest and (block := stream.read(_BLOCK)):
+        found += block
+    return bytes(found)
 
 
 def too_large(path: str | Path, size: int, largest: int, remedy: str) -> FileError:
@@ -229,6 +237,8 @@ def write_bytes(
         ) as handle:
             temporary = Path(handle.name)
             handle.write(data)
+            handle.flush()
+            os.fsync(handle.fileno())  # else a fault of power may leave the new name to nothing
         if verify is not None:
             verify(temporary)
         # NamedTemporaryFile makes private files; give ours the permissions any new file gets.
