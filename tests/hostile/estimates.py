@@ -126,7 +126,7 @@ def of_another_robot(text: str) -> Callable[[Path], object]:
     return make
 
 
-def _covariance(change: Callable[[np.ndarray], None]) -> Callable[[Path], object]:
+def _covariance(change: Callable[[np.ndarray], object]) -> Callable[[Path], object]:
     """Return what makes an estimate whose covariance was changed."""
 
     def make(path: Path) -> None:
