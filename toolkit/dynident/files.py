@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import stat
@@ -252,6 +253,32 @@ def write_bytes(
         if temporary is not None:
             temporary.unlink(missing_ok=True)
     return path
+
+
+@contextmanager
+def held(path: str | Path) -> Iterator[None]:
+    """Keep a file for oneself while it is read and written anew; whoever else asks waits.
+
+    Where files cannot be locked, as on some network drives, nobody waits.
+
+    Raises
+    ------
+    FileError
+        As `open_regular`.
+    """
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        yield
+        return
+    while True:
+        with open_regular(path) as stream:
+            with contextlib.suppress(OSError):
+                fcntl.flock(stream, fcntl.LOCK_EX)
+            # Whoever held it may have put another file in its place.
+            if os.path.samestat(os.fstat(stream.fileno()), os.stat(path)):
+                yield
+                return
 
 
 def write_text(path: str | Path, text: str) -> Path:

@@ -6,6 +6,8 @@ else. Exit status: 0 done, 1 a check failed, 2 unusable input.
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 import sys
 import warnings
@@ -42,6 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     ----------
     arguments : by default those of the process.
     """
+    _open_streams()
     with warnings.catch_warnings():
         warnings.showwarning = _Warnings().show
         warnings.simplefilter("always", DynidentWarning)
@@ -82,9 +85,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
             _fail(f"unexpected {type(error).__name__}: {error}. {where}")
 
 
+def _open_streams() -> None:
+    """Have standard output and standard error, and letters that they lack spelt out."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:  # closed by whoever started us
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
+        elif isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
 def _fail(message: str) -> NoReturn:
     """Say on one line why the input is unusable, and end."""
-    click.echo(f"error: {printable(shortened(' '.join(message.splitlines())))}", err=True)
+    line = f"error: {printable(shortened(' '.join(message.splitlines())))}"
+    with contextlib.suppress(OSError):  # there may be no room for that either
+        click.echo(line, err=True)
     sys.exit(2)
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import click
 
+from dynident.errors import FileError
 from dynident.progress import logged, to_standard_error
 from dynident.tables import printable
 
@@ -47,6 +48,9 @@ def _reader() -> Iterator[None]:
         sys.stdout.flush()
     except BrokenPipeError:
         raise ReaderGone from None
+    except OSError as error:
+        what = f"cannot be written ({error.strerror or error})"
+        raise FileError(what, "standard output") from None
 
 
 def _plain(value: Any) -> Any:

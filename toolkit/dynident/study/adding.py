@@ -27,12 +27,21 @@ def add_effects(path: str | Path, effects: tuple[Effect, ...], laws: tuple[Law, 
     Raises
     ------
     StudyError
-        If there is no way to do so that leaves all else in the file as it is.
+        If there is no way to do so that leaves all else in the file as it is, or it has one of
+        them already.
     """
     path = Path(path)
+    with files.held(path):  # somebody else may add to it at the same time
+        _add(path, [effect.label for effect in effects], laws)
+
+
+def _add(path: Path, labels: list[str], laws: tuple[Law, ...]) -> None:
+    """Write labels of effects into a study file that nobody else writes."""
     text = files.read_text(path)
-    labels = [effect.label for effect in effects]
     wanted = tomllib.loads(text)
+    twice = [one for one in labels if one in wanted.get("effects", [])]
+    if twice:
+        raise StudyError(f"has {', '.join(twice)} by now", str(path), "nothing was changed")
     wanted["effects"] = sorted([*wanted.get("effects", []), *labels])
     end = _tables(laws) if laws else ""
     if laws:
