@@ -42,11 +42,14 @@ def text_pieces(stream: BinaryIO, file: str) -> Iterator[bytes]:
         end = _end(raw) if block else len(raw)
         if block and end < len(raw) and raw.count(b'"', 0, end) % 2:
             end = 0
+        is_header = not place and not any(one in raw[:end].strip() for one in (b"\r", b"\n"))
+        if block and is_header:
+            end = 0  # the first line comes with the next one: alone it looks like a file of no rows
         if b"\0" in block:
             _text(raw, place, file)  # which says what it is
         if not end and len(raw) > LONGEST_LINE:
             end = _end(raw)  # a mark that is never closed is for who reads the lines
-            if not end:
+            if not end or is_header:
                 what = f"holds a line, or empty lines, of more than {LONGEST_LINE >> 20} MB"
                 raise RecordingError(what, file, "is it the right file?")
         if end and not (place and raw[:end].isspace()):
