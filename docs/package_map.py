@@ -16,6 +16,8 @@ PACKAGE = Path(__file__).resolve().parents[1] / "toolkit" / "dynident"
 FACADES = ("__init__.py", "__init__.pyi")
 
 FLOORS = (
+    ("errors", "words"),
+    ("files", "tables"),
     ("progress", "settings", "data_files", "places", "threads"),
     ("criteria", "clusters"),
     ("inertia", "moments", "batch"),
