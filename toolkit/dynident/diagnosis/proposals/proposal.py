@@ -51,6 +51,13 @@ class Proposal:
     advice : the experiment that would show which of them it is; empty without rivals.
     remark : on what it rests, where that is doubtful.
     picture : to be drawn; None where there is none.
+
+    Examples
+    --------
+    >>> first = di.diagnose(study.model, study.train, study.test).proposals[0]
+    >>> print(first.sentence, first.named_values)
+    >>> better = di.fit(study.model + first.effect, study.train)
+    >>> law_picture(first)  # of dynident.reporting.pictures.plots
     """
 
     effect: LawEffect

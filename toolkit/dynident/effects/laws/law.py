@@ -32,6 +32,14 @@ class Law:
     EffectError
         If it has no proper name, the formula cannot be read, is not linear in what has no range,
         does not vanish with that, or a range is none.
+
+    Examples
+    --------
+    >>> shape = (("k", 1.0, 6.0), ("p", -1.6, 1.6))
+    >>> drum = Law(name="drum", torque="e*load*cos(k*q + p)", shape=shape)
+    >>> drum.linear
+    ('e',)
+    >>> fit = di.fit(study.model + law_effect(drum)("elbow"), study.train)
     """
 
     name: str
