@@ -107,6 +107,11 @@ def law_figures(judged: list[JudgedLaws]) -> list[Rate]:
     healthy = [one for one in judged if not one.family]
     return [
         Rate("library: true law first", [one.first for one in known], 0.90),
+        Rate(
+            "library: true law first and called an explanation",
+            [one.first and one.proposals[0]["is_explanation"] for one in known],
+            0.0,
+        ),
         Rate("library: true law in the set", [one.in_set for one in known], 0.95),
         Rate(
             "library: coefficients within 3 sigma, of those of its form",
@@ -129,7 +134,7 @@ def law_figures(judged: list[JudgedLaws]) -> list[Rate]:
 
 def _wrongly(one: JudgedLaws) -> bool:
     """Whether a law is called an explanation that is not the true one."""
-    return bool(one.proposals) and one.proposals[0]["is_explanation"] and not one.first
+    return any(p["is_explanation"] for p in one.proposals) and not one.first
 
 
 def show_laws(folder: Path) -> None:

@@ -65,8 +65,10 @@ class LawSearch:
             proposal = self._proposal(best, (fitted, wider), (before, after))
             if proposal is None:
                 break
-            # What another law is found after, it did not explain.
-            found = [replace(one, is_explanation=False) for one in found]
+            # An explanation stands alone: several terms can follow any law, as a series does.
+            if found:
+                found = [replace(one, is_explanation=False) for one in found]
+                proposal = replace(proposal, is_explanation=False)
             found.append(proposal)
             fitted, before = wider, after
         return tuple(found)
@@ -127,7 +129,7 @@ class LawSearch:
                 kept = (*kept, *screen(self.evidence, metric, joint, wider, beside=len(repeating)))
             tried += len(some) + len(wider)
             found += [(one.penalised, joint, one.term) for one in kept]
-        found.sort(key=lambda one: -one[0])
+        found = _best_start(found)
         session = [(j, one) for j, some in terms.items() for one in some if one.of_session]
         best = [(joint, term) for _, joint, term in found[: criteria.contenders]]
         return best + session, tried
@@ -272,6 +274,14 @@ def _remark(effect: LawEffect) -> str:
         if min(value - lower, upper - value) <= _AT_BOUND * (upper - lower):
             return f"Its {name} is at the end of what was sought: it may lie beyond."
     return ""
+
+
+def _best_start(found: Sequence[tuple[float, int, LibraryTerm]]) -> list:
+    """Of each law at each joint that with the best start of its shapes, the best first."""
+    best: dict[tuple[int, str], tuple[float, int, LibraryTerm]] = {}
+    for one in sorted(found, key=lambda one: -one[0]):
+        best.setdefault((one[1], one[2].law("x").torque), one)
+    return list(best.values())
 
 
 def _each_once(scores: Sequence[Score]) -> list[Score]:

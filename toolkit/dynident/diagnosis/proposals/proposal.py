@@ -41,8 +41,8 @@ class Proposal:
     values, sigma : (k,) coefficients and their standard deviations, the shapes estimated too.
     shape_sigma : (s,) of the shapes.
     explains : share of the systematic squared residual that it takes off, at all joints.
-    is_explanation : whether that is enough to be called an explanation, and nothing but noise is
-        left on held-out data.
+    is_explanation : whether that is enough to be called an explanation: it is the only law that is
+        proposed, and nothing but noise is left on held-out data.
     p_value : of the hypothesis that it has no part, times the number of terms tried.
     tried : how many terms that were.
     test_error_before, test_error_after : relative error on held-out data.
