@@ -331,6 +331,12 @@ class ProposalCriteria(CriteriaGroup):
     least_left: float = criterion(
         0.02, "1", "share of a term's square that must be left beside the model", over=0, most=1
     )
+    least_decay: float = criterion(
+        2.0,
+        "friction widths",
+        "speed within which a term may fade: what fades sooner is how dry friction reverses",
+        over=0,
+    )
     trusted_load: float = criterion(
         0.3, "1", "relative error above which the predicted load means nothing", over=0, most=1
     )

@@ -106,9 +106,10 @@ class LawSearch:
     def _terms(self, fitted: EvidenceFit, before: HeldOut, joint: int) -> tuple[LibraryTerm, ...]:
         """The library at one joint, as far as its signals mean something."""
         robot = fitted.model.robot
-        terms = library(robot, robot.names[joint])
-        trusted = self.evidence.criteria.proposals.trusted_load
-        if before.joint_errors[joint] > trusted:
+        criteria = self.evidence.criteria.proposals
+        slowest = criteria.least_decay * float(np.max(fitted.model.friction_widths))
+        terms = library(robot, robot.names[joint], slowest)
+        if before.joint_errors[joint] > criteria.trusted_load:
             terms = tuple(one for one in terms if not one.of_load)
         return terms
 

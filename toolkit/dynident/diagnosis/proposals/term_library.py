@@ -22,7 +22,7 @@ HARMONICS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 _REACH = 1.0  # of a frequency, to both sides
 _LOWEST = 0.25
 _DECAY = (0.02, 0.1, 0.5)  # rad/s or m/s, of an exponential of the speed
-_SLOWEST, _FASTEST = 0.005, 3.0
+_SLOWEST, _FASTEST = 0.01, 3.0
 
 
 @dataclass(frozen=True)
@@ -129,22 +129,23 @@ def centred(name: str, value: float, given: tuple[float, float]) -> tuple[float,
     return round(max(value - _REACH, _LOWEST), 2), round(value + _REACH, 2)
 
 
-def library(robot: Robot, joint: str) -> tuple[LibraryTerm, ...]:
+def library(robot: Robot, joint: str, slowest: float = _SLOWEST) -> tuple[LibraryTerm, ...]:
     """Return every term that may be missing at a joint.
 
     Parameters
     ----------
     robot, joint : of this one, and of others beside it.
+    slowest : rad/s or m/s within which no term may fade.
     """
     others = [name for name in robot.names if name != joint]
-    own, load = _of_joint(None), tuple(_load())
+    own, load = _of_joint(None, slowest), tuple(_load())
     terms = [LibraryTerm((one,)) for one in (*own, *load)]
     terms += _products(own, own)
     terms += [LibraryTerm((one, other)) for one, other in product(own, load)]
     terms += [LibraryTerm((one,)) for one in _session()]
     terms += [LibraryTerm((one, other)) for one, other in product(own, _session()) if _plain(one)]
     for name in others:
-        far = _of_joint(name)
+        far = _of_joint(name, slowest)
         terms += [LibraryTerm((one,)) for one in far]
         terms += [
             LibraryTerm((one, other)) for one, other in product(own, far) if _coupled(one, other)
@@ -192,8 +193,8 @@ def _plain(one: Factor) -> bool:
     return one.texts in (("{q}",), ("{v}",), ("sign({v})",), ("abs({v})",), ("{v}^2",))
 
 
-def _of_joint(joint: str | None) -> tuple[Factor, ...]:
-    return (*_position(joint), *_motion(joint))
+def _of_joint(joint: str | None, slowest: float) -> tuple[Factor, ...]:
+    return (*_position(joint), *_motion(joint, slowest))
 
 
 def _position(joint: str | None) -> Iterator[Factor]:
@@ -204,12 +205,13 @@ def _position(joint: str | None) -> Iterator[Factor]:
         yield Factor("position", ("sin({shape}*{q})", "cos({shape}*{q})"), joint, shape)
 
 
-def _motion(joint: str | None) -> Iterator[Factor]:
+def _motion(joint: str | None, slowest: float) -> Iterator[Factor]:
     for text in ("{v}", "sign({v})", "abs({v})", "{v}*abs({v})", "{v}^2", "{v}^3", "{a}"):
         yield Factor("motion", (text,), joint)
     yield Factor("motion", ("abs({a})",), joint)
-    for speed in _DECAY:
-        shape = ("w", speed, _SLOWEST, _FASTEST)
+    lower = float(f"{slowest:.2g}")
+    for speed in (one for one in _DECAY if one > lower):
+        shape = ("w", speed, lower, _FASTEST)
         yield Factor("motion", ("sign({v})*exp(-abs({v})/{shape})",), joint, shape)
 
 
