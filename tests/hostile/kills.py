@@ -1,0 +1,264 @@
+"""Commands that write, killed at any moment: what was there is whole, or what is new is.
+
+`python -m hostile.kills --kills 200` kills as often, at random moments, and prints what was lost.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import signal
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import dynident as di
+from dynident.cli import main as command
+from dynident.robot import Robot
+from hostile.case import place
+from hostile.experiments import EXPERIMENT
+from hostile.worker import load_libraries
+from loop_studies import LOOP_STUDY, write_loop_study
+from study_files import CONTROLLER, STUDY, write_study
+
+WRITING = "dynident/files.py"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Writer:
+    """A command that writes.
+
+    Attributes
+    ----------
+    words : of the command.
+    results : files that it writes, with what reads them or raises.
+    """
+
+    words: tuple[str, ...]
+    results: dict[str, Callable[[Path], object]]
+
+
+def _page(path: Path) -> None:
+    assert path.read_text().rstrip().endswith("</html>")
+
+
+def _picture(path: Path) -> None:
+    data = path.read_bytes()
+    assert data.startswith(b"\x89PNG") and b"IEND" in data[-12:]
+
+
+def _tables(path: Path) -> None:
+    assert di.read(path).samples > 2
+
+
+WRITERS = {
+    "add": Writer(
+        words=("add", "study.toml", "coulomb_friction@elbow"), results={"study.toml": di.load}
+    ),
+    "fit": Writer(
+        words=("fit", "study.toml", "--out", "fit.json", "--robot", "fit.urdf"),
+        results={"fit.json": di.load_estimate, "fit.urdf": Robot.from_file},
+    ),
+    "refit": Writer(
+        words=("refit", "arm.urdf", "--out", "new.urdf"), results={"new.urdf": Robot.from_file}
+    ),
+    "refit in place": Writer(
+        words=("refit", "broken.urdf", "--out", "broken.urdf"),
+        results={"broken.urdf": Robot.from_file},
+    ),
+    "init": Writer(
+        words=("init", "arm.urdf", "train.csv", "test.csv", "--out", "draft.toml"),
+        results={"draft.toml": di.load},
+    ),
+    "show": Writer(words=("show", "study.toml", "--to", "old.png"), results={"old.png": _picture}),
+    "explain": Writer(
+        words=("explain", "study.toml", "--most", "0", "--report", "old.html"),
+        results={"old.html": _page},
+    ),
+    "report": Writer(
+        words=("report", "study.toml", "--most", "0", "--to", "new.html"),
+        results={"new.html": _page},
+    ),
+    "simulate": Writer(
+        words=("simulate", "loop/study.toml", "--report", "loop.html", "--plot", "loop.png"),
+        results={"loop.html": _page, "loop.png": _picture},
+    ),
+    "experiment": Writer(
+        words=("simulate", "experiment.toml", "--out", "virtual"),
+        results={"virtual/run1.csv": _tables, "virtual/study.toml": Path.read_text},
+    ),
+    "demo": Writer(words=("demo", "--to", "demo.html"), results={"demo.html": _page}),
+}
+
+
+def prepare(folder: Path) -> None:
+    """Write what the commands read, and some of what they replace."""
+    write_study(folder, STUDY + CONTROLLER)
+    (folder / "loop").mkdir()
+    write_loop_study(folder / "loop", LOOP_STUDY)
+    robot = (folder / "arm.urdf").read_text()
+    place(folder / "broken.urdf", robot.replace('ixx="0.01"', 'ixx="9"'))
+    place(folder / "experiment.toml", EXPERIMENT)
+    place(folder / "old.html", "<html>\nan older page</html>")
+    place(folder / "old.png", b"\x89PNG older IEND\xae\x42\x60\x82")
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    """Return every file below a folder by its name from there."""
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {str(path.relative_to(folder)): path.read_bytes() for path in files}
+
+
+def started(words: tuple[str, ...], folder: Path, line: int | None = None) -> int:
+    """Run a command in a child of this process; return its number.
+
+    Parameters
+    ----------
+    words : the command.
+    folder : where it runs.
+    line : that many lines of the code that writes files are run before the child kills itself;
+        None for never.
+    """
+    sys.stdout.flush()
+    child = os.fork()
+    if child:
+        return child
+    status = 3
+    try:
+        os.chdir(folder)
+        silent = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(silent, 1)
+        os.dup2(silent, 2)
+        if line is not None:
+            sys.settrace(_killer(line))
+        command(words)
+    except SystemExit as stop:
+        status = int(stop.code or 0)
+    finally:
+        os._exit(status)
+
+
+def _killer(lines: int) -> Callable:
+    """Return a trace function that kills this process within the code that writes files."""
+    left = lines
+
+    def within(frame, event, _argument):
+        nonlocal left
+        if event == "line":
+            left -= 1
+            if left < 0:
+                os.kill(os.getpid(), signal.SIGKILL)
+        return within
+
+    def enter(frame, _event, _argument):
+        here = frame.f_code.co_filename.endswith(WRITING)
+        return within if here and frame.f_code.co_name in ("write_bytes", "write_text") else None
+
+    return enter
+
+
+def finished(child: int) -> int:
+    """Wait for a child; return its status, below zero the signal that ended it."""
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Uninterrupted:
+    """A command that nobody killed: what it wrote, and how many seconds it took."""
+
+    files: dict[str, bytes]
+    seconds: float
+
+
+def uninterrupted(writer: Writer) -> Uninterrupted:
+    """Run a command to its end; AssertionError if it fails."""
+    with tempfile.TemporaryDirectory(prefix="kills.") as name:
+        folder = Path(name)
+        prepare(folder)
+        begun = time.monotonic()
+        assert finished(started(writer.words, folder)) in (0, 1), writer.words
+        return Uninterrupted(files=content(folder), seconds=time.monotonic() - begun)
+
+
+def damage(writer: Writer, kill: Callable[[Path], int]) -> tuple[bool, list[str]]:
+    """Kill a command, and look at what is left.
+
+    Parameters
+    ----------
+    writer : the command.
+    kill : starts it in a folder and kills it; returns its status.
+
+    Returns
+    -------
+    Whether it was killed (it may have been done), and what was lost or is half there.
+    """
+    with tempfile.TemporaryDirectory(prefix="kills.") as name:
+        folder = Path(name)
+        prepare(folder)
+        before = content(folder)
+        status = kill(folder)
+        after = content(folder)
+        lost = [f"{file} is gone" for file in before if file not in after]
+        for file, data in after.items():
+            if before.get(file) == data:
+                continue
+            hidden = Path(file).name.startswith(".")  # the neighbour that was to take a place
+            if file in writer.results:
+                try:
+                    writer.results[file](folder / file)
+                except Exception as error:
+                    lost.append(f"{file} is broken: {error}")
+            elif not hidden and not file.startswith("virtual/"):
+                lost.append(f"{file} is changed")
+        if status == 0 and len(after) < len(before):
+            lost.append("it said that all was well")
+        return status == -signal.SIGKILL, lost
+
+
+def at_line(writer: Writer, line: int) -> Callable[[Path], int]:
+    """Return what kills a command in the code that writes."""
+    return lambda folder: finished(started(writer.words, folder, line))
+
+
+def at_moment(writer: Writer, seconds: float) -> Callable[[Path], int]:
+    """Return what kills a command after some time."""
+
+    def kill(folder: Path) -> int:
+        child = started(writer.words, folder)
+        time.sleep(seconds)
+        os.kill(child, signal.SIGKILL)
+        return finished(child)
+
+    return kill
+
+
+def main() -> None:
+    """Kill every command in turn, half of the times while it writes."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--kills", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=0)
+    asked = parser.parse_args()
+    load_libraries()
+    rng = random.Random(asked.seed)
+    whole = {name: uninterrupted(writer) for name, writer in WRITERS.items()}
+    count, found = Counter(), []
+    for number in range(asked.kills):
+        name = list(WRITERS)[number % len(WRITERS)]
+        writer = WRITERS[name]
+        if (number // len(WRITERS)) % 2:
+            kill = at_line(writer, rng.randrange(30 * len(writer.results)))
+        else:
+            kill = at_moment(writer, rng.uniform(0.0, 1.05 * whole[name].seconds))
+        killed, lost = damage(writer, kill)
+        count["killed" if killed else "done before"] += 1
+        found += [f"{name}: {one}" for one in lost]
+    print(dict(count), *(found or ["nothing lost, nothing half"]), sep="\n")
+
+
+if __name__ == "__main__":
+    main()
