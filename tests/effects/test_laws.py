@@ -9,13 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import dynident as di
 from dynident.closed_loop import Mechanism, TrueEffect
 from dynident.closed_loop.plant.point_force import can_be_traced
 from dynident.effects import Block, Effect, Law, effects_of, law_effect, laws_of
 from dynident.effects.laws import LawEntry
 from dynident.errors import EffectError, FileError, SimulationError, StudyError
+from dynident.fitting import fit
+from dynident.formulas import Operation, Signal, Unknown, parse_formula, text_of
 from dynident.model import Model
-from synthetic import arm, smooth_motion
+from dynident.recording import Dataset
+from synthetic import arm, smooth_motion, synthetic, true_values
 
 ROBOT = arm()
 WAVE = Law(name="wave", torque="c*v*sin(k*q + p)", shape=(("k", 1.0, 6.0), ("p", -3.2, 3.2)))
@@ -150,8 +154,10 @@ def test_a_law_sits_where_its_units_make_sense() -> None:
 
 
 def test_a_law_of_no_joint_says_why() -> None:
+    nonsense = Law(name="nonsense", torque="c*sin(v)")
+    assert not list(law_effect(nonsense).candidates(ROBOT))
     with pytest.raises(EffectError, match="rad/s"):
-        list(law_effect(Law(name="nonsense", torque="c*sin(v)")).candidates(ROBOT))
+        effects_of("law:nonsense", ROBOT, [nonsense])
     with pytest.raises(EffectError, match="no joint 'wrist'"):
         effects_of("law:far", ROBOT, [Law(name="far", torque="c*v[wrist]")])
 
@@ -163,8 +169,9 @@ def test_a_law_of_no_joint_says_why() -> None:
 def test_what_is_not_finite_is_said_with_the_place(torque: str, q: float) -> None:
     b = block()
     b.q[7, 1] = q
+    model = Model(ROBOT, (law(torque),))
     with pytest.raises(EffectError, match="is not finite at q"):
-        law(torque).columns(b)
+        model.columns(b)
 
 
 def test_misspelt_laws_are_answered_with_the_right_one() -> None:
@@ -197,6 +204,7 @@ def test_grids_are_within_their_ranges_and_not_too_many() -> None:
         ({"shape": (("k", 1.0, 2.0), ("k", 1.0, 2.0), ("p", 0.0, 1.0))}, "two ranges"),
         ({"shape": (("k", 1.0, 2.0),)}, "'p' stands inside sin"),
         ({"torque": "c*eval(q)"}, "calls 'eval'"),
+        ({"torque": "c*sin(k*p)"}, "a constant has no shape"),
     ],
 )
 def test_wrong_laws_are_refused(wrong, says: str) -> None:
@@ -229,3 +237,42 @@ def test_laws_are_shared_by_files(tmp_path: Path) -> None:
     shared.write_text('[laws]\nmore = "other.toml"\n')
     with pytest.raises(StudyError, match="names another"):
         laws_of({"lab": lab}, study)
+
+
+def test_a_law_of_another_robots_file_is_no_obstacle(tmp_path: Path) -> None:
+    from dynident.errors import DynidentWarning
+    from study_files import write_study
+
+    (tmp_path / "lab.toml").write_text('[laws.far]\ntorque = "c*v*v[wrist]"\n')
+    path = write_study(tmp_path)
+    path.write_text('laws = "lab.toml"\n' + path.read_text())
+    with pytest.warns(DynidentWarning, match="no joint 'wrist'"):
+        study = di.load(path)
+    assert [one.name for one in study.model.laws] == ["far"]
+
+
+def test_a_shape_at_which_a_law_is_no_number_is_passed_over() -> None:
+    """Of c sqrt(q + p) many p are none: the fit takes those that are."""
+    root = law_effect(Law(name="root", torque="c*sqrt(q + p)*v", shape=(("p", -1.0, 5.0),)))
+    true = root("elbow", shape=(3.0,)).on(ROBOT)
+    model = Model(ROBOT, (true,))
+    values = true_values(model)
+    values[-1] = 0.4
+    data = Dataset((synthetic(model, values, 2, torque_std=0.01),))
+    start = Model(ROBOT, (root("elbow", shape=(2.5,)),))
+    found = fit(start, data)
+    assert found.shapes[0].value == pytest.approx(3.0, abs=0.2)
+
+
+def test_a_root_has_a_slope_where_it_is_zero() -> None:
+    half = Law(name="half", torque="c*sign(v)*exp(-sqrt(abs(v)/w))", shape=(("w", 0.01, 2.0),))
+    b = block()
+    b.v[3] = 0.0
+    slopes = law_effect(half)("elbow").on(ROBOT).sensitivities(b)
+    assert slopes is not None and np.all(np.isfinite(slopes))
+
+
+@pytest.mark.parametrize("name", ['a"b', "lambda", "None", "arm^1", "left arm", "back\\slash"])
+def test_any_name_of_a_joint_can_be_written(name: str) -> None:
+    text = text_of(Operation("*", (Unknown("c"), Signal("q", name))))
+    assert parse_formula(text) == Operation("*", (Unknown("c"), Signal("q", name)))

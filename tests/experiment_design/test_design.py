@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from chains import chain
-from dynident.effects import effects_of
+from dynident.effects import Law, effects_of, law_effect
 from dynident.errors import DesignError
 from dynident.experiment_design import DesignTask, MotionLimits, design
 from dynident.experiment_design.column_function import ColumnFunction
@@ -17,7 +17,8 @@ from dynident.experiment_design.motion_program import FINER, MotionProgram, inst
 from dynident.experiment_design.periodic import PeriodicMotions
 from dynident.model import Model
 from dynident.recording import Dataset
-from synthetic import arm, synthetic, true_values
+from dynident.robot import Robot
+from synthetic import ARM, arm, synthetic, true_values
 
 ROBOT = arm()
 MODEL = Model(ROBOT) + "viscous_friction" + "coulomb_friction"
@@ -162,6 +163,16 @@ def test_pairs_are_told_apart_better_than_by_any_of_many_motions(pair, times: fl
     assert phi(found.motion.variables) > best
     assert one.worth > times
     assert one.designed > one.recorded
+    # So many times a usual motion separate as far; so many times the designed one decide.
+    nothing = program.information
+    usual, ours = (
+        nothing.matrix(t, program.motions.fourier(x).at(t))
+        for x in (found.usual, found.motion.variables)
+    )
+    for times_, matrix, wanted in ((one.worth, usual, one.designed), (one.enough, ours, 3.0)):
+        if 0 < times_ < 1000:
+            reached = np.sqrt(nothing.about(times_ * matrix)[0, 0])
+            assert reached == pytest.approx(wanted, rel=1e-6)
     assert "standard deviations" in found.sentence
 
 
@@ -249,3 +260,54 @@ def test_limits_by_file(tmp_path) -> None:
     path.write_text("[joints.elbow]\nlower = 2.0\nupper = 1.0\n")
     with pytest.raises(DesignError, match="lower below upper"):
         MotionLimits.from_file(path, ROBOT)
+
+
+def test_what_no_motion_tells_is_infinite_and_named() -> None:
+    """Beside viscous friction the law c v has no sigma; rivals that are the same are not told."""
+    law = law_effect(Law(name="again", torque="c*v"))("elbow").on(ROBOT)
+    with pytest.raises(DesignError, match="cannot be told from the model"):
+        design(MODEL, recorded(), DesignTask(show=law, starts=1, harmonics=3))
+    (viscous,) = effects_of("viscous_friction@elbow", ROBOT)
+    base = Model(ROBOT) + "coulomb_friction"
+    task = DesignTask(tell=(viscous, law), starts=1, harmonics=3)
+    found = design(base, recorded(base + viscous), task)
+    assert found.separation is not None and found.separation.designed < 1e-3
+    assert "No motion within the limits" in found.sentence
+    assert "usual motion" not in found.sentence
+    with pytest.raises(DesignError, match="from itself"):
+        DesignTask(tell=(viscous, viscous))
+
+
+def test_torques_that_are_no_numbers_are_within_no_limit() -> None:
+    root = law_effect(Law(name="root", torque="c*sqrt(q + 2.0)"))("elbow").on(ROBOT)
+    model = Model(ROBOT) + root
+    columns = ColumnFunction.of(model, np.append(Model(ROBOT).given_values(), 0.5))
+    some = motions()
+    information = Information(
+        columns=columns,
+        mix=np.eye(columns.count),
+        last=columns.count,
+        weight=np.ones(2),
+        prior=np.eye(columns.count),
+        scale=np.ones(columns.count),
+    )
+    program = MotionProgram(information, some)
+    variables = some.random(0) * 5.0
+    assert program.excess(variables, some.times(500)) == np.inf
+    found = program.within(variables)
+    assert found is None or program.excess(found, some.times(5000)) <= 1.0
+
+
+@pytest.mark.parametrize("label", ["torque_drift@elbow", "thermal_friction@elbow"])
+def test_effects_of_the_hour_are_refused_by_name(label: str) -> None:
+    (effect,) = effects_of(label, ROBOT)
+    with pytest.raises(DesignError, match=label):
+        design(MODEL, recorded(), DesignTask(show=effect, starts=1))
+
+
+def test_ranges_with_one_end_or_none() -> None:
+    given = 'lower="-2.5" upper="2.5" velocity="6" effort="200"'
+    text = ARM.replace(given, 'lower="0.2" upper="1e20" velocity="0" effort="0"')
+    limits = MotionLimits.of(Robot.from_text(text))
+    assert 0.2 < limits.lower[0] < limits.upper[0] < 1.2
+    assert limits.torque[0] == np.inf

@@ -63,7 +63,10 @@ def design(study: Path, limits: Path | None, out: Path | None, **settings) -> Co
     if out is not None:
         rate = loaded.train.recordings[0].rate_hz
         written = write_design(answer, out, round(rate, 6), loaded.controller)
+    notes = [f"Written: {one}" for one in written]
+    if out is not None and loaded.controller is None:
+        notes.append("No experiment.toml: the study has no [controller] to simulate with.")
     return CommandAnswer(
         content=lambda: {**answer.to_dict(), "files": [str(one) for one in written]},
-        parts=lambda: (*answer.tables(), *(f"Written: {one}" for one in written)),
+        parts=lambda: (*answer.tables(), *notes),
     )

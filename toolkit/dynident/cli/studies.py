@@ -53,6 +53,8 @@ def explain(
     Example: dynident explain study.toml --report report.html
     """
     require_places(study, report, laws)
+    if laws is not None and laws.exists():
+        raise FileError("is there already", str(laws), "name another file: laws may be in it")
     loaded = load_study(study, report, laws)
     diagnosis = diagnosis_of(loaded, most, propose)
     write_report(loaded, diagnosis, report)

@@ -194,11 +194,14 @@ def proposed_laws(diagnosis: Diagnosis, number: int, study: Path) -> tuple[Law, 
 
 
 def write_laws(path: Path, laws: tuple[Law, ...]) -> None:
-    """Write a file of laws, which studies name."""
+    """Write a file of laws, which studies name; none where there is none."""
     import tomlkit
 
     from dynident.effects import laws_table
 
+    if not laws:
+        click.echo(f"no laws: nothing was proposed, and {path} is not written", err=True)
+        return
     files.write_text(path, tomlkit.dumps({"laws": laws_table(laws)}))
     click.echo(f"laws: {path}", err=True)
 

@@ -222,6 +222,15 @@ class Effect(EffectTraits, SimulatedEffect, ABC):
     def columns(self, block: Block) -> np.ndarray:
         """Torque per unit of each linear parameter, (T, n, k) in N m or N."""
 
+    def require_finite(self, columns: np.ndarray, block: Block) -> None:
+        """Refuse columns (T, n, k) in a model that are not numbers; nothing by default.
+
+        Raises
+        ------
+        EffectError
+            Saying where.
+        """
+
     def acting_at(self, robot: Robot) -> tuple[int, ...]:
         """Columns of the joints whose torque it changes."""
         return tuple(range(robot.n))

@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 from dynident.effects.effect import Effect
 from dynident.effects.known_effects import known_effects, unchanged_if_it_fails
-from dynident.effects.laws import PREFIX, Law, law_effect
+from dynident.effects.laws import PREFIX, Law, LawEffect, law_effect
 from dynident.errors import DynidentWarning, EffectError
 from dynident.settings import nearest
 
@@ -93,7 +93,11 @@ def effects_of(label: str, robot, laws: Sequence[Law] = ()) -> tuple[Effect, ...
     if not place and effect.place == "joint or robot":
         return (effect().on(robot),)
     if not place:
-        return tuple(one.on(robot) for one in effect.candidates(robot))
+        found = tuple(one.on(robot) for one in effect.candidates(robot))
+        if not found and issubclass(effect, LawEffect):
+            why = effect.elsewhere(robot)
+            raise why or EffectError("fits no joint of the robot", label)
+        return found
     joint, source = _joints(place, robot.names)
     return (effect(joint, source).on(robot),)
 

@@ -145,8 +145,11 @@ def _rigid_torque(robot: Robot, x: Any) -> Any:
 
 def _effect_columns(model: Model, effect: Effect, robot: Robot, x: Any, torque: Any) -> Any:
     """Columns of an effect, (n, k)."""
-    if effect.needs_recording or effect.is_payload or effect.found_by == "repetition":
-        remedy = "leave it out: what depends on the past, or on a load, is not designed for yet"
+    held = effect.needs_recording or effect.is_payload or effect.found_by == "repetition"
+    if held or effect.time_varying:
+        remedy = (
+            "leave it out: what depends on the past, the hour or a load is not designed for yet"
+        )
         raise DesignError("its torque is no function of an instant", effect.label, remedy)
     if effect.needs_bodies:
         return _changes_of_bodies(effect, robot, x)

@@ -12,7 +12,7 @@ from dynident import files
 from dynident.closed_loop import Controller
 from dynident.closed_loop.experiments.virtual_study import controller_table
 from dynident.effects import LawEffect, laws_table
-from dynident.errors import DesignError, FileError
+from dynident.errors import FileError
 from dynident.experiment_design.recording_design import RecordingDesign
 from dynident.robot.patching import write
 
@@ -32,7 +32,7 @@ def write_design(
     ----------
     design : of `dynident.experiment_design.design`.
     folder : made if it is missing.
-    rate_hz : of the reference.
+    rate_hz : of the reference, at least nearly: a period is a whole number of samples.
     controller : of the robot.
 
     Returns
@@ -41,19 +41,14 @@ def write_design(
 
     Raises
     ------
-    DesignError
-        If the period is not a whole number of samples.
     FileError
         If a file cannot be written.
     """
     folder = Path(folder)
     task, series, names = design.task, design.trajectory, design.model.robot.names
-    per_period = task.duration * rate_hz
-    if abs(per_period - round(per_period)) > 1e-6 * per_period or round(per_period) < 2:
-        what = f"{task.duration:g} s are no whole number of samples at {rate_hz:g} Hz"
-        raise DesignError(what, remedy="choose another duration")
+    per_period = max(round(task.duration * rate_hz), 2)
     files.require_folder(folder)
-    t = np.arange(task.repeat * round(per_period) + 1) / rate_hz
+    t = np.arange(task.repeat * per_period + 1) * (task.duration / per_period)
     q, v, _ = series.at(t)
     table = {"t": t}
     for j, name in enumerate(names):
@@ -65,16 +60,10 @@ def write_design(
     text = pd.DataFrame(table).to_csv(index=False, float_format="%.9g", lineterminator="\n")
     written = [files.write_text(folder / REFERENCE, text)]
     if controller is not None:
-        robot = write(_robot(design), folder / _name(design))
+        robot = write(design.estimate.robot, folder / _name(design))
         document = tomlkit.dumps(_experiment(design, robot.name, controller))
         written += [robot, files.write_text(folder / EXPERIMENT, document)]
     return tuple(written)
-
-
-def _robot(design: RecordingDesign):
-    model = design.model
-    rigid = design.values[: model.base.rank]
-    return model.robot.with_theta(model.base.lift(rigid, model.robot.theta))
 
 
 def _name(design: RecordingDesign) -> str:
@@ -84,15 +73,18 @@ def _name(design: RecordingDesign) -> str:
 
 
 def _experiment(design: RecordingDesign, robot: str, controller: Controller):
-    model, task, series = design.model, design.task, design.trajectory
+    estimate, task, series = design.estimate, design.task, design.trajectory
+    model = estimate.model
     document = tomlkit.document()
     document["robot"] = robot
     document["joints"] = list(model.robot.names)
+    # An experiment has one width: the widest is the one that a motion shows.
+    document["friction_width"] = float(np.max(model.friction_widths))
     entries = tomlkit.aot()
     for effect in model.effects:
         entry = tomlkit.table()
         entry["effect"] = effect.label
-        own = design.values[model.slices[effect.label]]
+        own = estimate.effect_values(effect.label)
         parameters = effect.parameters(model.robot)
         entry["values"] = {
             p.name: float(np.clip(x, p.lower, p.upper))

@@ -36,6 +36,9 @@ class DesignTask:
     def __post_init__(self) -> None:
         if len(self.tell) == 1:
             raise DesignError("one effect to tell apart", remedy="name two, or use show")
+        labels = [one.label for one in self.tell]
+        if len(set(labels)) < len(labels):
+            raise DesignError(f"{labels[0]} is to be told from itself", remedy="name two effects")
         if self.tell and self.show:
             raise DesignError("tell and show together", remedy="design a recording for each")
         if self.repeat < 1 or self.starts < 1:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import brentq
 
 from dynident.effects import Effect
 from dynident.errors import DesignError
@@ -13,9 +14,9 @@ from dynident.experiment_design.column_function import ColumnFunction
 from dynident.experiment_design.design_task import DesignTask
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.motion_limits import MotionLimits
-from dynident.experiment_design.motion_program import MotionProgram, instants_of
+from dynident.experiment_design.motion_program import DesignedMotion, MotionProgram, instants_of
 from dynident.experiment_design.periodic import PeriodicMotions
-from dynident.experiment_design.recording_design import RecordingDesign, Separation
+from dynident.experiment_design.recording_design import DECIDES, RecordingDesign, Separation
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.fit_model import fit
 from dynident.fitting.sampling import sample
@@ -28,6 +29,7 @@ _FIRST_USUAL = 10_000  # seed
 _USUAL = 20  # random motions, whose median a design is compared with
 _SIZES = 5  # random motions by which columns are scaled
 _UNSEEN = 1e-9  # of the size of the others: it makes no torque
+_MOST_TIMES = 1000.0
 _RIVAL_SHAPES = 3  # of a rival, beside its own
 
 
@@ -75,6 +77,9 @@ def design(
     found = program.solved(task.starts, task.seed, progress)
     progress("comparing with usual motions")
     usual = _usual(program)
+    if task.show is not None and not np.any(np.isfinite(information.sigma(_whole(program, found)))):
+        what = f"no motion of this robot shows {question.asked[0].title}"
+        raise DesignError(f"{what}: its torque cannot be told from the model's")
     return RecordingDesign(
         task=task,
         model=question.bare,
@@ -82,7 +87,7 @@ def design(
         program=program,
         motion=found,
         usual=usual,
-        values=question.values,
+        estimate=question.estimate,
         labels=labels,
         separation=_separation(program, found.variables, usual, question),
     )
@@ -158,6 +163,13 @@ class _Question:
         return information, tuple(np.array(labels)[kept].tolist())
 
 
+def _whole(program: MotionProgram, found: DesignedMotion) -> np.ndarray:
+    """Information of a designed motion."""
+    t = program.motions.times(program.instants)
+    series = program.motions.fourier(found.variables)
+    return program.information.matrix(t, series.at(t))
+
+
 def _usual(program: MotionProgram) -> np.ndarray:
     """Variables of the median of some random motions within the limits."""
     usual = [program.within(program.motions.random(_FIRST_USUAL + k)) for k in range(_USUAL)]
@@ -217,7 +229,7 @@ def _recorded(
     total, rates = np.zeros((mix.shape[1],) * 2), []
     for recording in recorded.recordings:
         rows = sample(recording, recorded.filter)
-        found = columns.along(rows.t, rows.q, rows.v, rows.a) @ mix
+        found = _numbers(columns, columns.along(rows.t, rows.q, rows.v, rows.a)) @ mix
         weighted = (found / std[None, :, None]).reshape(-1, mix.shape[1])
         total += weighted.T @ weighted
         rates.append((len(rows.t) - 1) / float(rows.t[-1] - rows.t[0]))
@@ -231,9 +243,20 @@ def _sizes(
     t = motions.times(100)
     sizes = []
     for k in range(_SIZES):
-        found = columns.along(t, *motions.fourier(motions.random(k) * 0.3).at(t)) @ mix
+        motion = motions.fourier(motions.random(k) * 0.3).at(t)
+        found = _numbers(columns, columns.along(t, *motion)) @ mix
         sizes.append(np.sqrt(np.mean((found / std[None, :, None]) ** 2, axis=(0, 1))))
     return np.mean(sizes, axis=0)
+
+
+def _numbers(columns: ColumnFunction, found: np.ndarray) -> np.ndarray:
+    """Columns (T, n, m), if all of them are finite."""
+    bad = ~np.isfinite(found).all(axis=(0, 1))
+    if bad.any():
+        name = columns.labels[int(np.argmax(bad))]
+        remedy = "state tighter limits of its joint, within which the formula is a number"
+        raise DesignError(f"{name}: its torque is not finite within the limits", remedy=remedy)
+    return found
 
 
 def _separation(
@@ -245,17 +268,30 @@ def _separation(
     information = program.information
     t = program.motions.times(program.instants)
 
-    def sigma(variables: np.ndarray | None) -> float:
-        found = np.zeros_like(information.prior)
-        if variables is not None:
-            found = information.matrix(t, program.motions.fourier(variables).at(t))
-        return float(np.sqrt(max(information.about(found)[0, 0], 0.0)))
+    told, other = (
+        information.matrix(t, program.motions.fourier(variables).at(t))
+        for variables in (best, usual)
+    )
+
+    def sigma(matrix: np.ndarray) -> float:
+        return float(np.sqrt(max(information.about(matrix)[0, 0], 0.0)))
 
     first, *others = question.asked
     return Separation(
         first=first.title,
         others=tuple(one.title for one in others),
-        recorded=sigma(None),
-        designed=sigma(best),
-        usual=sigma(usual),
+        recorded=sigma(0.0 * told),
+        designed=sigma(told),
+        usual=sigma(other),
+        worth=_times(lambda k: sigma(k * other), sigma(told)),
+        enough=_times(lambda k: sigma(k * told), DECIDES),
     )
+
+
+def _times(sigma: Callable[[float], float], wanted: float) -> float:
+    """How many times a motion separates as far as is wanted; what was recorded stays as it is."""
+    if sigma(_MOST_TIMES) < wanted:
+        return float("inf")
+    if sigma(0.0) >= wanted:
+        return 0.0
+    return float(brentq(lambda k: sigma(float(k)) - wanted, 0.0, _MOST_TIMES))  # type: ignore[arg-type]

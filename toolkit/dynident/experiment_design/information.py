@@ -14,14 +14,17 @@ from typing import Any, Literal
 
 import lazy_loader
 import numpy as np
-from scipy.linalg import cho_solve, cholesky
 
 from dynident.experiment_design.column_function import ColumnFunction
 
 ca: Any = lazy_loader.load("casadi")
 Objective = Literal["D", "A"]
 RIDGE = 1e-8
-"""Added to the diagonal of the scaled information: what nothing shows is then not infinite."""
+"""Added to the diagonal of the scaled information while a motion is sought: what nothing shows must
+not make the loss infinite."""
+ROUNDING = 1e-11
+"""Of the largest eigenvalue of a scaled information: what is less is rounding."""
+_HIDDEN = 1e-6  # of a parameter's direction that may lie where nothing is seen
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -62,19 +65,40 @@ class Information:
 
     def about(self, matrix: np.ndarray) -> np.ndarray:
         """Information about what is of interest, all else estimated too, (last, last)."""
-        scaled = self._scaled(matrix)
+        size = self.scale[len(self.scale) - self.last :]
+        return self.scaled_about(matrix) * np.outer(size, size)
+
+    def scaled_about(self, matrix: np.ndarray) -> np.ndarray:
+        """`about` in units of the scales; zero where rounding is all that is left."""
+        scaled = (matrix + self.prior) / np.outer(self.scale, self.scale)
         first = len(scaled) - self.last
         rest, cross, own = scaled[:first, :first], scaled[:first, first:], scaled[first:, first:]
-        if first:
-            own = own - cross.T @ cho_solve((cholesky(rest, lower=True), True), cross)
-        size = self.scale[first:]
-        return own * np.outer(size, size)
+        if not first:
+            return own
+        known, turn = np.linalg.eigh(rest)
+        kept = known > ROUNDING * max(known[-1], 0.0)
+        along = turn[:, kept].T @ cross
+        left = own - along.T @ (along / known[kept][:, None])
+        gone = np.diag(left) <= ROUNDING * np.diag(own)
+        return np.where(gone[:, None] | gone[None, :], 0.0, left)
+
+    def sigma(self, matrix: np.ndarray) -> np.ndarray:
+        """Standard deviations of what is of interest, (last,); infinite where nothing shows one.
+
+        Parameters
+        ----------
+        matrix : information of a motion; that of the recordings so far is added.
+        """
+        values, turn = np.linalg.eigh(self.scaled_about(matrix))
+        seen = values > ROUNDING * max(values[-1], 0.0)
+        variance = np.sum(turn[:, seen] ** 2 / values[seen], axis=1)
+        hidden = np.sum(turn[:, ~seen] ** 2, axis=1) > _HIDDEN
+        size = self.scale[len(self.scale) - self.last :]
+        return np.where(hidden, np.inf, np.sqrt(variance) / size)
 
     def loss(self, matrix: np.ndarray) -> float:
         """What is minimised, of the information of a motion with that of the recordings."""
-        found = self.about(matrix)
-        size = self.scale[len(self.scale) - self.last :]
-        scaled = found / np.outer(size, size) + RIDGE * np.eye(self.last)
+        scaled = self.scaled_about(matrix) + RIDGE * np.eye(self.last)
         if self.objective == "A":
             return float(np.log(np.trace(np.linalg.inv(scaled))))
         return -float(np.linalg.slogdet(scaled)[1])
@@ -87,10 +111,6 @@ class Information:
         assert rows.shape[1] == n * instants
         prior = self.prior / np.outer(self.scale, self.scale) + RIDGE * np.eye(len(self.scale))
         return self._factor_loss()(rows @ rows.T + ca.DM(prior))
-
-    def _scaled(self, matrix: np.ndarray) -> np.ndarray:
-        whole = (matrix + self.prior) / np.outer(self.scale, self.scale)
-        return whole + RIDGE * np.eye(len(whole))
 
     def _factor_loss(self) -> Any:
         """The loss of an information matrix, (k, k)."""

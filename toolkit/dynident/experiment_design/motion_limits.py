@@ -74,14 +74,15 @@ class MotionLimits:
         if not 0 < margin <= 1:
             raise DesignError(f"margin = {margin:g}", remedy="choose it above 0, and at most 1")
         usual = np.array([UNLIMITED[joint.kind] for joint in robot.joints])
-        lower = np.array([joint.lower for joint in robot.joints])
-        upper = np.array([joint.upper for joint in robot.joints])
-        ranged = np.isfinite(lower) & np.isfinite(upper)
-        middle = np.where(ranged, (np.where(ranged, lower, 0) + np.where(ranged, upper, 0)) / 2, 0)
-        half = np.where(ranged, margin * (upper - middle), usual[:, 0])
-        stated = np.array([joint.velocity for joint in robot.joints])
+        lower, upper = (_stated([getattr(j, end) for j in robot.joints]) for end in _ENDS)
+        # Where one end is free, the range begins at the other; where both are, it is about zero.
+        free = np.isinf(lower) & np.isinf(upper)
+        low = np.where(np.isinf(lower), np.where(free, 0.0, upper) - usual[:, 0], lower)
+        high = np.where(np.isinf(upper), np.where(free, 0.0, lower) + usual[:, 0], upper)
+        middle, half = (low + high) / 2, margin * (high - low) / 2
+        stated = _stated([joint.velocity for joint in robot.joints])
         speed = np.where(np.isfinite(stated), margin * stated, usual[:, 1])
-        effort = np.array([joint.effort for joint in robot.joints])
+        effort = _stated([joint.effort for joint in robot.joints])
         acceleration = np.where(np.isfinite(stated), 3.0 * speed, usual[:, 2])
         return cls(
             lower=middle - half,
@@ -143,4 +144,12 @@ class MotionLimits:
         return found
 
 
+def _stated(numbers: list[float]) -> np.ndarray:
+    """Limits of a description; what is beyond everything stands for none."""
+    found = np.array(numbers, dtype=float)
+    return np.where(np.abs(found) < _NONE, found, np.copysign(np.inf, found))
+
+
 _NAMES = ("lower", "upper", "speed", "acceleration", "torque")
+_ENDS = ("lower", "upper")
+_NONE = 1e6

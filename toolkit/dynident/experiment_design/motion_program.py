@@ -24,7 +24,7 @@ _PER_HARMONIC = 22  # instants
 _LEAST = 100
 FINER = 10
 """Instants at which limits are checked, over those at which they were imposed."""
-_START = 0.05  # of the largest motion: with none at all nothing can be told
+_START = 0.5  # of the largest motion: with none at all nothing can be told
 _ITERATIONS = 150
 _SHRINKS = 100
 _ROUNDING = 1e-9
@@ -120,7 +120,9 @@ class MotionProgram:
             np.abs(a) / limits.acceleration,
             np.abs(torque) / limits.torque,
         ]
-        return float(max(np.abs(one).max() for one in shares))
+        used = np.abs(np.concatenate(shares, axis=1))
+        # What is no number is within no limit.
+        return float(used.max()) if np.all(np.isfinite(used)) else float("inf")
 
     # --- the program --------------------------------------------------------------------------
 
@@ -162,7 +164,7 @@ class MotionProgram:
             largest = self.within(variables)
         if largest is None:
             return variables * _START
-        return np.hstack([largest[:, :1], _START * largest[:, 1:] / max(_START, 1.0) * 10])
+        return np.hstack([largest[:, :1], _START * largest[:, 1:]])
 
     def _from(self, solver: Any, rows: _LimitRows, start: np.ndarray) -> DesignedMotion | None:
         from dynident.nlp.ipopt import interruptible

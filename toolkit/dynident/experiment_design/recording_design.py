@@ -11,8 +11,18 @@ from dynident.closed_loop import Fourier
 from dynident.experiment_design.design_task import DesignTask
 from dynident.experiment_design.motion_limits import MotionLimits
 from dynident.experiment_design.motion_program import FINER, DesignedMotion, MotionProgram
+from dynident.fitting.estimate import Estimate
 from dynident.model import Model
 from dynident.tables import Shown, Table, number, percent
+
+DECIDES = 3.0
+"""Standard deviations that tell two effects apart."""
+NEVER = 0.1
+"""Standard deviations below which no length of such a motion does."""
+_CAVEAT = (
+    "Predicted from the training recordings, as if the residual of the fit, with all that the "
+    "model lacks, were noise, and rows independent."
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,6 +34,9 @@ class Separation:
     first, others : the effect that is taken for true, and its rivals.
     recorded, designed, usual : standard deviations, by the recordings so far; by these and the
         designed recording; by these and a usual motion of the same length.
+    worth : length of usual motion that separates as far, over that of the design; infinite beyond a
+        thousand.
+    enough : length of the designed motion that decides, over what was asked for; likewise.
     """
 
     first: str
@@ -31,13 +44,8 @@ class Separation:
     recorded: float
     designed: float
     usual: float
-
-    @property
-    def worth(self) -> float:
-        """Length of usual motion that separates as far, over that of the design."""
-        gained = self.designed**2 - self.recorded**2
-        usual = self.usual**2 - self.recorded**2
-        return gained / usual if usual > 0 else float("inf")
+    worth: float
+    enough: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,7 +60,7 @@ class RecordingDesign(Shown):
     program : that was solved.
     motion : what came out.
     usual : a random motion within the same limits, the median of twenty.
-    values : (p,) of the model, as fitted to the recordings so far.
+    estimate : of the recordings so far; where effects are to be told apart, with the first.
     labels : of what is told, those of interest last.
     separation : of the effects to be told apart; None for another task.
     """
@@ -63,7 +71,7 @@ class RecordingDesign(Shown):
     program: MotionProgram
     motion: DesignedMotion
     usual: np.ndarray
-    values: np.ndarray
+    estimate: Estimate
     labels: tuple[str, ...]
     separation: Separation | None = None
 
@@ -88,11 +96,7 @@ class RecordingDesign(Shown):
         found = np.zeros_like(information.prior)
         if variables is not None:
             found = information.matrix(t, self.program.motions.fourier(variables).at(t))
-        about = information.about(found)
-        values = np.linalg.eigvalsh(about)
-        if values[0] <= 0:
-            return np.full(len(about), np.inf)
-        return np.sqrt(np.diag(np.linalg.inv(about)))
+        return information.sigma(found)
 
     @property
     def sentence(self) -> str:
@@ -105,32 +109,38 @@ class RecordingDesign(Shown):
                 f"{length:g} s of this tell {one.first} from {others} by {number(one.designed, 2)} "
                 f"standard deviations; the recordings so far by {number(one.recorded, 2)}"
             )
-            if np.isfinite(one.worth):
-                words += f"; a usual motion needs {length * one.worth:.0f} s"
+            if one.designed >= NEVER:
+                needs = f"{length * one.worth:.0f} s" if np.isfinite(one.worth) else "far longer"
+                words += f"; a usual motion needs {needs}"
             return f"{words}.{self._enough(one)}"
         before, after, usual = (self.sigma(x) for x in (None, self.motion.variables, self.usual))
-        shares = after / usual
+        names = self.labels[len(self.labels) - len(after) :]
+        seen = np.isfinite(after)
+        shares = np.where(seen, after, 0.0) / np.where(seen, usual, 1.0)
+        worst = int(np.argmax(shares))
         told = (
             f"With {length:g} s of this the standard deviations are {percent(_mean(shares), 0)} of "
-            f"those with a usual motion of that length (geometric mean; the worst "
-            f"{percent(float(shares.max()), 0)})"
+            f"those with a usual motion of that length (geometric mean; the worst, {names[worst]}, "
+            f"{percent(float(shares[worst]), 0)})"
         )
-        if np.all(np.isfinite(before)):
-            told += f", and {percent(_mean(after / before), 0)} of what they are now"
-        return f"{told}."
+        both = seen & np.isfinite(before)
+        if np.any(both):
+            told += f", and {percent(_mean(after[both] / before[both]), 0)} of what they are now"
+        hidden = ", ".join(name for name, one in zip(names, seen, strict=True) if not one)
+        return f"{told}." + (f" No motion tells on its own: {hidden}." if hidden else "")
 
     def _enough(self, one: Separation) -> str:
         """What follows where the effects are not told apart."""
-        if one.designed >= _DECIDES:
+        if one.designed >= DECIDES:
             return ""
-        if one.designed < _NEVER:
+        if one.designed < NEVER:
             advice = self.first_advice
             return (
                 " No motion within the limits tells them apart: another experiment might"
                 f"{f', {advice}' if advice else ''}, or a load, another base, a sensor."
             )
-        more = (_DECIDES / one.designed) ** 2
-        return f" That does not decide: {_DECIDES:g} take {more:.0f} times as long."
+        more = f"{one.enough:.0f}" if np.isfinite(one.enough) else "more than a thousand"
+        return f" That does not decide: {DECIDES:g} take {more} times as long."
 
     @property
     def first_advice(self) -> str:
@@ -176,7 +186,7 @@ class RecordingDesign(Shown):
 
     def tables(self) -> tuple[Table | str, ...]:
         """Everything that `show` prints, in its order."""
-        tail = (f"Ipopt: {self.motion.status}, {self.motion.iterations} iterations.",)
+        tail = (_CAVEAT, f"Ipopt: {self.motion.status}, {self.motion.iterations} iterations.")
         told = () if self.separation is not None else (self.sigma_table(),)
         return (self.sentence, *told, self.limit_table(), *tail)
 
@@ -196,10 +206,6 @@ class RecordingDesign(Shown):
             else {"recorded": one.recorded, "designed": one.designed, "usual": one.usual},
             "status": self.motion.status,
         }
-
-
-_DECIDES = 3.0  # standard deviations that tell two effects apart
-_NEVER = 0.1
 
 
 def _mean(ratios: np.ndarray) -> float:

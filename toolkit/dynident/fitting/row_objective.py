@@ -276,12 +276,19 @@ class _RowTrial:
         return self.rows.columns(self.effects)
 
     @cached_property
+    def _finite(self) -> bool:
+        """Whether its columns are numbers: some laws are none at some shapes."""
+        return bool(np.all(np.isfinite(self._columns)))
+
+    @cached_property
     def _values(self) -> np.ndarray:
         return _solved(self._columns, self.rows.torque)
 
     @cached_property
     def residual(self) -> np.ndarray:
         """Weighted rows of the torque that no column explains, (N,)."""
+        if not self._finite:
+            return np.full(len(self.rows.torque), np.inf)
         return self.rows.torque - self._columns @ self._values
 
     @property

@@ -12,6 +12,7 @@ from dynident.formulas.formula_tree import (
     Signal,
     Unknown,
     nodes,
+    quoted_joint,
     text_of,
 )
 from dynident.formulas.formula_value import Values, evaluate
@@ -33,6 +34,7 @@ __all__ = [
     "linear_parameters",
     "nodes",
     "parse_formula",
+    "quoted_joint",
     "text_of",
     "units_of",
 ]

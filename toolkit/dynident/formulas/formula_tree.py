@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import keyword
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
@@ -73,7 +75,7 @@ def text_of(formula: Formula) -> str:
         case Unknown(name):
             return name
         case Signal(quantity, joint):
-            return quantity if joint is None else f"{quantity}[{_quoted(joint)}]"
+            return quantity if joint is None else f"{quantity}[{quoted_joint(joint)}]"
         case Operation("neg", (one,)):
             return f"-{_inside(one, _BINDS['neg'])}"
         case Operation(name, (left, right)):
@@ -93,5 +95,7 @@ def _inside(formula: Formula, binds: int) -> str:
     return f"({text})" if negative else text
 
 
-def _quoted(joint: str) -> str:
-    return joint if joint.isidentifier() else '"' + joint.replace('"', r"\"") + '"'
+def quoted_joint(joint: str) -> str:
+    """Return the name of a joint as brackets hold it: in quotes unless it is a plain word."""
+    plain = joint.isascii() and joint.isidentifier() and not keyword.iskeyword(joint)
+    return joint if plain else json.dumps(joint, ensure_ascii=False)

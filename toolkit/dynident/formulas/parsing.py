@@ -33,6 +33,7 @@ HIGHEST_POWER = 4
 _LARGEST = 1e12
 _QUANTITIES: tuple[str, ...] = get_args(Quantity)
 _OF_NO_JOINT = ("t",)
+_POWER = re.compile(r"""("(?:[^"\\]|\\.)*"|'(?:[^'\\]|\\.)*')|\^""")
 _NAME = re.compile(r"[A-Za-z]\w{0,23}", re.ASCII)
 _REMEDY = (
     "write numbers, pi, parameters, + - * / ^ (to a whole power up to 4), "
@@ -76,7 +77,7 @@ def parse_formula(text: str) -> Formula:
     Raises
     ------
     EffectError
-        If it is longer than 300 characters, has more than 160 parts, is nested more than 20 deep,
+        If it is longer than 300 characters, has more than 160 parts, is nested more than 60 deep,
         or holds anything else; the message says what, in one line.
     """
     if not isinstance(text, str):
@@ -90,8 +91,9 @@ def parse_formula(text: str) -> Formula:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            # ^ is exclusive or to Python, and binds less than a product.
-            tree = ast.parse(text.replace("^", "**").strip(), mode="eval")
+            # ^ is exclusive or to Python, and binds less than a product; in quotes it is a name's.
+            powers = _POWER.sub(lambda found: found[1] or "**", text)
+            tree = ast.parse(powers.strip(), mode="eval")
     except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
         reason = getattr(error, "msg", None) or "too deeply nested, or not text"
         raise _refused(text, f"cannot be read ({' '.join(str(reason).split())[:80]})") from None

@@ -239,7 +239,9 @@ class Model(ParametrisedRobot):
         for effect in sorted(effects, key=lambda one: one.needs_torque):
             if effect.needs_torque and block.torque is None:
                 block = replace(block, torque=torque(found))
-            found[effect.label] = effect.columns(self.ready(effect, block, values))
+            columns = effect.columns(self.ready(effect, block, values))
+            effect.require_finite(columns, block)
+            found[effect.label] = columns
         return found
 
     def _write_rigid(self, block: Block, out: np.ndarray) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from dynident.closed_loop import Controller
 from dynident.criteria import DEFAULTS, Criteria
 from dynident.effect_modules import Permission, import_effects, require_sound
 from dynident.effects import FRICTION_WIDTH, effects_of, law_effect, laws_of
-from dynident.errors import DynidentError, EffectError, StudyError
+from dynident.errors import DynidentError, DynidentWarning, EffectError, StudyError
 from dynident.fitting.drive_gains import (
     DriveGains,
     GainProblem,
@@ -92,7 +93,11 @@ def load(path: str | Path, *, modules: Permission = "trusted") -> Study:
     laws = laws_of(said.laws, path)
     try:
         for law in laws:
-            tuple(law_effect(law).candidates(robot))
+            why = law_effect(law).elsewhere(robot)
+            if why is not None and law.name in said.laws:
+                raise why
+            if why is not None:  # of another robot's file
+                warnings.warn(f"{why}; it is not tried", DynidentWarning, stacklevel=2)
         effects = tuple(one for label in said.effects for one in effects_of(label, robot, laws))
         model = Model(robot, effects, _widths(said.friction_width, robot), laws)
     except DynidentError as error:

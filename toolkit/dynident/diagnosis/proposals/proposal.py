@@ -48,7 +48,6 @@ class Proposal:
     test_error_before, test_error_after : relative error on held-out data.
     noise_floor : the least that a model can reach; None where the noise is unknown.
     rivals : laws that do as well on the held-out blocks, as far as can be told, best first.
-    advice : the experiment that would show which of them it is; empty without rivals.
     remark : on what it rests, where that is doubtful.
     picture : to be drawn; None where there is none.
 
@@ -72,7 +71,6 @@ class Proposal:
     test_error_after: float
     noise_floor: float | None
     rivals: tuple[LawEffect, ...] = ()
-    advice: str = ""
     remark: str = ""
     picture: LawPicture | None = None
 
@@ -137,6 +135,7 @@ class Proposal:
             ),
             "explains": self.explains,
             "is_explanation": self.is_explanation,
+            "remark": self.remark,
             "p_value": self.p_value,
             "tried": self.tried,
             "test_error_before": self.test_error_before,

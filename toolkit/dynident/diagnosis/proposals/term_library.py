@@ -14,6 +14,7 @@ from itertools import product
 from typing import Literal
 
 from dynident.effects import Law
+from dynident.formulas import quoted_joint
 from dynident.robot import Robot
 
 Sort = Literal["position", "motion", "load", "session"]
@@ -52,9 +53,7 @@ class Factor:
         return tuple(self._written(text, numeric=False) for text in self.texts)
 
     def _written(self, text: str, *, numeric: bool) -> str:
-        place = "" if self.joint is None else f'["{self.joint}"]'
-        if self.joint is not None and self.joint.isidentifier():
-            place = f"[{self.joint}]"
+        place = "" if self.joint is None else f"[{quoted_joint(self.joint)}]"
         signals = {name: f"{name}{place}" for name in ("q", "v", "a", "load")}
         found = text.format(**signals, shape=repr(self.shape[1]) if self.shape else "")
         if self.shape and not numeric:

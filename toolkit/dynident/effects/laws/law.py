@@ -61,6 +61,9 @@ class Law:
         try:
             object.__setattr__(self, "formula", parse_formula(self.torque))
             _ = self.linear
+            if self.shape and not self.signals:
+                remedy = "put a signal into it, as q or v"
+                raise EffectError("a constant has no shape", remedy=remedy)
         except EffectError as error:
             raise EffectError(error.what, self.label, error.remedy) from None
 

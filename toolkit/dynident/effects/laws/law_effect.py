@@ -53,22 +53,25 @@ class LawEffect(JointEffect):
 
     @classmethod
     def candidates(cls, robot: Robot) -> Iterator[Self]:
-        """Every joint at which the units of the formula are those of a torque.
-
-        Raises
-        ------
-        EffectError
-            If there is none.
-        """
-        refusal, found = None, False
+        """Every joint at which the units of the formula are those of a torque; see `elsewhere`."""
         for joint in robot.names:
             try:
                 yield cls(joint).on(robot)
-                found = True
+            except EffectError:
+                continue
+
+    @classmethod
+    def elsewhere(cls, robot: Robot) -> EffectError | None:
+        """Why it sits at no joint of a robot; None where it sits at one."""
+        refusal = None
+        for joint in robot.names:
+            try:
+                cls(joint).on(robot)
             except EffectError as error:
                 refusal = refusal or error
-        if not found and refusal is not None:
-            raise refusal
+            else:
+                return None
+        return refusal
 
     def on(self, robot: Robot) -> Self:
         own = super().on(robot)
@@ -113,15 +116,17 @@ class LawEffect(JointEffect):
     def at_joint(self, block: Block) -> np.ndarray:
         found = _BlockValues(self, block)
         columns = [found.column(name) for name in self.made_of.linear]
-        together = np.stack(columns, axis=1)
-        if together.dtype != object and not np.all(np.isfinite(together)):
-            row = int(np.argmin(np.isfinite(together).all(axis=1)))
-            j = block.index(self.joint)
+        return np.stack(columns, axis=1)
+
+    def require_finite(self, columns: np.ndarray, block: Block) -> None:
+        """See `Effect.require_finite`."""
+        finite = np.isfinite(columns).all(axis=(1, 2))
+        if not finite.all():
+            row, j = int(np.argmin(finite)), block.index(self.joint)
             where = f"at q = {block.q[row, j]:.4g}, v = {block.v[row, j]:.4g}"
             remedy = "keep divisors, roots and exponents within what numbers can hold"
             what = f"{self.made_of.torque} is not finite {where}"
             raise EffectError(what, self.label, remedy)
-        return together
 
     def sensitivities(self, block: Block) -> np.ndarray:
         """See `Effect.sensitivities`: exact, by CasADi."""
@@ -134,6 +139,8 @@ class LawEffect(JointEffect):
             widths = [found.width(one) for one in _sign_joints(law)]
             slopes = np.array(_slopes(law)(inputs, widths, list(self.shape)))
             slopes = slopes.reshape(len(law.shape), len(law.linear), -1)
+            # A root has no slope at zero, where its column may have a value all the same.
+            slopes = np.where(np.isfinite(slopes), slopes, 0.0)
             full[:, block.index(self.joint)] = np.moveaxis(slopes, 2, 0).swapaxes(1, 2)
             for k, (value, (_, lower, upper)) in enumerate(zip(self.shape, law.shape, strict=True)):
                 one = ShapeParameter("", "", (), lower=lower, upper=upper)

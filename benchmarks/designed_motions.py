@@ -1,0 +1,102 @@
+"""Designed motions against random ones within the same limits.
+
+    python benchmarks/designed_motions.py --random 1000 --starts 2
+
+For arms of two, six and seven joints: the geometric mean of the standard deviations of all
+parameters with the designed motion over that with the best, and with the median, of many random
+motions (Fourier series of the same period and harmonics, each as large as the limits allow); the
+worst of these ratios; and processor time. Then pairs of effects: the squared distance in standard
+deviations over that of the best of 200 random motions, and the length of usual motion that a design
+of 10 s is worth.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+import numpy as np
+
+import dynident as di
+from dynident.effects import effects_of
+from dynident.experiment_design import DesignTask, RecordingDesign
+from dynident.tables import Table
+
+PROBLEMS = Path(__file__).resolve().parents[1] / "problems"
+ARMS = ("hidden_effect", "anthropomorphic_arm", "seven_joint_arm")
+PAIRS = (
+    ("joint_zero@{}", "joint_spring@{}"),
+    ("torque_offset@{}", "base_tilt"),
+    ("quadratic_drag@{}", "viscous_friction@{}"),
+    ("stribeck_friction@{}", "viscous_friction@{}"),
+    ("load_friction@{}", "coulomb_friction@{}"),
+)
+
+
+def ratios(found: RecordingDesign, count: int) -> tuple[float, float, float, float]:
+    """Sigma over that of the best and of the median random motion; the worst; and their CPU s."""
+    program, began = found.program, time.process_time()
+    some = (program.within(program.motions.random(50_000 + k)) for k in range(count))
+    losses = sorted((program.loss(one), k) for k, one in enumerate(some) if one is not None)
+    spent = time.process_time() - began
+    last, ours = program.information.last, found.motion.loss
+    best, median = losses[0][0], losses[len(losses) // 2][0]
+    winner = program.within(program.motions.random(50_000 + losses[0][1]))
+    each = found.sigma(found.motion.variables) / found.sigma(winner)
+    mean = [float(np.exp((ours - one) / (2 * last))) for one in (best, median)]
+    return mean[0], mean[1], float(each.max()), spent
+
+
+def main() -> None:
+    """Print both tables."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--random", type=int, default=1000, help="random motions")
+    parser.add_argument("--starts", type=int, default=2)
+    parser.add_argument("--seeds", type=int, default=1, help="designs of each arm")
+    parser.add_argument("--arms", nargs="*", default=ARMS)
+    asked = parser.parse_args()
+    rows, pairs = [], []
+    for name in asked.arms:
+        study = di.load(PROBLEMS / name / "study.toml")
+        for seed in range(asked.seeds):
+            began = time.process_time()
+            task = DesignTask(repeat=1, harmonics=5, starts=asked.starts, seed=100 * seed)
+            found = di.design(study.model, study.train, task, progress=lambda _: None)
+            ours = time.process_time() - began
+            best, median, worst, theirs = ratios(found, asked.random)
+            cells = (f"{best:.2f}", f"{median:.2f}", f"{worst:.2f}", f"{ours:.1f}", f"{theirs:.1f}")
+            rows.append((f"{name}, {study.robot.n} joints", str(seed), *cells))
+        pairs += [row for pair in PAIRS if (row := told_apart(study, name, pair, asked.starts))]
+    heads = ("arm", "seed", "over the best", "over the median", "worst", "s", "s, random")
+    print(Table("Standard deviations, designed over random", heads, tuple(rows)))
+    heads = ("arm", "pair", "phi over best of 200", "worth, s of usual motion", "s")
+    print(Table("Pairs told apart by 10 s", heads, tuple(pairs)))
+
+
+def told_apart(study, name: str, pair: tuple[str, str], starts: int) -> tuple[str, ...] | None:
+    """One row: how much better a pair is told apart than by the best of 200 random motions."""
+    joint = study.robot.names[1]
+    first, second = (effects_of(one.format(joint), study.robot)[0] for one in pair)
+    task = DesignTask(repeat=1, harmonics=5, starts=starts, tell=(first, second))
+    began = time.process_time()
+    found = di.design(study.model, study.train, task, progress=lambda _: None)
+    spent, program, one = time.process_time() - began, found.program, found.separation
+    assert one is not None
+    t = program.motions.times(program.instants)
+    nothing = np.zeros_like(program.information.prior)
+
+    def phi(variables: np.ndarray) -> float:
+        motion = program.motions.fourier(variables).at(t)
+        gained = program.information.about(program.information.matrix(t, motion) + nothing)
+        return float(gained[0, 0])
+
+    some = (program.within(program.motions.random(70_000 + k)) for k in range(200))
+    best = max(phi(each) for each in some if each is not None)
+    share = phi(found.motion.variables) / best if best > 0 else float("inf")
+    worth = 10.0 * one.worth
+    return name, f"{first.label} or {second.label}", f"{share:.2f}", f"{worth:.0f}", f"{spent:.1f}"
+
+
+if __name__ == "__main__":
+    main()
