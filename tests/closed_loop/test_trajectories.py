@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.effects.test_contract import CRANE
 from tests.synthetic import arm
 
 from dynident.closed_loop import Fourier
+from dynident.effect_contract.crane import crane
 from dynident.errors import SimulationError
-from dynident.robot import Robot
 
-CRANE_ROBOT = Robot.from_text(CRANE)
+CRANE_ROBOT = crane()
 LOWER, UPPER, FASTEST = (
     np.array([getattr(joint, name) for joint in CRANE_ROBOT.joints])
     for name in ("lower", "upper", "velocity")

@@ -75,7 +75,7 @@ LOCAL: tuple[ShapeSolver, ...] = (
 )
 def test_one_shape_is_found_by_every_solver(solver: ShapeSolver) -> None:
     found = search(decays([0.7], [2.0]), solver)
-    assert np.exp(found.logarithms) == pytest.approx([0.7], rel=1e-2)
+    assert np.exp(found.coordinates) == pytest.approx([0.7], rel=1e-2)
     assert found.best[0].values == pytest.approx([2.0], rel=2e-2)
     assert found.evaluations > 2 and found.message
 
@@ -84,13 +84,13 @@ def test_one_shape_is_found_by_every_solver(solver: ShapeSolver) -> None:
 def test_two_shapes_are_found_with_and_without_derivatives(solver: ShapeSolver) -> None:
     found = search(decays([0.4, 3.0], [0.7, 2.0]), solver)
     assert found.converged
-    assert np.exp(found.logarithms) == pytest.approx([0.4, 3.0], rel=1e-4)
+    assert np.exp(found.coordinates) == pytest.approx([0.4, 3.0], rel=1e-4)
 
 
 def test_a_shape_outside_its_bounds_ends_at_the_bound() -> None:
     problem = decays([30.0], [2.0])
     found = search(problem, LOCAL[0])
-    assert found.logarithms == pytest.approx(problem.upper, abs=1e-6)
+    assert found.coordinates == pytest.approx(problem.upper, abs=1e-6)
 
 
 @dataclass(frozen=True)
