@@ -134,7 +134,7 @@ def test_interrupt_during_a_diagnosis(tmp_path):
         signal.signal(signal.SIGINT, inherited)
     os.close(other)
     try:
-        assert b"evaluating" in read_until(terminal, b"evaluating")
+        assert b"diagnosing: " in read_until(terminal, b"diagnosing: ")
         process.send_signal(signal.SIGINT)
         said = read_until(terminal, b"half written")
         said += read_until(terminal, b"nothing more comes")

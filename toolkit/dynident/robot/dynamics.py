@@ -21,8 +21,8 @@ pin: Any = lazy_loader.load("pinocchio")
 
 # Samples of one call for which a function of many samples pays. Measured: making it takes as long
 # as 3000 (30 or 60 joints) to 7000 (2 joints) samples through Pinocchio, once for all calls, and
-# whoever asks for a recording asks again. Below, a plain fit is done before CasADi is loaded. Not by
-# what was asked before: the last digits would be.
+# whoever asks for a recording asks again; below, a plain fit is done before CasADi is loaded. Not
+# by what was asked before: the last digits would be.
 _MANY = 2500
 
 
