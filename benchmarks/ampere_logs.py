@@ -1,6 +1,6 @@
 """Logs as a controller of a six-joint arm writes them, begun with `dynident init`.
 
-    python benchmarks/ampere_logs.py --out /tmp/logs [--seconds 60] [--seed 1]
+    python benchmarks/ampere_logs.py --out logs [--seconds 60] [--seed 1]
 
 Amperes instead of torques, no header line, a clock that jitters, columns of targets and
 temperatures that nobody asked for, and 2.8 kg in the gripper in some of the recordings. The script

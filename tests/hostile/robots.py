@@ -380,7 +380,7 @@ CHECKED: dict[str, tuple[str, Content, str]] = {
     ),
     "SDF that runs a plugin": (
         "a.sdf",
-        SDF.format('<plugin name="p" filename="/tmp/evil.so"/>'),
+        SDF.format('<plugin name="p" filename="/nowhere/evil.so"/>'),
         ANSWER,
     ),
     "MJCF of a giant replicate": (
