@@ -93,9 +93,11 @@ def told_apart(study, name: str, pair: tuple[str, str], starts: int) -> tuple[st
 
     some = (program.within(program.motions.random(70_000 + k)) for k in range(200))
     best = max(phi(each) for each in some if each is not None)
-    share = phi(found.motion.variables) / best if best > 0 else float("inf")
-    worth = 10.0 * one.worth
-    return name, f"{first.label} or {second.label}", f"{share:.2f}", f"{worth:.0f}", f"{spent:.1f}"
+    label = f"{first.label} or {second.label}"
+    if best <= 0:
+        return name, label, "no motion tells them", "", f"{spent:.1f}"
+    share, worth = phi(found.motion.variables) / best, 10.0 * one.worth
+    return name, label, f"{share:.2f}", f"{worth:.0f}", f"{spent:.1f}"
 
 
 if __name__ == "__main__":

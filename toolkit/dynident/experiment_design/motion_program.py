@@ -24,7 +24,7 @@ _PER_HARMONIC = 22  # instants
 _LEAST = 100
 FINER = 10
 """Instants at which limits are checked, over those at which they were imposed."""
-_START = 0.5  # of the largest motion: with none at all nothing can be told
+_TRIED = 150  # random motions for each start
 _ITERATIONS = 150
 _SHRINKS = 100
 _ROUNDING = 1e-9
@@ -142,29 +142,32 @@ class MotionProgram:
         DesignError
             If no start ends at a motion within the limits.
         """
+        begins = self._begins(starts, seed)
         solver, rows = self._solver()
         found: list[DesignedMotion] = []
-        for start in range(starts):
-            progress(f"start {start + 1} of {starts}")
-            one = self._from(solver, rows, self._begin(seed + start))
-            if one is not None:
-                found.append(one)
+        for number, begin in enumerate(begins, 1):
+            progress(f"start {number} of {len(begins)}")
+            one = self._from(solver, rows, begin.variables)
+            # Narrow laws have many optima: what was found by chance may be better.
+            found += [begin] if one is None else [one, begin]
         if not found:
             remedy = "widen them, or shorten the motion's reach"
             raise DesignError("no motion was found within the limits", remedy=remedy)
         return min(found, key=lambda one: one.loss)
 
-    def _begin(self, seed: int) -> np.ndarray:
-        """A small random motion within the limits."""
-        variables = self.motions.random(seed)
-        largest = self.within(variables)
-        if largest is None:
-            # Gravity alone may take more torque than there is: from another pose it need not.
-            variables[:, 0] = 0.0
-            largest = self.within(variables)
-        if largest is None:
-            return variables * _START
-        return np.hstack([largest[:, :1], _START * largest[:, 1:]])
+    def _begins(self, starts: int, seed: int) -> list[DesignedMotion]:
+        """The best of many random motions within the limits."""
+        rng = np.random.default_rng(seed)
+        found = []
+        for number in rng.integers(0, 2**31, starts * _TRIED):
+            variables = self.within(self.motions.random(int(number)))
+            if variables is not None:
+                status = "no better motion than a random one"
+                loss = self.loss(variables)
+                found.append(
+                    DesignedMotion(variables=variables, loss=loss, status=status, iterations=0)
+                )
+        return sorted(found, key=lambda one: one.loss)[:starts]
 
     def _from(self, solver: Any, rows: _LimitRows, start: np.ndarray) -> DesignedMotion | None:
         from dynident.nlp.ipopt import interruptible
