@@ -12,7 +12,7 @@ from dynident.effects import Law, effects_of, law_effect
 from dynident.errors import DesignError
 from dynident.experiment_design import DesignTask, MotionLimits, design
 from dynident.experiment_design.column_function import ColumnFunction
-from dynident.experiment_design.information import Information
+from dynident.experiment_design.information import Information, Objective
 from dynident.experiment_design.motion_program import FINER, MotionProgram, instants_of
 from dynident.experiment_design.periodic import PeriodicMotions
 from dynident.model import Model
@@ -88,7 +88,8 @@ def test_the_symbolic_loss_is_the_loss() -> None:
     count, some = columns.count, motions()
     rng = np.random.default_rng(0)
     prior = np.diag(rng.uniform(0.1, 2.0, count))
-    for objective, last in (("D", count), ("D", 3), ("A", 4)):
+    asked: list[tuple[Objective, int]] = [("D", count), ("D", 3), ("A", 4)]
+    for objective, last in asked:
         information = Information(
             columns=columns,
             mix=np.eye(count),
