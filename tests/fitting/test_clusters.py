@@ -32,11 +32,13 @@ class Elsewhere:
         self.sent = 0
         self.started = 0
 
-    def scatter(self, data: list[Any], /) -> list[Any]:
+    def scatter(self, data: list[Any], /, *, hash: bool) -> list[Any]:
         self.sent += len(data)
         return [pickle.dumps(one) for one in data]
 
-    def map(self, function: Callable[..., Any], /, *iterables: Iterable[Any]) -> list[Any]:
+    def map(
+        self, function: Callable[..., Any], /, *iterables: Iterable[Any], pure: bool
+    ) -> list[Any]:
         found = []
         for functions, *arguments in zip(*iterables, strict=True):
             self.started += 1
@@ -146,7 +148,7 @@ def test_errors_of_a_pass_are_not_the_clusters(runs) -> None:
 
 @pytest.mark.parametrize("method", ["scatter", "map", "gather"])
 def test_a_cluster_that_fails_is_one_line(runs, monkeypatch, method) -> None:
-    def fail(*_: Any) -> None:
+    def fail(*_: Any, **__: Any) -> None:
         raise CancelledError("lost\nit all")
 
     cluster = Elsewhere()

@@ -22,10 +22,10 @@ T = TypeVar("T")
 class Cluster(Protocol):
     """What works elsewhere: the `Client` of dask.distributed, or what has its three methods."""
 
-    def scatter(self, data: Any, /) -> Any:
+    def scatter(self, data: Any, /, *, hash: bool) -> Any:
         """Send a list of objects; return what stands for each of them in `map`."""
 
-    def map(self, function: Callable[..., Any], /, *iterables: Iterable[Any]) -> Any:
+    def map(self, function: Callable[..., Any], /, *iterables: Iterable[Any], pure: bool) -> Any:
         """Start a function on each tuple of arguments."""
 
     def gather(self, futures: Any, /) -> Any:
@@ -44,7 +44,9 @@ class _Place:
         found = []
         for one in recordings:
             if id(one) not in self.sent:
-                self.sent[id(one)] = (one, self.client.scatter([one])[0])
+                # Under a name of its own: one made of the content may be on its way out, from a fit
+                # before this one, and would take this one along.
+                self.sent[id(one)] = (one, self.client.scatter([one], hash=False)[0])
             found.append(self.sent[id(one)][1])
         return found
 
@@ -111,7 +113,7 @@ def spread(
         yield from map(function, *every)
         return
     with _cluster_errors():
-        futures = list(client.map(_attempt, [function] * count, *every))
+        futures = list(client.map(_attempt, [function] * count, *every, pure=False))
     for k in range(count):
         with _cluster_errors():
             found, error = client.gather(futures[k])
