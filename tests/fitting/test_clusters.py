@@ -32,12 +32,12 @@ class Elsewhere:
         self.sent = 0
         self.started = 0
 
-    def scatter(self, data: list[Any], /, *, hash: bool) -> list[Any]:
+    def scatter(self, data: list[Any], /, **_: Any) -> list[Any]:
         self.sent += len(data)
         return [pickle.dumps(one) for one in data]
 
     def map(
-        self, function: Callable[..., Any], /, *iterables: Iterable[Any], pure: bool
+        self, function: Callable[..., Any], /, *iterables: Iterable[Any], **_: Any
     ) -> list[Any]:
         found = []
         for functions, *arguments in zip(*iterables, strict=True):

@@ -22,11 +22,24 @@ T = TypeVar("T")
 class Cluster(Protocol):
     """What works elsewhere: the `Client` of dask.distributed, or what has its three methods."""
 
-    def scatter(self, data: Any, /, *, hash: bool) -> Any:
+    def scatter(self, data: Any, /, **settings: Any) -> Any:
         """Send a list of objects; return what stands for each of them in `map`."""
 
-    def map(self, function: Callable[..., Any], /, *iterables: Iterable[Any], pure: bool) -> Any:
-        """Start a function on each tuple of arguments."""
+    def map(
+        self, function: Callable[..., Any], /, *iterables: Iterable[Any], **settings: Any
+    ) -> Any:
+        """Start a function on each tuple of arguments.
+
+        Parameters
+        ----------
+        function : of a module.
+        iterables : its arguments.
+        settings : of dask.distributed, by which names follow from no content.
+
+        Returns
+        -------
+        What stands for the results in `gather`.
+        """
 
     def gather(self, futures: Any, /) -> Any:
         """Return what one came to, or several in their order."""
