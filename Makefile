@@ -1,12 +1,13 @@
 # make demo   environment, install, the main job on an embedded example, a report to open
 # make test   environment, install, all tests
 # make test-fast   the same less the tests that are marked slow
+# make docs   the documentation as a site to open without a network: docs/_build/html/index.html
 # make bench  beside what a user would pick instead, on the same work: docs/benchmarks.md (20 minutes)
 PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
 
-.PHONY: install demo test test-fast lint bench clean
+.PHONY: install demo test test-fast lint docs bench clean
 
 install: $(STAMP)
 
@@ -34,6 +35,10 @@ lint: install
 	$(BIN)/ruff format --check
 	$(BIN)/pyright --pythonpath $(BIN)/python
 
+docs: install
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	@echo docs/_build/html/index.html
+
 # Peers get environments of their own in .bench; who cannot be installed is a line with the reason.
 bench: export OMP_NUM_THREADS = 1
 
@@ -41,4 +46,4 @@ bench: install
 	$(BIN)/python benchmarks/run.py
 
 clean:
-	rm -rf .venv .bench
+	rm -rf .venv .bench docs/_build docs/_made

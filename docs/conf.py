@@ -1,0 +1,47 @@
+"""The site: `make docs` builds it into docs/_build/html, which opens without a network."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+sys.path[:0] = [str(HERE), str(ROOT / "toolkit")]
+
+project = "dynident"
+copyright = "the authors of dynident, BSD-3-Clause"
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+exclude_patterns = ["_build"]
+html_theme = "furo"
+html_title = "dynident"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_show_sphinx = False
+html_copy_source = False
+templates_path: list[str] = []
+myst_heading_anchors = 3
+default_role = "code"
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+napoleon_google_docstring = False
+
+
+def setup(app: Any) -> None:
+    """Join the steps of this site to a build."""
+    app.connect("source-read", _for_the_site)
+
+
+def _for_the_site(app: Any, docname: str, source: list[str]) -> None:
+    """Leave out of a page what only a forge shows: Mermaid, and links to folders of the source."""
+    text = re.sub(r"```mermaid\n.*?```\n", "", source[0], flags=re.DOTALL)
+    folder = Path(app.env.doc2path(docname)).parent
+
+    def link(found: re.Match[str]) -> str:
+        outside = not (folder / found[2].partition("#")[0]).resolve().is_relative_to(HERE)
+        return found[1] if outside else found[0]
+
+    source[0] = re.sub(r"(?<!!)\[([^\]]+)\]\(((?!\w+:|#)[^)\s]+)\)", link, text)
