@@ -6,10 +6,10 @@ here from the source, and a test asks that it is as this script would write it.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from made_parts import renewed
 from package_map import FLOORS, PACKAGE, first_line, modules, reduced, room_imports
 
 PAGE = Path(__file__).resolve().parent / "architecture.md"
@@ -27,14 +27,7 @@ def main() -> None:
 
 def page(text: str) -> str:
     """Return the page with its made parts as the source has them now."""
-    for name, make in PARTS.items():
-        begin, end = f"<!-- {name} -->\n", "<!-- end -->"
-        pattern = re.compile(f"{re.escape(begin)}.*?{re.escape(end)}", re.DOTALL)
-        made = begin + make() + end
-        text, count = pattern.subn(lambda _, made=made: made, text)
-        if count != 1:
-            raise ValueError(f"{PAGE.name} needs one '{begin.strip()}' with its '{end}'")
-    return text
+    return renewed(text, PARTS, PAGE.name)
 
 
 def picture() -> str:

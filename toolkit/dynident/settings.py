@@ -11,7 +11,7 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError
 
 from dynident import files
 from dynident.errors import StudyError
@@ -19,9 +19,18 @@ from dynident.words import close_word
 
 
 class SettingsTable(BaseModel):
-    """A table of a settings file: unknown keys and numbers that are not finite are refused."""
+    """A table of a settings file: unknown keys and numbers that are not finite are refused.
 
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    What stands under a key in the class says what the key means: in the published schema, in the
+    reference and in `pydoc`. Units are there as `unit`.
+    """
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+
+def in_unit(unit: str) -> dict[str, JsonValue]:
+    """Return what a number's schema says of its unit, for `Field(json_schema_extra=...)`."""
+    return {"unit": unit}
 
 
 LONGEST_TIME = 1e9
@@ -30,13 +39,13 @@ FASTEST = 1e7
 """Hz: nothing in a robot is sampled, filtered or controlled faster."""
 SLOWEST = 1e-6
 """Hz: nothing is slower."""
-Time = Annotated[float, Field(ge=-LONGEST_TIME, le=LONGEST_TIME)]
+Time = Annotated[float, Field(ge=-LONGEST_TIME, le=LONGEST_TIME, json_schema_extra=in_unit("s"))]
 """A time in s, of either sign."""
-Duration = Annotated[float, Field(gt=0, le=LONGEST_TIME)]
+Duration = Annotated[float, Field(gt=0, le=LONGEST_TIME, json_schema_extra=in_unit("s"))]
 """A time in s, above zero."""
-Rate = Annotated[float, Field(ge=SLOWEST, le=FASTEST)]
+Rate = Annotated[float, Field(ge=SLOWEST, le=FASTEST, json_schema_extra=in_unit("Hz"))]
 """Samples or cycles a second."""
-Gravity = Annotated[float, Field(ge=-100, le=100)]
+Gravity = Annotated[float, Field(ge=-100, le=100, json_schema_extra=in_unit("m/s^2"))]
 """m/s^2, of one axis."""
 DEEPEST = 50
 """Levels of tables within tables that a file of settings has at most."""

@@ -19,7 +19,7 @@ from pydantic import Field
 
 from dynident.errors import DynidentError, SimulationError, StudyError
 from dynident.robot import Robot
-from dynident.settings import Rate, SettingsTable, Time
+from dynident.settings import Rate, SettingsTable, Time, in_unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,20 +80,10 @@ class Controller:
 
     Attributes
     ----------
-    kind : "pd", "pid", "cascade" or "computed_torque".
-    rate_hz : samples per second; each command is held from its sample to the next. None where it
-        is not stated: such a loop cannot be simulated.
-    kp, ki, kd, kv : (n,) gains of each joint, none negative. kp, ki, kd in N m/rad, N m/(rad s)
-        and N m s/rad (N/m, ... for prismatic joints); of a cascade, kp in 1/s and kv in N m s/rad;
-        of a computed torque, kp in 1/s^2 and kd in 1/s.
-    velocity_reference : False sets v_ref = 0 (a cascade has no v_ref).
-    derivative_cutoff_hz : Hz, or None for the bare difference.
-    limit : (n,) N m or N, greatest magnitude of the command, or None.
-    delay_s : s from a sample to when its command acts; any fraction or multiple of a sample.
-    feedforward : whether the torque of the controller's nominal model, along the reference,
-        is added (a computed torque has it already: there it changes nothing).
-    drive_gain : (n,) N m or N per unit of control signal, positive; the gains are then per unit of
-        torque above, in units of that signal. None where the gains make torques.
+    kind, rate_hz, velocity_reference, derivative_cutoff_hz, delay_s, feedforward : as the keys of
+        a file, see `ControllerFile`; without a rate such a loop cannot be simulated.
+    kp, ki, kd, kv : (n,) gains of each joint, in the units of `ControllerFile`.
+    limit, drive_gain : (n,) as there, or None.
 
     Raises
     ------
@@ -210,24 +200,52 @@ GAINS = tuple(dict.fromkeys(name for law in LAWS.values() for name in law.gains)
 """The names of all gains."""
 
 
-class ControllerFile(SettingsTable):
-    """The table [controller] of a study or an experiment file; its keys are those of `Controller`.
+def _gain(unit: str):
+    return Field(default=None, json_schema_extra=in_unit(unit))
 
-    A number in the place of a list stands for every joint.
+
+class ControllerFile(SettingsTable):
+    """The table [controller] of a study or an experiment file: the loop that moved the robot.
+
+    A number in the place of a list stands for every joint. At each sample, with e = q_ref - q:
+
+    - "pd": u = kp e + kd (v_ref - v)
+    - "pid": u = kp e + ki (integral of e) + kd (v_ref - v)
+    - "cascade": u = kv (kp e - v)
+    - "computed_torque": u = M(q) (a_ref + kp e + kd (v_ref - v)) + h(q, v)
     """
 
-    kind: str
+    kind: str = Field(json_schema_extra={"enum": [*LAWS]})
+    """The law, see above."""
     rate_hz: Rate | None = None
-    kp: float | list[float]
-    kd: float | list[float] | None = None
-    kv: float | list[float] | None = None
-    ki: float | list[float] | None = None
+    """Samples per second; each command is held from its sample to the next. Needed to simulate the
+    loop."""
+    kp: float | list[float] = Field(
+        json_schema_extra=in_unit("N m/rad, N/m; cascade 1/s; computed torque 1/s^2")
+    )
+    """Gain of the error of position, not negative; one, or one per joint."""
+    kd: float | list[float] | None = _gain("N m s/rad, N s/m; computed torque 1/s")
+    """Gain of the error of velocity, of every kind but a cascade."""
+    kv: float | list[float] | None = _gain("N m s/rad, N s/m")
+    """Gain of the inner loop of a cascade."""
+    ki: float | list[float] | None = _gain("N m/(rad s), N/(m s)")
+    """Gain of the integral, of a pid. The integral stands still while the torque is at its
+    limit."""
     velocity_reference: bool = True
+    """False sets v_ref = 0 (a cascade has no v_ref)."""
     derivative_cutoff_hz: Rate | None = None
-    limit: float | list[float] | None = None
+    """First-order low-pass of the measured velocity; by default the bare backward difference of
+    the position."""
+    limit: float | list[float] | None = _gain("N m or N")
+    """Greatest magnitude of the command, above zero; one, or one per joint."""
     delay_s: Annotated[Time, Field(ge=0)] = 0.0
+    """From a sample to when its command acts; any fraction or multiple of a sample."""
     feedforward: bool = False
-    drive_gain: float | list[float] | None = None
+    """Whether the torque of the controller's nominal model, along the reference, is added (a
+    computed torque has it already: there it changes nothing)."""
+    drive_gain: float | list[float] | None = _gain("N m or N per unit of control signal")
+    """Of a drive whose loops work on a signal before an amplifier, above zero; the gains are then
+    per unit of torque above, in units of that signal. By default the gains make torques."""
 
     def controller(self, robot: Robot, where: str) -> Controller:
         """Return the controller of a robot; a single number stands for every joint.

@@ -27,6 +27,7 @@ A study changes criteria by tables that are named as the groups are::
 """
 
 from dynident.criteria.criteria import DEFAULTS, Criteria
+from dynident.criteria.criteria_schema import criteria_schema
 from dynident.criteria.criterion import ChangedCriterion
 from dynident.criteria.evidence_criteria import FitCriteria, MapCriteria, NoiseCriteria
 from dynident.criteria.judgement_criteria import (
@@ -63,4 +64,5 @@ __all__ = [
     "StickingCriteria",
     "VerdictCriteria",
     "WiringCriteria",
+    "criteria_schema",
 ]

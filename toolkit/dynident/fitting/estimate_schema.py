@@ -16,6 +16,7 @@ from dynident.effects import Effect, origin_of
 from dynident.inertia import LARGEST
 from dynident.model import Model
 from dynident.robot import BaseParameters
+from dynident.settings import in_unit
 
 FORMAT = "dynident-estimate-1"
 """Name and version of the file's format."""
@@ -37,109 +38,193 @@ _Number = Annotated[float, Field(gt=-LARGEST, lt=LARGEST)]
 _Size = Annotated[float, Field(ge=0.0, lt=LARGEST)]
 _Positive = Annotated[float, Field(gt=0.0, lt=LARGEST)]
 # What nothing is computed from: unknown (NaN, null) where nothing was fitted.
-_Reported = Annotated[float, BeforeValidator(_not_null), AfterValidator(_reported)]
+_Reported = Annotated[
+    float,
+    BeforeValidator(_not_null, json_schema_input_type=_Size | None),
+    AfterValidator(_reported),
+]
 _Index = Annotated[int, Field(ge=0)]
 
 
 class _Part(BaseModel):
-    model_config = ConfigDict(strict=True)
+    # What stands under a key is what the published schema says of it.
+    model_config = ConfigDict(strict=True, use_attribute_docstrings=True)
 
 
 class _Parameter(_Part):
+    """A parameter of the model."""
+
     name: str
+    """As `Izz.forearm` or `Fc@elbow`, see the page of symbols."""
     value: _Number
+    """In `unit`; what the data do not identify keeps the value of the description."""
     sigma: _Size | None
+    """Standard deviation, in `unit`; null where the parameter is not identified on its own."""
     unit: str
+    """Of value and sigma."""
     expression: str
+    """The parameter as a combination of the standard ones of links and effects."""
 
 
 class BasisPart(_Part):
-    """What the data identify."""
+    """What the data identify: independent columns, and what depends on them."""
 
     names: list[str]
+    """All parameters, in the order of the model."""
     independent: list[_Index]
+    """Places of those that stand for the base parameters, ascending."""
     dependent: list[_Index]
+    """Places of the others."""
     expressions: list[str]
+    """Each base parameter as a combination of parameters."""
     K: list[list[_Number]]
+    """(independent, dependent): the columns of the dependent are those of the independent times
+    K."""
     scale: list[_Size]
+    """Norm of each column, by which it was divided before the rank was decided."""
     diagonal: list[_Size]
+    """Of the triangular factor, in the order of its pivots."""
     tolerance: _Size
+    """Share of the first entry of `diagonal` below which a column is dependent."""
 
 
 class _Recording(_Part):
+    """A recording that the estimate rests on."""
+
     file: str
+    """Its name."""
     sha256: str
+    """Of the file's content."""
     filter: str
+    """How it was filtered, in words."""
 
 
 class _Origin(_Part):
+    """Where an effect of one's own came from."""
+
     module: str
+    """By which it was imported."""
     file: str
+    """Its name without its folder; empty for a notebook's cell and a console."""
     package: str
+    """That was installed and brings it; empty for none."""
 
 
 class _Effect(_Part):
+    """An effect of the model."""
+
     effect: str
+    """Its name in the catalogue, or `law:NAME`."""
     joint: str | None
+    """The joint whose torque changes; null for an effect of the whole robot."""
     source: str | None
+    """The other joint of a coupling."""
     shape: list[_Number]
+    """Its shape parameters, as they were found."""
     point: list[_Number] = []
+    """Values at which columns are taken that are not linear in them."""
     origin: _Origin | None = None
+    """Of an effect of one's own."""
 
 
 class _Range(_Part):
+    """A parameter inside a law, with its range."""
+
     name: str
+    """As in the formula."""
     lower: _Number
+    """Least that is sought."""
     upper: _Number
+    """Most that is sought."""
 
 
 class _Law(_Part):
+    """An effect as a formula."""
+
     name: str
+    """NAME of `law:NAME`."""
     torque: str
+    """The formula."""
     shape: list[_Range] = []
+    """Parameters inside it."""
 
 
 class _ShapePart(_Part):
+    """A parameter inside an effect, in which the torque is not linear."""
+
     name: str
+    """As `vs@elbow`."""
     value: _Number
+    """In `unit`."""
     sigma: _Size | None
+    """Standard deviation, in `unit`; null where it is not known."""
     unit: str
+    """Of value and sigma."""
 
 
 class ModelPart(_Part):
     """The model that was fitted."""
 
     robot: str
+    """Its description, the whole text."""
     joints: list[str]
-    gravity: list[_Number]
-    friction_width: _Positive | list[_Positive]
+    """In the order of columns."""
+    gravity: list[_Number] = Field(json_schema_extra=in_unit("m/s^2"))
+    """In the axes of the description's base."""
+    friction_width: _Positive | list[_Positive] = Field(json_schema_extra=in_unit("rad/s or m/s"))
+    """Speed within which dry friction turns over; one, or one per joint."""
     effects: list[_Effect]
+    """Those that were fitted."""
     laws: list[_Law] = []
+    """Formulas that they need."""
 
 
 class EstimateFile(_Part):
-    """The whole file."""
+    """Identified parameters, with what they rest on."""
 
     format: Literal["dynident-estimate-1"]
+    """Name and version of the format."""
     method: str
+    """How it was estimated."""
     status: str
+    """The solver's word."""
     parameters: list[_Parameter]
+    """In the order of the model."""
     covariance: list[list[_Square]]
+    """Of the parameters, in products of their units; rows of those that are not identified on
+    their own are zero."""
     basis: BasisPart
-    torque_std: list[_Reported]
-    joint_errors: list[_Reported]
-    error: _Reported
-    condition_number: _Reported
+    """What the data identify."""
+    torque_std: list[_Reported] = Field(json_schema_extra=in_unit("N m or N"))
+    """Standard deviation of the torque residual of each joint; null where nothing was fitted."""
+    joint_errors: list[_Reported] = Field(json_schema_extra=in_unit("1"))
+    """Of each joint: norm of the residual over norm of the torque, on the data of the fit."""
+    error: _Reported = Field(json_schema_extra=in_unit("1"))
+    """The same over all joints."""
+    condition_number: _Reported = Field(json_schema_extra=in_unit("1"))
+    """Of the columns identified, as they were weighted."""
     rows: Annotated[int, Field(ge=0, le=10**15)]
+    """Number of equations."""
     notes: list[str]
+    """Caveats in plain words."""
     sigma_words: str = ""
+    """What the standard deviations hold, where the method has its own."""
     headline: str = ""
+    """What is to be read before any number: that the model is rejected; empty if it is not."""
     shapes: list[_ShapePart] = []
+    """Parameters inside effects, as they were found."""
     recordings: list[_Recording]
+    """Those that it rests on."""
     links: dict[str, list[_Number]] | None = None
+    """Inertial parameters of each link in its own frame (mass, first moments, Ixx, Ixy, Ixz, Iyy,
+    Iyz, Izz about its origin), where the fit chose them; null where only base parameters are
+    known."""
     certificate: dict[str, Any] | None = None
+    """How far a constrained fit is from the optimum of its problem; not read back."""
     iterations: dict[str, Any] | None = None
+    """Of an instrumental variable estimate; not read back."""
     model: ModelPart
+    """The model that was fitted."""
 
 
 def basis_part(basis: BaseParameters) -> dict[str, Any]:

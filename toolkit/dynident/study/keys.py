@@ -1,12 +1,14 @@
-"""The keys of a study file in words, from the docstrings of its tables."""
+"""The keys of a study file in words, from what its tables say of themselves."""
 
 from __future__ import annotations
 
 import inspect
-from typing import Any
+import textwrap
 
-from dynident.closed_loop import Controller
+from dynident.closed_loop import ControllerFile
+from dynident.effects import LawEntry
 from dynident.fitting.loads import LoadEntry
+from dynident.settings import SettingsTable
 from dynident.study.study_file import (
     ColumnEntry,
     FilterEntry,
@@ -15,25 +17,36 @@ from dynident.study.study_file import (
     StudyFile,
 )
 
-TABLES: tuple[tuple[str, type[Any]], ...] = (
+TABLES: tuple[tuple[str, type[SettingsTable]], ...] = (
     ("At the top", StudyFile),
     ("[[recordings]]", RecordingEntry),
     ("[columns]", ColumnEntry),
     ("[filter]", FilterEntry),
     ("[noise]", NoiseEntry),
     ("[loads.NAME]", LoadEntry),
-    ("[controller]", Controller),
+    ("[controller]", ControllerFile),
+    ("[laws.NAME]", LawEntry),
 )
 """Tables of a study file by their headings."""
 
 
 def keys_in_words() -> str:
-    """Return every table of a study file with its keys, as their docstrings have them."""
-    return "\n\n".join(f"{heading}\n{_indented(table)}" for heading, table in TABLES)
+    """Return every table of a study file with its keys, as the classes have them."""
+    return "\n\n".join(f"{heading}\n{_table(table)}" for heading, table in TABLES)
 
 
-def _indented(table: type[Any]) -> str:
-    text = inspect.cleandoc(table.__doc__ or "").partition("\nRaises\n")[0].rstrip()
-    # The underlined word "Attributes" is for programmers.
-    lines = text.replace("\nAttributes\n----------\n", "\n").splitlines()
-    return "\n".join(f"    {line}" if line else "" for line in lines)
+def _table(table: type[SettingsTable]) -> str:
+    said = textwrap.indent(inspect.cleandoc(table.__doc__ or ""), _INDENT)
+    keys = (
+        textwrap.fill(
+            f"{key} : {' '.join((field.description or '').split())}",
+            width=96,
+            initial_indent=_INDENT,
+            subsequent_indent=2 * _INDENT,
+        )
+        for key, field in table.model_fields.items()
+    )
+    return "\n".join((said, "", *keys))
+
+
+_INDENT = "    "

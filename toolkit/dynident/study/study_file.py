@@ -8,85 +8,76 @@ from pydantic import Field, field_validator
 from pydantic_core import PydanticCustomError
 
 from dynident.closed_loop import ControllerFile
+from dynident.criteria import criteria_schema
 from dynident.effects import FRICTION_WIDTH, LawsEntry
 from dynident.fitting.loads import LoadEntry, PayloadEntry
-from dynident.settings import Duration, Gravity, Rate, SettingsTable, Time
+from dynident.settings import Duration, Gravity, Rate, SettingsTable, Time, in_unit
 
 _NARROWEST, _WIDEST = 1e-9, 1e3
 """rad/s or m/s over which dry friction changes its sign."""
-_Gain = Annotated[float, Field(ge=-1e9, le=1e9)]
-_Std = Annotated[float, Field(le=1e9)]
+_Gain = Annotated[float, Field(ge=-1e9, le=1e9, json_schema_extra=in_unit("N m (or N) per A or %"))]
+_PositionStd = Annotated[float, Field(le=1e9, json_schema_extra=in_unit("rad or m"))]
+_TorqueStd = Annotated[float, Field(le=1e9, json_schema_extra=in_unit("N m, N, A or %"))]
+_Width = Annotated[float, Field(json_schema_extra=in_unit("rad/s or m/s"))]
 
 
 class RecordingEntry(SettingsTable):
-    """A file of data, or several that have the rest in common.
-
-    Attributes
-    ----------
-    file : its name, from the folder of the study; a pattern, as `"runs/train_*.csv"`, one
-        recording for each file that matches, in the order of the numbers in their names; or a list
-        of either.
-    record : which one of an NPZ or MAT file that holds several; then it is one file.
-    columns : names of the columns of a text file without a header line, by position, as
-        `["t", "q.joint1", "-"]`; "" or "-" skips one.
-    rate_hz : sampling rate, where the file has no column of time.
-    topic : of a bag that holds the joints on several, as `"/joint_states"`.
-    use : "train" to fit, "test" to judge by.
-    period : s after which the excitation repeats.
-    start : s, when the recording began in the session, for what warms up.
-    window : [t0, t1] in s of the file's clock: what is used of it once the whole is filtered.
-    payload : whether the load under study was on board, true or false; "unknown" asks for it. Or
-        the name of one of several loads, see `LoadEntry`, or what is known of a load without one:
-        `payload = { mass = 2.8, centre = [0.0, 0.02, 0.05] }`.
-    """
+    """A file of data, or several that have the rest in common."""
 
     file: str | list[str]
+    """Its name, from the folder of the study; a pattern, as `"runs/train_*.csv"`, one recording for
+    each file that matches, in the order of the numbers in their names; or a list of either."""
     record: str | None = None
+    """Which one of an NPZ or MAT file that holds several; then it is one file."""
     columns: list[str] | None = None
+    """Names of the columns of a text file without a header line, by position, as
+    `["t", "q.joint1", "-"]`; "" or "-" skips one."""
     rate_hz: Rate | None = None
+    """Sampling rate, where the file has no column of time."""
     topic: str = ""
+    """Of a bag that holds the joints on several, as `"/joint_states"`."""
     use: Literal["train", "test"] = "train"
+    """`"train"` to fit, `"test"` to judge by."""
     period: Duration | None = None
+    """After which the excitation repeats: what differs between repetitions is the noise."""
     start: Time = 0.0
+    """When the recording began in the session, for what warms up or drifts."""
     window: tuple[Time, Time] | None = None
+    """[t0, t1] of the file's clock: what is used of it once the whole is filtered."""
     payload: PayloadEntry = None
+    """Whether the load under study was on board, true or false; `"unknown"` asks for it. Or the
+    name of one of several loads, see [loads.NAME], or what is known of a load without a name:
+    `payload = { mass = 2.8, centre = [0.0, 0.02, 0.05] }`."""
 
 
 class FilterEntry(SettingsTable):
     """How positions are differentiated, and columns and torque filtered alike.
 
     Without this table frequencies follow the sampling rate; see `dynident.recording.Filter`.
-
-    Attributes
-    ----------
-    position_cutoff_hz : zero-phase low-pass of q before it is differentiated; "none" for none. By
-        default it follows the sampling rate.
-    cutoff_hz : the same low-pass on every column and on the torque.
-    rate_hz : decimated to about this; without it every sample is kept.
-    decimation : "pick" keeps every k-th filtered row, "chebyshev" filters as MATLAB's `decimate`.
-    edge_s : [start, end] in s dropped after differentiation.
-    ends : "drop" leaves out what filters make up at the ends, "keep" uses all of the record.
     """
 
     position_cutoff_hz: Rate | Literal["default", "none"] = "default"
+    """Zero-phase low-pass of q before it is differentiated; `"none"` for none. By default it
+    follows the sampling rate."""
     cutoff_hz: Rate | None = None
+    """The same low-pass on every column and on the torque."""
     rate_hz: Rate | None = None
+    """Decimated to about this; without it every sample is kept."""
     decimation: Literal["pick", "chebyshev"] = "pick"
+    """`"pick"` keeps every k-th filtered row, `"chebyshev"` filters as MATLAB's `decimate`."""
     edge_s: tuple[Time, Time] = (0.0, 0.0)
+    """[start, end] dropped after differentiation."""
     ends: Literal["drop", "keep"] = "drop"
+    """`"drop"` leaves out what filters make up at the ends, `"keep"` uses all of the record."""
 
 
 class NoiseEntry(SettingsTable):
-    """Standard deviations of a raw sample, where nothing repeats: one number, or one per joint.
+    """Standard deviations of a raw sample, where nothing repeats: one number, or one per joint."""
 
-    Attributes
-    ----------
-    position_std : rad or m.
-    torque_std : in the unit of the torques.
-    """
-
-    position_std: _Std | list[_Std]
-    torque_std: _Std | list[_Std]
+    position_std: _PositionStd | list[_PositionStd]
+    """Of the position."""
+    torque_std: _TorqueStd | list[_TorqueStd]
+    """Of the torque, in the unit in which torques are recorded."""
 
 
 class ColumnEntry(SettingsTable):
@@ -101,61 +92,60 @@ class ColumnEntry(SettingsTable):
     """
 
     name: str
+    """The file's name of the column, or a linear expression of its columns."""
     scale: float = 1.0
+    """Factor from the file's unit to ours (s, rad or m, N m or N)."""
 
 
 class StudyFile(SettingsTable):
-    """What a study file says; `robot` and [[recordings]] have to be there.
-
-    Attributes
-    ----------
-    robot : its description (URDF, SDF, MJCF), a path from the folder of the study.
-    joints : names, the order of columns; by default every joint that moves.
-    effects : that the robot is said to have, `name` or `name@joint`.
-    effect_modules : Python files with effects of one's own, as `["my_effects.py"]`, paths from the
-        folder of the study. To read the study is to run them: what nobody has said yes to before
-        is asked for on a terminal, and refused elsewhere without --trust.
-    torque : "measured", or "held_command" where a command acts from its sample to the next.
-    torque_unit : "N m" (and N, of prismatic joints), or the unit of the drives, "A" or "%": then
-        each joint's gain is identified, and torques are converted before anything else is done.
-    drive_gains : joint -> its gain where that is known, N m (or N) per unit; one fixes the scale.
-    trusted : links whose mass, centre and inertia in the description are right, as of a hand that
-        was weighed; with torque_unit = "A" they fix the scale, as far as what they weigh shows
-        without that of links that are not trusted.
-    loads : name -> a load that recordings carry; a known one fixes the scale.
-    friction_width : speed (rad/s or m/s) within which dry friction turns over; one, or by joint.
-    gravity : m/s^2, in the axes of the description's base.
-    recordings : files of data.
-    filter : how positions are differentiated, and what is filtered alike.
-    noise : of a raw sample, where nothing repeats.
-    controller : of the closed loop; see `dynident.Controller`.
-    laws : effects as formulas, in tables `[laws.NAME]` or files of their own; see
-        `dynident.effects.LawEntry`. At a joint such an effect is `law:NAME@joint`.
-    columns : ours -> the files' names of columns, or linear expressions of them. Ours are t, and
-        for each joint q.<joint>, tau.<joint>, v.<joint>, a.<joint>, q_ref.<joint> and
-        temperature.<joint>; for a wrench sensor wrench.<link>.fx, .fy, .fz, .tx, .ty and .tz, in N
-        and N m in the frame of that link of the description, for `dynident payload`.
-    criteria : numbers that decide a diagnosis, otherwise than by default; see `Criteria`.
-    """
+    """What a study file says; `robot` and [[recordings]] have to be there."""
 
     robot: str
+    """Its description (URDF, SDF, MJCF), a path from the folder of the study."""
     joints: list[str] | None = None
+    """Names, the order of columns; by default every joint that moves."""
     effects: list[str] = Field(default_factory=list)
+    """Those that the robot is said to have, `name` or `name@joint`."""
     effect_modules: list[str] = Field(default_factory=list)
+    """Python files with effects of one's own, as `["my_effects.py"]`, paths from the folder of the
+    study. To read the study is to run them: what nobody has said yes to before is asked for on a
+    terminal, and refused elsewhere without --trust."""
     torque: Literal["measured", "held_command"] = "measured"
+    """`"measured"`, or `"held_command"` where a command acts from its sample to the next."""
     torque_unit: Literal["N m", "A", "%"] = "N m"
+    """`"N m"` (and N, of prismatic joints), or the unit of the drives, `"A"` or `"%"`: then each
+    joint's gain is identified, and torques are converted before anything else is done."""
     drive_gains: dict[str, _Gain] = Field(default_factory=dict)
+    """Joint -> its gain where that is known; one fixes the scale."""
     trusted: list[str] = Field(default_factory=list)
+    """Links whose mass, centre and inertia in the description are right, as of a hand that was
+    weighed; with `torque_unit = "A"` they fix the scale, as far as what they weigh shows without
+    that of links that are not trusted."""
     loads: dict[str, LoadEntry] = Field(default_factory=dict)
-    friction_width: float | dict[str, float] = FRICTION_WIDTH
+    """Name -> a load that recordings carry; a known one fixes the scale."""
+    friction_width: _Width | dict[str, _Width] = FRICTION_WIDTH
+    """Speed within which dry friction turns over, from 1e-9 to 1000; one, or by joint."""
     gravity: tuple[Gravity, Gravity, Gravity] | None = None
+    """In the axes of the description's base; by default [0, 0, -9.81], or what the description
+    says."""
     recordings: list[RecordingEntry]
+    """Files of data."""
     filter: FilterEntry | None = None
+    """How positions are differentiated, and what is filtered alike."""
     noise: NoiseEntry | None = None
+    """Noise of a raw sample, where nothing repeats."""
     controller: ControllerFile | None = None
+    """The controller of the closed loop: needed to simulate it, and for instruments from it."""
     laws: LawsEntry = Field(default_factory=dict)
+    """Effects as formulas, in tables [laws.NAME] or files of their own. At a joint such an effect
+    is `law:NAME@joint`."""
     columns: dict[str, str | ColumnEntry] = Field(default_factory=dict)
-    criteria: dict[str, Any] = Field(default_factory=dict)
+    """Ours -> the files' names of columns, or linear expressions of them. Ours are t, and for each
+    joint q.<joint>, tau.<joint>, v.<joint>, a.<joint>, q_ref.<joint> and temperature.<joint>; for a
+    wrench sensor wrench.<link>.fx, .fy, .fz, .tx, .ty and .tz, in N and N m in the frame of that
+    link of the description, for `dynident payload`."""
+    criteria: dict[str, Any] = Field(default_factory=dict, json_schema_extra=criteria_schema())
+    """Numbers that decide a diagnosis, otherwise than by default, in tables [criteria.GROUP]."""
 
     @field_validator("friction_width")
     @classmethod

@@ -18,36 +18,88 @@ from dynident.effect_modules import Permission, import_effects, require_sound
 from dynident.effects import FRICTION_WIDTH, LawsEntry, laws_of
 from dynident.errors import DynidentError, SimulationError, StudyError
 from dynident.robot import Robot
-from dynident.settings import Duration, Gravity, SettingsTable, Time, read_toml
+from dynident.settings import Duration, Gravity, SettingsTable, Time, in_unit, read_toml
+
+_Number = float | list[float]
 
 
-class _EffectEntry(SettingsTable):
+def _per_joint(unit: str):
+    """A number, or one per joint, that the file may leave out."""
+    return Field(default=None, json_schema_extra=in_unit(unit))
+
+
+def _ideal(unit: str):
+    """The same of a sensor, which by default adds nothing."""
+    return Field(default=0.0, json_schema_extra=in_unit(unit))
+
+
+class TrueEffectEntry(SettingsTable):
+    """An effect that the robot truly has."""
+
     effect: str
+    """`name@joint`, or `name` of an effect of the whole robot."""
     values: dict[str, float] = Field(default_factory=dict)
+    """Its parameters, as `{ Fv = 0.9 }`, in their units (see the catalogue); others are zero."""
     shape: dict[str, float] = Field(default_factory=dict)
+    """Its shape parameters, as `{ vs = 0.12 }`; by default the middle of their grid."""
     hidden: bool = False
+    """Whether the study that is written does not mention it."""
 
 
-class _SensorsEntry(SettingsTable):
-    position_std: float | list[float] = 0.0
-    position_resolution: float | list[float] = 0.0
-    torque_std: float | list[float] = 0.0
-    torque_resolution: float | list[float] = 0.0
-    temperature_std: float | list[float] | None = None
+class SensorsEntry(SettingsTable):
+    """What is measured, and how well; a number, or one per joint."""
+
+    position_std: _Number = _ideal("rad or m")
+    """White noise of each position sample."""
+    position_resolution: _Number = _ideal("rad or m")
+    """One step of the encoder; 0 for none."""
+    torque_std: _Number = _ideal("N m or N")
+    """White noise of each recorded torque."""
+    torque_resolution: _Number = _ideal("N m or N")
+    """One step of the record; 0 for none."""
+    temperature_std: _Number | None = _per_joint("K")
+    """White noise of the motors' recorded temperatures; without it none are recorded."""
 
 
-class _TrajectoryEntry(SettingsTable):
+class TrajectoryEntry(SettingsTable):
+    """A random Fourier series, as large as the robot's limits allow; or one by its coefficients.
+
+    q(t) = centre + sum over k of sine_k sin(k w t) + cosine_k cos(k w t), w = 2 pi/period.
+    """
+
     harmonics: int = Field(default=5, ge=1, le=MOST_HARMONICS)
+    """How many; of a random series."""
     seed: int | None = Field(default=None, ge=0)
-    amplitude: float | list[float] | None = None
-    speed: float | list[float] | None = None
-    acceleration: float | list[float] | None = None
-    centre: float | list[float] | None = None
-    sine: list[list[float]] | None = None
-    cosine: list[list[float]] | None = None
+    """Of a random series; by default it follows from the seed of the experiment and the recording's
+    place."""
+    amplitude: _Number | None = _per_joint("rad or m")
+    """Most that a random series leaves its centre; by default what the limits allow."""
+    speed: _Number | None = _per_joint("rad/s or m/s")
+    """Most that a random series reaches."""
+    acceleration: _Number | None = _per_joint("rad/s^2 or m/s^2")
+    """Most that a random series reaches."""
+    centre: _Number | None = _per_joint("rad or m")
+    """The middle; by default that of the limits."""
+    sine: list[list[float]] | None = _per_joint("rad or m")
+    """A row of amplitudes for each joint; with `cosine` and `centre`, in place of a random
+    series."""
+    cosine: list[list[float]] | None = _per_joint("rad or m")
+    """The same of the cosines."""
 
     def trajectory(self, robot: Robot, period: float, seed: object) -> Fourier:
-        """Return the series that is stated, or a random one."""
+        """Return the series that is stated, or a random one.
+
+        Parameters
+        ----------
+        robot : whose joints move, and whose limits a random series keeps.
+        period : s.
+        seed : of a random series.
+
+        Raises
+        ------
+        SimulationError
+            If the series is stated in part only, or does not fit the robot.
+        """
         settings = self.model_dump(exclude={"seed", "sine", "cosine"})
         if self.sine is None and self.cosine is None:
             return Fourier.random(robot, period, seed, **settings)  # type: ignore[arg-type]
@@ -62,45 +114,65 @@ class _TrajectoryEntry(SettingsTable):
         return Fourier(period, *arrays)
 
 
-class _ExperimentRecordingEntry(SettingsTable):
+class ExperimentRecordingEntry(SettingsTable):
+    """A recording to be made."""
+
     file: str
+    """Its name, without a folder; the suffix (.csv, .npz, .mat or .parquet) is its format."""
     use: Literal["train", "test"] = "train"
+    """As in a study."""
     duration: Duration
+    """How long it is."""
     period: Duration
+    """After which the motion repeats."""
     start: Time = 0.0
+    """When it begins in the session, for what warms up or drifts."""
     payload: bool = False
-    trajectory: _TrajectoryEntry = _TrajectoryEntry()
+    """Whether the payload is on board."""
+    trajectory: TrajectoryEntry = TrajectoryEntry()
+    """The motion that is asked for."""
 
 
-class _ExperimentFile(SettingsTable):
+class ExperimentFile(SettingsTable):
+    """A robot as it truly is, its controller, and the recordings to be made of it."""
+
     robot: str
+    """The true robot (URDF, SDF, MJCF), a path from the folder of the file."""
     nominal: str | None = None
+    """The description that the user of the recordings is given; by default the true one."""
     joints: list[str] | None = None
+    """Names, the order of columns; by default every joint that moves."""
     gravity: tuple[Gravity, Gravity, Gravity] | None = None
+    """In the axes of the description's base; by default as in a study."""
     seed: int = Field(default=0, ge=0)
-    friction_width: float = Field(default=FRICTION_WIDTH, ge=1e-9, le=1e3)
+    """Of all noise, and of motions that state no seed of their own."""
+    friction_width: float = Field(
+        default=FRICTION_WIDTH, ge=1e-9, le=1e3, json_schema_extra=in_unit("rad/s or m/s")
+    )
+    """Speed within which dry friction turns over."""
     torque: Literal["held_command", "measured"] = "held_command"
+    """What is recorded: the command, held from its sample to the next, or its mean over the sample
+    before and the one after, as a sensor of limited bandwidth has it."""
     lead_in: Annotated[Time, Field(ge=0)] = LEAD_IN
+    """Simulated before each recording, for its transient to decay."""
     effect_modules: list[str] = Field(default_factory=list)
-    effects: list[_EffectEntry] = Field(default_factory=list)
+    """Python files with effects of one's own, as in a study."""
+    effects: list[TrueEffectEntry] = Field(default_factory=list)
+    """Effects that the robot truly has."""
     laws: LawsEntry = Field(default_factory=dict)
+    """Effects as formulas, as in a study."""
     controller: ControllerFile
-    sensors: _SensorsEntry = _SensorsEntry()
-    recordings: list[_ExperimentRecordingEntry]
+    """The loop that moves the robot; it needs `rate_hz`."""
+    sensors: SensorsEntry = SensorsEntry()
+    """What is measured, and how well."""
+    recordings: list[ExperimentRecordingEntry]
+    """Those that are made."""
 
 
 def load_experiment(path: str | Path, *, modules: Permission = "trusted") -> Experiment:
     """Read an experiment file and the robots that it names.
 
-    Keys: `robot` (the true one; paths are relative to the file), `nominal` (given to the user;
-    default the true one), `joints`, `effect_modules` (as in a study), `gravity`, `seed`,
-    `friction_width`, `torque`, `lead_in`;
-    [[effects]] `effect`, `values`, `shape`, `hidden`; [laws] and [controller] as in a study;
-    [sensors] `position_std`, `position_resolution`, `torque_std`, `torque_resolution`,
-    `temperature_std` (a number, or one per joint; without the last there are no temperatures);
-    [[recordings]] `file`, `use`, `duration`, `period`, `start`, `payload`, `trajectory` with
-    `harmonics`, `seed`, `amplitude`, `speed`, `acceleration`, `centre`, or with `centre`, `sine`
-    and `cosine`, rows of amplitudes of each joint.
+    Its keys are those of `ExperimentFile`.
 
     Parameters
     ----------
@@ -118,7 +190,7 @@ def load_experiment(path: str | Path, *, modules: Permission = "trusted") -> Exp
         If a robot description is unusable.
     """
     path = Path(path)
-    said = read_toml(path, _ExperimentFile)
+    said = read_toml(path, ExperimentFile)
     brought = import_effects(said.effect_modules, path, modules)
     robot = _robot(said, path, said.robot)
     require_sound(brought, robot)
@@ -151,12 +223,12 @@ def load_experiment(path: str | Path, *, modules: Permission = "trusted") -> Exp
         raise _at(error, path) from None
 
 
-def _robot(said: _ExperimentFile, path: Path, file: str) -> Robot:
+def _robot(said: ExperimentFile, path: Path, file: str) -> Robot:
     return Robot.from_file(path.parent / file, said.joints, said.gravity)
 
 
 def _run(
-    entry: _ExperimentRecordingEntry, said: _ExperimentFile, path: Path, robot: Robot, number: int
+    entry: ExperimentRecordingEntry, said: ExperimentFile, path: Path, robot: Robot, number: int
 ) -> ExperimentRun:
     seed = entry.trajectory.seed
     # Recordings that name no seed differ from each other all the same.

@@ -17,18 +17,15 @@ MOST = 200
 
 
 class LawEntry(SettingsTable):
-    """A law, in a table `[laws.NAME]`; or a file of laws.
-
-    Attributes
-    ----------
-    torque : the formula, as `"c*v*sin(k*q + p)"`; see `dynident.formulas.parse_formula`.
-    shape : range of each parameter inside the formula, as `{ k = [1, 6], p = [-3.2, 3.2] }`.
-    file : of settings whose `[laws.NAME]` tables are meant instead, from the folder of this one.
-    """
+    """A law, in a table [laws.NAME]; or a file of laws."""
 
     torque: str | None = None
+    """The formula, as `"c*v*sin(k*q + p)"`; see `dynident.formulas.parse_formula`."""
     shape: dict[str, tuple[float, float]] = Field(default_factory=dict)
+    """Range of each parameter inside the formula, as `{ k = [1, 6], p = [-3.2, 3.2] }`."""
     file: str | None = None
+    """A file of settings whose [laws.NAME] tables are meant instead, from the folder of this
+    one."""
 
     def law(self, name: str) -> Law:
         """Return it under a name."""
@@ -49,7 +46,8 @@ def _tables(said: Any) -> Any:
     return said
 
 
-LawsEntry = Annotated[dict[str, LawEntry], BeforeValidator(_tables)]
+_Said = str | list[str] | dict[str, str | LawEntry]
+LawsEntry = Annotated[dict[str, LawEntry], BeforeValidator(_tables, json_schema_input_type=_Said)]
 """`laws` of a study: tables `[laws.NAME]`; or a file of laws, a list of such files, or a file in
 place of a table."""
 

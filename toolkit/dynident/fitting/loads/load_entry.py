@@ -9,32 +9,28 @@ from pydantic import Field
 
 from dynident.errors import StudyError
 from dynident.fitting.loads.load import Load
-from dynident.settings import SettingsTable, nearest
+from dynident.settings import SettingsTable, in_unit, nearest
 
 _LARGEST = 1e6
-_Place = Annotated[float, Field(ge=-1e3, le=1e3)]
-_Moment = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST)]
+_Place = Annotated[float, Field(ge=-1e3, le=1e3, json_schema_extra=in_unit("m"))]
+_Moment = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST, json_schema_extra=in_unit("kg m^2"))]
 UNKNOWN = "unknown"
 """What `payload` says of a recording of which nobody knows whether it carries the load."""
 
 
 class LoadEntry(SettingsTable):
-    """A load that some recordings carry; what is left out is unknown, and is identified.
+    """A load that some recordings carry; what is left out is unknown, and is identified."""
 
-    Attributes
-    ----------
-    mass : kg.
-    centre : [x, y, z] of its centre of mass, m, in the frame of `link`.
-    inertia : [Ixx, Ixy, Ixz, Iyy, Iyz, Izz] about its centre of mass, kg m^2, in the axes of
-        `link`; goes with a centre.
-    link : a link that the last joint moves, as "tool0"; by default the one that it drives, or that
-        of the wrench sensor that weighs the load.
-    """
-
-    mass: float | None = Field(default=None, gt=0, le=_LARGEST)
+    mass: float | None = Field(default=None, gt=0, le=_LARGEST, json_schema_extra=in_unit("kg"))
+    """What it weighs."""
     centre: tuple[_Place, _Place, _Place] | None = None
+    """[x, y, z] of its centre of mass, in the frame of `link`."""
     inertia: tuple[_Moment, _Moment, _Moment, _Moment, _Moment, _Moment] | None = None
+    """[Ixx, Ixy, Ixz, Iyy, Iyz, Izz] about its centre of mass, in the axes of `link`; goes with a
+    centre."""
     link: str = ""
+    """A link that the last joint moves, as `"tool0"`; by default the one that it drives, or that
+    of the wrench sensor that weighs the load."""
 
     def load(self, name: str) -> Load:
         """Return the load by its name."""
