@@ -40,6 +40,7 @@ FLOORS = (
     ("study_draft",),
     ("refitting",),
     ("reporting",),
+    ("explorer",),
     ("cli",),
 )
 """Rooms (and files beside them), the ground floor first: imports go to floors below."""

@@ -4,10 +4,10 @@
 in a study are relative to its folder; unknown keys are refused by name. Its keys:
 """
 
-from dynident.study.adding import add_effects
+from dynident.study.adding import add_effects, study_digest
 from dynident.study.keys import keys_in_words
 from dynident.study.loading import Study, load
 from dynident.study.wrenches import load_wrenches
 
-__all__ = ["Study", "add_effects", "load", "load_wrenches"]
+__all__ = ["Study", "add_effects", "load", "load_wrenches", "study_digest"]
 __doc__ = f"{__doc__}\n{keys_in_words()}\n"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 import tomllib
@@ -15,7 +16,24 @@ from dynident.effects import Effect, Law, laws_table
 from dynident.errors import StudyError
 
 
-def add_effects(path: str | Path, effects: tuple[Effect, ...], laws: tuple[Law, ...] = ()) -> None:
+def study_digest(path: str | Path) -> str:
+    """Return the SHA-256 of a study file's text, by which it is known again.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read.
+    """
+    return _digest(files.read_text(path))
+
+
+def add_effects(
+    path: str | Path,
+    effects: tuple[Effect, ...],
+    laws: tuple[Law, ...] = (),
+    *,
+    digest: str | None = None,
+) -> None:
     """Write effects into a study file, comments and order untouched.
 
     Parameters
@@ -23,21 +41,28 @@ def add_effects(path: str | Path, effects: tuple[Effect, ...], laws: tuple[Law, 
     path : the study file.
     effects : to add to its list.
     laws : of theirs that it does not have, to be written as tables at its end.
+    digest : `study_digest` of the file that is meant; None for whatever it is by now.
 
     Raises
     ------
     StudyError
-        If there is no way to do so that leaves all else in the file as it is, or it has one of
-        them already.
+        If there is no way to do so that leaves all else in the file as it is, it has one of them
+        already, or it is another file by now.
     """
     path = Path(path)
     with files.held(path):  # somebody else may add to it at the same time
-        _add(path, [effect.label for effect in effects], laws)
+        text = files.read_text(path)
+        if digest is not None and _digest(text) != digest:
+            raise StudyError("has changed since it was read", str(path), "nothing was written")
+        _add(path, text, [effect.label for effect in effects], laws)
 
 
-def _add(path: Path, labels: list[str], laws: tuple[Law, ...]) -> None:
-    """Write labels of effects into a study file that nobody else writes."""
-    text = files.read_text(path)
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _add(path: Path, text: str, labels: list[str], laws: tuple[Law, ...]) -> None:
+    """Write labels of effects into a study file of this text that nobody else writes."""
     wanted = tomllib.loads(text)
     twice = [one for one in labels if one in wanted.get("effects", [])]
     if twice:
