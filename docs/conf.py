@@ -32,12 +32,26 @@ napoleon_google_docstring = False
 
 def setup(app: Any) -> None:
     """Join the steps of this site to a build."""
+    app.connect("builder-inited", _draw)
     app.connect("source-read", _for_the_site)
 
 
+def _draw(app: Any) -> None:
+    """Draw the pictures that are made with the site."""
+    from effect_pictures import write_pictures
+
+    write_pictures(HERE / "_made" / "effects")
+
+
 def _for_the_site(app: Any, docname: str, source: list[str]) -> None:
-    """Leave out of a page what only a forge shows: Mermaid, and links to folders of the source."""
+    """Leave out of a page what only a forge shows: Mermaid, and links to folders of the source.
+
+    What only the site has is put in: pictures that are made with it.
+    """
     text = re.sub(r"```mermaid\n.*?```\n", "", source[0], flags=re.DOTALL)
+    text = re.sub(
+        r"<!-- picture of (\w+) -->", r"![\1 in the residual](_made/effects/\1.png)", text
+    )
     folder = Path(app.env.doc2path(docname)).parent
 
     def link(found: re.Match[str]) -> str:

@@ -110,7 +110,7 @@ def _kind(said: Schema, schema: Schema) -> str:
         plural = {"number": "numbers", "text": "texts", "table": "tables"}
         return f"list of {plural.get(one, one.replace('list', 'lists'))}"
     plain = {"string": "text", "integer": "whole number", "boolean": "true or false"}
-    return plain.get(said["type"], said["type"])
+    return plain.get(said["type"]) or str(said["type"])
 
 
 def _limits(said: Schema) -> str:

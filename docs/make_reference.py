@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
+from effect_catalogue import effect_symbols, effect_table, effects, inertial_symbols
 from key_tables import key_tables
 from made_parts import renewed
 from published_schemas import FILES, schema, schema_path, schema_text
@@ -38,7 +39,9 @@ def _keys(name: str) -> str:
 
 
 PAGES: Mapping[str, Parts] = {
-    f"reference/{name}.md": {"keys": partial(_keys, name)} for name in FILES
+    **{f"reference/{name}.md": {"keys": partial(_keys, name)} for name in FILES},
+    "effects.md": {"table": effect_table, "effects": effects},
+    "symbols.md": {"inertial": inertial_symbols, "effects": effect_symbols},
 }
 """Pages by their paths in this folder, with their made parts."""
 

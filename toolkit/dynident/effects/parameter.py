@@ -10,12 +10,14 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Parameter:
-    """A linear parameter of an effect: its name, unit and physical bounds."""
+    """A linear parameter of an effect: its name, unit, physical bounds, and what it is in words."""
 
     name: str
     unit: str
     lower: float = -np.inf
     upper: float = np.inf
+    _: KW_ONLY
+    means: str = ""
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,7 @@ class ShapeParameter:
     _: KW_ONLY
     lower: float
     upper: float
+    means: str = ""
 
     def coordinate(self, value: float) -> float:
         """Return the coordinate of a value."""

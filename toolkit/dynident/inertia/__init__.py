@@ -22,6 +22,7 @@ from dynident.inertia.log_cholesky import (
 from dynident.inertia.margins import Margins, margins
 from dynident.inertia.parameters import (
     LARGEST,
+    MEANINGS,
     PARAMETERS,
     UNITS,
     MassProperties,
@@ -44,6 +45,7 @@ from dynident.inertia.virtual import (
 __all__ = [
     "LARGEST",
     "LOG_CHOLESKY",
+    "MEANINGS",
     "PAPER_ORDER",
     "PARAMETERS",
     "UNITS",

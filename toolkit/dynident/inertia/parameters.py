@@ -14,6 +14,17 @@ from numpy.typing import ArrayLike, NDArray
 
 PARAMETERS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 UNITS = ("kg", "kg m", "kg m", "kg m", *(("kg m^2",) * 6))
+MEANINGS = (
+    "mass",
+    *(f"first moment: mass times the {x} of its centre" for x in "xyz"),
+    "moment of inertia about x",
+    "product of inertia, minus the integral of x y",
+    "moment of inertia about y",
+    "product of inertia, minus the integral of x z",
+    "product of inertia, minus the integral of y z",
+    "moment of inertia about z",
+)
+"""What each is, in the frame of its joint and about its origin."""
 
 # Row and column in the symmetric matrix of each of the six inertia parameters.
 _ROW = np.array([0, 0, 1, 0, 1, 2])

@@ -40,7 +40,10 @@ class BaseTilt(Forceless):
     nonlinear = True
 
     def parameters(self, robot):
-        return (Parameter("rx", "rad", -1.0, 1.0), Parameter("ry", "rad", -1.0, 1.0))
+        return tuple(
+            Parameter(f"r{axis}", "rad", -1.0, 1.0, means=f"rotation of the base about {axis}")
+            for axis in "xy"
+        )
 
     def columns(self, block: Block) -> np.ndarray:
         body = block.fitted_robot(self.label)

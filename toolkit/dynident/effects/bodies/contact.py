@@ -29,14 +29,25 @@ class Contact(JointEffect):
     found_by = "repetition"
 
     def parameters(self, robot):
-        return (Parameter("A", force_unit(robot, self.joint)),)
+        return (Parameter("A", force_unit(robot, self.joint), means="greatest torque of the push"),)
 
     def shape_parameters(self, robot):
         # Places are not screened: what differs between repetitions says where it is.
         return (
-            ShapeParameter("number", "1", (1.0,), lower=1.0, upper=1e6),
-            ShapeParameter("time", "s", (0.0,), lower=-1e6, upper=1e6),
-            ShapeParameter("width", "s", (0.2,), lower=1e-3, upper=10.0),
+            ShapeParameter(
+                "number", "1", (1.0,), lower=1.0, upper=1e6, means="number of the recording"
+            ),
+            ShapeParameter(
+                "time", "s", (0.0,), lower=-1e6, upper=1e6, means="when the push is strongest"
+            ),
+            ShapeParameter(
+                "width",
+                "s",
+                (0.2,),
+                lower=1e-3,
+                upper=10.0,
+                means="how long it lasts, as a standard deviation",
+            ),
         )
 
     def variants(self, robot):

@@ -28,7 +28,10 @@ class JointSpring(JointEffect):
 
     def parameters(self, robot):
         force, motion = force_unit(robot, self.joint), motion_unit(robot, self.joint)
-        return (Parameter("k", f"{force}/{motion}", 0.0), Parameter("c", force))
+        return (
+            Parameter("k", f"{force}/{motion}", 0.0, means="stiffness"),
+            Parameter("c", force, means="torque at position zero"),
+        )
 
     def at_joint(self, block: Block) -> np.ndarray:
         q = block.q[:, [block.index(self.joint)]]

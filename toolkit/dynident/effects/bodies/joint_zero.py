@@ -37,7 +37,7 @@ class JointZero(Forceless):
 
     def parameters(self, robot):
         unit = motion_unit(robot, self.joint)
-        return (Parameter("offset", unit, -1.0, 1.0),)
+        return (Parameter("offset", unit, -1.0, 1.0, means="position less what the record says"),)
 
     def columns(self, block: Block) -> np.ndarray:
         body, j = block.fitted_robot(self.label), block.index(self.joint)

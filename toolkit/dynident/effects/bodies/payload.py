@@ -7,7 +7,7 @@ import numpy as np
 from dynident.effects.effect import Block, Forceless, Parameter
 from dynident.effects.traits import Needs
 from dynident.errors import EffectError
-from dynident.inertia import PARAMETERS, UNITS
+from dynident.inertia import MEANINGS, PARAMETERS, UNITS
 
 _NAMES = ("mass", *PARAMETERS[1:])
 
@@ -35,8 +35,8 @@ class Payload(Forceless):
         # A load has mass, and diagonal second moments are sums of m x^2: none is negative.
         positive = {"mass", "Ixx", "Iyy", "Izz"}
         return tuple(
-            Parameter(name, unit, 0.0 if name in positive else -np.inf)
-            for name, unit in zip(_NAMES, UNITS, strict=True)
+            Parameter(name, unit, 0.0 if name in positive else -np.inf, means=words)
+            for name, unit, words in zip(_NAMES, UNITS, MEANINGS, strict=True)
         )
 
     def columns(self, block: Block) -> np.ndarray:

@@ -32,7 +32,9 @@ class DriveGain(Forceless, JointEffect):
 
     def parameters(self, robot):
         # Beyond half and twice it is another unit, or another column, and no torque constant.
-        return (Parameter("e", "1", -0.5, 1.0),)
+        return (
+            Parameter("e", "1", -0.5, 1.0, means="recorded torque over acting torque, less one"),
+        )
 
     def at_joint(self, block: Block) -> np.ndarray:
         if block.torque is None:

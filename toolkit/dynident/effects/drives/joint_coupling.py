@@ -30,10 +30,16 @@ class JointCoupling(JointEffect):
     def parameters(self, robot):
         force, motion = force_unit(robot, self.joint), motion_unit(robot, self.source)
         return (
-            Parameter("cv", f"{force} s/{motion}"),
-            Parameter("cc", force),
-            Parameter("ca", f"{force} s^2/{motion}"),
-            Parameter("cs", force),
+            Parameter(
+                "cv", f"{force} s/{motion}", means="torque per unit of the other joint's speed"
+            ),
+            Parameter("cc", force, means="torque that changes sign with the other joint's speed"),
+            Parameter(
+                "ca",
+                f"{force} s^2/{motion}",
+                means="torque per unit of the other joint's acceleration",
+            ),
+            Parameter("cs", force, means="torque that changes sign with the sum of both speeds"),
         )
 
     def at_joint(self, block: Block) -> np.ndarray:

@@ -35,7 +35,9 @@ class RotorInertia(Forceless, JointEffect):
 
     def parameters(self, robot):
         unit = "kg" if motion_unit(robot, self.joint) == "m" else "kg m^2"
-        return (Parameter("Ia", unit, 0.0),)
+        return (
+            Parameter("Ia", unit, 0.0, means="inertia of motor and gear, as felt at the joint"),
+        )
 
     def at_joint(self, block: Block) -> np.ndarray:
         return block.a[:, [block.index(self.joint)]]

@@ -39,7 +39,11 @@ class TorqueDelay(Forceless):
         return f"{self.experiment} at {self.joint}" if self.joint else self.experiment
 
     def parameters(self, robot):
-        return (Parameter("d", "s", -0.05, 0.05),)
+        return (
+            Parameter(
+                "d", "s", -0.05, 0.05, means="how much later the torque acts than the record says"
+            ),
+        )
 
     def columns(self, block: Block) -> np.ndarray:
         if block.torque is None:

@@ -23,7 +23,13 @@ class TorqueDrift(JointEffect):
     reverses = False
 
     def parameters(self, robot):
-        return (Parameter("rate", f"{force_unit(robot, self.joint)}/s"),)
+        return (
+            Parameter(
+                "rate",
+                f"{force_unit(robot, self.joint)}/s",
+                means="change of the torque with the time of the session",
+            ),
+        )
 
     def at_joint(self, block: Block) -> np.ndarray:
         return block.t[:, None]

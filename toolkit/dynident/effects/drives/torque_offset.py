@@ -30,7 +30,7 @@ class TorqueOffset(JointEffect):
     reverses = False
 
     def parameters(self, robot):
-        return (Parameter("offset", force_unit(robot, self.joint)),)
+        return (Parameter("offset", force_unit(robot, self.joint), means="constant torque"),)
 
     def at_joint(self, block: Block) -> np.ndarray:
         return np.ones((len(block.t), 1))

@@ -34,15 +34,26 @@ class TorqueRipple(JointEffect):
 
     def parameters(self, robot):
         unit = force_unit(robot, self.joint)
-        return (Parameter("As", unit), Parameter("Ac", unit))
+        return (
+            Parameter("As", unit, means="amplitude of the sine part"),
+            Parameter("Ac", unit, means="amplitude of the cosine part"),
+        )
 
     def shape_parameters(self, robot):
         if motion_unit(robot, self.joint) == "m":
             # As close as lines of a quarter of a metre's travel are wide, 25 rad/m.
             grid = tuple(float(k) for k in range(30, 3001, 10))
-            return (ShapeParameter("k", "rad/m", grid, lower=10.0, upper=1e5),)
+            return (
+                ShapeParameter(
+                    "k", "rad/m", grid, lower=10.0, upper=1e5, means="phase of the ripple per metre"
+                ),
+            )
         grid = tuple(float(k) for k in (*range(2, 33), *range(34, 62, 2)))
-        return (ShapeParameter("k", "1/rev", grid, lower=1.0, upper=500.0),)
+        return (
+            ShapeParameter(
+                "k", "1/rev", grid, lower=1.0, upper=500.0, means="ripples per revolution"
+            ),
+        )
 
     def at_joint(self, block: Block) -> np.ndarray:
         phase = self.shape[0] * block.q[:, [block.index(self.joint)]]

@@ -37,7 +37,16 @@ class AsymmetricFriction(JointEffect):
 
     def parameters(self, robot):
         force, motion = force_unit(robot, self.joint), motion_unit(robot, self.joint)
-        return (Parameter("dFv", f"{force} s/{motion}"), Parameter("dFc", force))
+        return (
+            Parameter(
+                "dFv",
+                f"{force} s/{motion}",
+                means="half the difference of viscous friction between the directions",
+            ),
+            Parameter(
+                "dFc", force, means="half the difference of dry friction between the directions"
+            ),
+        )
 
     def at_joint(self, block: Block) -> np.ndarray:
         v = block.v[:, [block.index(self.joint)]]

@@ -30,7 +30,14 @@ class CoulombFriction(JointEffect):
     experiment = "reverse {joint} many times and move it at several speeds"
 
     def parameters(self, robot):
-        return (Parameter("Fc", force_unit(robot, self.joint), 0.0),)
+        return (
+            Parameter(
+                "Fc",
+                force_unit(robot, self.joint),
+                0.0,
+                means="dry friction, the same at every speed",
+            ),
+        )
 
     def at_joint(self, block: Block) -> np.ndarray:
         return block.sign(block.v[:, [block.index(self.joint)]], self.joint)

@@ -27,7 +27,7 @@ class LoadFriction(Forceless, JointEffect):
 
     def parameters(self, robot):
         # From 1 on the gear would block itself.
-        return (Parameter("mu", "1", 0.0, 0.9),)
+        return (Parameter("mu", "1", 0.0, 0.9, means="share of the load that becomes friction"),)
 
     def at_joint(self, block: Block) -> np.ndarray:
         if block.torque is None:

@@ -38,13 +38,29 @@ class Presliding(JointEffect):
     memory = 1
 
     def parameters(self, robot):
-        return (Parameter("Fp", force_unit(robot, self.joint), 0.0),)
+        return (
+            Parameter(
+                "Fp",
+                force_unit(robot, self.joint),
+                0.0,
+                means="dry friction that builds up over a distance",
+            ),
+        )
 
     def shape_parameters(self, robot):
         unit = motion_unit(robot, self.joint)
         scale = 0.1 if unit == "m" else 1.0
         grid = tuple(scale * distance for distance in (1e-3, 3e-3, 1e-2, 3e-2))
-        return (ShapeParameter("distance", unit, grid, lower=1e-4 * scale, upper=0.3 * scale),)
+        return (
+            ShapeParameter(
+                "distance",
+                unit,
+                grid,
+                lower=1e-4 * scale,
+                upper=0.3 * scale,
+                means="distance after a reversal over which it builds up",
+            ),
+        )
 
     def at_joint(self, block: Block) -> np.ndarray:
         if block.memory is not None:  # one instant of a simulation

@@ -26,7 +26,9 @@ class QuadraticDrag(JointEffect):
 
     def parameters(self, robot):
         force, motion = force_unit(robot, self.joint), motion_unit(robot, self.joint)
-        return (Parameter("Fq", f"{force} s^2/{motion}^2", 0.0),)
+        return (
+            Parameter("Fq", f"{force} s^2/{motion}^2", 0.0, means="friction per square of speed"),
+        )
 
     def at_joint(self, block: Block) -> np.ndarray:
         v = block.v[:, [block.index(self.joint)]]

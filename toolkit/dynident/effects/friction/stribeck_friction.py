@@ -41,13 +41,29 @@ class StribeckFriction(JointEffect):
     experiment = "move {joint} slowly, at speeds below 0.1 rad/s (or 0.01 m/s), in both directions"
 
     def parameters(self, robot):
-        return (Parameter("Fs", force_unit(robot, self.joint), 0.0),)
+        return (
+            Parameter(
+                "Fs",
+                force_unit(robot, self.joint),
+                0.0,
+                means="dry friction at creeping speed, beyond that of gliding",
+            ),
+        )
 
     def shape_parameters(self, robot):
         unit = motion_unit(robot, self.joint)
         scale = 0.1 if unit == "m" else 1.0
         grid = tuple(scale * speed for speed in (0.02, 0.04, 0.08, 0.16, 0.32, 0.64))
-        return (ShapeParameter("vs", f"{unit}/s", grid, lower=0.005 * scale, upper=2.0 * scale),)
+        return (
+            ShapeParameter(
+                "vs",
+                f"{unit}/s",
+                grid,
+                lower=0.005 * scale,
+                upper=2.0 * scale,
+                means="Stribeck speed: where 37 % of Fs are left",
+            ),
+        )
 
     def at_joint(self, block: Block) -> np.ndarray:
         v = block.v[:, [block.index(self.joint)]]

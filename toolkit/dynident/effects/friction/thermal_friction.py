@@ -46,11 +46,26 @@ class ThermalFriction(JointEffect):
 
     def parameters(self, robot):
         force, motion = force_unit(robot, self.joint), motion_unit(robot, self.joint)
-        return (Parameter("Fvt", f"{force} s/{motion}"), Parameter("Fct", force))
+        return (
+            Parameter(
+                "Fvt",
+                f"{force} s/{motion}",
+                means="viscous friction, cold less warm; or its change per 10 K",
+            ),
+            Parameter(
+                "Fct",
+                force,
+                means="dry friction, cold less warm; or its change per 10 K",
+            ),
+        )
 
     def shape_parameters(self, robot):
         grid = (10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0)
-        return (ShapeParameter("T", "s", grid, lower=1.0, upper=1e5),)
+        return (
+            ShapeParameter(
+                "T", "s", grid, lower=1.0, upper=1e5, means="time in which the joint warms up"
+            ),
+        )
 
     def at_joint(self, block: Block) -> np.ndarray:
         v = block.v[:, [block.index(self.joint)]]

@@ -28,7 +28,7 @@ class ViscousFriction(JointEffect):
 
     def parameters(self, robot):
         unit = f"{force_unit(robot, self.joint)} s/{motion_unit(robot, self.joint)}"
-        return (Parameter("Fv", unit, 0.0),)
+        return (Parameter("Fv", unit, 0.0, means="friction per unit of speed"),)
 
     def at_joint(self, block: Block) -> np.ndarray:
         return block.v[:, [block.index(self.joint)]]

@@ -41,11 +41,18 @@ class Backlash(FlexibleJoint):
     nonlinear = True
 
     def parameters(self, robot):
-        return (Parameter("gap", motion_unit(robot, self.joint), 0.0),)
+        return (
+            Parameter("gap", motion_unit(robot, self.joint), 0.0, means="play of the transmission"),
+        )
 
     def shape_parameters(self, robot):
         sides = ShapeParameter(
-            "resonance", "Hz", (15.0, 30.0), lower=RESONANCE.lower, upper=RESONANCE.upper
+            "resonance",
+            "Hz",
+            (15.0, 30.0),
+            lower=RESONANCE.lower,
+            upper=RESONANCE.upper,
+            means=RESONANCE.means,
         )
         return (sides, DAMPING, ROTOR_SHARE)
 

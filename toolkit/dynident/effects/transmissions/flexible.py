@@ -17,10 +17,26 @@ from dynident.effects.transmissions.link_response import Response, responses, st
 from dynident.robot import Robot
 
 _SCREENED = (3.0, 4.0, 5.4, 7.3, 9.8, 13.2, 18.0, 25.0, 40.0, 80.0)  # Hz: a peak is narrow
-RESONANCE = ShapeParameter("resonance", "Hz", _SCREENED, lower=2.0, upper=200.0)
+RESONANCE = ShapeParameter(
+    "resonance",
+    "Hz",
+    _SCREENED,
+    lower=2.0,
+    upper=200.0,
+    means="frequency of the link against the locked motor",
+)
 """Of the link against the locked motor, at the mean of its inertia."""
-DAMPING = ShapeParameter("damping", "1", (0.1,), lower=0.002, upper=2.0)
-ROTOR_SHARE = ShapeParameter("rotor_share", "1", (0.3,), lower=0.005, upper=0.95)
+DAMPING = ShapeParameter(
+    "damping", "1", (0.1,), lower=0.002, upper=2.0, means="damping ratio of that resonance"
+)
+ROTOR_SHARE = ShapeParameter(
+    "rotor_share",
+    "1",
+    (0.3,),
+    lower=0.005,
+    upper=0.95,
+    means="share of the motor in the inertia that moves with the joint",
+)
 """Share of the motor in the inertia that moves with the joint."""
 
 

@@ -24,7 +24,7 @@ class JointElasticity(FlexibleJoint):
         unit = f"{motion_unit(robot, self.joint)}/({force_unit(robot, self.joint)})"
         if force_unit(robot, self.joint) == "N":
             unit = "m/N"
-        return (Parameter("c", unit, 0.0),)
+        return (Parameter("c", unit, 0.0, means="compliance: the inverse of the stiffness"),)
 
     def shape_parameters(self, robot):
         return (RESONANCE, DAMPING, ROTOR_SHARE)
