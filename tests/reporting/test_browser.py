@@ -116,7 +116,8 @@ def _visited(browser, path: Path, width: int) -> Visit:
     found.page.on("request", lambda request: found.requests.append(request.url))
     found.page.set_default_timeout(120_000)
     found.page.goto(found.address)
-    found.page.wait_for_function("document.querySelectorAll('.js-plotly-plot').length > 2")
+    # Drawn in the order of the page, and all at once.
+    found.page.locator(".js-plotly-plot").nth(2).wait_for()
     return found
 
 

@@ -24,6 +24,7 @@ from dynident.validation.loop_errors import QUANTITIES, Quantity
 from dynident.validation.validation_result import Skipped, Unsimulated, Validation
 from reporting.fabricated import diagnosis
 from reporting.fabricated_loop import validation
+from reporting.read_page import Elements
 
 
 @pytest.fixture(scope="module")
@@ -32,9 +33,7 @@ def found() -> Validation:
 
 
 def figures_of(html: str) -> dict:
-    text = re.search(r'id="figures">(.*?)</script>', html, re.DOTALL)
-    assert text
-    return json.loads(text[1])
+    return json.loads(Elements(html).figures)
 
 
 def test_thinning_keeps_the_extremes_of_the_differences(found):

@@ -16,6 +16,7 @@ from dynident.reporting.joint_states import joint_errors, opened, states
 from dynident.reporting.next_steps import next_steps, summary
 from dynident.reporting.packing import packed
 from reporting.fabricated import diagnosis, effect
+from reporting.read_page import unpacked
 
 
 @pytest.fixture(scope="module")
@@ -134,16 +135,16 @@ def test_shared_parts_are_written_once_and_come_back():
     x = np.arange(200, dtype=np.float32)
     figures = {name: go.Figure(go.Scatter(x=x, y=x**2, name="<a&b>")) for name in ("one", "two")}
     both = packed(figures)
-    assert not set("<>&") & set(both.figures + both.shared)
-    shared = json.loads(both.shared)
+    assert not set("<>&") & set(both.figures + both.shared + both.library)
+    shared = json.loads(unpacked(both.shared))
 
     def whole(part):
         return shared[part["shared"]] if "shared" in part else part
 
-    restored = json.loads(both.figures, object_hook=whole)
+    restored = json.loads(unpacked(both.figures), object_hook=whole)
     assert restored == {name: json.loads(str(one.to_json())) for name, one in figures.items()}
     alone = packed({"one": figures["one"]})
-    assert len(both.shared) == len(alone.shared)
+    assert len(unpacked(both.shared)) == len(unpacked(alone.shared))
 
 
 def test_a_step_of_the_whole_robot_leaves_its_joints_as_they_are(found):

@@ -6,8 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import jinja2
-from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from dynident import files
 from dynident.diagnosis.dependence.residual_dependence import dependence_table
@@ -187,9 +185,7 @@ def _diagnosis_page(
         fit_error=diagnosis.after.error_table(),
         given_parameters=given_parameters if diagnosis.steps else None,
         provenance=made,
-        figures=parts.figures,
-        shared=parts.shared,
-        plotly=Markup(get_plotlyjs()),
+        packed=parts,
     )
 
 
@@ -208,9 +204,7 @@ def _validation_page(validation: Validation, command: str) -> str:
         sentence=validation.sentence,
         errors=list(errors) if validation.runs else [],
         provenance=(Table("Files", ("file", "SHA-256", "filter"), used), versions(command)),
-        figures=parts.figures,
-        shared=parts.shared,
-        plotly=Markup(get_plotlyjs()),
+        packed=parts,
     )
 
 

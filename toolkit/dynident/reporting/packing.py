@@ -1,11 +1,13 @@
-"""Figures as JSON in a page: what several of them share is written once.
+"""Figures and their library in a page: compressed, and what several figures share written once.
 
 Plotly writes each figure whole, template and times included; a page of fifty would be five times
-as large.
+as large. Its library is two thirds smaller compressed; every browser since 2023 decompresses it.
 """
 
 from __future__ import annotations
 
+import base64
+import gzip
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,6 +15,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 from markupsafe import Markup
+from plotly.offline import get_plotlyjs
 
 _SMALLEST = 100
 """Characters from which on an array is worth sharing."""
@@ -46,10 +49,14 @@ class _Shared:
 
 @dataclass(frozen=True)
 class Packed:
-    """JSON for two script elements: the figures by name, and the parts that they refer to."""
+    """Content of three script elements: figures by name, parts they refer to, and their library.
+
+    Each is text, compressed by gzip and written in base 64.
+    """
 
     figures: Markup
     shared: Markup
+    library: Markup
 
 
 def packed(figures: Mapping[str, go.Figure]) -> Packed:
@@ -59,10 +66,17 @@ def packed(figures: Mapping[str, go.Figure]) -> Packed:
     """
     shared = _Shared()
     parts = {name: shared.packed(json.loads(str(one.to_json()))) for name, one in figures.items()}
-    return Packed(_json(parts), _json(shared.parts))
+    return Packed(
+        figures=compressed(_json(parts)),
+        shared=compressed(_json(shared.parts)),
+        library=compressed(get_plotlyjs()),
+    )
 
 
-def _json(content: Any) -> Markup:
-    # Written as escapes, so that no text can close the script element.
-    text = json.dumps(content, separators=(",", ":"), allow_nan=False)
-    return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
+def compressed(text: str) -> Markup:
+    """Text as a script element holds it: base 64 has no character that could close one."""
+    return Markup(base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode())
+
+
+def _json(content: Any) -> str:
+    return json.dumps(content, separators=(",", ":"), allow_nan=False)
