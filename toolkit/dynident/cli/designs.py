@@ -24,8 +24,16 @@ _PATH = click.Path(path_type=Path)
 @click.option("--starts", type=click.IntRange(1, 100), default=2, show_default=True)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--objective", type=click.Choice(["D", "A"]), default="D", show_default=True)
-@click.option("--tell", nargs=2, metavar="EFFECT EFFECT", help="Tell which of these it is.")
-@click.option("--show", metavar="EFFECT", help="Show what the recordings could not.")
+@click.option(
+    "--tell",
+    nargs=2,
+    multiple=True,
+    metavar="EFFECT EFFECT",
+    help="Tell which of these it is; may be repeated.",
+)
+@click.option(
+    "--show", multiple=True, metavar="EFFECT", help="Show what the recordings could not; likewise."
+)
 @click.option("--limits", type=_PATH, help="A file of limits, [joints.NAME].")
 @click.option("--out", type=_PATH, help="Write reference.csv and experiment.toml here.")
 def design(study: Path, limits: Path | None, out: Path | None, **settings) -> CommandAnswer:
@@ -53,8 +61,8 @@ def design(study: Path, limits: Path | None, out: Path | None, **settings) -> Co
     tell, show = settings.pop("tell"), settings.pop("show")
     task = DesignTask(
         **settings,
-        tell=tuple(one(label) for label in tell or ()),
-        show=one(show) if show else None,
+        tell=tuple(tuple(one(label) for label in pair) for pair in tell),
+        show=tuple(one(label) for label in show),
     )
     bounds = MotionLimits.from_file(limits, loaded.robot) if limits else None
     with progress("designing") as told:

@@ -19,8 +19,9 @@ class DesignTask:
     repeat : how many repetitions: two or more measure the noise.
     harmonics : of the series of each joint.
     objective : "D", the volume of the confidence region, or "A", the sum of the variances.
-    tell : effects of which the recording is to tell which one it is; the first is taken for true.
-    show : an effect that the recordings so far could not show.
+    tell : groups of effects, of each of which the recording is to tell which one it is; the first
+        of a group is taken for true. Of several groups, the one that is told least counts.
+    show : effects that the recordings so far could not show.
     starts, seed : of the search.
     """
 
@@ -28,19 +29,26 @@ class DesignTask:
     repeat: int = 3
     harmonics: int = 8
     objective: Objective = "D"
-    tell: tuple[Effect, ...] = ()
-    show: Effect | None = None
+    tell: tuple[tuple[Effect, ...], ...] = ()
+    show: tuple[Effect, ...] = ()
     starts: int = 2
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if len(self.tell) == 1:
-            raise DesignError("one effect to tell apart", remedy="name two, or use show")
-        labels = [one.label for one in self.tell]
-        if len(set(labels)) < len(labels):
-            raise DesignError(f"{labels[0]} is to be told from itself", remedy="name two effects")
+        for group in self.tell:
+            if len(group) < 2:
+                raise DesignError("one effect to tell apart", remedy="name two, or use show")
+            _require_different(group, "to be told from itself")
+        _require_different(self.show, "to be shown twice")
         if self.tell and self.show:
             raise DesignError("tell and show together", remedy="design a recording for each")
         if self.repeat < 1 or self.starts < 1:
             what = f"repeat = {self.repeat}, starts = {self.starts}"
             raise DesignError(what, remedy="choose 1 or more of each")
+
+
+def _require_different(effects: tuple[Effect, ...], what: str) -> None:
+    labels = [one.label for one in effects]
+    twice = next((one for one in labels if labels.count(one) > 1), None)
+    if twice is not None:
+        raise DesignError(f"{twice} is {what}", remedy="name different effects")

@@ -36,7 +36,8 @@ class Information:
     columns : of the model, then of the rivals, then of interest.
     mix : (m, k) combinations of the columns that are meant, those of interest last.
     last : how many these are; k for all.
-    weight : (n,) of the rows of each joint: rows of the recording per instant, over the variance.
+    weight : (n,) of each joint: rows that the recording will have, over the variance of their
+        noise.
     prior : (k, k) information that recordings bring already.
     scale : (k,) sizes of the combinations.
     objective : "D", the determinant, or "A", the sum of the variances.
@@ -51,15 +52,15 @@ class Information:
     objective: Objective = "D"
 
     def matrix(self, t: np.ndarray, motion: tuple[np.ndarray, ...]) -> np.ndarray:
-        """Information of a motion, (k, k), per row of `t` as many rows as its weight says.
+        """Information of a recording of a motion, (k, k).
 
         Parameters
         ----------
-        t : (T,) s.
+        t : (T,) s, instants that stand for all rows of the recording.
         motion : q, v, a, (T, n) each.
         """
         found = self.columns.along(t, *motion) @ self.mix
-        weighted = found * np.sqrt(self.weight)[None, :, None]
+        weighted = found * np.sqrt(self.weight / len(t))[None, :, None]
         rows = weighted.reshape(-1, found.shape[2])
         return rows.T @ rows
 
@@ -101,16 +102,21 @@ class Information:
         scaled = self.scaled_about(matrix) + RIDGE * np.eye(self.last)
         if self.objective == "A":
             return float(np.log(np.trace(np.linalg.inv(scaled))))
-        return -float(np.linalg.slogdet(scaled)[1])
+        return self._unit - float(np.linalg.slogdet(scaled)[1])
 
     def symbolic_loss(self, columns: Any, instants: int) -> Any:
         """Return the loss of CasADi's columns, (m, n * instants)."""
         n = len(self.weight)
-        weights = np.tile(np.sqrt(self.weight), instants)
+        weights = np.tile(np.sqrt(self.weight / instants), instants)
         rows = (ca.DM(self.mix / self.scale).T @ columns) @ ca.diag(ca.DM(weights))
         assert rows.shape[1] == n * instants
         prior = self.prior / np.outer(self.scale, self.scale) + RIDGE * np.eye(len(self.scale))
         return self._factor_loss()(rows @ rows.T + ca.DM(prior))
+
+    @property
+    def _unit(self) -> float:
+        """What the scales take from a determinant: losses of several questions are compared."""
+        return -2 * float(np.sum(np.log(self.scale[len(self.scale) - self.last :])))
 
     def _factor_loss(self) -> Any:
         """The loss of an information matrix, (k, k)."""
@@ -123,5 +129,5 @@ class Information:
             inverse = ca.solve(own, ca.SX.eye(self.last))
             loss = ca.log(ca.sumsqr(inverse))
         else:
-            loss = -2 * ca.sum1(ca.log(ca.diag(own)))
+            loss = self._unit - 2 * ca.sum1(ca.log(ca.diag(own)))
         return ca.Function("loss", [matrix], [loss])

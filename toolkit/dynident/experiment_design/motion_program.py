@@ -8,24 +8,22 @@ on ten times as many, and made smaller about its centre until none is exceeded t
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
-import lazy_loader
 import numpy as np
 
 from dynident.errors import DesignError
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.motion_limits import MotionLimits
+from dynident.experiment_design.motion_solver import MotionSolver
 from dynident.experiment_design.periodic import PeriodicMotions
 
-ca: Any = lazy_loader.load("casadi")
 _PER_HARMONIC = 22  # instants
-_LEAST = 100
+_LEAST, _LEAST_NARROW = 100, 300
 FINER = 10
 """Instants at which limits are checked, over those at which they were imposed."""
 _TRIED = 150  # random motions for each start
-_ITERATIONS = 150
+_ITERATIONS, _ITERATIONS_SOFT = 150, 60
 _SHRINKS = 100
 _ROUNDING = 1e-9
 
@@ -48,28 +46,42 @@ class DesignedMotion:
     iterations: int
 
 
-def instants_of(motions: PeriodicMotions) -> int:
-    """Return at how many instants limits are imposed, and columns evaluated."""
-    return max(_LEAST, _PER_HARMONIC * motions.harmonics)
+def instants_of(motions: PeriodicMotions, *, narrow: int = 0) -> int:
+    """Return at how many instants limits are imposed, and columns evaluated.
+
+    Parameters
+    ----------
+    motions : of which one is sought.
+    narrow : how many softer forms its columns have; with any there are more instants.
+    """
+    return max(_LEAST_NARROW if narrow else _LEAST, _PER_HARMONIC * motions.harmonics)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class MotionProgram:
     """The search for the motion that tells the most.
 
     Attributes
     ----------
-    information : what is asked.
+    informations : what is asked; of several, the one that is told least counts.
     motions : among which it is sought.
+    softer : of each of these, the same with dry friction over wider ranges of speed, the widest
+        first, through which the search goes; none where that makes no difference.
     """
 
-    information: Information
+    informations: tuple[Information, ...]
     motions: PeriodicMotions
+    softer: tuple[tuple[Information, ...], ...] = ()
+
+    @property
+    def information(self) -> Information:
+        """The first of what is asked; its model predicts the torque that is limited."""
+        return self.informations[0]
 
     @property
     def instants(self) -> int:
         """Instants at which limits are imposed and columns evaluated."""
-        return instants_of(self.motions)
+        return max(instants_of(self.motions, narrow=len(one)) for one in self.softer or ((),))
 
     @property
     def limits(self) -> MotionLimits:
@@ -78,11 +90,30 @@ class MotionProgram:
 
     # --- what a motion tells ------------------------------------------------------------------
 
-    def loss(self, variables: np.ndarray) -> float:
-        """Return the loss of some variables, on the grid of the program."""
-        t = self.motions.times(self.instants)
-        motion = self.motions.fourier(variables).at(t)
-        return self.information.loss(self.information.matrix(t, motion))
+    def told(self, information: Information, variables: np.ndarray) -> np.ndarray:
+        """Return what the motion of some variables adds to what is known, on a fine grid, (k, k).
+
+        Parameters
+        ----------
+        information : what is asked.
+        variables : (n, 2 H - 1).
+        """
+        return self._matrix(information, variables, FINER * self.instants)
+
+    def loss(self, variables: np.ndarray, finer: int = 1) -> float:
+        """Return the loss of some variables; of several informations, the largest.
+
+        Parameters
+        ----------
+        variables : (n, 2 H - 1).
+        finer : instants, over those of the program.
+        """
+        count = finer * self.instants
+        return max(one.loss(self._matrix(one, variables, count)) for one in self.informations)
+
+    def _matrix(self, information: Information, variables: np.ndarray, count: int) -> np.ndarray:
+        t = self.motions.times(count)
+        return information.matrix(t, self.motions.fourier(variables).at(t))
 
     def within(self, variables: np.ndarray) -> np.ndarray | None:
         """Return the motion, made smaller until no limit is exceeded; None where that fails.
@@ -143,17 +174,42 @@ class MotionProgram:
             If no start ends at a motion within the limits.
         """
         begins = self._begins(starts, seed)
-        solver, rows = self._solver()
-        found: list[DesignedMotion] = []
+        motions, fewer = self.motions, instants_of(self.motions)
+        stages = [
+            MotionSolver.of(motions, one, fewer, fewer, _ITERATIONS_SOFT)
+            for one in self._softened()
+        ]
+        solver = MotionSolver.of(motions, self.informations, self.instants, fewer, _ITERATIONS)
+        found = list(begins)
         for number, begin in enumerate(begins, 1):
             progress(f"start {number} of {len(begins)}")
-            one = self._from(solver, rows, begin.variables)
-            # Narrow laws have many optima: what was found by chance may be better.
-            found += [begin] if one is None else [one, begin]
+            found += self._from(solver, begin.variables)
+            if not stages:
+                continue
+            progress(f"start {number} of {len(begins)}, narrow laws widened first")
+            variables = begin.variables
+            for stage in stages:
+                for one in self._from(stage, variables):
+                    variables = one.variables
+            found += self._from(solver, variables)
         if not found:
             remedy = "widen them, or shorten the motion's reach"
             raise DesignError("no motion was found within the limits", remedy=remedy)
-        return min(found, key=lambda one: one.loss)
+        # Narrow laws have many optima: what was found by chance may be better. And instants that
+        # the program does not see count here.
+        fine = [replace(one, loss=self.loss(one.variables, FINER)) for one in found]
+        return min(fine, key=lambda one: one.loss)
+
+    def _softened(self) -> list[tuple[Information, ...]]:
+        """What is asked, with narrow laws made wider, the widest first."""
+        count = max((len(one) for one in self.softer), default=0)
+        return [
+            tuple(
+                soft[k] if soft else sharp
+                for soft, sharp in zip(self.softer, self.informations, strict=True)
+            )
+            for k in range(count)
+        ]
 
     def _begins(self, starts: int, seed: int) -> list[DesignedMotion]:
         """The best of many random motions within the limits."""
@@ -169,86 +225,28 @@ class MotionProgram:
                 )
         return sorted(found, key=lambda one: one.loss)[:starts]
 
-    def _from(self, solver: Any, rows: _LimitRows, start: np.ndarray) -> DesignedMotion | None:
+    def _from(self, solver: MotionSolver, start: np.ndarray) -> list[DesignedMotion]:
+        """The motion at which the search from a start ends; none where none is within limits."""
         from dynident.nlp.ipopt import interruptible
 
         bound = np.full(start.shape, np.inf)
         bound[:, 0] = 0.999
+        bounds, begin = bound.ravel(), start.ravel()
+        if len(self.informations) > 1:
+            bounds, begin = np.append(bounds, np.inf), np.append(begin, self.loss(start))
         with interruptible():
-            result = solver(
-                x0=start.ravel(),
-                lbx=-bound.ravel(),
-                ubx=bound.ravel(),
-                lbg=rows.lower,
-                ubg=rows.upper,
+            result = solver.function(
+                x0=begin, lbx=-bounds, ubx=bounds, lbg=solver.rows.lower, ubg=solver.rows.upper
             )
-        stats = solver.stats()
-        variables = result["x"].full().reshape(start.shape)
-        if not np.all(np.isfinite(variables)):
-            return None
-        best = self.within(variables)
+        stats = solver.function.stats()
+        variables = result["x"].full().ravel()[: start.size].reshape(start.shape)
+        best = self.within(variables) if np.all(np.isfinite(variables)) else None
         if best is None:
-            return None
-        return DesignedMotion(
+            return []
+        motion = DesignedMotion(
             variables=best,
             loss=self.loss(best),
             status=str(stats["return_status"]).replace("_", " "),
             iterations=int(stats["iter_count"]),
         )
-
-    def _solver(self) -> tuple[Any, _LimitRows]:
-        motions, limits, count = self.motions, self.limits, self.instants
-        n, size = motions.n, motions.size
-        t = motions.times(count)
-        bases = [ca.DM(one) for one in motions.bases(t)]
-        z = ca.MX.sym("z", n * size)
-        variables = ca.reshape(z, size, n)  # a column for each joint
-        half = (limits.upper - limits.lower) / 2
-        centre = ca.DM(limits.lower + half).T + variables[0, :] * ca.DM(half).T
-        speed = ca.diag(ca.DM(limits.speed))
-        moved, v, a = (one @ variables @ speed for one in bases)
-        q = ca.repmat(centre, count, 1) + moved
-        inputs = ca.vertcat(q.T, v.T, a.T, ca.DM(t).T)
-        columns = self.information.columns
-        wide = columns.function.map(count)(inputs)
-        loss = self.information.symbolic_loss(wide, count)
-        rows = _LimitRows()
-        rows.add(q / ca.repmat(ca.DM(half).T, count, 1), limits.lower / half, limits.upper / half)
-        ones = np.ones(n)
-        rows.add(v / ca.repmat(ca.DM(limits.speed).T, count, 1), -ones, ones)
-        rows.add(a / ca.repmat(ca.DM(limits.acceleration).T, count, 1), -ones, ones)
-        limited = np.flatnonzero(np.isfinite(limits.torque))
-        if len(limited):
-            torque = columns.torque.map(count)(inputs).T[:, limited.tolist()]
-            torque = torque / ca.repmat(ca.DM(limits.torque[limited]).T, count, 1)
-            rows.add(torque, -np.ones(len(limited)), np.ones(len(limited)))
-        options = {
-            "print_time": False,
-            "show_eval_warnings": False,
-            "ipopt": {
-                "print_level": 0,
-                "sb": "yes",
-                "tol": 1e-4,
-                "max_iter": _ITERATIONS,
-                "hessian_approximation": "limited-memory",
-                "limited_memory_max_history": 20,
-            },
-        }
-        program = {"x": z, "f": loss, "g": ca.vertcat(*rows.parts)}
-        return ca.nlpsol("design", "ipopt", program, options), rows
-
-
-class _LimitRows:
-    """Rows of limits: expressions, and their bounds."""
-
-    def __init__(self) -> None:
-        self.parts: list[Any] = []
-        self.lower = np.zeros(0)
-        self.upper = np.zeros(0)
-
-    def add(self, expression: Any, lower: np.ndarray, upper: np.ndarray) -> None:
-        """Add (T, n) rows with bounds (n,) each."""
-        count = expression.shape[0]
-        self.parts.append(ca.vec(expression))
-        self.lower = np.concatenate([self.lower, np.repeat(lower, count)])
-        self.upper = np.concatenate([self.upper, np.repeat(upper, count)])
+        return [motion]

@@ -13,7 +13,7 @@ from dynident.experiment_design.motion_limits import MotionLimits
 from dynident.experiment_design.motion_program import FINER, DesignedMotion, MotionProgram
 from dynident.fitting.estimate import Estimate
 from dynident.model import Model
-from dynident.tables import Shown, Table, number, percent
+from dynident.tables import Shown, Table, finite, number, percent
 
 DECIDES = 3.0
 """Standard deviations that tell two effects apart."""
@@ -32,6 +32,7 @@ class Separation:
     Attributes
     ----------
     first, others : the effect that is taken for true, and its rivals.
+    advice : the usual experiment that shows the first, in words.
     recorded, designed, usual : standard deviations, by the recordings so far; by these and the
         designed recording; by these and a usual motion of the same length.
     worth : length of usual motion that separates as far, over that of the design; infinite beyond a
@@ -41,11 +42,48 @@ class Separation:
 
     first: str
     others: tuple[str, ...]
+    advice: str
     recorded: float
     designed: float
     usual: float
     worth: float
     enough: float
+
+    def sentence(self, length: float) -> str:
+        """Say what the recording is worth, in plain words.
+
+        Parameters
+        ----------
+        length : s, of the designed recording.
+        """
+        others = " and ".join(self.others)
+        words = (
+            f"{length:g} s of this tell {self.first} from {others} by {number(self.designed, 2)} "
+            f"standard deviations; the recordings so far by {number(self.recorded, 2)}"
+        )
+        if self.designed < NEVER:
+            return (
+                f"{words}. No motion within the limits tells them apart: another experiment might"
+                f"{f', {self.advice}' if self.advice else ''}, or a load, another base, a sensor."
+            )
+        needs = f"{length * self.worth:.0f} s" if np.isfinite(self.worth) else "far longer"
+        words += f"; a usual motion needs {needs}."
+        if self.designed >= DECIDES:
+            return words
+        more = f"{self.enough:.0f}" if np.isfinite(self.enough) else "more than a thousand"
+        return f"{words} That does not decide: {DECIDES:g} take {more} times as long."
+
+    def to_dict(self) -> dict[str, Any]:
+        """The separation as JSON has it; what is infinite is null."""
+        return {
+            "first": self.first,
+            "others": list(self.others),
+            "recorded": self.recorded,
+            "designed": self.designed,
+            "usual": self.usual,
+            "worth": finite(self.worth),
+            "enough": finite(self.enough),
+        }
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -62,7 +100,7 @@ class RecordingDesign(Shown):
     usual : a random motion within the same limits, the median of twenty.
     estimate : of the recordings so far; where effects are to be told apart, with the first.
     labels : of what is told, those of interest last.
-    separation : of the effects to be told apart; None for another task.
+    separations : of the effects to be told apart, a group each; none for another task.
     """
 
     task: DesignTask
@@ -73,7 +111,7 @@ class RecordingDesign(Shown):
     usual: np.ndarray
     estimate: Estimate
     labels: tuple[str, ...]
-    separation: Separation | None = None
+    separations: tuple[Separation, ...] = ()
 
     @property
     def trajectory(self) -> Fourier:
@@ -92,27 +130,17 @@ class RecordingDesign(Shown):
         (last,) in units of the parameters; infinite where nothing shows one.
         """
         information = self.program.information
-        t = self.program.motions.times(self.program.instants)
         found = np.zeros_like(information.prior)
         if variables is not None:
-            found = information.matrix(t, self.program.motions.fourier(variables).at(t))
+            found = self.program.told(information, variables)
         return information.sigma(found)
 
     @property
     def sentence(self) -> str:
         """What the recording is worth, in plain words."""
         length = self.task.duration * self.task.repeat
-        if self.separation is not None:
-            one = self.separation
-            others = " and ".join(one.others)
-            words = (
-                f"{length:g} s of this tell {one.first} from {others} by {number(one.designed, 2)} "
-                f"standard deviations; the recordings so far by {number(one.recorded, 2)}"
-            )
-            if one.designed >= NEVER:
-                needs = f"{length * one.worth:.0f} s" if np.isfinite(one.worth) else "far longer"
-                words += f"; a usual motion needs {needs}"
-            return f"{words}.{self._enough(one)}"
+        if self.separations:
+            return " ".join(one.sentence(length) for one in self.separations)
         before, after, usual = (self.sigma(x) for x in (None, self.motion.variables, self.usual))
         names = self.labels[len(self.labels) - len(after) :]
         seen = np.isfinite(after)
@@ -128,24 +156,6 @@ class RecordingDesign(Shown):
             told += f", and {percent(_mean(after[both] / before[both]), 0)} of what they are now"
         hidden = ", ".join(name for name, one in zip(names, seen, strict=True) if not one)
         return f"{told}." + (f" No motion tells on its own: {hidden}." if hidden else "")
-
-    def _enough(self, one: Separation) -> str:
-        """What follows where the effects are not told apart."""
-        if one.designed >= DECIDES:
-            return ""
-        if one.designed < NEVER:
-            advice = self.first_advice
-            return (
-                " No motion within the limits tells them apart: another experiment might"
-                f"{f', {advice}' if advice else ''}, or a load, another base, a sensor."
-            )
-        more = f"{one.enough:.0f}" if np.isfinite(one.enough) else "more than a thousand"
-        return f" That does not decide: {DECIDES:g} take {more} times as long."
-
-    @property
-    def first_advice(self) -> str:
-        """The experiment that shows the effect that is asked for, in words."""
-        return self.task.tell[0].advice if self.task.tell else ""
 
     def sigma_table(self) -> Table:
         """Standard deviations: so far, with the design, with a usual motion."""
@@ -187,12 +197,12 @@ class RecordingDesign(Shown):
     def tables(self) -> tuple[Table | str, ...]:
         """Everything that `show` prints, in its order."""
         tail = (_CAVEAT, f"Ipopt: {self.motion.status}, {self.motion.iterations} iterations.")
-        told = () if self.separation is not None else (self.sigma_table(),)
+        told = () if self.separations else (self.sigma_table(),)
         return (self.sentence, *told, self.limit_table(), *tail)
 
     def to_dict(self) -> dict[str, Any]:
         """The design as JSON has it."""
-        series, one = self.trajectory, self.separation
+        series = self.trajectory
         return {
             "sentence": self.sentence,
             "duration": self.task.duration,
@@ -201,9 +211,7 @@ class RecordingDesign(Shown):
             "centre": series.centre.tolist(),
             "sine": series.sine.tolist(),
             "cosine": series.cosine.tolist(),
-            "separation": None
-            if one is None
-            else {"recorded": one.recorded, "designed": one.designed, "usual": one.usual},
+            "separations": [one.to_dict() for one in self.separations],
             "status": self.motion.status,
         }
 

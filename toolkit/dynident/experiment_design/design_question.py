@@ -1,0 +1,236 @@
+"""What is asked of the next recording, as columns along a motion and what is known already."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dynident.effects import Effect
+from dynident.errors import DesignError
+from dynident.experiment_design.column_function import ColumnFunction
+from dynident.experiment_design.design_task import DesignTask
+from dynident.experiment_design.information import Information
+from dynident.experiment_design.periodic import PeriodicMotions
+from dynident.fitting.estimate import Estimate
+from dynident.fitting.fit_model import fit
+from dynident.fitting.sampling import sample
+from dynident.model import Model
+from dynident.recording import Dataset
+
+_SIZES = 5  # random motions by which columns are scaled
+_UNSEEN = 1e-9  # of the size of the others: it makes no torque
+_RIVAL_SHAPES = 3  # of a rival, beside its own
+WIDER = (30.0, 10.0, 3.0)
+"""Widths of dry friction, over the true one, through which a narrow law is approached: with the
+true one, a motion that is a little slower or faster tells the same, and no slope leads anywhere."""
+_COMPARED = 200  # instants
+_NARROW = 0.05  # of a column: its change, with the first of these, that makes it narrow
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Asked:
+    """What a motion is judged by.
+
+    Attributes
+    ----------
+    information : of a motion.
+    softer : the same with dry friction over wider ranges of speed, the widest first; none where
+        that makes no difference to the effects that are asked for.
+    labels : of what is told, those of interest last.
+    """
+
+    information: Information
+    softer: tuple[Information, ...]
+    labels: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DesignQuestion:
+    """What is asked, of which model.
+
+    Attributes
+    ----------
+    task : what for.
+    told : effects of which it is to be told which one it is, the first taken for true.
+    shown : effects that are to be shown.
+    bare : the model without these.
+    estimate : of the recordings so far, with the first of those that are to be told apart.
+    """
+
+    task: DesignTask
+    told: tuple[Effect, ...]
+    shown: tuple[Effect, ...]
+    bare: Model
+    estimate: Estimate
+
+    @classmethod
+    def of(
+        cls, model: Model, recorded: Dataset, task: DesignTask, told: Sequence[Effect] = ()
+    ) -> DesignQuestion:
+        """Fit what was recorded.
+
+        Parameters
+        ----------
+        model : the robot and its effects.
+        recorded : recordings so far.
+        task : what for.
+        told : one of its groups of effects.
+
+        Returns
+        -------
+        The question of that group; without one, that of what is to be shown, or of all parameters.
+        """
+        told = tuple(one.on(model.robot) for one in told)
+        shown = () if told else tuple(one.on(model.robot) for one in task.show)
+        bare = model
+        for one in (*told, *shown):
+            bare = bare - one.label if one in bare else bare
+        estimate = fit(bare + told[:1] if told else bare, recorded)
+        fitted = {one.label: one for one in estimate.model.effects}
+        return cls(
+            task=task,
+            told=tuple(fitted.get(one.label, one) for one in told),
+            shown=shown,
+            bare=bare,
+            estimate=estimate,
+        )
+
+    @property
+    def values(self) -> np.ndarray:
+        """Of the bare model, (p,)."""
+        known = dict(zip(self.estimate.names, self.estimate.values, strict=True))
+        return np.array([known[name] for name in self.bare.names])
+
+    @property
+    def std(self) -> np.ndarray:
+        """Size of the torque's residual, (n,); infinite where there is no torque."""
+        found = self.estimate.torque_std
+        return np.where(found > 0, found, np.inf)
+
+    def asked(self, recorded: Dataset, motions: PeriodicMotions) -> Asked:
+        """Return what a motion is judged by, and the names of what it tells.
+
+        Raises
+        ------
+        DesignError
+            If no motion makes a torque of what is asked for.
+        """
+        task, std = self.task, self.std
+        extra = self._beside()
+        columns = ColumnFunction.of(self.bare, self.values, extra)
+        mix, last, labels = self._mix(columns, extra)
+        size = _sizes(mix, columns, motions, std)
+        kept = size > _UNSEEN * np.median(size[size > 0]) if np.any(size > 0) else size > 0
+        last = int(np.sum(kept[len(kept) - last :]))
+        if last == 0:
+            named = next((one.title for one in (*self.told, *self.shown)), "the model")
+            raise DesignError(f"no motion of this robot makes a torque of {named}")
+        mix = mix[:, kept]
+        prior, rate = _recorded(columns, mix, recorded, std)
+        rows = rate * task.duration * task.repeat
+        softer = self._softer(columns, extra, motions)
+        information = Information(
+            columns=columns,
+            mix=mix,
+            last=last,
+            weight=rows / std**2,
+            prior=prior,
+            scale=size[kept] * np.sqrt(rows * len(std)),
+            objective=task.objective,
+        )
+        return Asked(
+            information=information,
+            softer=tuple(replace(information, columns=one) for one in softer),
+            labels=tuple(np.array(labels)[kept].tolist()),
+        )
+
+    def _softer(
+        self, columns: ColumnFunction, extra: Sequence[Effect], motions: PeriodicMotions
+    ) -> list[ColumnFunction]:
+        """The columns with wider dry friction, if that changes those that are asked for."""
+        if not self.told:
+            return []
+        found = []
+        t = motions.times(_COMPARED)
+        motion = motions.fourier(motions.random(0) * 0.3).at(t)
+        own = slice(self.bare.size, None)
+        sharp = columns.along(t, *motion)[:, :, own]
+        for wider in WIDER:
+            widths = tuple(wider * one for one in self.bare.friction_widths)
+            soft = ColumnFunction.of(replace(self.bare, friction_width=widths), self.values, extra)
+            if not found:
+                change = soft.along(t, *motion)[:, :, own] - sharp
+                sizes = [np.linalg.norm(one, axis=(0, 1)) for one in (change, sharp)]
+                if not np.any(sizes[0] > _NARROW * sizes[1]):
+                    return []
+            found.append(soft)
+        return found
+
+    def _beside(self) -> tuple[Effect, ...]:
+        """Rivals, with the other shapes that they may have, then the effect that is asked for."""
+        if not self.told:
+            return self.shown
+        first, *others = self.told
+        found: list[Effect] = []
+        for rival in others:
+            shapes = [one.shape for one in rival.variants(self.bare.robot)]
+            step = max(1, len(shapes) // _RIVAL_SHAPES)
+            kept = dict.fromkeys((rival.shape, *shapes[step // 2 :: step]))
+            found += [rival.shaped(*shape) for shape in kept]
+        return (*found, first)
+
+    def _mix(
+        self, columns: ColumnFunction, extra: Sequence[Effect]
+    ) -> tuple[np.ndarray, int, tuple[str, ...]]:
+        """Combinations of columns, how many of them are of interest, and their names."""
+        count, robot = columns.count, self.bare.robot
+        if not self.told:
+            own = sum(len(one.parameters(robot)) for one in self.shown)
+            return np.eye(count), own or count, columns.labels
+        own, label = len(extra[-1].parameters(robot)), extra[-1].label
+        values = self.estimate.effect_values(label)
+        if not np.any(values):
+            raise DesignError("has no size in the recordings so far", label)
+        mix = np.zeros((count, count - own + 1))
+        mix[: count - own, : count - own] = np.eye(count - own)
+        mix[count - own :, -1] = values
+        return mix, 1, (*columns.labels[: count - own], f"torque of {label}")
+
+
+def _recorded(
+    columns: ColumnFunction, mix: np.ndarray, recorded: Dataset, std: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Information of the recordings so far, (k, k), and their rows per second."""
+    total, rates = np.zeros((mix.shape[1],) * 2), []
+    for recording in recorded.recordings:
+        rows = sample(recording, recorded.filter)
+        found = _numbers(columns, columns.along(rows.t, rows.q, rows.v, rows.a)) @ mix
+        weighted = (found / std[None, :, None]).reshape(-1, mix.shape[1])
+        total += weighted.T @ weighted
+        rates.append((len(rows.t) - 1) / float(rows.t[-1] - rows.t[0]))
+    return total, float(np.median(rates))
+
+
+def _sizes(
+    mix: np.ndarray, columns: ColumnFunction, motions: PeriodicMotions, std: np.ndarray
+) -> np.ndarray:
+    """Whitened size of each combination on random motions, (k,)."""
+    t = motions.times(100)
+    sizes = []
+    for k in range(_SIZES):
+        motion = motions.fourier(motions.random(k) * 0.3).at(t)
+        found = _numbers(columns, columns.along(t, *motion)) @ mix
+        sizes.append(np.sqrt(np.mean((found / std[None, :, None]) ** 2, axis=(0, 1))))
+    return np.mean(sizes, axis=0)
+
+
+def _numbers(columns: ColumnFunction, found: np.ndarray) -> np.ndarray:
+    """Columns (T, n, m), if all of them are finite."""
+    bad = ~np.isfinite(found).all(axis=(0, 1))
+    if bad.any():
+        name = columns.labels[int(np.argmax(bad))]
+        remedy = "state tighter limits of its joint, within which the formula is a number"
+        raise DesignError(f"{name}: its torque is not finite within the limits", remedy=remedy)
+    return found

@@ -1,0 +1,128 @@
+"""Ipopt's form of the search for a motion: variables, limits on a grid of instants, and a loss."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import lazy_loader
+import numpy as np
+
+from dynident.experiment_design.information import Information
+from dynident.experiment_design.periodic import PeriodicMotions
+
+ca: Any = lazy_loader.load("casadi")
+
+
+@dataclass(frozen=True, eq=False)
+class MotionSolver:
+    """Ipopt's function, and the rows that it keeps within bounds.
+
+    Attributes
+    ----------
+    function : casadi.Function of the variables of a motion, joint by joint; behind them, where
+        several things are asked, the largest of their losses.
+    rows : of the limits.
+    """
+
+    function: Any
+    rows: LimitRows
+
+    @classmethod
+    def of(
+        cls,
+        motions: PeriodicMotions,
+        informations: tuple[Information, ...],
+        instants: int,
+        limit_instants: int,
+        iterations: int,
+    ) -> MotionSolver:
+        """Write the program out.
+
+        Parameters
+        ----------
+        motions : among which one is sought.
+        informations : what is asked; of several, the largest loss is made small. The torque that
+            is limited is what the model of the first predicts.
+        instants, limit_instants : at which columns are evaluated, and limits imposed.
+        iterations : at most.
+
+        Returns
+        -------
+        The solver, to be started anywhere.
+        """
+        limits = motions.limits
+        n, size = motions.n, motions.size
+        z = ca.MX.sym("z", n * size)
+        variables = ca.reshape(z, size, n)  # a column for each joint
+        half = (limits.upper - limits.lower) / 2
+        speed = ca.diag(ca.DM(limits.speed))
+
+        def along(count: int) -> tuple[Any, ...]:
+            """Position, speed and acceleration, (count, n) each, and all of an instant."""
+            t = motions.times(count)
+            moved, v, a = (ca.DM(one) @ variables @ speed for one in motions.bases(t))
+            centre = ca.DM(limits.lower + half).T + variables[0, :] * ca.DM(half).T
+            q = ca.repmat(centre, count, 1) + moved
+            return q, v, a, ca.vertcat(q.T, v.T, a.T, ca.DM(t).T)
+
+        *_, every = along(instants)
+        losses = [
+            one.symbolic_loss(one.columns.function.map(instants)(every), instants)
+            for one in informations
+        ]
+        count = min(instants, limit_instants)
+        q, v, a, inputs = along(count)
+        columns = informations[0].columns
+        rows = LimitRows()
+        rows.add(q / ca.repmat(ca.DM(half).T, count, 1), limits.lower / half, limits.upper / half)
+        ones = np.ones(n)
+        rows.add(v / ca.repmat(ca.DM(limits.speed).T, count, 1), -ones, ones)
+        rows.add(a / ca.repmat(ca.DM(limits.acceleration).T, count, 1), -ones, ones)
+        limited = np.flatnonzero(np.isfinite(limits.torque))
+        if len(limited):
+            torque = columns.torque.map(count)(inputs).T[:, limited.tolist()]
+            torque = torque / ca.repmat(ca.DM(limits.torque[limited]).T, count, 1)
+            rows.add(torque, -np.ones(len(limited)), np.ones(len(limited)))
+        options = {
+            "print_time": False,
+            "show_eval_warnings": False,
+            "ipopt": {
+                "print_level": 0,
+                "sb": "yes",
+                "tol": 1e-4,
+                "max_iter": iterations,
+                "hessian_approximation": "limited-memory",
+                "limited_memory_max_history": 20,
+            },
+        }
+        unknown, loss = z, losses[0]
+        if len(losses) > 1:
+            loss = ca.MX.sym("loss")  # the largest: none is above it
+            unknown = ca.vertcat(z, loss)
+            over = ca.vertcat(*losses).T - loss
+            rows.add(over, np.full(len(losses), -np.inf), np.zeros(len(losses)))
+        program = {"x": unknown, "f": loss, "g": ca.vertcat(*rows.parts)}
+        return cls(ca.nlpsol("design", "ipopt", program, options), rows)
+
+
+class LimitRows:
+    """Rows of limits: expressions, and their bounds."""
+
+    def __init__(self) -> None:
+        self.parts: list[Any] = []
+        self.lower = np.zeros(0)
+        self.upper = np.zeros(0)
+
+    def add(self, expression: Any, lower: np.ndarray, upper: np.ndarray) -> None:
+        """Add rows.
+
+        Parameters
+        ----------
+        expression : (T, n).
+        lower, upper : (n,) bounds of each column.
+        """
+        count = expression.shape[0]
+        self.parts.append(ca.vec(expression))
+        self.lower = np.concatenate([self.lower, np.repeat(lower, count)])
+        self.upper = np.concatenate([self.upper, np.repeat(upper, count)])
