@@ -21,19 +21,19 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_show_sphinx = False
 html_copy_source = False
-templates_path: list[str] = []
+suppress_warnings = ["ref.python"]  # `n` of several classes, in shapes
 myst_heading_anchors = 3
-default_role = "code"
-
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 napoleon_google_docstring = False
+napoleon_use_ivar = True
 
 
 def setup(app: Any) -> None:
     """Join the steps of this site to a build."""
     app.connect("builder-inited", _draw)
     app.connect("source-read", _for_the_site)
+    app.connect("autodoc-process-docstring", _as_numpydoc, priority=400)  # before napoleon
 
 
 def _draw(app: Any) -> None:
@@ -59,3 +59,23 @@ def _for_the_site(app: Any, docname: str, source: list[str]) -> None:
         return found[1] if outside else found[0]
 
     source[0] = re.sub(r"(?<!!)\[([^\]]+)\]\(((?!\w+:|#)[^)\s]+)\)", link, text)
+
+
+def _as_numpydoc(
+    app: Any, what: str, name: str, found: Any, options: Any, lines: list[str]
+) -> None:
+    """Put a docstring of this project into the words of reStructuredText.
+
+    What stands behind `name :` in its lists is a meaning, not a type; `|x|` and single backquotes
+    are text.
+    """
+    said = []
+    for line in lines:
+        parts = re.split(r"(`[^`]+`)", line)
+        plain = "".join(
+            f"`{part}`" if part.startswith("`") else part.replace("|", "\\|").replace("*", "\\*")
+            for part in parts
+        )
+        key = re.match(r"([\w\\*]+(?:, [\w\\*]+)*) : (.+)", plain)
+        said += [key[1], f"    {key[2]}"] if key else [plain]
+    lines[:] = said
