@@ -173,6 +173,13 @@ class GateCriteria(CriteriaGroup):
         over=0,
         most=1,
     )
+    second_filter_share: float = criterion(
+        0.35,
+        "1",
+        "a second such share: what noise makes of an effect does not fall evenly with the cut-offs",
+        over=0,
+        most=1,
+    )
     same_value: float = criterion(
         1 / 3,
         "1",

@@ -37,6 +37,7 @@ from dynident.diagnosis.details import Withdrawn
 from dynident.diagnosis.nuisances.contacts import Contacts
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.nuisances.quantisation import nothing_but_rounding
+from dynident.diagnosis.nuisances.reversal_laws import ReversalLaw, laws_that_do_as_well
 from dynident.diagnosis.nuisances.sticking import left_out_at, without_reversals, without_sticking
 from dynident.diagnosis.proposals.law_search import LawSearch
 from dynident.diagnosis.result import Diagnosis
@@ -149,12 +150,12 @@ def _compare(
     whole = evidence
     evidence, held = without_sticking(evidence, held, start)
     if evidence is not whole:
-        start = with_friction_width(evidence, shaped(evidence, given))
+        start = with_friction_width(evidence, shaped(evidence, start.model))
     task.progress("looking for contacts")
     contacts = Contacts.find(evidence, held, start)
     evidence, held = contacts.left_out(evidence), contacts.left_out_of_test(held)
     if contacts.pulses:
-        start = with_friction_width(evidence, shaped(evidence, given))
+        start = with_friction_width(evidence, shaped(evidence, start.model))
     return Stage(
         evidence=evidence,
         held=held,
@@ -187,13 +188,47 @@ def _extend(stage: Stage, task: DiagnosisTask) -> Stage:
         best = choose(stage.evidence, stage.fitted, stage.rounds[-1])
         if best is None:
             break
+        laws = laws_that_do_as_well(stage.evidence, stage.fitted, best.score)
+        doubtful = _without_their_reversals(stage, laws)
+        if doubtful is not stage:
+            stage = _rank(doubtful, task)
+            continue
         wider, why = _tried(stage, best, task)
+        why = "; ".join(law.note for law in laws) or why
         if why:
             ranking = stage.rounds[-1].refusing({best.score.effect.label: why})
             stage = replace(stage, rounds=(*stage.rounds[:-1], ranking))
         else:
             stage = _rank(wider, task)
     return stage
+
+
+def _without_their_reversals(stage: Stage, laws: tuple[ReversalLaw, ...]) -> Stage:
+    """Leave out the reversals of joints whose dry friction may follow another law.
+
+    The same stage where they are left out already, or the recordings would hold too little.
+    """
+    known = left_out_at(stage.evidence)
+    new = tuple(law for law in laws if law.joint not in known)
+    if not new:
+        return stage
+    within = {law.joint: law.within for law in new}
+    evidence = without_reversals(stage.evidence, tuple(within), within)
+    gone = left_out_at(evidence)
+    if set(gone) == set(known):
+        return stage
+    notes = tuple(f"{law.note}." for law in new if law.joint in gone)
+    start = fit_evidence(evidence, stage.start.model, stage.start)
+    fitted = fit_evidence(evidence, stage.fitted.model, stage.fitted)
+    return replace(
+        stage,
+        evidence=evidence,
+        held=stage.held and without_reversals(stage.held, tuple(within), within),
+        start=with_friction_width(evidence, start),
+        fitted=with_friction_width(evidence, fitted),
+        rounds=stage.rounds[:-1],
+        notes=(*stage.notes, *notes),
+    )
 
 
 def _tried(stage: Stage, best: AddedEffect, task: DiagnosisTask) -> tuple[Stage, str]:
@@ -203,7 +238,8 @@ def _tried(stage: Stage, best: AddedEffect, task: DiagnosisTask) -> tuple[Stage,
         return added, why
     wider = _seen_anew(stage, added)
     why = newly_impossible(wider.evidence, stage.fitted, wider.fitted)
-    narrow = stage.narrow and without_reversals(stage.narrow, left_out_at(wider.evidence))
+    gone = left_out_at(wider.evidence)
+    narrow = tuple(without_reversals(one, gone) for one in stage.narrow)
     why = why or follows_the_filter(wider.evidence, narrow, wider.fitted, best.score.effect)
     return wider, why
 
@@ -313,7 +349,7 @@ def _judge(stage: Stage, path: Path, task: DiagnosisTask) -> Diagnosis:
         path=path,
         rounds=stage.rounds,
         disturbances=stage.contacts.disturbances(stage.evidence, held, stage.start),
-        notes=stage.loop.notes,
+        notes=(*stage.loop.notes, *stage.notes),
         limit=task.most if reached and stage.rounds[-1].passing else None,
     )
     answer = assemble(search, task.train, task.test, held)

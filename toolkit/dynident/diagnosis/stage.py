@@ -45,11 +45,12 @@ class Stage:
     found : these effects.
     rounds : the ranking after each of them, the first one before any.
     refused : labels of effects that were withdrawn, with the reason: they are not tried again.
+    notes : what was left out on the way, in plain words.
     """
 
     evidence: Evidence
     held: Evidence | None
-    narrow: Evidence | None
+    narrow: tuple[Evidence, ...]
     loop: SimulatedMotion
     contacts: Contacts
     start: EvidenceFit
@@ -57,6 +58,7 @@ class Stage:
     found: tuple[AddedEffect, ...] = ()
     rounds: tuple[Ranking, ...] = ()
     refused: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     @property
     def proposals(self) -> int:

@@ -7,5 +7,7 @@ that says so.
   `pulse_search` finds them by matched filters in what repetitions do not share, which `changes`
   separates and whitens.
 - `friction_width`: dry friction that reverses over another range of speeds than the model's law.
+- `sticking`: joints that stand at their stops, whose rows there say nothing.
+- `reversal_laws`: other laws of dry friction, which effects at reversals must beat.
 - `quantisation`: the residual that the steps of encoders leave, the same in every repetition.
 """

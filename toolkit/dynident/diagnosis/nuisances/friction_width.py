@@ -11,7 +11,7 @@ say, explains more than any width.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -88,25 +88,9 @@ class WidthProfile:
 
     def missed(self, factors: np.ndarray) -> np.ndarray:
         """Squared systematic residual, whitened, with widths that are so many times the model's."""
-        model = self.fitted.model
         column = FrictionWidthColumn(self.joint)
         shaped = [column.shaped(float(k)) for k in factors]
-        at = model.slices[f"coulomb_friction@{self.joint}"].start
-        known = self.fitted.pooled
-        reliable = self.fitted.criteria.noise.reliable
-        found = []
-        for beside, own in candidate_moments(self.evidence, self.fitted, shaped):
-            products = [
-                _widened(whole, cross[:, 0], square[0, 0], at)
-                for whole, cross, square in (
-                    (known.total, beside.pooled().total, own.pooled().total),
-                    (known.signal, beside.pooled().signal, own.pooled().signal),
-                )
-            ]
-            moments = SecondMoments(products[0], known.counts, None, products[1])
-            combination = np.append(-regress(moments, reliable).values, 1.0)
-            found.append(float(combination @ moments.signal @ combination))
-        return np.array(found)
+        return missed_instead(self.evidence, self.fitted, shaped)
 
     def best(self) -> tuple[float, float]:
         """Factor of the width that misses least, and what it misses."""
@@ -141,6 +125,38 @@ class WidthProfile:
         if len(over_one):
             upper = self.width * math.exp(_root(excess, 0.0, float(np.log(over_one[0]))))
         return lower, upper
+
+
+def missed_instead(
+    evidence: Evidence, fitted: EvidenceFit, laws: Sequence[JointEffect]
+) -> np.ndarray:
+    """Squared systematic residual, whitened, with other dry friction instead of the model's.
+
+    Parameters
+    ----------
+    evidence, fitted : the recordings, and the model as it fits them.
+    laws : one effect at one joint, with any number of shapes: what dry friction of another law has
+        more than the model's.
+
+    Returns
+    -------
+    One for each; all parameters are fitted anew.
+    """
+    at = fitted.model.slices[f"coulomb_friction@{laws[0].joint}"].start
+    known, reliable = fitted.pooled, fitted.criteria.noise.reliable
+    found = []
+    for beside, own in candidate_moments(evidence, fitted, laws):
+        products = [
+            _widened(whole, cross[:, 0], square[0, 0], at)
+            for whole, cross, square in (
+                (known.total, beside.pooled().total, own.pooled().total),
+                (known.signal, beside.pooled().signal, own.pooled().signal),
+            )
+        ]
+        moments = SecondMoments(products[0], known.counts, None, products[1])
+        combination = np.append(-regress(moments, reliable).values, 1.0)
+        found.append(float(combination @ moments.signal @ combination))
+    return np.array(found)
 
 
 def _root(excess: Callable[[float], float], low: float, high: float) -> float:
@@ -185,7 +201,7 @@ def with_friction_width(evidence: Evidence, fitted: EvidenceFit) -> EvidenceFit:
         width = factor * WidthProfile(evidence, fitted, joint).width
         model = fitted.model.with_friction_width(joint, width)
         wider = fit_evidence(evidence, model, fitted)
-        if wider.misfit(fitted) < fitted.misfit(fitted):
+        if wider.misfit(fitted) < fitted.misfit(fitted) or wider.error_signal < fitted.error_signal:
             fitted = wider
     return fitted
 

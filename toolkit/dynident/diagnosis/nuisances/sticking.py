@@ -12,7 +12,7 @@ takes to pass through zero), or if the friction width that the data call for is 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -82,19 +82,29 @@ def sticking_joints(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
     )
 
 
-def without_reversals(evidence: Evidence, joints: tuple[str, ...]) -> Evidence:
-    """Return the evidence without the rows of these joints around their reversals, no others.
+def without_reversals(
+    evidence: Evidence, joints: tuple[str, ...], within: Mapping[str, float] | None = None
+) -> Evidence:
+    """Return the evidence without the rows of these joints around their reversals.
 
-    All rows of a joint stay of which these recordings would leave too few.
+    All rows of a joint stay of which these recordings would leave too few; what was left out
+    before stays so.
+
+    Parameters
+    ----------
+    evidence : as for `without_sticking`.
+    joints : names.
+    within : rad/s or m/s, for some of them: speed within which their dry friction is not known,
+        where that is more than the noise of the speed.
     """
-    criteria, names = evidence.criteria.sticking, evidence.model.robot.names
-    columns = [names.index(joint) for joint in joints]
-    columns = [j for j in columns if _share(evidence, j) <= criteria.most]
+    criteria, names, reach = evidence.criteria.sticking, evidence.model.robot.names, within or {}
+    columns = [(names.index(joint), reach.get(joint, 0.0)) for joint in joints]
+    columns = [(j, least) for j, least in columns if _share(evidence, j, least) <= criteria.most]
     runs = []
     for run in evidence.runs:
-        uncertain = np.zeros(run.replicates[0].v.shape, dtype=bool)
-        for j in columns:
-            uncertain[:, j] = _near_stops(evidence, run, j)
+        uncertain = ~run.certain_rows
+        for j, least in columns:
+            uncertain[:, j] |= _near_stops(evidence, run, j, least)
         runs.append(replace(run, uncertain=uncertain))
     return evidence.with_runs(tuple(runs))
 
@@ -112,34 +122,34 @@ def sticking_notes(evidence: Evidence) -> tuple[str, ...]:
         return ()
     uncertain = ~np.concatenate([run.certain_rows for run in evidence.runs])
     return tuple(
-        f"{joint} stands still at many of its stops, or its dry friction reverses within the noise "
-        f"of its speed: no data tell that friction, and {percent(share, 0)} of the joint's rows, "
-        "those around its stops, count neither in the fit nor in the errors."
+        f"{joint} stands still at many of its stops, or the data do not tell how its dry friction "
+        f"reverses there: {percent(share, 0)} of the joint's rows, those around its stops, count "
+        "neither in the fit nor in the errors."
         for joint, share in zip(evidence.model.robot.names, uncertain.mean(axis=0), strict=True)
         if share
     )
 
 
-def _share(evidence: Evidence, j: int) -> float:
+def _share(evidence: Evidence, j: int, least: float = 0.0) -> float:
     """Share of a joint's rows that leaving out its reversals takes."""
     near = [
-        np.any(_near_stops(evidence, run, j)[run.index], axis=0)
+        np.any(_near_stops(evidence, run, j, least)[run.index], axis=0)
         for run in evidence.runs
         if run.index.shape[1]
     ]
     return float(np.mean(np.concatenate(near))) if near else 1.0
 
 
-def _near_stops(evidence: Evidence, run: Run, j: int) -> np.ndarray:
+def _near_stops(evidence: Evidence, run: Run, j: int, least: float = 0.0) -> np.ndarray:
     """Rows of a joint around its reversals, (T,) mask; asked for with every model."""
     sampled, criteria = run.replicates[0], evidence.criteria.sticking
     known, kept = evidence.cache.along(sampled.motion), sampled.kept
-    key = ("near stops", j, kept.start, kept.stop)
+    key = ("near stops", j, least, kept.start, kept.stop)
     if key not in known:
         v = sampled.motion.v[:, j]
         # Around a reversal the speed is off by what the position's low-pass rounds.
         rounded = criteria.rounded * float(np.sqrt(np.mean(v[_used(sampled)] ** 2)))
-        reach = max(criteria.noise * _speed_noise(evidence, sampled)[j], rounded)
+        reach = max(criteria.noise * _speed_noise(evidence, sampled)[j], rounded, least)
         near = sampled.filtered((np.abs(v) < reach).astype(float))
         known[key] = np.abs(near) > criteria.spread
     return known[key]

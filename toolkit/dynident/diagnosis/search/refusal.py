@@ -115,8 +115,8 @@ def _was(old: Impossible, new: Impossible, gates: GateCriteria) -> bool:
     return same and new.value >= old.value - gates.beyond_bounds * old.std
 
 
-def narrower(evidence: Evidence, train: Dataset) -> Evidence | None:
-    """Return the evidence of the same recordings behind a filter with lower cut-offs.
+def narrower(evidence: Evidence, train: Dataset) -> tuple[Evidence, ...]:
+    """Return the evidence of the same recordings behind filters with lower cut-offs.
 
     Parameters
     ----------
@@ -125,23 +125,26 @@ def narrower(evidence: Evidence, train: Dataset) -> Evidence | None:
 
     Returns
     -------
-    None where noise in the columns is known, and allowed for; or nothing is left of a recording.
+    None of them where noise in the columns is known, and allowed for; or nothing is left of a
+    recording.
     """
     if any(run.kind != "single" or run.columns_from != "recording" for run in evidence.runs):
-        return None
+        return ()
     rate = min(one.rate_hz for one in train.recordings)
-    settings = (train.filter or default_filter(rate)).narrowed(
-        evidence.criteria.gates.filter_share, rate
-    )
-    try:
-        runs = gather(replace(train, filter=settings), evidence.criteria.noise)
-    except RecordingError:
-        return None
-    return Evidence(evidence.model, runs, criteria=evidence.criteria)
+    gates, own = evidence.criteria.gates, train.filter or default_filter(rate)
+    found = []
+    for share in (gates.filter_share, gates.second_filter_share):
+        lower = replace(train, filter=own.narrowed(share, rate))
+        try:
+            runs = gather(lower, evidence.criteria.noise)
+        except RecordingError:
+            break
+        found.append(Evidence(evidence.model, runs, criteria=evidence.criteria))
+    return tuple(found)
 
 
 def follows_the_filter(
-    evidence: Evidence, narrow: Evidence | None, wider: EvidenceFit, effect: Effect
+    evidence: Evidence, narrow: tuple[Evidence, ...], wider: EvidenceFit, effect: Effect
 ) -> str:
     """Say by how much an effect's torque changes with the filter, if it does.
 
@@ -156,9 +159,13 @@ def follows_the_filter(
     -------
     In words; empty where it makes the same torque, or that does not matter.
     """
-    if narrow is None:
-        return ""
-    narrow = marked(narrow, [run.recording.payload for run in evidence.runs])
+    payloads = [run.recording.payload for run in evidence.runs]
+    every = (_changed(marked(one, payloads), wider, effect) for one in narrow)
+    return next((why for why in every if why), "")
+
+
+def _changed(narrow: Evidence, wider: EvidenceFit, effect: Effect) -> str:
+    """Say by how much an effect's torque changes with one filter, if it does."""
     gates, own = narrow.criteria.gates, wider.model.slices[effect.label]
     again = fit_evidence(narrow, wider.model)
     first, second = wider.values[own], again.values[own]
@@ -166,7 +173,7 @@ def follows_the_filter(
     doubt = again.covariance[own, own]
     whole = next(e for e in wider.model.effects if e.label == effect.label)
     squares = np.zeros(4)
-    for run in range(len(evidence.runs)):
+    for run in range(len(narrow.runs)):
         for columns in narrow.of(whole, run, wider.model, wider.values):
             rows = columns.reshape(-1, columns.shape[-1])
             sizes = [rows @ first, rows @ second, rows @ apart]

@@ -1,0 +1,91 @@
+"""Dry friction by another law than the model's is no finding; what is more than that stays one."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+import dynident as di
+from dynident.diagnosis.nuisances.reversal_laws import laws_that_do_as_well
+from dynident.diagnosis.search.ranking import rank
+from dynident.effects import effects_of
+from dynident.effects.friction.stribeck_friction import StribeckFriction
+from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence_fit import fit_evidence
+from dynident.evidence.runs import gather
+from dynident.model import Model
+from dynident.recording import Dataset, Recording
+from synthetic import arm, smooth_motion, true_values
+
+RATE_HZ = 500.0
+PERIOD_S = 8.0
+WIDTH = 0.05
+"""rad/s, of the law in the model and of the true one."""
+COULOMB = 2.0
+"""N m, at the elbow."""
+
+
+def given() -> Model:
+    robot, names = arm(), ("viscous_friction", "coulomb_friction")
+    return Model(robot, tuple(e for name in names for e in effects_of(name, robot)), WIDTH)
+
+
+def record(seed: int, lead: float, stribeck: float = 0.0) -> Recording:
+    """Dry friction of the elbow along a straight line, `lead` seconds before the elbow reverses."""
+    model, rng = given(), np.random.default_rng([seed, 6])
+    t, q, v, a = smooth_motion(2, seed, RATE_HZ, 3 * PERIOD_S, PERIOD_S)
+    values = true_values(model, Fv__shoulder=1.0, Fv__elbow=0.6, Fc__shoulder=3.0)
+    tau = model.torque(model.block(t, q, v, a), values)
+    ahead = np.clip((v[:, 1] + lead * a[:, 1]) / WIDTH, -1.0, 1.0)
+    tau[:, 1] += ahead * (COULOMB + stribeck * np.exp(-((v[:, 1] / 0.2) ** 2)))
+    return Recording(
+        t,
+        q + 1e-5 * rng.normal(size=q.shape),
+        tau + 0.05 * rng.normal(size=tau.shape),
+        model.robot.names,
+        period=PERIOD_S,
+        name=f"{seed}",
+    )
+
+
+def dataset(*seeds: int, lead: float, stribeck: float = 0.0) -> Dataset:
+    return Dataset(tuple(record(seed, lead, stribeck) for seed in seeds))
+
+
+@pytest.mark.parametrize("lead", [8e-3, -8e-3])
+def test_the_law_that_made_the_data_explains_more_than_an_effect_that_stands_in(
+    lead: float,
+) -> None:
+    evidence = Evidence(given(), gather(dataset(0, 1, lead=lead)))
+    fitted = fit_evidence(evidence, evidence.model)
+    stands_in = StribeckFriction("elbow").on(evidence.model.robot)
+    (one,) = rank(evidence, fitted, 0, only=(stands_in,)).scores
+    (law,) = laws_that_do_as_well(evidence, fitted, one)
+    assert law.joint == "elbow"
+    assert law.drop > one.drop
+    ahead = re.search(r"([\d.]+) ms", law.words)
+    assert ahead is not None
+    assert float(ahead[1]) == pytest.approx(8.0, rel=0.2)
+    assert ("before the joint" if lead > 0 else "after the joint") in law.words
+
+
+def test_friction_that_falls_with_speed_is_more_than_any_law_of_dry_friction() -> None:
+    evidence = Evidence(given(), gather(dataset(0, 1, lead=8e-3, stribeck=1.0)))
+    fitted = fit_evidence(evidence, evidence.model)
+    missing = StribeckFriction("elbow").on(evidence.model.robot)
+    (one,) = rank(evidence, fitted, 0, only=(missing,)).scores
+    assert laws_that_do_as_well(evidence, fitted, one) == ()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("stribeck", "found"), [(0.0, []), (1.0, ["stribeck_friction@elbow"])])
+def test_a_robot_whose_friction_leads_lacks_what_it_lacks_beside(
+    stribeck: float, found: list[str]
+) -> None:
+    train = dataset(0, 1, 2, lead=8e-3, stribeck=stribeck)
+    said = di.diagnose(given(), train, dataset(7, lead=8e-3, stribeck=stribeck))
+    assert [step.effect.label for step in said.steps] == found
+    assert said.verdict == ("explained" if found else "nothing_missing")
+    assert any("another law of dry friction" in note for note in said.notes)

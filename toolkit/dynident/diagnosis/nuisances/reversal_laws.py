@@ -1,0 +1,183 @@
+"""Other laws of dry friction: how it reverses is no finding, unless no law of it does as well.
+
+The model's dry friction is Fc tanh(v / w). A joint's may go through zero along a line, over another
+width, and sooner or later than its speed: a lag of friction behind speed is measured on machines
+(Hess and Soom, ASME Journal of Tribology 112, 1990), a lead comes from how torque and position are
+sampled, or from a simulator's constraint. What the model then misses at its reversals, Stribeck
+friction, a delay or presliding would take off too. So whatever is said to be missing at a joint
+with dry friction must explain more than any such law does in the place of the model's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from scipy.optimize import minimize
+
+from dynident.diagnosis.nuisances.friction_width import missed_instead
+from dynident.diagnosis.search.scoring import Score
+from dynident.effects import Block, JointEffect, Parameter, ShapeParameter
+from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence_fit import EvidenceFit
+from dynident.tables import number
+
+_WIDTHS = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4)
+_LEADS = (-8e-3, -4e-3, -2e-3, -1e-3, 0.0, 1e-3, 2e-3, 4e-3, 8e-3)
+_RANGE = (0.02, 15.0)
+"""Narrowest and widest law that is tried, over the model's width."""
+_LATEST = 0.02
+"""s, the most by which friction may reverse before the joint, or after it."""
+_TURNED = 3.0
+"""Speed over the width at which dry friction has turned: tanh(3) is 0.995."""
+_USUAL = 99.0
+"""Percentile of a joint's acceleration that counts as its highest."""
+_AT_ONCE = 5e-5
+"""s, below which it reverses with the joint."""
+
+
+class SmoothReversal(JointEffect):
+    """What dry friction has more that reverses over k times the width, at another moment."""
+
+    name = "smooth_reversal"
+    in_catalogue = False
+    law = "Fc (tanh((v + lead a)/(k w)) - tanh(v/w))"
+    sign_of = "opposite spikes on both sides of zero velocity"
+    experiment = "reverse {joint} at several accelerations"
+
+    def parameters(self, robot):
+        unit = robot.torque_units[robot.names.index(str(self.joint))]
+        return (Parameter("Fc", unit, 0.0),)
+
+    def shape_parameters(self, robot):
+        return (
+            ShapeParameter("k", "1", _WIDTHS, lower=_RANGE[0], upper=_RANGE[1]),
+            ShapeParameter("lead", "s", _LEADS, lower=-_LATEST, upper=_LATEST),
+        )
+
+    def at_joint(self, block: Block) -> np.ndarray:
+        j, (k, lead) = block.index(self.joint), self.shape
+        v, a = block.v[:, [j]], block.a[:, [j]]
+        width = float(np.broadcast_to(block.friction_width, len(block.names))[j])
+        return self.reversal((v + lead * a) / (k * width)) - block.sign(v, self.joint)
+
+    @staticmethod
+    def reversal(x: np.ndarray) -> np.ndarray:
+        """Return a smoothed sign of x."""
+        return np.tanh(x)
+
+
+class StraightReversal(SmoothReversal):
+    """The same of dry friction that goes through zero along a line."""
+
+    name = "straight_reversal"
+    law = "Fc (clip((v + lead a)/(k w), -1, 1) - tanh(v/w))"
+
+    @staticmethod
+    def reversal(x: np.ndarray) -> np.ndarray:
+        return np.clip(x, -1.0, 1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReversalLaw:
+    """Another law of dry friction at a joint, in the place of the model's.
+
+    Attributes
+    ----------
+    joint : where.
+    drop : of the squared systematic residual, whitened, all else fitted anew.
+    effect : label of what would be missing else.
+    words : the law, a clause.
+    within : rad/s or m/s, speed within which it is another one than the model's.
+    """
+
+    joint: str
+    drop: float
+    effect: str
+    words: str
+    within: float
+
+    @property
+    def note(self) -> str:
+        """What is not known, in plain words."""
+        return (
+            f"{self.effect} cannot be told from another law of dry friction: at {self.joint} one "
+            f"that {self.words} explains as much"
+        )
+
+
+def laws_that_do_as_well(
+    evidence: Evidence, fitted: EvidenceFit, one: Score
+) -> tuple[ReversalLaw, ...]:
+    """Other laws of dry friction that explain together what an effect would, less its price.
+
+    Parameters
+    ----------
+    evidence, fitted : the training recordings, and the model as it fits them.
+    one : the score of an effect that the model lacks.
+
+    Returns
+    -------
+    At joints where the effect acts and the model has dry friction, those that explain something;
+    empty where they explain less than the effect.
+    """
+    model = fitted.model
+    joints = [model.robot.names[j] for j in one.effect.acting_at(model.robot)]
+    dry = [joint for joint in joints if f"coulomb_friction@{joint}" in model.slices]
+    found = [_best_law(evidence, fitted, joint, one.effect.label) for joint in dry]
+    found = [law for law in found if law.drop > 2.0 * np.log(fitted.rows)]
+    if sum(law.drop for law in found) < one.penalised:
+        return ()
+    return tuple(found)
+
+
+def _best_law(evidence: Evidence, fitted: EvidenceFit, joint: str, effect: str) -> ReversalLaw:
+    """Return the law that misses least at a joint."""
+    each = [_shaped(evidence, fitted, kind(joint)) for kind in (SmoothReversal, StraightReversal)]
+    missed, k, lead = min(each)
+    at = fitted.model.robot.names.index(joint)
+    own = float(fitted.model.friction_widths[at])
+    words = f"reverses over {number(k * own, 2)} {fitted.model.robot.units[at]}/s"
+    if abs(lead) >= _AT_ONCE:
+        words += f", {number(1e3 * abs(lead), 2)} ms {'before' if lead > 0 else 'after'} the joint"
+    fastest = max(float(np.percentile(np.abs(a), _USUAL)) for a in _accelerations(evidence, at))
+    return ReversalLaw(
+        joint=joint,
+        drop=fitted.error_signal - missed,
+        effect=effect,
+        words=words,
+        within=_TURNED * max(k, 1.0) * own + abs(lead) * fastest,
+    )
+
+
+def _accelerations(evidence: Evidence, at: int) -> list[np.ndarray]:
+    return [run.replicates[0].a[:, at] for run in evidence.runs]
+
+
+def _shaped(
+    evidence: Evidence, fitted: EvidenceFit, column: SmoothReversal
+) -> tuple[float, float, float]:
+    """Return what is missed with the best shape of a law, and that shape."""
+    shapes = list(product(_WIDTHS, _LEADS))
+    missed = missed_instead(evidence, fitted, [column.shaped(*shape) for shape in shapes])
+    k, lead = shapes[int(np.argmin(missed))]
+
+    def misses(x: np.ndarray) -> float:
+        shape = float(np.exp(x[0])), float(x[1])
+        return float(missed_instead(evidence, fitted, [column.shaped(*shape)])[0])
+
+    start = np.array([np.log(k), lead])
+    found = minimize(
+        misses,
+        start,
+        method="Nelder-Mead",
+        bounds=[tuple(np.log(_RANGE)), (-_LATEST, _LATEST)],
+        options={
+            "initial_simplex": start + np.array([[0.0, 0.0], [0.3, 0.0], [0.0, 5e-4]]),
+            "maxfev": 40,
+            "xatol": 1e-4,
+            "fatol": 0.5,
+        },
+    )
+    return float(found.fun), float(np.exp(found.x[0])), float(found.x[1])
