@@ -23,10 +23,12 @@ html_show_sphinx = False
 html_copy_source = False
 suppress_warnings = ["ref.python"]  # `n` of several classes, in shapes
 myst_heading_anchors = 3
+smartquotes = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 napoleon_google_docstring = False
 napoleon_use_ivar = True
+napoleon_use_rtype = False
 
 
 def setup(app: Any) -> None:

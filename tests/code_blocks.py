@@ -19,6 +19,16 @@ PAGES = sorted(
 
 
 @dataclass(frozen=True)
+class Typed:
+    """A command on a page, with the lines that it prints and its exit status."""
+
+    program: str
+    arguments: list[str]
+    printed: list[str]
+    status: int
+
+
+@dataclass(frozen=True)
 class CodeBlock:
     """A fenced block of a page.
 
@@ -33,11 +43,12 @@ class CodeBlock:
     text: str
     file: str
 
-    def commands(self) -> Iterator[tuple[list[str], list[str]]]:
-        """Yield the arguments of each command of a console, and the lines that it prints."""
+    def commands(self) -> Iterator[Typed]:
+        """Yield each command of a console."""
         for one in re.split(r"^\$ ", self.text, flags=re.MULTILINE)[1:]:
             first, *printed = one.splitlines()
-            yield shlex.split(first, comments=True), printed
+            program, *arguments = shlex.split(first, comments=True)
+            yield Typed(program, arguments, printed, int("exit status 1" in first))
 
 
 def blocks(page: Path) -> list[CodeBlock]:
@@ -54,6 +65,6 @@ def blocks(page: Path) -> list[CodeBlock]:
     return found
 
 
-def told(line: str) -> str:
-    """A line of output less its numbers, blanks and rules."""
-    return " ".join(re.sub(r"\d[\d.e+-]*", "#", line).replace("─", "").split())
+def told(output: str) -> str:
+    """Output less its numbers, blanks and rules, however its lines are broken."""
+    return " ".join(re.sub(r"\d[\d.e+-]*", "#", output).replace("─", "").split())

@@ -109,7 +109,7 @@ class StudyFile(SettingsTable):
     effect_modules: list[str] = Field(default_factory=list)
     """Python files with effects of one's own, as `["my_effects.py"]`, paths from the folder of the
     study. To read the study is to run them: what nobody has said yes to before is asked for on a
-    terminal, and refused elsewhere without --trust."""
+    terminal, and refused elsewhere without `--trust`."""
     torque: Literal["measured", "held_command"] = "measured"
     """`"measured"`, or `"held_command"` where a command acts from its sample to the next."""
     torque_unit: Literal["N m", "A", "%"] = "N m"
