@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import dynident as di
-from dynident.diagnosis.nuisances.reversal_laws import laws_that_do_as_well
+from dynident.diagnosis.nuisances.reversal_laws import laws_of_the_rest, laws_that_do_as_well
 from dynident.diagnosis.search.ranking import rank
 from dynident.effects import effects_of
 from dynident.effects.friction.stribeck_friction import StribeckFriction
@@ -69,6 +69,15 @@ def test_the_law_that_made_the_data_explains_more_than_an_effect_that_stands_in(
     assert ahead is not None
     assert float(ahead[1]) == pytest.approx(8.0, rel=0.2)
     assert ("before the joint" if lead > 0 else "after the joint") in law.words
+
+
+@pytest.mark.parametrize(("lead", "excused"), [(8e-3, ["elbow"]), (0.0, ["elbow"]), (-8e-3, [])])
+def test_what_no_effect_explains_is_excused_unless_friction_lags(
+    lead: float, excused: list[str]
+) -> None:
+    evidence = Evidence(given(), gather(dataset(0, 1, lead=lead)))
+    laws = laws_of_the_rest(evidence, fit_evidence(evidence, evidence.model))
+    assert [law.joint for law in laws] == excused
 
 
 def test_friction_that_falls_with_speed_is_more_than_any_law_of_dry_friction() -> None:

@@ -37,10 +37,11 @@ from dynident.diagnosis.details import Withdrawn
 from dynident.diagnosis.nuisances.contacts import Contacts
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.nuisances.quantisation import nothing_but_rounding
-from dynident.diagnosis.nuisances.reversal_laws import ReversalLaw, laws_that_do_as_well
+from dynident.diagnosis.nuisances.reversal_laws import laws_of_the_rest, laws_that_do_as_well
 from dynident.diagnosis.nuisances.sticking import left_out_at, without_reversals, without_sticking
 from dynident.diagnosis.proposals.law_search import LawSearch
 from dynident.diagnosis.result import Diagnosis
+from dynident.diagnosis.reversals import as_much, without_their_reversals
 from dynident.diagnosis.search.global_search import global_search
 from dynident.diagnosis.search.payload_recordings import (
     marked,
@@ -187,48 +188,26 @@ def _extend(stage: Stage, task: DiagnosisTask) -> Stage:
     while stage.proposals < task.most and not _resolved(stage, task):
         best = choose(stage.evidence, stage.fitted, stage.rounds[-1])
         if best is None:
-            break
+            laws = laws_of_the_rest(stage.evidence, stage.fitted)
+            doubtful = without_their_reversals(stage, laws, "")
+            if doubtful is stage:
+                break
+            stage = _rank(doubtful, task)
+            continue
+        label = best.score.effect.label
         laws = laws_that_do_as_well(stage.evidence, stage.fitted, best.score)
-        doubtful = _without_their_reversals(stage, laws)
+        doubtful = without_their_reversals(stage, laws, label)
         if doubtful is not stage:
             stage = _rank(doubtful, task)
             continue
         wider, why = _tried(stage, best, task)
-        why = "; ".join(law.note for law in laws) or why
+        why = as_much(laws, label) if laws else why
         if why:
-            ranking = stage.rounds[-1].refusing({best.score.effect.label: why})
+            ranking = stage.rounds[-1].refusing({label: why})
             stage = replace(stage, rounds=(*stage.rounds[:-1], ranking))
         else:
             stage = _rank(wider, task)
     return stage
-
-
-def _without_their_reversals(stage: Stage, laws: tuple[ReversalLaw, ...]) -> Stage:
-    """Leave out the reversals of joints whose dry friction may follow another law.
-
-    The same stage where they are left out already, or the recordings would hold too little.
-    """
-    known = left_out_at(stage.evidence)
-    new = tuple(law for law in laws if law.joint not in known)
-    if not new:
-        return stage
-    within = {law.joint: law.within for law in new}
-    evidence = without_reversals(stage.evidence, tuple(within), within)
-    gone = left_out_at(evidence)
-    if set(gone) == set(known):
-        return stage
-    notes = tuple(f"{law.note}." for law in new if law.joint in gone)
-    start = fit_evidence(evidence, stage.start.model, stage.start)
-    fitted = fit_evidence(evidence, stage.fitted.model, stage.fitted)
-    return replace(
-        stage,
-        evidence=evidence,
-        held=stage.held and without_reversals(stage.held, tuple(within), within),
-        start=with_friction_width(evidence, start),
-        fitted=with_friction_width(evidence, fitted),
-        rounds=stage.rounds[:-1],
-        notes=(*stage.notes, *notes),
-    )
 
 
 def _tried(stage: Stage, best: AddedEffect, task: DiagnosisTask) -> tuple[Stage, str]:

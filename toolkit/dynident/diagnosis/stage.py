@@ -45,6 +45,8 @@ class Stage:
     found : these effects.
     rounds : the ranking after each of them, the first one before any.
     refused : labels of effects that were withdrawn, with the reason: they are not tried again.
+    doubtful : joints around whose reversals rows were left out because dry friction may follow
+        another law there.
     notes : what was left out on the way, in plain words.
     """
 
@@ -58,6 +60,7 @@ class Stage:
     found: tuple[AddedEffect, ...] = ()
     rounds: tuple[Ranking, ...] = ()
     refused: Mapping[str, str] = field(default_factory=dict)
+    doubtful: frozenset[str] = frozenset()
     notes: tuple[str, ...] = ()
 
     @property

@@ -50,8 +50,8 @@ class FrictionWidthColumn(JointEffect):
         grid = (0.1, 0.3, 2.0, 4.0, 8.0)
         # It only says whether another width is called for; which one, the profile says.
         own = DEFAULTS.nuisances
-        bounds = {"lower": own.narrowest_width, "upper": own.widest_width}
-        return (ShapeParameter("k", "1", grid, **bounds),)
+        lower, upper = own.narrowest_width, own.widest_width
+        return (ShapeParameter("k", "1", grid, lower=lower, upper=upper),)
 
     def at_joint(self, block: Block) -> np.ndarray:
         v = block.v[:, [block.index(self.joint)]]

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from dynident.diagnosis.nuisances.friction_width import missed_instead
+from dynident.diagnosis.search.ranking import joints_below_noise
 from dynident.diagnosis.search.scoring import Score
 from dynident.effects import Block, JointEffect, Parameter, ShapeParameter
 from dynident.evidence.columns import Evidence
@@ -87,24 +88,16 @@ class ReversalLaw:
     ----------
     joint : where.
     drop : of the squared systematic residual, whitened, all else fitted anew.
-    effect : label of what would be missing else.
+    lead_s : by which it reverses before the joint.
     words : the law, a clause.
     within : rad/s or m/s, speed within which it is another one than the model's.
     """
 
     joint: str
     drop: float
-    effect: str
+    lead_s: float
     words: str
     within: float
-
-    @property
-    def note(self) -> str:
-        """What is not known, in plain words."""
-        return (
-            f"{self.effect} cannot be told from another law of dry friction: at {self.joint} one "
-            f"that {self.words} explains as much"
-        )
 
 
 def laws_that_do_as_well(
@@ -125,14 +118,40 @@ def laws_that_do_as_well(
     model = fitted.model
     joints = [model.robot.names[j] for j in one.effect.acting_at(model.robot)]
     dry = [joint for joint in joints if f"coulomb_friction@{joint}" in model.slices]
-    found = [_best_law(evidence, fitted, joint, one.effect.label) for joint in dry]
+    found = [_best_law(evidence, fitted, joint) for joint in dry]
     found = [law for law in found if law.drop > 2.0 * np.log(fitted.rows)]
     if sum(law.drop for law in found) < one.penalised:
         return ()
     return tuple(found)
 
 
-def _best_law(evidence: Evidence, fitted: EvidenceFit, joint: str, effect: str) -> ReversalLaw:
+def laws_of_the_rest(evidence: Evidence, fitted: EvidenceFit) -> tuple[ReversalLaw, ...]:
+    """Other laws of dry friction that explain a part of what no effect does.
+
+    Only those that reverse with the joint or before it. Friction that lags behind the joint has a
+    memory: that is physics which the model lacks.
+
+    Parameters
+    ----------
+    evidence, fitted : the training recordings, and the model as it fits them.
+
+    Returns
+    -------
+    At joints where they explain the share of the squared residual that an effect has to; none where
+    the noise is unknown.
+    """
+    if not fitted.noise_known:
+        return ()
+    least = evidence.criteria.gates.later_share * fitted.error_total
+    if fitted.error_signal < least:
+        return ()
+    quiet, names = joints_below_noise(evidence, fitted), fitted.model.robot.names
+    dry = [one for one in names if f"coulomb_friction@{one}" in fitted.model.slices]
+    every = (_best_law(evidence, fitted, joint) for joint in dry if joint not in quiet)
+    return tuple(law for law in every if law.drop >= least and law.lead_s > -_AT_ONCE)
+
+
+def _best_law(evidence: Evidence, fitted: EvidenceFit, joint: str) -> ReversalLaw:
     """Return the law that misses least at a joint."""
     each = [_shaped(evidence, fitted, kind(joint)) for kind in (SmoothReversal, StraightReversal)]
     missed, k, lead = min(each)
@@ -145,7 +164,7 @@ def _best_law(evidence: Evidence, fitted: EvidenceFit, joint: str, effect: str) 
     return ReversalLaw(
         joint=joint,
         drop=fitted.error_signal - missed,
-        effect=effect,
+        lead_s=lead,
         words=words,
         within=_TURNED * max(k, 1.0) * own + abs(lead) * fastest,
     )
