@@ -40,17 +40,27 @@ def test_nothing_imports_the_facade_that_it_stands_behind() -> None:
     assert found == set()
 
 
-def test_only_the_report_imports_plotting_libraries() -> None:
+def test_only_the_report_and_the_page_import_plotting_libraries() -> None:
+    """The page draws what is switched on at the moment, which no report holds."""
     users = {
         module.room
         for module in modules().values()
         if {name.split(".")[0] for name in module.names} & PLOTTING
     }
-    assert users == {"reporting"}
+    assert users == {"reporting", "explorer"}
+
+
+def test_only_the_page_imports_a_web_framework() -> None:
+    web = {"dash", "flask", "werkzeug"}
+    users = {m.room for m in modules().values() if {n.split(".")[0] for n in m.names} & web}
+    assert users == {"explorer"}
 
 
 def test_importing_the_package_loads_nothing_heavy() -> None:
-    heavy = ("pydrake", "pinocchio", "plotly", "matplotlib", "casadi", "scipy", "pandas", "numpy")
+    heavy = (
+        *("pydrake", "pinocchio", "plotly", "matplotlib", "casadi", "scipy", "pandas", "numpy"),
+        "dash",
+    )
     code = f"import sys, dynident, dynident.cli; print([m for m in {heavy!r} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -10,12 +10,14 @@ import pytest
 
 import dynident as di
 from dynident.diagnosis import Diagnosis
+from dynident.effects import Law
 from dynident.errors import StudyError
 from dynident.evidence import compare_models
-from dynident.explorer.effect_choices import MOST_OTHERS, effect_choices
-from dynident.explorer.opened_study import StudyVersions
+from dynident.explorer.effect_choices import MOST_OTHERS, EffectChoice, effect_choices
+from dynident.explorer.opened_study import OpenedStudy, StudyVersions
 from dynident.explorer.search_thread import SearchThread
 from dynident.explorer.switched_fit import Refitter
+from dynident.study import study_digest
 from study_files import STUDY, edited, write_study
 
 HIDDEN = "coulomb_friction@elbow"
@@ -139,7 +141,8 @@ def _for_ever(progress):
 
 
 def versions(path: Path, diagnosis: Diagnosis) -> StudyVersions:
-    return StudyVersions(path, lambda: di.load(path), (di.load(path), diagnosis))
+    first = OpenedStudy(di.load(path), study_digest(path), diagnosis)
+    return StudyVersions(path, lambda: di.load(path), first)
 
 
 def test_what_is_switched_on_is_written(tmp_path, diagnosis):
@@ -169,3 +172,16 @@ def test_a_study_that_has_changed_is_left_alone(tmp_path, diagnosis):
 def test_labels_that_nobody_offered_choose_nothing(tmp_path, diagnosis):
     opened = versions(write_study(tmp_path), diagnosis).latest()
     assert opened.chosen(["../../etc/passwd", "payload", HIDDEN]) == opened.choices[:1]
+
+
+def test_a_law_is_written_with_its_formula(tmp_path, diagnosis, study):
+    path = write_study(tmp_path)
+    opened = versions(path, diagnosis)
+    law = Law(name="drum", torque="c*v*sin(q)")
+    (effect,) = di.effects_of("law:drum@elbow", study.robot, (law,))
+    choice = EffectChoice(effect=effect, group="proposed", words="", laws=(law,))
+    opened.write([choice], opened.latest().digest)
+    assert "law:drum@elbow" in [one.label for one in di.load(path).model.effects]
+    fitted = Refitter(study).fit([effect])
+    wanted = di.fit(study.model + effect, study.train)
+    np.testing.assert_allclose(fitted.estimate.values, wanted.values, rtol=1e-9)

@@ -7,6 +7,7 @@ from . import effects as effects
 from . import errors as errors
 from . import evidence as evidence
 from . import experiment_design as experiment_design
+from . import explorer as explorer
 from . import fitting as fitting
 from . import inertia as inertia
 from . import model as model

@@ -20,6 +20,7 @@ from dynident.cli import (  # which add their commands to the group
     designs,
     fits,
     loops,
+    opening,
     robots,
     starting,
     studies,
@@ -30,7 +31,17 @@ from dynident.errors import DynidentError, DynidentWarning
 from dynident.tables import printable
 from dynident.words import shortened
 
-__all__ = ["commands", "designs", "fits", "loops", "main", "robots", "starting", "studies"]
+__all__ = [
+    "commands",
+    "designs",
+    "fits",
+    "loops",
+    "main",
+    "opening",
+    "robots",
+    "starting",
+    "studies",
+]
 
 
 TRACEBACK = "DYNIDENT_TRACEBACK"

@@ -16,6 +16,7 @@ _ORDER = (
     "init",
     "show",
     "explain",
+    "open",
     "diagnose",
     "fit",
     "payload",

@@ -91,10 +91,9 @@ def permitted(read: Callable[[Permission], Loaded]) -> Loaded:
     Without --trust, code that is not trusted yet is asked for on a terminal, and an error
     elsewhere. A yes is remembered, by the content that it was said of.
     """
-    given = click.get_current_context().meta.get(_TRUST)
     try:
         with progress("reading"):
-            return read("run" if given else "trusted")
+            return read(permission_given())
     except UntrustedError as error:
         if not (sys.stdin.isatty() and sys.stderr.isatty()):
             raise
@@ -108,6 +107,11 @@ def permitted(read: Callable[[Permission], Loaded]) -> Loaded:
     remember(sums)
     with progress("reading"):
         return read("trusted")
+
+
+def permission_given() -> Permission:
+    """Return what may be run of a study's code, by the options of the command."""
+    return "run" if click.get_current_context().meta.get(_TRUST) else "trusted"
 
 
 def with_drives(study: Study, answer: CommandAnswer) -> CommandAnswer:

@@ -1,9 +1,78 @@
 """The loop by hand, on a local page: compare, see what is missing, switch it on, write it down.
 
 In: a study. Out: a page on the loopback address, under a token, that writes nothing but effects
-into that study, and these on a click only.
+into that study, and these on a click only. `dynident open STUDY` serves it from the command line,
+`explore` in a notebook. It needs Dash: `pip install "dynident[app]"`.
 
 - `switched_fit`: the model with the effects that are switched on, fitted and judged at once.
 - `effect_choices`: what a diagnosis offers to switch on; `search_thread` runs it meanwhile.
 - `opened_study`: a study as it was read, and written to while it is still that.
+- `tab_state`: what one tab of the browser has chosen.
+- `page`, of `page_parts`, `page_figures` and `page_answers`: what a tab shows.
+- `local_access`, `local_server`: who may see it, and from where.
 """
+
+from __future__ import annotations
+
+import importlib.util
+from typing import TYPE_CHECKING
+
+from dynident.errors import DynidentError
+
+if TYPE_CHECKING:
+    from dynident.diagnosis import Diagnosis
+    from dynident.explorer.local_server import LocalServer
+    from dynident.study import Study
+
+__all__ = ["explore", "require_app"]
+
+
+def require_app() -> None:
+    """Refuse to go on without the libraries of the page.
+
+    Raises
+    ------
+    DynidentError
+        If they are not installed.
+    """
+    if importlib.util.find_spec("dash") is None:
+        raise DynidentError("the page needs Dash", remedy="pip install 'dynident[app]'")
+
+
+def explore(study: Study, diagnosis: Diagnosis | None = None) -> LocalServer:
+    """Show a study's page in a notebook; the last line of a cell displays what is returned.
+
+    Parameters
+    ----------
+    study : as `load` reads it; effects that are switched on are written to its file, on a click.
+    diagnosis : of that study, where there is one; else it is made beside the page.
+
+    Returns
+    -------
+    The page; `stop()` ends it.
+
+    Raises
+    ------
+    DynidentError
+        If Dash is not installed, or the study's file is another one by now.
+
+    Examples
+    --------
+    >>> study = di.load("study.toml")
+    >>> d = di.diagnose(study.model, study.train, study.test)
+    >>> di.explorer.explore(study, d)
+    """
+    require_app()
+    from dynident.explorer.local_server import LocalServer
+    from dynident.explorer.opened_study import OpenedStudy, StudyVersions
+    from dynident.study import load, study_digest
+
+    digest = study_digest(study.path)
+    now = [effect.label for effect in load(study.path).model.effects]
+    if now != [effect.label for effect in study.model.effects]:
+        raise DynidentError("has other effects by now", str(study.path), "load it again")
+    first = OpenedStudy(study, digest, diagnosis)
+    versions = StudyVersions(study.path, lambda: load(study.path), first)
+    server = LocalServer(versions, "in a notebook")
+    server.start()
+    return server

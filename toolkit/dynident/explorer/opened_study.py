@@ -8,6 +8,8 @@ from functools import cached_property
 from pathlib import Path
 from threading import RLock
 
+import numpy as np
+
 from dynident.diagnosis import Diagnosis
 from dynident.diagnosis.recorded_units import in_recorded_units
 from dynident.effects import Law
@@ -61,7 +63,7 @@ class OpenedStudy:
         assert found is not None
         # Over which speed dry friction reverses, the diagnosis has found out.
         model = found.before.model
-        same = model.friction_widths == self.study.model.friction_widths
+        same = np.array_equal(model.friction_widths, self.study.model.friction_widths)
         return self.given if same else Refitter(self.study, model)
 
     @cached_property
@@ -77,20 +79,12 @@ class StudyVersions:
     ----------
     path : the study file.
     read : reads it, once for each version.
-    first : a version that is known already, as it was read now.
+    first : the version that has been read already.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        read: Callable[[], Study],
-        first: tuple[Study, Diagnosis | None] | None = None,
-    ) -> None:
+    def __init__(self, path: Path, read: Callable[[], Study], first: OpenedStudy) -> None:
         self.path, self._read, self._lock = path, read, RLock()
-        self._opened: OrderedDict[str, OpenedStudy] = OrderedDict()
-        if first is not None:
-            digest = study_digest(path)
-            self._opened[digest] = OpenedStudy(first[0], digest, first[1])
+        self._opened = OrderedDict({first.digest: first})
 
     def latest(self) -> OpenedStudy:
         """Return the study as the file is now, read anew if it is another one.

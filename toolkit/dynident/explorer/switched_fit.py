@@ -73,7 +73,7 @@ class Refitter:
             runs = gather(study.test, criteria.noise)
             self._test = Evidence(self.model, runs, criteria=criteria)
         # What is kept of columns is for one at a time; requests come in threads.
-        self._lock = RLock()
+        self._lock, self._slowly = RLock(), RLock()
         self._fits = lru_cache(_KEPT)(self._fit)
         self._estimates = lru_cache(_KEPT)(self._with_intervals)
 
@@ -99,7 +99,8 @@ class Refitter:
         ----------
         effects : as for `fit`.
         """
-        return self._estimates(_ordered(effects))
+        with self._slowly:  # or what is asked for twice would be worked out twice
+            return self._estimates(_ordered(effects))
 
     def impossible(self, estimate: Estimate) -> tuple[str, ...]:
         """Return what an estimate says that no robot can have, by the rules of the diagnosis."""

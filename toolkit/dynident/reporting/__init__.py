@@ -1,4 +1,4 @@
-"""The report and its pictures: the only room that imports plotting libraries.
+"""The report and its pictures: what is drawn of a diagnosis or a validation.
 
 In: a `Diagnosis` or a `Validation`. Out: one HTML file (`html.report`), whose parts are the tables
 (`diagnosis_tables`, `intervals`), the words (`glossary`, `joint_states`, `next_steps`) and the

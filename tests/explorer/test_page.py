@@ -1,0 +1,306 @@
+"""The page in a real browser: the demo is solved by clicking, and what goes wrong is told."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import pytest
+from playwright.sync_api import sync_playwright
+
+import dynident as di
+from dynident.diagnosis import Diagnosis
+from dynident.explorer import explore
+from dynident.explorer.local_server import LocalServer
+from study_files import STUDY, csv_text, edited, write_study
+from synthetic import ARM
+
+BROWSER = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        BROWSER is None, reason="no chromium, chromium-browser or google-chrome on the path"
+    ),
+]
+
+DEMO = Path(__file__).parents[2] / "problems" / "hidden_effect"
+HIDDEN = "coulomb_friction@elbow"
+PHONE, DESK = 390, 1280
+NASTY = "<script>alert(1)</script>"
+_NOW = re.compile(r"All joints: ([0-9.]+) % before, ([0-9.]+) % now")
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory) -> Iterator:
+    home = tmp_path_factory.mktemp("home")
+    with sync_playwright() as driver:
+        found = driver.chromium.launch(
+            executable_path=BROWSER,
+            timeout=120_000,
+            args=["--no-sandbox", "--disable-gpu"],
+            env={**os.environ, "HOME": str(home)},
+        )
+        yield found
+        found.close()
+
+
+@dataclass
+class Tab:
+    """A tab of the browser, with what it has complained of and asked for."""
+
+    page: Any
+    home: str
+    complaints: list[str] = field(default_factory=list)
+    requests: list[str] = field(default_factory=list)
+
+    def switch(self, place: int = 0) -> None:
+        """Flip a switch by the keyboard, and wait until the error has been seen to change."""
+        before = self.said
+        box = self.page.locator(".switch input").nth(place)
+        box.focus()
+        self.page.keyboard.press("Space")
+        self.page.wait_for_function(
+            "(old) => document.querySelector('#said').innerText !== old", arg=before
+        )
+
+    def write(self) -> str:
+        """Write what is switched on; what the page says to it."""
+        self.page.locator("#write:not([disabled])").click()
+        self.page.wait_for_function("document.querySelector('#written').innerText.length > 0")
+        return self.page.locator("#written").inner_text()
+
+    @property
+    def said(self) -> str:
+        return self.page.locator("#said").inner_text()
+
+    def assert_quiet(self) -> None:
+        """Nothing was complained of, and nothing left the machine."""
+        assert self.complaints == []
+        assert [one for one in self.requests if not one.startswith((self.home, "data:"))] == []
+
+
+Opened = Callable[..., Tab]
+
+
+@pytest.fixture
+def tab(browser) -> Iterator[Opened]:
+    contexts = []
+
+    def opened(url: str, width: int = DESK) -> Tab:
+        context = browser.new_context(viewport={"width": width, "height": 844})
+        contexts.append(context)
+        found = Tab(context.new_page(), url)
+        found.page.on("console", lambda message: found.complaints.append(message.text))
+        found.page.on("pageerror", lambda error: found.complaints.append(str(error)))
+        found.page.on("dialog", lambda one: found.complaints.append(one.message))
+        found.page.on("request", lambda request: found.requests.append(request.url))
+        found.page.set_default_timeout(120_000)
+        found.page.goto(url)
+        found.page.locator(".effect").first.wait_for(state="attached")
+        found.page.wait_for_function("document.querySelector('#said').innerText.length > 0")
+        return found
+
+    yield opened
+    for context in contexts:
+        context.close()
+
+
+@pytest.fixture(scope="module")
+def diagnosis(tmp_path_factory) -> Diagnosis:
+    study = di.load(write_study(tmp_path_factory.mktemp("diagnosed")))
+    return di.diagnose(study.model, study.train, study.test)
+
+
+@pytest.fixture
+def small(tmp_path, diagnosis) -> Iterator[tuple[Path, LocalServer]]:
+    """The arm of the tests, diagnosed already."""
+    path = write_study(tmp_path)
+    server = explore(di.load(path), diagnosis)
+    yield path, server
+    server.stop()
+
+
+@pytest.fixture
+def demo(tmp_path) -> Iterator[tuple[Path, str, subprocess.Popen]]:
+    """The demo served by the command in a process of its own."""
+    folder = tmp_path / "demo"
+    shutil.copytree(DEMO, folder)
+    command = [sys.executable, "-m", "dynident.cli", "open", "study.toml", "--no-browser"]
+    server = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True)
+    assert server.stdout is not None
+    line = server.stdout.readline()
+    found = re.fullmatch(
+        r"study\.toml is open at (http://127\.0\.0\.1:\d+/\S{32}/) \(Ctrl-C ends it\)\n", line
+    )
+    assert found, line
+    yield folder / "study.toml", found[1], server
+    if server.poll() is None:
+        server.kill()
+    server.communicate()
+
+
+def test_the_demo_is_solved_by_clicking(demo, tab):
+    path, url, server = demo
+    one = tab(url)
+    verdict = one.page.locator("#search").inner_text()
+    assert "Explained: stribeck friction at elbow" in verdict
+    first = one.page.locator(".effect").first.inner_text()
+    assert first.startswith("Stribeck friction at elbow")
+    assert "spikes beside zero velocity" in one.page.locator("#seen").inner_text().lower()
+    assert "Nothing is switched on yet" in one.said
+    assert one.page.locator("#write").is_disabled()
+    one.switch()
+    before, now = map(float, _NOW.findall(one.said)[0])
+    assert now < 0.6 * before
+    row = one.page.locator("#values tbody tr").first
+    row.wait_for()
+    assert row.inner_text().split()[0] == "Fs@elbow" and "N m" in row.inner_text()
+    low, high = map(float, row.locator("td").nth(1).inner_text().split(" to "))
+    assert low < 0.5 < high  # the value that was hidden in the data
+    assert "Written into study.toml: stribeck_friction@elbow" in one.write()
+    assert "stribeck_friction@elbow" in [e.label for e in di.load(path).model.effects]
+    one.assert_quiet()
+    # The study as it is now: what was missing is in it.
+    one.page.locator("#written a").click()
+    one.page.locator("#search", has_text="Nothing is missing").wait_for()
+    one.page.locator("#said", has_text="All joints").wait_for()
+    assert float(re.findall(r"[0-9.]+", one.said)[0]) == pytest.approx(now, rel=0.1)
+    server.send_signal(signal.SIGINT)
+    rest, _ = server.communicate(timeout=60)
+    assert (server.returncode, rest) == (0, "closed; what was not written is gone\n")
+
+
+@pytest.mark.parametrize("width", [PHONE, DESK])
+def test_it_is_readable_and_reached_by_keys(small, tab, width):
+    one = tab(small[1].url, width)
+    one.switch()
+    one.page.locator("#values table").wait_for()
+    assert one.page.evaluate("document.documentElement.scrollWidth") <= width
+    # Every control has a name, and the keyboard reaches all that is open.
+    unnamed = """() => [...document.querySelectorAll("main input, main button, main summary")]
+      .filter((n) => !n.ariaHidden && n.getBoundingClientRect().height && !(n.labels?.length
+        ? n.labels[0].textContent.trim() : (n.innerText || n.ariaLabel || "").trim()))
+      .map((n) => n.outerHTML)"""
+    assert one.page.evaluate(unnamed) == []
+    one.page.evaluate("document.activeElement.blur()")
+    reached = set()
+    for _ in range(30):
+        one.page.keyboard.press("Tab")
+        reached.add(one.page.evaluate("document.activeElement.id || document.activeElement.type"))
+    assert {"write", "checkbox", "radio", "recording"} <= reached
+    one.assert_quiet()
+
+
+def test_a_recording_is_zoomed_and_what_is_held_out_is_said(small, tab):
+    one = tab(small[1].url)
+    page, span = one.page, "document.querySelector('#torque .js-plotly-plot')._fullLayout"
+    page.wait_for_function(f"{span}?.yaxis.range[1] < 20")  # of the elbow, not of the shoulder
+    assert page.locator("#held").inner_text() == "elbow, test.csv (held out)"
+    plot = page.locator("#torque .nsewdrag").first
+    plot.scroll_into_view_if_needed()
+    box = plot.bounding_box()
+    height = box["y"] + box["height"] / 2
+    page.mouse.move(box["x"] + 0.4 * box["width"], height)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.6 * box["width"], height + 2, steps=6)
+    page.mouse.up()
+    page.wait_for_function(f"{span}.xaxis.range[1] - {span}.xaxis.range[0] < 6")
+    near = page.evaluate(f"{span}.xaxis.range")
+    drawn = "document.querySelector('#torque .js-plotly-plot').data.at(-1).y[99]"
+    old = page.evaluate(drawn)
+    one.switch()
+    page.wait_for_function(f"(old) => {drawn} !== old", arg=old)
+    assert page.evaluate(f"{span}.xaxis.range") == near  # what is looked at stays in sight
+    page.locator("#joint input").first.check()
+    page.wait_for_function("document.querySelector('#held').innerText.startsWith('shoulder')")
+    page.locator("#recording").click()
+    page.get_by_text("train.csv (fitted)").last.click()
+    page.wait_for_function("document.querySelector('#held').innerText.includes('(fitted)')")
+    one.assert_quiet()
+
+
+def test_impossible_values_are_told(tmp_path, tab, diagnosis):
+    """Another effect in the place of dry friction needs a value that no robot has."""
+    drag = [one for one in diagnosis.candidates if one.effect.label == "quadratic_drag@elbow"]
+    server = explore(
+        di.load(write_study(tmp_path)), replace(diagnosis, steps=(), candidates=tuple(drag))
+    )
+    one = tab(server.url)
+    assert "adds nothing" in one.page.locator("#choices").inner_text()
+    one.page.locator("summary", has_text="Other effects").click()
+    one.switch()
+    values = one.page.locator("#values")
+    values.locator("table").wait_for()
+    assert "Impossible: no robot can have Fq = -" in values.inner_text()
+    server.stop()
+
+
+def test_two_tabs_choose_for_themselves_and_the_second_to_write_is_told(small, tab):
+    path, server = small
+    one, two = tab(server.url), tab(server.url)
+    one.switch()
+    assert "Nothing is switched on yet" in two.said
+    two.switch()
+    assert one.write().startswith(f"Written into study.toml: {HIDDEN}")
+    after = path.read_text()
+    said = two.write()
+    assert "Not written" in said and "has changed since it was read" in said
+    assert path.read_text() == after == edited(('friction"]', f'friction", "{HIDDEN}"]'))
+
+
+def test_a_study_that_changes_underneath_is_left_alone(small, tab):
+    path, server = small
+    one = tab(server.url)
+    one.switch()
+    path.write_text(STUDY + "# somebody else was here\n")
+    assert "has changed since it was read" in one.write()
+    assert path.read_text() == STUDY + "# somebody else was here\n"
+    # A study that cannot be read any more is told, too.
+    path.write_text("robot = ")
+    one.page.reload()
+    one.page.get_by_text("The study cannot be read").wait_for()
+
+
+def test_a_killed_server_is_told(demo, tab):
+    _, url, server = demo
+    one = tab(url)
+    assert one.page.locator("#lost").is_hidden()
+    server.kill()
+    one.page.locator("#lost").wait_for(state="visible")
+    assert "The connection is lost" in one.page.locator("#lost").inner_text()
+    assert one.page.locator(".dash-error-card, .dash-fe-error__title").count() == 0
+
+
+def test_names_stay_names(tmp_path, tab):
+    """Of the study, its files and its joints, wherever they are drawn or written."""
+    joint, name = NASTY, f"{NASTY.replace('/', '|')}.csv"
+    path = write_study(tmp_path)
+    (tmp_path / "arm.urdf").write_text(ARM.replace('"elbow"', quoteattr(joint)))
+    for seed, file in enumerate(("train.csv", name)):
+        (tmp_path / file).write_text(csv_text(seed).replace("elbow", joint))
+    text = edited(('"elbow"', f'"{joint}"'), ('"test.csv"', f'"{name}"'))
+    path = path.rename(tmp_path / f"{NASTY.replace('/', '|')}.toml")
+    path.write_text(text)
+    study = di.load(path)
+    server = explore(study, di.diagnose(study.model, study.train, study.test))
+    one = tab(server.url)
+    one.switch()
+    one.page.locator("#values table").wait_for()
+    shown = one.page.locator("main").inner_text()
+    assert f"Coulomb friction at {joint}" in shown and name in shown and path.name in shown
+    assert f"coulomb_friction@{joint}" in one.write()
+    assert one.page.locator("main script").count() == 0
+    one.assert_quiet()
+    server.stop()
+    assert f"coulomb_friction@{joint}" in [e.label for e in di.load(path).model.effects]

@@ -1,0 +1,87 @@
+"""The page served on this machine: until Ctrl-C, or beside a notebook."""
+
+from __future__ import annotations
+
+from html import escape
+from threading import Thread
+
+from flask import Flask
+from werkzeug.serving import WSGIRequestHandler, make_server
+
+from dynident.explorer.local_access import ADDRESS, Framing, guard, new_token
+from dynident.explorer.opened_study import StudyVersions
+from dynident.explorer.page import page
+
+_HEIGHT = 900  # pixels of the frame in a notebook
+
+
+class _Quiet(WSGIRequestHandler):
+    """Says nothing of single requests, whose paths hold the token."""
+
+    def log(self, type: str, message: str, *args: object) -> None:
+        pass
+
+
+class LocalServer:
+    """A study's page at an address of its own.
+
+    Parameters
+    ----------
+    versions : the study.
+    framing : whether a notebook may show it in a frame.
+
+    Attributes
+    ----------
+    flask : the application behind it.
+    token : without which nothing is told.
+    """
+
+    def __init__(self, versions: StudyVersions, framing: Framing = "alone") -> None:
+        self.versions, self.token = versions, new_token()
+        self.flask = Flask("dynident", static_folder=None)
+        guard(self.flask, self.token, lambda: self.port, framing)
+        self.flask.add_url_rule(f"/{self.token}/alive", "alive", lambda: ("", 204))
+        page(self.flask, self.token, versions)
+        self._server = make_server(ADDRESS, 0, self.flask, threaded=True, request_handler=_Quiet)
+        self._thread: Thread | None = None
+
+    @property
+    def port(self) -> int:
+        """At which it listens: one that was free."""
+        return self._server.server_port
+
+    @property
+    def url(self) -> str:
+        """What is opened in a browser."""
+        return f"http://{ADDRESS}:{self.port}/{self.token}/"
+
+    def serve(self) -> None:
+        """Answer until somebody interrupts."""
+        try:
+            self._server.serve_forever(poll_interval=0.2)
+        finally:
+            self.versions.stop()
+            self._server.server_close()
+
+    def start(self) -> None:
+        """Answer beside whatever else goes on."""
+        self._thread = Thread(target=self.serve, daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End it; what was not written is lost."""
+        if self._thread is None:
+            self._server.server_close()
+            return
+        self._server.shutdown()
+        self._thread.join()
+
+    def _repr_html_(self) -> str:
+        """Show the page in a notebook."""
+        url = escape(self.url)
+        return (
+            f'<iframe src="{url}" title="dynident" width="100%" height="{_HEIGHT}" '
+            'style="border: 1px solid #888"></iframe>'
+            "<p>It runs until the notebook's kernel ends, or until <code>.stop()</code> is called "
+            "on this object.</p>"
+        )
