@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pandas as pd
+import pytest
 
 from loop_studies import write_loop_study
 
@@ -47,3 +50,48 @@ def test_what_cannot_be_designed_is_one_line(run, tmp_path) -> None:
         assert done.status == 2
         assert done.err.count("\n") == 1, done.err
         assert not (tmp_path / "next").exists()
+
+
+@pytest.mark.slow
+def test_the_loop_is_closed_without_a_hand_in_between(run, tmp_path) -> None:
+    done = run("demo", "--design", "made", "--json")
+    assert done.status == 0, done.err
+    said = json.loads(done.out)
+    pair = {"quadratic_drag", "stribeck_friction"}
+    (step,) = said["before"]["steps"]
+    assert {step["effect"], *(one["effect"] for one in step["indistinguishable"])} == pair
+    (told,) = said["design"]["separations"]
+    assert told["recorded"] < 3.0 < told["designed"]
+    (after,) = said["after"]["steps"]
+    assert after["effect"] == "quadratic_drag" and not after["indistinguishable"]
+    assert said["settled"] == [
+        "quadratic_drag@elbow or stribeck_friction@elbow: settled, it is quadratic_drag@elbow."
+    ]
+    study = tmp_path / "made" / "study.toml"
+    assert study.read_text().count("[[recordings]]") == 4
+    assert "drag" not in study.read_text()  # what is hidden stays hidden
+
+    # Without the designed recording the two are open: the answer comes with it.
+    before, _, after_ = study.read_text().partition('[[recordings]]\nfile = "designed.csv"')
+    study.write_text(before + after_[after_.index("[controller]") :])
+    done = run("explain", study, "--propose", "never", "--design", "next", "--json")
+    assert done.status == 0, done.err
+    design = json.loads(done.out)["next_recording"]["design"]
+    assert design["separations"][0]["designed"] > 3.0
+    assert {one.rpartition("/")[2] for one in design["files"]} >= {
+        "reference.csv",
+        "experiment.toml",
+    }
+    assert len(pd.read_csv(tmp_path / "next" / "reference.csv")) > 1000
+
+
+def test_where_no_recording_can_settle_anything_the_answer_says_so(run, tmp_path) -> None:
+    study = write_loop_study(tmp_path)
+    done = run("explain", study, "--propose", "never", "--design", "next")
+    assert done.status == 0, done.err
+    said = " ".join(done.out.split())
+    assert "Nothing is left open" in said or "No recording is designed" in said
+    assert not (tmp_path / "next").exists()
+    (tmp_path / "taken").write_text("")
+    done = run("explain", study, "--design", "taken")
+    assert done.status == 2 and done.err.count("\n") == 1, done.err

@@ -17,6 +17,7 @@ from typing import NoReturn
 import click
 
 from dynident.cli import (  # which add their commands to the group
+    demonstration,
     designs,
     fits,
     loops,
@@ -33,6 +34,7 @@ from dynident.words import shortened
 
 __all__ = [
     "commands",
+    "demonstration",
     "designs",
     "fits",
     "loops",

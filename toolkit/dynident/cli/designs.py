@@ -1,8 +1,10 @@
-"""The command that designs the next recording."""
+"""The command that designs the next recording, and what other commands ask of it."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -10,7 +12,12 @@ from dynident import files
 from dynident.cli.group import CommandAnswer, answered, commands
 from dynident.cli.output import progress
 from dynident.cli.work import STUDY, load_study
-from dynident.errors import DesignError
+from dynident.errors import DesignError, DynidentError
+
+if TYPE_CHECKING:
+    from dynident.diagnosis import Diagnosis
+    from dynident.experiment_design import RecordingDesign
+    from dynident.study import Study
 
 _PATH = click.Path(path_type=Path)
 
@@ -46,7 +53,6 @@ def design(study: Path, limits: Path | None, out: Path | None, **settings) -> Co
     from dynident.effects import Effect, effects_of
     from dynident.experiment_design import DesignTask, MotionLimits
     from dynident.experiment_design import design as designed
-    from dynident.experiment_design.design_files import write_design
 
     loaded = load_study(study)
     if out is not None:
@@ -67,14 +73,93 @@ def design(study: Path, limits: Path | None, out: Path | None, **settings) -> Co
     bounds = MotionLimits.from_file(limits, loaded.robot) if limits else None
     with progress("designing") as told:
         answer = designed(loaded.model, loaded.train, task, limits=bounds, progress=told)
-    written: tuple[Path, ...] = ()
-    if out is not None:
-        rate = loaded.train.recordings[0].rate_hz
-        written = write_design(answer, out, round(rate, 6), loaded.controller)
-    notes = [f"Written: {one}" for one in written]
-    if out is not None and loaded.controller is None:
-        notes.append("No experiment.toml: the study has no [controller] to simulate with.")
+    written, notes = write_files(answer, loaded, out)
     return CommandAnswer(
         content=lambda: {**answer.to_dict(), "files": [str(one) for one in written]},
         parts=lambda: (*answer.tables(), *notes),
     )
+
+
+def write_files(
+    designed: RecordingDesign, study: Study, out: Path | None
+) -> tuple[tuple[Path, ...], tuple[str, ...]]:
+    """Write a design into a folder.
+
+    Parameters
+    ----------
+    designed : the recording to make.
+    study : for its rate and its controller.
+    out : the folder; None for none.
+
+    Returns
+    -------
+    The files, and what is to be said of them.
+    """
+    from dynident.experiment_design.design_files import write_design
+
+    if out is None:
+        return (), ()
+    rate = study.train.recordings[0].rate_hz
+    written = write_design(designed, out, round(rate, 6), study.controller)
+    notes = [f"Written: {one}" for one in written]
+    if study.controller is None:
+        notes.append("No experiment.toml: the study has no [controller] to simulate with.")
+    return written, tuple(notes)
+
+
+@dataclass(frozen=True, kw_only=True)
+class NextRecording:
+    """The recording to make after a diagnosis; without a design, why there is none."""
+
+    design: RecordingDesign | None = None
+    notes: tuple[str, ...] = ()
+    written: tuple[Path, ...] = ()
+
+    def advised(self, diagnosis: Diagnosis) -> Diagnosis:
+        """The diagnosis, with the designed recording in the place of advice in words."""
+        from dynident.experiment_design.open_questions import with_designed_advice
+
+        if self.design is None:
+            return diagnosis
+        return with_designed_advice(diagnosis, self.design)
+
+    def parts(self):
+        """What is shown of it, after the diagnosis."""
+        return (*(self.design.tables() if self.design else ()), *self.notes)
+
+    def content(self):
+        """The same as JSON has it."""
+        if self.design is None:
+            return {"design": None, "notes": list(self.notes)}
+        return {"design": {**self.design.to_dict(), "files": [str(one) for one in self.written]}}
+
+
+def next_recording(diagnosis: Diagnosis, study: Study, out: Path) -> NextRecording:
+    """Design the recording that settles what a diagnosis left open, and write it into a folder.
+
+    Parameters
+    ----------
+    diagnosis : of the study.
+    study : for its recordings, their rate and its controller.
+    out : the folder.
+
+    Returns
+    -------
+    The design; or why there is none.
+    """
+    from dynident.experiment_design import DesignTask
+    from dynident.experiment_design import design as designed
+    from dynident.experiment_design.open_questions import open_task
+
+    if diagnosis.wiring or diagnosis.impossible:
+        return NextRecording(notes=("No recording is designed before the study is mended.",))
+    task = open_task(diagnosis, DesignTask(starts=1))
+    if task is None:
+        return NextRecording(notes=("Nothing is left open that a motion could settle.",))
+    try:
+        with progress("designing") as told:
+            answer = designed(diagnosis.after.model, study.train, task, progress=told)
+    except DynidentError as error:  # the diagnosis holds without it
+        return NextRecording(notes=(f"No recording is designed: {error}",))
+    written, notes = write_files(answer, study, out)
+    return NextRecording(design=answer, notes=notes, written=written)

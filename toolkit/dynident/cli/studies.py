@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dynident import files
+from dynident.cli.designs import NextRecording, next_recording
 from dynident.cli.group import CommandAnswer, answered, commands
 from dynident.cli.output import progress
 from dynident.cli.work import (
@@ -41,8 +42,14 @@ _PATH = click.Path(path_type=Path)
 @PROPOSE
 @click.option("--report", type=_PATH, help="Also write this HTML report.")
 @click.option("--laws", type=_PATH, help="Also write the proposals as a file of laws.")
+@click.option("--design", "next_", type=_PATH, help="Also design the next recording, into DIR.")
 def explain(
-    study: Path, most: int | None, propose: Propose, report: Path | None, laws: Path | None
+    study: Path,
+    most: int | None,
+    propose: Propose,
+    report: Path | None,
+    laws: Path | None,
+    next_: Path | None,
 ) -> CommandAnswer:
     """Run the whole loop: compare, diagnose, add, refit, compare. The study stays as it is.
 
@@ -50,19 +57,33 @@ def explain(
     --proposal 1` writes one into the study; a file of them is named in another study by laws =
     "laws.toml", and then tried with the catalogue.
 
+    With --design the recording is designed that tells apart what the data left open, else one that
+    shows what they could not (see `dynident design`).
+
     Example: dynident explain study.toml --report report.html
     """
+    if next_ is not None:
+        files.require_folder(next_)
     require_places(study, report, laws)
     if laws is not None and laws.exists():
         raise FileError("is there already", str(laws), "name another file: laws may be in it")
     loaded = load_study(study, report, laws)
     diagnosis = diagnosis_of(loaded, most, propose)
+    following = NextRecording() if next_ is None else next_recording(diagnosis, loaded, next_)
+    diagnosis = following.advised(diagnosis)
     write_report(loaded, diagnosis, report)
     if laws is not None:
         write_laws(laws, tuple(one.effect.made_of for one in diagnosis.proposals))
     answer = CommandAnswer(
-        content=diagnosis.to_dict,
-        parts=lambda: (*diagnosis.tables(), diagnosis.after.parameter_table()),
+        content=lambda: {
+            **diagnosis.to_dict(),
+            **({} if next_ is None else {"next_recording": following.content()}),
+        },
+        parts=lambda: (
+            *diagnosis.tables(),
+            diagnosis.after.parameter_table(),
+            *following.parts(),
+        ),
     )
     return with_drives(loaded, answer)
 
@@ -243,31 +264,3 @@ def report(study: Path, most: int | None, to: Path) -> CommandAnswer:
     return CommandAnswer(
         content=lambda: {"report": str(to), **diagnosis.to_dict()}, lines=(diagnosis.sentence,)
     )
-
-
-@commands.command()
-@answered
-@click.option("--to", type=_PATH, default=Path("demo.report.html"), show_default=True)
-def demo(to: Path) -> CommandAnswer:
-    """Find the effect hidden in the data of an embedded two-link arm.
-
-    Example: dynident demo
-    """
-    study = _demo_study()
-    require_places(study, to)
-    loaded = load_study(study, to)
-    diagnosis = diagnosis_of(loaded)
-    write_report(loaded, diagnosis, to)
-    return CommandAnswer(
-        content=diagnosis.to_dict,
-        parts=lambda: (*diagnosis.tables(), f"The report to open: {to.resolve()}"),
-    )
-
-
-def _demo_study() -> Path:
-    here = Path(__file__).resolve().parents[1]
-    places = (here / "demo", here.parents[1] / "problems" / "hidden_effect")
-    for place in places:
-        if (place / "study.toml").is_file():
-            return place / "study.toml"
-    raise FileError("the embedded example is not installed", str(places[0]), "run it from a clone")

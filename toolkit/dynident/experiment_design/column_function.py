@@ -111,6 +111,12 @@ class ColumnFunction:
         return np.array(self.torque(np.hstack([q, v, a, t[:, None]]).T)).T
 
 
+def is_of_an_instant(effect: Effect) -> bool:
+    """Whether an effect's torque depends on nothing but the motion at an instant."""
+    held = effect.needs_recording or effect.is_payload or effect.found_by == "repetition"
+    return not (held or effect.time_varying)
+
+
 def _robot(model: Model, values: np.ndarray) -> Robot:
     rigid = values[: model.base.rank]
     return model.robot.with_theta(model.base.lift(rigid, model.robot.theta))
@@ -145,8 +151,7 @@ def _rigid_torque(robot: Robot, x: Any) -> Any:
 
 def _effect_columns(model: Model, effect: Effect, robot: Robot, x: Any, torque: Any) -> Any:
     """Columns of an effect, (n, k)."""
-    held = effect.needs_recording or effect.is_payload or effect.found_by == "repetition"
-    if held or effect.time_varying:
+    if not is_of_an_instant(effect):
         remedy = (
             "leave it out: what depends on the past, the hour or a load is not designed for yet"
         )

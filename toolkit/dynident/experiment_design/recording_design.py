@@ -58,8 +58,8 @@ class Separation:
         """
         others = " and ".join(self.others)
         words = (
-            f"{length:g} s of this tell {self.first} from {others} by {number(self.designed, 2)} "
-            f"standard deviations; the recordings so far by {number(self.recorded, 2)}"
+            f"{length:g} s of this tell {self.first} from {others} by {number(self.designed, 3)} "
+            f"standard deviations; the recordings so far by {number(self.recorded, 3)}"
         )
         if self.designed < NEVER:
             return (

@@ -1,13 +1,14 @@
-"""A study file read into a model, recordings and settings; and written back with an effect more.
+"""A study file read into a model, recordings and settings; and written back with more in it.
 
-`load` reads a study, `load_wrenches` the wrench sensors in it, `add_effects` writes into it. Paths
-in a study are relative to its folder; unknown keys are refused by name. Its keys:
+`load` reads a study, `load_wrenches` the wrench sensors in it, `add_effects` and `add_recording`
+write into it. Paths in a study are relative to its folder; unknown keys are refused by name. Its
+keys:
 """
 
-from dynident.study.adding import add_effects, study_digest
+from dynident.study.adding import add_effects, add_recording, study_digest
 from dynident.study.keys import keys_in_words
 from dynident.study.loading import Study, load
 from dynident.study.wrenches import load_wrenches
 
-__all__ = ["Study", "add_effects", "load", "load_wrenches", "study_digest"]
+__all__ = ["Study", "add_effects", "add_recording", "load", "load_wrenches", "study_digest"]
 __doc__ = f"{__doc__}\n{keys_in_words()}\n"

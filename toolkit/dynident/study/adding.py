@@ -1,4 +1,4 @@
-"""A study file written back with effects more, all else in it untouched."""
+"""A study file written back with effects or a recording more, all else in it untouched."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import tomlkit
+from tomlkit.items import AoT
 
 from dynident import files
 from dynident.effects import Effect, Law, laws_table
 from dynident.errors import StudyError
+from dynident.recording import Recording
 
 
 def study_digest(path: str | Path) -> str:
@@ -55,6 +57,40 @@ def add_effects(
         if digest is not None and _digest(text) != digest:
             raise StudyError("has changed since it was read", str(path), "nothing was written")
         _add(path, text, [effect.label for effect in effects], laws)
+
+
+def add_recording(path: str | Path, recording: Recording) -> None:
+    """Write a recording into a study file, as the last of its list.
+
+    Parameters
+    ----------
+    path : the study file.
+    recording : its name is that of its file, in the folder of the study.
+
+    Raises
+    ------
+    StudyError
+        If the study names that file already, or its recordings are no list of tables.
+    """
+    path = Path(path)
+    with files.held(path):  # as above
+        document = tomlkit.parse(files.read_text(path))
+        entries = document.get("recordings")
+        if not isinstance(entries, AoT):
+            remedy = 'write [[recordings]] and file = "..." below it'
+            raise StudyError("has no list of recordings", str(path), remedy)
+        if any(one.get("file") == recording.name for one in entries):
+            raise StudyError(f"has {recording.name} already", str(path), "nothing was changed")
+        entry = tomlkit.table()
+        entry["file"] = recording.name
+        entry["use"] = recording.use
+        if recording.period is not None:
+            entry["period"] = recording.period
+        if recording.start:
+            entry["start"] = recording.start
+        entry.add(tomlkit.nl())  # before the table that may follow
+        entries.append(entry)
+        files.write_text(path, tomlkit.dumps(document))
 
 
 def _digest(text: str) -> str:
