@@ -35,6 +35,7 @@ def setup(app: Any) -> None:
     """Join the steps of this site to a build."""
     app.connect("builder-inited", _draw)
     app.connect("source-read", _for_the_site)
+    app.connect("html-page-context", _for_everybody, priority=900)  # after the theme
     app.connect("autodoc-process-docstring", _as_numpydoc, priority=400)  # before napoleon
 
 
@@ -64,6 +65,15 @@ def _for_the_site(app: Any, docname: str, source: list[str]) -> None:
         return found[0] if stays else found[1]
 
     source[0] = re.sub(r"(?<!!)\[([^\]]+)\]\(((?!\w+:|#)[^)\s]+)\)", link, text)
+
+
+def _for_everybody(app: Any, page: str, template: str, context: dict[str, Any], tree: Any) -> None:
+    """Let code that is wider than the screen be scrolled by keys, and headings have their level."""
+    context["body"] = context.get("body", "").replace("<pre>", '<pre tabindex="0">')
+    heading = 'role="heading"'
+    for name in ("furo_navigation_tree", "toctree"):
+        if isinstance(context.get(name), str):
+            context[name] = context[name].replace(heading, f'{heading} aria-level="2"')
 
 
 def _as_numpydoc(
