@@ -6,7 +6,7 @@ A test asks that they are as this script would write them.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 from effect_catalogue import effect_symbols, effect_table, effects, inertial_symbols
@@ -24,6 +24,7 @@ def main() -> None:
         path.write_text(text)
 
 
+@cache
 def made() -> dict[Path, str]:
     """Return the text of every file that is made, whole or in parts, by its path."""
     files = {schema_path(name): schema_text(name) for name in FILES}

@@ -33,7 +33,7 @@ LONGEST = (
     "diagnosis/dependence/test_explained_shares.py",
     "docs/test_code_on_pages.py",
     "problems/test_emps.py",
-    "docs/test_links.py",
+    "docs/test_site.py",
     "fitting/instrumental/test_simulated_loop.py",
     "diagnosis/search/test_withdrawal.py",
     "blind_study/test_mujoco_study.py",

@@ -1,13 +1,15 @@
-"""The page on the architecture is current: its made parts, its paths and its names."""
+"""What pages have from the source is current; paths and names on that of the architecture exist."""
 
 from __future__ import annotations
 
 import ast
 import re
+from pathlib import Path
 
 import pytest
 
 from make_architecture import PAGE, page
+from make_reference import made
 from package_map import PACKAGE, circles, reachable, reduced
 
 PATHS = sorted(set(re.findall(r"`((?:[a-z_]+/)*[a-z_]+(?:\.py|/)(?::[\w.]+)?)`", PAGE.read_text())))
@@ -16,6 +18,12 @@ PATHS = sorted(set(re.findall(r"`((?:[a-z_]+/)*[a-z_]+(?:\.py|/)(?::[\w.]+)?)`",
 def test_what_is_made_from_the_source_is_current() -> None:
     """`python docs/make_architecture.py` makes it so."""
     assert page(PAGE.read_text()) == PAGE.read_text()
+
+
+@pytest.mark.parametrize("path", made(), ids=lambda path: path.name)
+def test_the_reference_is_current(path: Path) -> None:
+    """`python docs/make_reference.py` makes it so: schemas, keys, effects, symbols."""
+    assert path.read_text() == made()[path]
 
 
 def test_a_page_without_a_place_for_the_picture_is_refused() -> None:

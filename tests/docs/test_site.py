@@ -1,0 +1,91 @@
+"""The site: it builds, needs no network, and can be read on a desk and on a phone."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from bs4 import BeautifulSoup
+from playwright.sync_api import sync_playwright
+
+from code_blocks import ROOT
+from dynident.effects import catalogue
+
+BROWSER = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
+WIDE = ("effects", "symbols", "reference/study", "accuracy", "api")
+TRIED = ("index", "first_robot", "reference/experiment")
+"""Pages with all that pages have, and short: axe-core takes its time by their length."""
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory) -> Path:
+    """The built site; warnings of the build are errors."""
+    folder = tmp_path_factory.mktemp("site")
+    build = [sys.executable, "-m", "sphinx", "-W", "-q", "-b", "html"]
+    folders = [str(ROOT / "docs"), str(folder / "html"), "-d", str(folder / "trees")]
+    subprocess.run([*build, *folders], check=True, timeout=300)
+    return folder / "html"
+
+
+@pytest.fixture(scope="module")
+def pages(site: Path) -> dict[Path, BeautifulSoup]:
+    return {path: BeautifulSoup(path.read_text(), "html.parser") for path in site.rglob("*.html")}
+
+
+def test_nothing_is_fetched_and_links_inside_lead_somewhere(pages) -> None:
+    assert len(pages) > 20
+    anchors = {path: {str(t["id"]) for t in page.find_all(id=True)} for path, page in pages.items()}
+    for path, page in pages.items():
+        fetched = [str(t["src"]) for t in page.find_all(["img", "script"], src=True)]
+        fetched += [str(t["href"]) for t in page.find_all("link", href=True)]
+        followed = [str(t["href"]) for t in page.find_all("a", href=True)]
+        assert not [one for one in fetched if re.match(r"(https?:)?//", one)], path
+        for one in (*fetched, *followed):
+            name, _, anchor = unquote(one).partition("#")
+            if re.match(r"(\w+:|//)", name):
+                continue
+            target = (path.parent / name.partition("?")[0]).resolve() if name else path
+            assert target.exists(), f"{path.name}: {one}"
+            if anchor and target in anchors and path.name not in ("search.html", "genindex.html"):
+                assert anchor in anchors[target], f"{path.name}: {one}"
+
+
+def test_every_effect_has_its_picture(site: Path, pages) -> None:
+    drawn = {Path(str(img["src"])).stem for img in pages[site / "effects.html"].find_all("img")}
+    own = {n for n, kind in catalogue().items() if kind.__module__.startswith("dynident.")}
+    assert own <= drawn
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator:
+    if BROWSER is None:
+        pytest.skip("no chromium, chromium-browser or google-chrome on the path")
+    with sync_playwright() as driver:
+        found = driver.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        yield found
+        found.close()
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_pages_fit_the_screen_and_have_no_serious_fault(site: Path, browser, width: int) -> None:
+    """No page is wider than the screen; axe-core finds nothing critical or serious."""
+    context = browser.new_context(viewport={"width": width, "height": 900}, offline=True)
+    page = context.new_page()
+    for name in (*WIDE, *TRIED):
+        page.goto((site / f"{name}.html").as_uri())
+        assert page.evaluate("document.documentElement.scrollWidth") <= width, name
+        if name not in TRIED:
+            continue
+        found = Axe().run(page).response["violations"]
+        assert [v["id"] for v in found if v["impact"] in ("critical", "serious")] == [], name
+    context.close()
