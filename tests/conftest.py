@@ -32,6 +32,7 @@ LONGEST = (
     "fitting/uncertainty/test_row_errors.py",
     "diagnosis/dependence/test_explained_shares.py",
     "docs/test_code_on_pages.py",
+    "explorer/test_page.py",
     "problems/test_emps.py",
     "docs/test_site.py",
     "fitting/instrumental/test_simulated_loop.py",

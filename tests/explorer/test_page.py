@@ -84,6 +84,15 @@ class Tab:
     def said(self) -> str:
         return self.page.locator("#said").inner_text()
 
+    def wait_for_bars(self) -> None:
+        """Wait until the bars of all joints say what the sentence says."""
+        self.page.locator("#said", has_text="before").wait_for()
+        want = [f"{share} %" for share in _NOW.findall(self.said)[0]]
+        for text in want:
+            self.page.locator("#errors .bartext", has_text=text).first.wait_for()
+        ends = self.page.locator("#errors .bartext").all_text_contents()
+        assert [ends[len(ends) // 2 - 1], ends[-1]] == want
+
     def assert_quiet(self) -> None:
         """Nothing was complained of, and nothing left the machine."""
         assert self.complaints == []
@@ -163,6 +172,7 @@ def test_the_demo_is_solved_by_clicking(demo, tab):
     one.switch()
     before, now = map(float, _NOW.findall(one.said)[0])
     assert now < 0.6 * before
+    one.wait_for_bars()
     row = one.page.locator("#values tbody tr").first
     row.wait_for()
     assert row.inner_text().split()[0] == "Fs@elbow" and "N m" in row.inner_text()
@@ -204,7 +214,7 @@ def test_it_is_readable_and_reached_by_keys(small, tab, width):
 
 def test_a_recording_is_zoomed_and_what_is_held_out_is_said(small, tab):
     one = tab(small[1].url)
-    page, span = one.page, "document.querySelector('#torque .js-plotly-plot')._fullLayout"
+    page, span = one.page, "document.querySelector('#torque .js-plotly-plot')?._fullLayout"
     page.wait_for_function(f"{span}?.yaxis.range[1] < 20")  # of the elbow, not of the shoulder
     assert page.locator("#held").inner_text() == "elbow, test.csv (held out)"
     plot = page.locator("#torque .nsewdrag").first
@@ -228,6 +238,16 @@ def test_a_recording_is_zoomed_and_what_is_held_out_is_said(small, tab):
     page.get_by_text("train.csv (fitted)").last.click()
     page.wait_for_function("document.querySelector('#held').innerText.includes('(fitted)')")
     one.assert_quiet()
+
+
+def test_bars_follow_when_switches_are_flipped_quickly(small, tab):
+    one = tab(small[1].url)
+    one.page.locator("summary", has_text="Significant and relevant alone").click()
+    for place in (1, 2, 0, 1, 2):
+        one.page.locator(".switch input").nth(place).click()
+    one.page.locator("#write", has_text="Write 1 effect into").wait_for()
+    one.wait_for_bars()
+    assert one.page.locator(".switch input").first.is_checked()
 
 
 def test_impossible_values_are_told(tmp_path, tab, diagnosis):
@@ -280,6 +300,28 @@ def test_a_killed_server_is_told(demo, tab):
     one.page.locator("#lost").wait_for(state="visible")
     assert "The connection is lost" in one.page.locator("#lost").inner_text()
     assert one.page.locator(".dash-error-card, .dash-fe-error__title").count() == 0
+
+
+def test_what_nobody_has_foreseen_is_told(small, tab, monkeypatch, capfd):
+    def broken(self, effects=()):
+        raise ValueError("<b>no</b>")
+
+    one = tab(small[1].url)
+    monkeypatch.setattr("dynident.explorer.switched_fit.Refitter.with_intervals", broken)
+    one.switch()
+    fault = one.page.locator("#fault", has_text="Unexpected ValueError: <b>no</b>")
+    fault.wait_for()
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_a_notebook_shows_it(small, tab):
+    """In a frame of a page that comes from elsewhere, which gets no cookie."""
+    one = tab(small[1].url).page
+    one.set_content(small[1]._repr_html_())
+    frame = one.frame_locator("iframe")
+    frame.locator(".switch input").first.check()
+    frame.locator("#said", has_text="before").wait_for()
+    frame.locator("#values table").wait_for()
 
 
 def test_names_stay_names(tmp_path, tab):

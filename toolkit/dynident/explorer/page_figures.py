@@ -26,7 +26,14 @@ from dynident.reporting.pictures.look import FAINT, dressed, plain, single_preci
 
 NOW = "with what is switched on"
 _POINTS = 3000
-_FALL = {"duration": 700, "easing": "cubic-in-out"}
+
+
+def waiting() -> go.Figure:
+    """Return what stands in the place of a picture that is being made."""
+    words = {"text": "working ...", "showarrow": False, "font": {"size": 15}}
+    empty = {"visible": False}
+    figure = go.Figure(layout={"xaxis": empty, "yaxis": empty, "annotations": [words]})
+    return dressed(figure, 300)
 
 
 def error_bars(before: SwitchedFit, now: SwitchedFit) -> go.Figure:
@@ -68,7 +75,7 @@ def error_bars(before: SwitchedFit, now: SwitchedFit) -> go.Figure:
     top = 100 * float(np.nanmax(both)) if np.isfinite(both).any() else 1.0
     figure.update_xaxes(title="held-out torque error (%)", range=[0, 1.25 * top], fixedrange=True)
     figure.update_yaxes(autorange="reversed", automargin=True, fixedrange=True, showgrid=False)
-    figure.update_layout(barmode="group", bargap=0.3, dragmode=False, transition=_FALL)
+    figure.update_layout(barmode="group", bargap=0.3, dragmode=False)
     return dressed(figure, 120 + 62 * len(joints), top=34)
 
 

@@ -10,8 +10,8 @@ from dash import dcc, html
 
 from dynident.explorer.effect_choices import EffectChoice, Group
 from dynident.explorer.opened_study import OpenedStudy
+from dynident.explorer.page_figures import waiting
 from dynident.explorer.tab_state import TabState
-from dynident.recording import Recording
 from dynident.tables import Table
 
 SWITCH = "switch"
@@ -86,7 +86,7 @@ def _errors() -> html.Section:
         [
             html.H2("Error on held-out data"),
             html.P(id="said", role="status", className="said"),
-            dcc.Graph(id="errors", config=_STILL),
+            dcc.Graph(id="errors", figure=waiting(), config=_STILL),
             html.P(id="fitted-by", className="quiet"),
         ],
         className="card falling",
@@ -99,7 +99,7 @@ def _where_it_fails(opened: OpenedStudy) -> html.Section:
         [
             html.H3("Measured and predicted torque"),
             html.P(id="held", className="quiet"),
-            dcc.Graph(id="torque", config=_ZOOMED),
+            dcc.Graph(id="torque", figure=waiting(), config=_ZOOMED),
         ]
     )
     residual = html.Div(
@@ -107,7 +107,7 @@ def _where_it_fails(opened: OpenedStudy) -> html.Section:
             html.H3("Mean residual against"),
             _choice("against", "", []),
             html.P(id="seen", className="quiet"),
-            dcc.Graph(id="map", config=_STILL),
+            dcc.Graph(id="map", figure=waiting(), config=_STILL),
         ]
     )
     return html.Section(
@@ -155,18 +155,15 @@ def _recordings(opened: OpenedStudy) -> html.Div:
 
 def recordings_of(opened: OpenedStudy) -> tuple[str, ...]:
     """Return the names of the recordings, in the order of the page, with what each is for."""
-    study = opened.study
-    names = Counter(one.name for one in (study.train + study.test).recordings)
-
-    def words(one: Recording) -> str:
-        span = f", {one.t[0]:.4g} to {one.t[-1]:.4g} s" if names[one.name] > 1 else ""
-        return f"{one.name}{span}"
-
-    train = [words(one) for one in study.train.recordings]
-    if not len(study.test):
-        return tuple(f"{name} (held out block by block)" for name in train)
-    test = (f"{words(one)} (held out)" for one in study.test.recordings)
-    return (*test, *(f"{name} (fitted)" for name in train))
+    fit, tested = opened.given.fit(), len(opened.study.test) > 0
+    runs = (*fit.judged.runs, *(fit.fitted.runs if tested else ()))
+    names = Counter(run.name for run in runs)
+    found = []
+    for place, run in enumerate(runs):
+        span = f", {run.t[0]:.3g} to {run.t[-1]:.3g} s" if names[run.name] > 1 else ""
+        use = "fitted" if place >= len(fit.judged.runs) else "held out"
+        found.append(f"{run.name}{span} ({use if tested else 'held out block by block'})")
+    return tuple(found)
 
 
 def switches(choices: Sequence[EffectChoice], state: TabState) -> list[Any]:
