@@ -9,6 +9,7 @@ import numpy as np
 
 from dynident.diagnosis.details import Candidate, JointResult, Step, TestError, Trace
 from dynident.diagnosis.result import Diagnosis
+from dynident.diagnosis.switches import SwitchedOn, Switches
 from dynident.effects import Effect, catalogue
 from dynident.evidence.maps import ResidualMap
 from dynident.fitting.estimate import DataSource, Estimate
@@ -250,7 +251,24 @@ def diagnosis(
             f"lock {joints[0]}'s gravity load to see it.",
         ),
     )
+    rows = slice(0, 120)
+    switches = Switches(
+        effects=((stribeck,),),
+        choices=tuple(
+            SwitchedOn(
+                on=(on,),
+                error=error.after if on else error.before,
+                joint_errors=np.array([j.error_after if on else j.error_before for j in results]),
+                predicted=(after if on else before)[0][rows],
+            )
+            for on in (False, True)
+        ),
+        recording=RECORDINGS[0],
+        t=moves[1][0][rows],
+        measured=measured[0][rows],
+    )
     return Diagnosis(
+        switches=switches if steps else None,
         verdict="explained" if steps else "nothing_missing",
         noise_source="replicates" if noise else "unknown",
         joints=results,

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import sync_playwright
 
 from dynident.reporting import report
+from dynident.tables import percent
 from reporting.fabricated import diagnosis
 from reporting.fabricated_loop import validation
 
@@ -138,7 +142,8 @@ def test_it_is_readable(which, width, visit, request):
     assert_readable(one)
     sentence = one.page.locator(".sentence").bounding_box()
     assert sentence["y"] + sentence["height"] < 844  # the verdict is seen without scrolling
-    assert one.page.locator("main h2").first.inner_text() == "What to do next"
+    first = one.page.locator(".plot").first.bounding_box()
+    assert first["y"] + 150 < 844  # and so is the first picture
 
 
 def test_zoom(visit, two_joints):
@@ -195,6 +200,47 @@ def test_what_is_chosen_is_drawn(visit, two_joints):
     after = one.page.evaluate(f"[{torque}, {loop}]")
     assert all(a != b for a, b in zip(before, after, strict=True))
     one.assert_quiet()
+
+
+def test_switching_an_effect_on_lets_the_error_fall(visit, two_joints):
+    one = visit(two_joints, PHONE)
+    found = diagnosis(samples=300)
+    shown = one.page.locator("#switched-error")
+    drawn = 'document.getElementById("switched-torque")._fullData[2].y[60]'
+    bar = "document.querySelectorAll('.bar .now')[1].style.width"
+    box = one.page.get_by_role("checkbox", name="stribeck friction at elbow")
+    seen = []
+    for check in (box.uncheck, box.check, box.uncheck):
+        check()
+        seen.append((shown.inner_text(), one.page.evaluate(drawn), one.page.evaluate(bar)))
+    assert seen[0] == seen[2]
+    assert [text for text, *_ in seen[:2]] == [
+        percent(found.test_error.before),
+        percent(found.test_error.after),
+    ]
+    assert seen[1][1] == pytest.approx(found.switches.choices[1].predicted[60, 1], rel=1e-4)
+    assert float(seen[1][2].rstrip("%")) < float(seen[0][2].rstrip("%"))
+    one.assert_quiet()
+
+
+@pytest.mark.slow
+def test_it_prints_on_less_than_ten_pages(visit, seven_joints):
+    pdf = visit(seven_joints, DESK).page.pdf(format="A4", prefer_css_page_size=True)
+    assert 1 < len(re.findall(rb"/Type\s*/Page\b", pdf)) < 10
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("which", ["two_joints", "seven_joints"])
+def test_who_cannot_see_or_point_can_read_it(which, browser, request):
+    one = _visited(browser, request.getfixturevalue(which), DESK)
+    one.page.evaluate("document.querySelectorAll('details').forEach((part) => part.open = true)")
+    found = Axe().run(one.page, options={"resultTypes": ["violations"]})
+    serious = [v for v in found.response["violations"] if v["impact"] in ("serious", "critical")]
+    assert [(v["id"], [n["html"][:90] for n in v["nodes"][:3]]) for v in serious] == []
+    levels = one.page.evaluate(
+        "[...document.querySelectorAll('h1,h2,h3,h4')].map((n) => Number(n.tagName[1]))"
+    )
+    assert levels[0] == 1 and all(b - a <= 1 for a, b in pairwise(levels))
 
 
 def test_the_page_of_a_validation(visit, tmp_path):

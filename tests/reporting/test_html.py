@@ -13,7 +13,9 @@ from dynident.diagnosis.details import Candidate, Step
 from dynident.diagnosis.result import Diagnosis
 from dynident.errors import DynidentError
 from dynident.reporting import report
+from dynident.reporting.headline import headline
 from dynident.reporting.html import page
+from dynident.reporting.intervals import parameter_table
 from dynident.tables import percent
 from reporting.fabricated import diagnosis, effect
 from reporting.read_page import Elements, unpacked
@@ -32,7 +34,8 @@ def html(found) -> str:
 def test_nothing_is_loaded_from_elsewhere(html):
     for tag, attributes in Elements(html).elements:
         assert tag not in ("link", "iframe", "base", "object", "embed")
-        for key in ("src", "href", "srcset", "data", "action", "poster"):
+        assert attributes.get("href", "#").startswith("#")  # within the page
+        for key in ("src", "srcset", "data", "action", "poster"):
             assert key not in attributes, (tag, attributes)
     style = html.split("<style>")[1].split("</style>")[0]
     assert "url(" not in style and "@import" not in style
@@ -55,16 +58,21 @@ def test_seven_joints_and_long_traces_stay_small():
 
 
 def test_it_goes_from_the_verdict_to_the_provenance(found, html):
-    headings = re.findall(r"<h2>(.*?)</h2>", html)
-    assert headings[:2] == ["What to do next", "How far the model is off"]
-    assert headings[-4:] == [
-        "The search in numbers",
-        "What this data cannot show",
-        "Parameters",
-        "Provenance",
-    ]
+    headings = re.findall(r"<h2.*?>(.*?)</h2>", html)
+    assert headings[:2] == ["How far the model is off", "What to do next"]
+    assert headings[2:4] == ["Switch effects on and off", "The joints"]
+    assert headings[-4:] == ["Parameters", "How sure this is", "Glossary", "Provenance"]
     text = Elements(html).text
-    assert text.index(found.sentence) < text.index("What to do next")
+    assert text.index(headline(found).sentence) < text.index("What to do next")
+    assert text.index("How sure this is") < text.index(found.sentence)
+
+
+def test_every_link_has_its_place_and_every_place_is_one(html):
+    parsed = Elements(html)
+    places = [a["id"] for _, a in parsed.elements if "id" in a]
+    links = [a["href"][1:] for tag, a in parsed.elements if tag == "a"]
+    assert len(links) > 10 and set(links) <= set(places)
+    assert len(set(places)) == len(places)
 
 
 def test_a_rejected_model_has_wider_intervals_and_says_so(found):
@@ -107,8 +115,13 @@ def test_numbers_are_those_of_the_diagnosis(found, html):
     for candidate in found.candidates:
         if candidate.status != "absorbed":
             assert f"{100 * candidate.test_gain:.2f}" in text
-    for name, value, *_, stands_for in found.after.parameter_table().rows:
-        assert all(cell in text for cell in (name, value, stands_for))
+    for name, *_, stands_for in found.after.parameter_table().rows:
+        assert name in text and stands_for in text
+    values = {name: x for name, x in zip(found.after.names, found.after.values, strict=True)}
+    shown = {row[0]: row[2] for row in parameter_table(found.after, None, "replicates").rows}
+    assert all(cell in text for cell in shown.values())
+    # An effect's parameter stands for itself: its value is the estimate's, as far as it is known.
+    assert float(shown["Fs@elbow"]) == pytest.approx(values["Fs@elbow"], rel=0.05)
 
 
 def test_provenance(found, html):
@@ -135,7 +148,7 @@ def test_every_plot_has_its_figure(found, html):
     wanted = [a["data-figure"] for _, a in parsed.elements if "data-figure" in a]
     wanted += [a["value"] for t, a in parsed.elements if t == "option" and "torque" in a["value"]]
     assert set(wanted) == set(figures)
-    assert len(figures) == 3 + len(found.maps) + len(found.traces)
+    assert len(figures) == 4 + len(found.maps) + len(found.traces)
 
 
 def test_hostile_names_are_text():
@@ -145,7 +158,7 @@ def test_hostile_names_are_text():
     html = page(bad, command="dynident </script><script>alert(4)</script>")
     parsed = Elements(html)
     assert {tag for tag, _ in parsed.elements}.isdisjoint({"img", "b"})
-    assert sum(tag == "script" for tag, _ in parsed.elements) == 4
+    assert sum(tag == "script" for tag, _ in parsed.elements) == 5
     assert not any(key.startswith("on") for _, a in parsed.elements for key in a)
     for name in names:
         assert name in parsed.text

@@ -11,9 +11,10 @@ from dynident.effects import catalogue
 from dynident.effects.friction.viscous_friction import ViscousFriction
 from dynident.reporting.content import left
 from dynident.reporting.glossary import meaning, use_of
+from dynident.reporting.headline import headline
 from dynident.reporting.intervals import parameter_table, widening_after, widening_before
 from dynident.reporting.joint_states import joint_errors, opened, states
-from dynident.reporting.next_steps import next_steps, summary
+from dynident.reporting.next_steps import next_steps
 from dynident.reporting.packing import packed
 from reporting.fabricated import diagnosis, effect
 from reporting.read_page import unpacked
@@ -55,7 +56,7 @@ def test_what_to_do_names_commands_and_the_experiment_that_separates(found):
 def test_without_noise_the_first_thing_is_a_motion_that_repeats():
     unknown = diagnosis(("slide",), noise=False, steps=False, samples=200)
     assert "Record a motion that repeats" in next_steps(unknown)[0].what
-    assert "not known" in summary(unknown)
+    assert "noise is unknown" in headline(unknown).sentence
 
 
 def test_where_nothing_is_missing_nothing_is_to_be_done():
@@ -77,9 +78,9 @@ def test_a_joint_fails_only_where_the_verdict_says_so(found):
     assert opened(found) >= {"elbow"}
 
 
-def test_at_most_two_joints_are_opened():
+def test_the_worst_joint_is_opened():
     many = diagnosis(tuple("abcdefg"), samples=200)
-    assert opened(rejected(many, *[1.0, 5.0, 2.0, 3.0, 0.1, 0.2, 0.3])) == {"b", "d"}
+    assert opened(rejected(many, *[1.0, 5.0, 2.0, 3.0, 0.1, 0.2, 0.3])) == {"b"}
 
 
 def test_errors_of_the_joints_are_drawn_over_the_noise(found):
@@ -98,7 +99,7 @@ def test_what_is_left_of_a_map_is_said(found):
 
 
 def half_widths(table):
-    ends = [row[2].split(" to ") for row in table.rows if row[2] != "-"]
+    ends = [row[3].split(" to ") for row in table.rows if row[3] != "-"]
     return np.array([float(stop) - float(start) for start, stop in ends]) / 2
 
 
@@ -117,7 +118,7 @@ def test_intervals_of_a_rejected_model_are_wider_by_the_birge_ratio(found):
     assert wider.overall == pytest.approx(np.sqrt(11.0 / 2.0))
     tables = [parameter_table(one.after, x, "given") for x in (None, wider)]
     grown = half_widths(tables[1]) / half_widths(tables[0])
-    names = [row[0] for row in tables[0].rows if row[2] != "-"]
+    names = [row[0] for row in tables[0].rows if row[3] != "-"]
     for name, ratio in zip(names, grown, strict=True):
         place = name.partition("@")[2]
         expected = wider.joints[place] if place else wider.overall

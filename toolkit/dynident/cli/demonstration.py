@@ -51,7 +51,7 @@ def demo(to: Path, folder: Path | None) -> CommandAnswer:
         return _settled(study, folder)
     require_places(study, to)
     loaded = load_study(study, to)
-    diagnosis = diagnosis_of(loaded)
+    diagnosis = diagnosis_of(loaded, switches="all")
     write_report(loaded, diagnosis, to)
     return CommandAnswer(
         content=diagnosis.to_dict,

@@ -68,7 +68,7 @@ def explain(
     if laws is not None and laws.exists():
         raise FileError("is there already", str(laws), "name another file: laws may be in it")
     loaded = load_study(study, report, laws)
-    diagnosis = diagnosis_of(loaded, most, propose)
+    diagnosis = diagnosis_of(loaded, most, propose, "none" if report is None else "all")
     following = NextRecording() if next_ is None else next_recording(diagnosis, loaded, next_)
     diagnosis = following.advised(diagnosis)
     write_report(loaded, diagnosis, report)
@@ -259,7 +259,7 @@ def report(study: Path, most: int | None, to: Path) -> CommandAnswer:
     """
     require_places(study, to)
     loaded = load_study(study, to)
-    diagnosis = diagnosis_of(loaded, most)
+    diagnosis = diagnosis_of(loaded, most, switches="all")
     write_report(loaded, diagnosis, to)
     return CommandAnswer(
         content=lambda: {"report": str(to), **diagnosis.to_dict()}, lines=(diagnosis.sentence,)

@@ -18,7 +18,7 @@ from dynident.tables import printable
 
 if TYPE_CHECKING:
     from dynident.diagnosis import Diagnosis
-    from dynident.diagnosis.stage import Propose
+    from dynident.diagnosis.stage import AskedSwitches, Propose
     from dynident.effect_modules import Permission
     from dynident.effects import Law
     from dynident.evidence import Comparison
@@ -145,7 +145,10 @@ PROPOSE = click.option(
 
 
 def diagnosis_of(
-    study: Study, most: int | None = None, propose: Propose = "unexplained"
+    study: Study,
+    most: int | None = None,
+    propose: Propose = "unexplained",
+    switches: AskedSwitches = "none",
 ) -> Diagnosis:
     """Run the search for what the model lacks.
 
@@ -154,6 +157,7 @@ def diagnosis_of(
     study : the study.
     most : effects that are added at most; None for the usual.
     propose : when laws are proposed for what is left.
+    switches : whether every choice among the effects is fitted, too, as a report shows them.
 
     Returns
     -------
@@ -170,6 +174,7 @@ def diagnosis_of(
             controller=study.controller,
             most=most,
             propose=propose,
+            switches=switches,
             criteria=study.criteria,
             progress=show_progress,
         )

@@ -60,7 +60,8 @@ from dynident.diagnosis.search.selection import (
 )
 from dynident.diagnosis.search.shaped_fit import refitted, shaped
 from dynident.diagnosis.search.withdrawal import Path, path_of
-from dynident.diagnosis.stage import DiagnosisTask, Propose, Stage
+from dynident.diagnosis.stage import AskedSwitches, DiagnosisTask, Propose, Stage
+from dynident.diagnosis.switches import switches_of
 from dynident.diagnosis.wiring_answer import answered_by
 from dynident.effects import Effect
 from dynident.evidence.columns import Evidence
@@ -85,6 +86,7 @@ def diagnose(
     controller: Controller | None = None,
     most: int | None = None,
     propose: Propose = "unexplained",
+    switches: AskedSwitches = "none",
     criteria: Criteria = DEFAULTS,
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
@@ -103,6 +105,8 @@ def diagnose(
     propose : when laws are proposed for what the catalogue leaves: "unexplained", where a residual
         beyond a known noise remains; "always", and what the residual depends on is looked for
         whatever the verdict; "never".
+    switches : "all": every choice among the effects added is fitted and judged, too, for a page
+        on which they are switched on and off (`dynident.diagnosis.switches`).
     criteria : the numbers that decide the answer, see `dynident.criteria`.
     progress : is called with what is being done, for a display; by default a line of the log every
         ten seconds, see `dynident.progress`.
@@ -126,7 +130,14 @@ def diagnose(
     held_out = others[0] if others else None
     faults = check_wiring(given, train, held_out, criteria.wiring)
     most = 0 if faults else most
-    task = DiagnosisTask(train=train, test=held_out, most=most, progress=progress, propose=propose)
+    task = DiagnosisTask(
+        train=train,
+        test=held_out,
+        most=most,
+        progress=progress,
+        propose=propose,
+        switches=switches,
+    )
     start = _compare(given, controller, criteria, task)
     extended = _extend(_rank(start, task), task)
     settled, path = _settle(_search_globally(start, extended, task), task)
@@ -332,6 +343,9 @@ def _judge(stage: Stage, path: Path, task: DiagnosisTask) -> Diagnosis:
         limit=task.most if reached and stage.rounds[-1].passing else None,
     )
     answer = assemble(search, task.train, task.test, held)
+    if task.switches == "all":
+        task.progress("switching effects on and off")
+        answer = replace(answer, switches=switches_of(stage.evidence, held, path))
     if not _asks_for_laws(answer, task):
         return answer
     laws = LawSearch(evidence=stage.evidence, held=held, progress=task.progress)

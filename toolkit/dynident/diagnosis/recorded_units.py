@@ -7,8 +7,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from dynident.diagnosis.details import JointResult, Trace
 from dynident.diagnosis.result import Diagnosis
+from dynident.diagnosis.switches import Switches
 from dynident.evidence.maps import ResidualMap
 from dynident.fitting.drive_gains import DriveGains
 
@@ -43,8 +46,14 @@ def in_recorded_units(diagnosis: Diagnosis, drives: DriveGains | None) -> Diagno
         parts = {name: getattr(one, name) / gains[one.joint] for name in _OF_TRACE}
         return replace(one, torque_unit=unit, **parts)
 
+    def of_switches(one: Switches) -> Switches:
+        by = np.array([gains[joint.name] for joint in diagnosis.joints])
+        choices = tuple(replace(c, predicted=c.predicted / by) for c in one.choices)
+        return replace(one, measured=one.measured / by, choices=choices)
+
     return replace(
         diagnosis,
+        switches=None if diagnosis.switches is None else of_switches(diagnosis.switches),
         joints=tuple(map(of_joint, diagnosis.joints)),
         maps=tuple(map(of_map, diagnosis.maps)),
         traces=tuple(map(of_trace, diagnosis.traces)),

@@ -19,6 +19,7 @@ from dynident.diagnosis.details import (
 )
 from dynident.diagnosis.detection_limits import DetectionLimit, limit_table
 from dynident.diagnosis.proposals.proposal import Proposal
+from dynident.diagnosis.switches import Switches
 from dynident.diagnosis.track_record import JOINTS, TrackRecord, track_record
 from dynident.evidence.maps import ResidualMap
 from dynident.fitting.estimate import DataSource, Estimate
@@ -73,6 +74,7 @@ class Diagnosis(Shown):
     limit : effects that were allowed, where the search ended there; None where it ended by itself.
     residual_dependence : where the verdict is "unexplained" (or laws are asked for), what the
         residual depends on, before any proposal, at each joint at which something is left.
+    switches : every choice among the effects added, fitted and judged, where that was asked for.
     """
 
     verdict: Verdict
@@ -97,6 +99,7 @@ class Diagnosis(Shown):
     limit: int | None = None
     rows: RowCount = field(default_factory=RowCount)
     residual_dependence: tuple[JointDependence, ...] = ()
+    switches: Switches | None = None
 
     @property
     def best(self) -> Step | None:

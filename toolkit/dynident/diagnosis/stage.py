@@ -18,6 +18,9 @@ from dynident.recording import Dataset
 Propose = Literal["unexplained", "always", "never"]
 """When laws are proposed for what the catalogue leaves."""
 
+AskedSwitches = Literal["none", "all"]
+"""Whether every choice among the effects added is fitted and judged, too."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class DiagnosisTask:
@@ -28,6 +31,7 @@ class DiagnosisTask:
     most: int
     progress: Callable[[str], None]
     propose: Propose
+    switches: AskedSwitches = "none"
 
 
 @dataclass(frozen=True, kw_only=True)

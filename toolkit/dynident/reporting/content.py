@@ -11,6 +11,7 @@ import numpy as np
 
 from dynident.diagnosis.details import Candidate, Step, Trace
 from dynident.diagnosis.result import Diagnosis
+from dynident.effects import Effect
 from dynident.errors import DynidentError
 from dynident.evidence.maps import ResidualMap
 
@@ -40,6 +41,74 @@ class Bar:
     text: str
 
 
+@dataclass(frozen=True)
+class StepGroup:
+    """Steps that are told as one: an effect that was added at several joints.
+
+    Attributes
+    ----------
+    title : as "coulomb friction at all six joints".
+    steps : one after the other.
+    others : what the data cannot tell from one of them, but for what was added, too.
+    """
+
+    title: str
+    steps: tuple[Step, ...]
+    others: tuple[Effect, ...]
+
+
+def step_groups(diagnosis: Diagnosis) -> tuple[StepGroup, ...]:
+    """Return the effects added, those of one kind that every joint has together."""
+    found: list[list[Step]] = []
+    for step in diagnosis.steps:
+        last = found[-1][0].effect if found else None
+        if last and step.effect.at_every_joint and step.effect.name == last.name:
+            found[-1].append(step)
+        else:
+            found.append([step])
+    joints, added = len(diagnosis.joints), {step.effect.label for step in diagnosis.steps}
+    return tuple(
+        StepGroup(
+            title=grouped_title([one.effect for one in group], joints),
+            steps=tuple(group),
+            others=tuple(
+                {
+                    one.label: one
+                    for step in group
+                    for one in step.indistinguishable
+                    if one.label not in added
+                }.values()
+            ),
+        )
+        for group in found
+    )
+
+
+def grouped_title(effects: Sequence[Effect], joints: int) -> str:
+    """What effects are called together.
+
+    Parameters
+    ----------
+    effects : at least one; of one kind, where they are told as one.
+    joints : of the robot.
+    """
+    first = effects[0]
+    if len(effects) == 1:
+        return first.title
+    if len({one.name for one in effects}) > 1 or any(one.source for one in effects):
+        return f"{first.title}, and {in_words(len(effects) - 1)} more"
+    name, at = first.name.replace("_", " "), [str(one.joint) for one in effects]
+    if len(at) == joints:
+        return f"{name} at {'both' if joints == 2 else f'all {in_words(joints)}'} joints"
+    return f"{name} at {', '.join(at[:-1])} and {at[-1]}"
+
+
+def in_words(count: int) -> str:
+    """A small number in words."""
+    words = ["no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine"]
+    return words[count] if count < len(words) else str(count)
+
+
 def bars(diagnosis: Diagnosis) -> tuple[Bar, ...]:
     """Rows of the waterfall of held-out error, from the model as given to the final one."""
     error = diagnosis.test_error
@@ -52,11 +121,12 @@ def bars(diagnosis: Diagnosis) -> tuple[Bar, ...]:
             text=f"{100 * error.before:.2f} %",
         )
     ]
-    for step in diagnosis.steps:
-        before, after = 100 * step.test_error_before, 100 * step.test_error_after
+    for group in step_groups(diagnosis):
+        before = 100 * group.steps[0].test_error_before
+        after = 100 * group.steps[-1].test_error_after
         change = f"{after - before:+.2f}".replace("-", "\u2212")
         found.append(
-            Bar(lines=_step_lines(step), start=after, stop=before, kind="added", text=change)
+            Bar(lines=_group_lines(group), start=after, stop=before, kind="added", text=change)
         )
     if diagnosis.steps:
         name = "with all of these" if len(diagnosis.steps) > 1 else "with it added"
@@ -72,13 +142,14 @@ def bars(diagnosis: Diagnosis) -> tuple[Bar, ...]:
     return tuple(found)
 
 
-def _step_lines(step: Step) -> tuple[str, ...]:
-    lines = wrapped(f"+ {step.effect.title}")
-    match step.indistinguishable:
+def _group_lines(group: StepGroup) -> tuple[str, ...]:
+    lines = wrapped(f"+ {group.title}")
+    match group.others:
         case ():
             return lines
         case (other,):
-            here = (other.joint, other.source) == (step.effect.joint, step.effect.source)
+            first = group.steps[0].effect
+            here = (other.joint, other.source) == (first.joint, first.source)
             return (*lines, f"or {other.name.replace('_', ' ') if here else other.title}")
         case others:
             return (*lines, f"or {len(others)} others")

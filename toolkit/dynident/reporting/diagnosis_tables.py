@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import platform
 import re
+from collections import Counter
 from dataclasses import replace
 from datetime import datetime
 from importlib.metadata import PackageNotFoundError, requires, version
@@ -23,46 +24,40 @@ from dynident.tables import Table, number, p_value, percent
 
 def joint_table(diagnosis: Diagnosis) -> Table:
     """As `Diagnosis.joint_table`, the noise also in its unit, and in words how each joint does."""
-    given = diagnosis.joint_table()
+    given, after = diagnosis.joint_table(), bool(diagnosis.steps)
+    known = diagnosis.noise_source != "unknown"
     words = {one.joint.name: one.words for one in states(diagnosis)}
     rows = []
     for joint in diagnosis.joints:
-        noise = joint.noise_rms
+        unit, noise = joint.torque_unit, joint.noise_rms
+        ratios = (joint.ratio_before, *([joint.ratio_after] if after else []))
+        judged = (percent(joint.noise_share), *(number(ratio, 3) for ratio in ratios))
+        size = "-" if noise is None else f"{number(noise, 3)} {unit}"
         rows.append(
             (
                 joint.name,
                 percent(joint.error_before),
-                *([percent(joint.error_after)] if diagnosis.steps else []),
-                percent(joint.noise_share),
-                number(joint.ratio_before, 3),
-                *([number(joint.ratio_after, 3)] if diagnosis.steps else []),
-                f"{number(joint.torque_rms, 3)} {joint.torque_unit}",
-                "-" if noise is None else f"{number(noise, 3)} {joint.torque_unit}",
+                *([percent(joint.error_after)] if after else []),
+                *(judged if known else ()),
+                f"{number(joint.torque_rms, 3)} {unit}",
+                *((size,) if known else ()),
                 words[joint.name],
             )
         )
     overall = diagnosis.test_error
-    rows.append(
-        (
-            "all joints",
-            percent(overall.before),
-            *([percent(overall.after)] if diagnosis.steps else []),
-            percent(overall.noise_floor),
-            *([""] * (5 if diagnosis.steps else 4)),
-        )
-    )
+    errors = (percent(overall.before), *([percent(overall.after)] if after else []))
+    floor = (percent(overall.noise_floor),) if known else ()
+    ratio = (" as given", " after") if after else ("",)
     columns = (
         "joint",
-        *(("error as given", "error after") if diagnosis.steps else ("error",)),
-        "noise floor",
-        *(
-            f"systematic / noise{when}"
-            for when in ((" as given", " after") if diagnosis.steps else ("",))
-        ),
+        *(("error as given", "error after") if after else ("error",)),
+        *(("noise floor", *(f"systematic / noise{when}" for when in ratio)) if known else ()),
         "torque rms",
-        "noise rms",
+        *(("noise rms",) if known else ()),
         "how it does",
     )
+    last = ("all joints", *errors, *floor)
+    rows.append((*last, *[""] * (len(columns) - len(last))))
     return Table(given.title, columns, tuple(rows), given.notes)
 
 
@@ -161,8 +156,14 @@ def provenance(diagnosis: Diagnosis, command: str, study: Path | None) -> tuple[
         digest = hashlib.sha256(description.text.encode()).hexdigest()
         rows.append((description.path, "robot description", digest, ""))
     used = (("training", diagnosis.after.sources), ("test", diagnosis.test_sources))
+    # A file that is used in parts stands here once.
+    parts: dict[tuple[str, str, str], Counter[str]] = {}
     for use, sources in used:
-        rows += [(s.file, use, s.sha256, s.filter) for s in sources]
+        for s in sources:
+            parts.setdefault((s.file, s.sha256, s.filter), Counter())[use] += 1
+    for (file, digest, settings), uses in parts.items():
+        words = (f"{use} ({n} parts)" if n > 1 else use for use, n in uses.items())
+        rows.append((file, ", ".join(words), digest, settings))
     columns = ("file", "used as", "SHA-256", "filter")
     changed = tuple(one.cells for one in diagnosis.criteria.changed)
     names = ("criterion", "value", "default")

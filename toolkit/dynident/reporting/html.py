@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -23,13 +24,15 @@ from dynident.reporting.diagnosis_tables import (
     step_table,
     versions,
 )
-from dynident.reporting.glossary import meaning, use_of
+from dynident.reporting.glossary import glossary, use_of
+from dynident.reporting.headline import headline
 from dynident.reporting.intervals import parameter_table, widening_after, widening_before
 from dynident.reporting.joint_states import State, joint_errors, opened, states
 from dynident.reporting.loop_page import LoopSection, loop_section
-from dynident.reporting.next_steps import next_steps, summary
-from dynident.reporting.packing import packed
+from dynident.reporting.next_steps import FIRST, next_steps
+from dynident.reporting.packing import compressed, packed
 from dynident.reporting.pictures import diagnosis_pictures as pictures
+from dynident.reporting.switch_page import switch_section
 from dynident.tables import Table, number, percent
 from dynident.validation.loop_errors import QUANTITIES
 from dynident.validation.validation_result import Unsimulated, Validation
@@ -133,9 +136,12 @@ def _diagnosis_page(
     diagnosis: Diagnosis, closed: LoopSection | None, made: tuple[Table, ...]
 ) -> str:
     joint_maps = _joint_maps(diagnosis)
+    switch = switch_section(diagnosis)
     names = [f"torque-{i}" for i in range(len(diagnosis.traces))]
     points = max(16, min(_MOST_POINTS, _TRACE_BYTES // _BYTES_PER_POINT // max(len(names), 1)))
     figures = {"waterfall": pictures.waterfall(diagnosis)}
+    if switch is not None:
+        figures["switch"] = switch.figure
     if len(diagnosis.joints) > 1:
         figures["joints"] = joint_errors(diagnosis)
     if ranked(diagnosis):
@@ -152,19 +158,19 @@ def _diagnosis_page(
         figures[name] = pictures.law_picture(one)
     place = {one.joint.name: i for i, one in enumerate(states(diagnosis))}
     order = sorted(range(len(names)), key=lambda i: place[diagnosis.traces[i].joint])
-    known = diagnosis.noise_source != "unknown"
-    given_parameters = parameter_table(
-        diagnosis.before, widening_before(diagnosis), diagnosis.noise_source
-    )
-    parts = packed(figures)
+    advice, terms = next_steps(diagnosis), glossary(diagnosis)
+    known = diagnosis.noise_source
+    parameters = parameter_table(diagnosis.after, widening_after(diagnosis), known)
+    bodies = diagnosis.after.model.base.rank
     return _template("report.html").render(
         d=diagnosis,
+        head=headline(diagnosis),
         closed=closed,
         robot=diagnosis.after.model.robot.name,
-        sure=diagnosis.verdict != "unexplained" and known,
         added=after_name(diagnosis) if diagnosis.steps else "",
-        summary=summary(diagnosis),
-        advice=next_steps(diagnosis),
+        advice=advice[:FIRST],
+        more_advice=advice[FIRST:],
+        switch=switch,
         proposals=[
             (f"law-{k}", p, proposal_table(p, diagnosis)) for k, p in enumerate(diagnosis.proposals)
         ],
@@ -179,13 +185,17 @@ def _diagnosis_page(
         remaining=remaining_table(diagnosis),
         limits=limit_table(diagnosis.detection_limits) if diagnosis.detection_limits else None,
         not_identifiable=not_identifiable_table(diagnosis),
-        parameters=parameter_table(
-            diagnosis.after, widening_after(diagnosis), diagnosis.noise_source
-        ),
+        of_effects=replace(parameters, rows=parameters.rows[bodies:]),
+        of_bodies=replace(parameters, rows=parameters.rows[:bodies], notes=()),
         fit_error=diagnosis.after.error_table(),
-        given_parameters=given_parameters if diagnosis.steps else None,
+        given_parameters=parameter_table(diagnosis.before, widening_before(diagnosis), known)
+        if diagnosis.steps
+        else None,
+        glossary=terms,
+        anchors={term.word: term.anchor for term in terms},
         provenance=made,
-        packed=parts,
+        packed=packed(figures),
+        data=compressed(json.dumps(switch.data)) if switch else "",
     )
 
 
@@ -194,7 +204,6 @@ def _validation_page(validation: Validation, command: str) -> str:
     assert closed is not None
     closed = replace(closed, sentence="")  # the head of the page has it
     errors = zip(QUANTITIES, validation.error_table().rows[-1][1:], strict=False)
-    parts = packed(dict(closed.figures))
     used = tuple((s.file, s.sha256, s.filter) for s in validation.sources)
     return _template("validation.html").render(
         closed=closed,
@@ -204,7 +213,8 @@ def _validation_page(validation: Validation, command: str) -> str:
         sentence=validation.sentence,
         errors=list(errors) if validation.runs else [],
         provenance=(Table("Files", ("file", "SHA-256", "filter"), used), versions(command)),
-        packed=parts,
+        packed=packed(dict(closed.figures)),
+        data="",
     )
 
 
@@ -221,7 +231,7 @@ def _template(name: str) -> jinja2.Template:
         "number": number,
         "capitalize_first": lambda words: words[:1].upper() + words[1:],
     }
-    words = {"left": left, "meaning": meaning, "seen": seen, "use_of": use_of}
+    words = {"left": left, "seen": seen, "use_of": use_of}
     environment.globals |= {"numeric": _numeric, **words}
     return environment.get_template(name)
 

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynident.diagnosis.result import Diagnosis
+from dynident.effects import Effect
 from dynident.fitting.estimate import Estimate
+from dynident.inertia.parameters import MEANINGS, PARAMETERS
 from dynident.recording.dataset import NoiseSource
 from dynident.tables import Table, number, percent
 
@@ -70,7 +72,8 @@ def parameter_table(estimate: Estimate, widening: Widening | None, noise: NoiseS
 
     Returns
     -------
-    A row for each parameter, in the order of the model.
+    A row for each parameter, in the order of the model: those of the rigid body come first. Those
+    inside effects (widths, frequencies, ...), without intervals, come last.
     """
     model = estimate.model
     values = np.array(estimate.values)
@@ -84,10 +87,12 @@ def parameter_table(estimate: Estimate, widening: Widening | None, noise: NoiseS
             factors[model.slices[effect.label]] = widening.of(effect.joint)
     half = _QUANTILE * factors * estimate.sigma
     stands_for = [row[-1] for row in estimate.parameter_table().rows]
+    words = _meanings(estimate)
     rows = tuple(
         (
             name,
-            number(values[i], 6),
+            words[i],
+            number(values[i], _digits(values[i], half[i])),
             _interval(values[i], half[i]),
             percent(float(half[i] / abs(values[i])) if values[i] else None, 1),
             model.units[i],
@@ -95,19 +100,71 @@ def parameter_table(estimate: Estimate, widening: Widening | None, noise: NoiseS
         )
         for i, name in enumerate(model.names)
     )
-    columns = ("parameter", "value", "95 % interval", "\u00b1 relative", "unit", "stands for")
+    rows = (*rows, *_shape_rows(estimate))
+    columns = (
+        "parameter",
+        "what it is",
+        "value",
+        "95 % interval",
+        "\u00b1 relative",
+        "unit",
+        "stands for",
+    )
     notes = (_in_words(widening, noise), estimate.parameter_table().notes[0])
     return Table("Parameters", columns, rows, notes)
+
+
+def _meanings(estimate: Estimate) -> list[str]:
+    """What each parameter is, in words, and where."""
+    model = estimate.model
+    found = [_of_body(name) for name in model.names]
+    for effect in model.effects:
+        for i, one in enumerate(effect.parameters(model.robot), model.slices[effect.label].start):
+            found[i] = _placed(one.means, effect)
+    return found
+
+
+def _of_body(name: str) -> str:
+    symbol, _, body = name.partition(".")
+    if symbol not in PARAMETERS:
+        return ""
+    return f"{MEANINGS[PARAMETERS.index(symbol)].partition(',')[0]}, {body}"
+
+
+def _placed(means: str, effect: Effect) -> str:
+    words = means or effect.name.replace("_", " ")
+    return words if effect.joint is None else f"{words}, {effect.title.partition(' at ')[2]}"
+
+
+def _shape_rows(estimate: Estimate) -> list[tuple[str, ...]]:
+    robot = estimate.model.robot
+    return [
+        (
+            effect.parameter_name(one.name),
+            _placed(one.means, effect),
+            number(x, 4),
+            "-",
+            "-",
+            one.unit,
+            "",
+        )
+        for effect in estimate.model.effects
+        for one, x in zip(effect.shape_parameters(robot), effect.shape, strict=False)
+    ]
 
 
 def _interval(value: float, half: float) -> str:
     if not np.isfinite(value) or not np.isfinite(half):
         return "-"
-    # As many digits as the width tells apart.
-    digits = 6
-    if half > 0 and value:
-        digits = int(np.clip(np.ceil(np.log10(abs(value) / half)) + 2, 2, 9))
+    digits = _digits(value, half)
     return f"{number(value - half, digits)} to {number(value + half, digits)}"
+
+
+def _digits(value: float, half: float) -> int:
+    """As many digits of a value as the width of its interval tells apart."""
+    if not (half > 0 and value):
+        return 6
+    return int(np.clip(np.ceil(np.log10(abs(value) / half)) + 2, 2, 9))
 
 
 def _in_words(widening: Widening | None, noise: NoiseSource) -> str:

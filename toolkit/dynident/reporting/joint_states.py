@@ -15,7 +15,7 @@ from dynident.tables import number
 
 BEYOND = 0.5
 """Systematic residual over noise from which on a joint is shown as failing."""
-MOST_OPEN = 2
+MOST_OPEN = 1
 """Joints whose residual maps are shown without asking."""
 
 State = Literal["fine", "repaired", "failing", "unknown"]
@@ -46,7 +46,7 @@ def states(diagnosis: Diagnosis) -> tuple[JointState, ...]:
 
 
 def opened(diagnosis: Diagnosis) -> frozenset[str]:
-    """Joints whose maps are shown without asking: the worst ones, at least one."""
+    """Joints whose maps are shown without asking: the worst one."""
     order = states(diagnosis)
     bad = [one for one in order if one.state not in ("fine", "unknown")] or list(order[:1])
     return frozenset(one.joint.name for one in bad[:MOST_OPEN])

@@ -8,9 +8,15 @@ from dataclasses import dataclass
 from dynident.diagnosis.details import Step
 from dynident.diagnosis.result import Diagnosis
 from dynident.effects import Effect
+from dynident.reporting.content import in_words, step_groups
 from dynident.reporting.joint_states import states
 from dynident.tables import percent
 from dynident.wiring import Fault
+
+_MOST_NAMED = 3
+"""Effects that a sentence lists; the picture and the command name more of them."""
+FIRST = 3
+"""Steps that are shown at once: who reads more has time to unfold them."""
 
 
 @dataclass(frozen=True)
@@ -22,26 +28,17 @@ class Advice:
     commands: tuple[str, ...] = ()
 
 
-def summary(diagnosis: Diagnosis) -> str:
-    """How far the model is off, for a reader who has never seen a residual."""
-    error = diagnosis.test_error
-    said = (
-        "On motions that the fit has not seen, the torque that the model predicts is off by "
-        f"{percent(error.before)} of the torque measured."
-    )
-    if error.noise_floor is None:
-        return f"{said} How much of that is noise is not known."
-    return f"{said} Noise alone would make {percent(error.noise_floor)}."
-
-
 def next_steps(diagnosis: Diagnosis) -> tuple[Advice, ...]:
     """What to do, the most useful first."""
     if diagnosis.wiring:
         return tuple(_to_mend(fault) for fault in diagnosis.wiring)
-    found = [*_to_add(diagnosis), *_to_separate(diagnosis), *_to_try(diagnosis)]
-    if diagnosis.verdict == "unexplained":
+    found = _to_add(diagnosis)
+    if diagnosis.verdict == "unexplained" and diagnosis.noise_source != "unknown":
         found.append(_unexplained(diagnosis))
-    if diagnosis.noise_source != "replicates":
+    if diagnosis.noise_source == "unknown":
+        found.append(_to_repeat(diagnosis))
+    found += [*_to_separate(diagnosis), *_to_try(diagnosis)]
+    if diagnosis.noise_source == "given":
         found.append(_to_repeat(diagnosis))
     not_identifiable = [c for c in diagnosis.candidates if c.status == "absorbed"]
     if not found:
@@ -74,7 +71,9 @@ def _to_add(diagnosis: Diagnosis) -> list[Advice]:
         return []
     error = diagnosis.test_error
     labels = [step.effect.label for step in diagnosis.steps]
-    names = _listed([step.effect.title for step in diagnosis.steps])
+    groups = [group.title for group in step_groups(diagnosis)]
+    many = len(groups) > _MOST_NAMED
+    names = f"these {in_words(len(labels))} effects" if many else _listed(groups)
     brings = f"That brings the error from {percent(error.before)} to {percent(error.after)}"
     floor = (
         ""
@@ -86,7 +85,7 @@ def _to_add(diagnosis: Diagnosis) -> list[Advice]:
             f"Add {names} to the model, and fit it.",
             f"{brings}{floor}.",
             (
-                *(f"dynident add STUDY {shlex.quote(label)}" for label in labels),
+                f"dynident add STUDY {shlex.join(labels)}",
                 "dynident fit STUDY",
             ),
         )

@@ -16,6 +16,7 @@ from dynident.reporting.content import (
     BEFORE_COLOUR,
     GIVEN,
     GREY,
+    Bar,
     after_name,
     bars,
     first_set,
@@ -29,10 +30,14 @@ from dynident.reporting.content import (
 )
 from dynident.reporting.pictures.look import FAINT, dressed, mark, plain, single_precision
 
+_LONG = 0.75
+"""Share of the longest bar from which on a bar has its number inside."""
+
 
 def waterfall(diagnosis: Diagnosis) -> go.Figure:
     """Held-out torque error as effects are added, down to the noise floor."""
     rows = bars(diagnosis)
+    widest = max(*(row.stop for row in rows), 1e-9)
     colours = {"given": BEFORE_COLOUR, "added": "rgba(31,127,196,0.45)", "final": AFTER_COLOUR}
     figure = go.Figure(
         go.Bar(
@@ -45,8 +50,10 @@ def waterfall(diagnosis: Diagnosis) -> go.Figure:
                 "line": {"color": AFTER_COLOUR, "width": [row.kind == "added" for row in rows]},
                 "pattern": {"shape": ["/" if row.kind == "added" else "" for row in rows]},
             },
-            text=[f"\u2002{row.text}" for row in rows],
-            textposition="outside",
+            text=[f"\u2002{row.text}\u2002" for row in rows],
+            textposition=[_text_place(row, widest) for row in rows],
+            insidetextanchor="end",
+            insidetextfont={"color": "#000"},
             textangle=0,
             cliponaxis=False,
             customdata=[[row.start, row.stop] for row in rows],
@@ -73,7 +80,7 @@ def waterfall(diagnosis: Diagnosis) -> go.Figure:
     figure.add_annotation(text=head, y=1, yref="paper", yanchor="bottom", showarrow=False, **place)
     top = max(*(max(row.start, row.stop) for row in rows), 100 * (floor or 0.0), 1e-9)
     ticks = ["<br>".join(plain(line) for line in row.lines) for row in rows]
-    figure.update_xaxes(title="held-out torque error (%)", range=[0, 1.22 * top], fixedrange=True)
+    figure.update_xaxes(title="held-out torque error (%)", range=[0, 1.3 * top], fixedrange=True)
     figure.update_yaxes(
         tickvals=list(range(len(rows))),
         ticktext=ticks,
@@ -84,8 +91,13 @@ def waterfall(diagnosis: Diagnosis) -> go.Figure:
         zeroline=False,
         ticklabelstandoff=6,
     )
-    height = 90 + sum(30 + 16 * len(row.lines) for row in rows)
+    height = 86 + sum(18 + 15 * len(row.lines) for row in rows)
     return dressed(figure, height, top=28)
+
+
+def _text_place(row: Bar, widest: float) -> str:
+    """Inside a bar that is long: on a phone there is no room beside it."""
+    return "inside" if row.kind != "added" and row.stop > _LONG * widest else "outside"
 
 
 def ranking(diagnosis: Diagnosis, most: int = 10) -> go.Figure:

@@ -1,0 +1,106 @@
+"""What a reader sees first: verdict, icon, title and colour must say the same, and briefly."""
+
+from dataclasses import replace
+from itertools import product
+
+import pytest
+
+from dynident.reporting.content import step_groups
+from dynident.reporting.glossary import glossary
+from dynident.reporting.headline import headline
+from dynident.reporting.html import page
+from dynident.reporting.next_steps import FIRST, next_steps
+from dynident.wiring import Fault
+from reporting.fabricated import diagnosis, effect
+from reporting.read_page import Elements
+
+KINDS = list(product(("nothing_missing", "explained", "unexplained"), (True, False), (True, False)))
+
+
+@pytest.fixture(scope="module")
+def six():
+    return diagnosis(tuple(f"joint{i}" for i in range(1, 7)), samples=200)
+
+
+def of_kind(verdict, steps, noise):
+    found = diagnosis(("shoulder", "elbow"), steps=steps, noise=noise, samples=100)
+    worse = 2.0 if noise and verdict == "unexplained" else 0.1 if noise else None
+    joints = tuple(replace(joint, ratio_after=worse) for joint in found.joints)
+    return replace(found, verdict=verdict, joints=joints)
+
+
+@pytest.mark.parametrize(("verdict", "steps", "noise"), KINDS)
+def test_verdict_icon_title_and_colour_agree(verdict, steps, noise):
+    if (verdict == "explained" and not steps) or (verdict == "nothing_missing" and steps):
+        pytest.skip("is no verdict that a diagnosis can have")
+    found = of_kind(verdict, steps, noise)
+    head, (kind, title) = headline(found), opening(page(found))
+    remains = noise and verdict == "unexplained"
+    assert (head.mark == "\u2713") == (noise and not remains) == (kind == "nothing_missing")
+    assert (head.mark == "!") == remains == (kind == "unexplained")
+    assert (head.mark == "?") == (not noise) == (kind == "unknown")
+    assert ("noise is unknown" in head.sentence) == (not noise) == ("noise unknown" in title)
+    assert ("remains" in title) == remains and ("beyond the noise" in head.sentence) == remains
+    assert ("missing" in title) == (verdict == "nothing_missing" and noise)
+    assert ("found" in title and "nothing" not in title) == steps
+    assert len(head.sentence.split()) <= 32
+
+
+def opening(html):
+    parsed = Elements(html)
+    (kind,) = (a["class"] for tag, a in parsed.elements if tag == "body")
+    return kind, html.partition("<title>")[2].partition("</title>")[0]
+
+
+def test_faulty_recordings_and_impossible_values_are_never_a_tick():
+    fault = Fault(
+        kind="torque_sign", joints=("slide",), what="sign of tau.slide", evidence="mirrored"
+    )
+    fine = diagnosis(("slide",), steps=False, samples=100)
+    for bad in (replace(fine, wiring=(fault,)), replace(fine, impossible=("m.link1 = -3 kg",))):
+        assert headline(bad).mark == "!" and headline(bad).colour == "unexplained"
+
+
+def test_what_every_joint_has_is_told_once(six):
+    names = [joint.name for joint in six.joints]
+    one = six.steps[0]
+    steps = tuple(
+        replace(one, effect=effect("coulomb_friction", name), indistinguishable=())
+        for name in names
+    )
+    (group,) = step_groups(replace(six, steps=steps))
+    assert group.title == "coulomb friction at all six joints"
+    some = step_groups(replace(six, steps=(*steps[:2], one)))
+    assert [g.title for g in some] == [
+        "coulomb friction at joint1 and joint2",
+        "stribeck friction at joint6",
+    ]
+
+
+def test_the_headline_never_names_an_effect_without_what_it_cannot_be_told_from(six):
+    assert (
+        "Stribeck friction at joint6 (or asymmetric friction at joint6)" in headline(six).sentence
+    )
+
+
+def test_at_most_three_next_steps_are_unfolded(six):
+    many = replace(six, noise_source="unknown", steps=six.steps * 4)
+    advice = next_steps(many)
+    assert len(advice) > FIRST
+    html = page(many)
+    shown, _, folded = html.partition("How far")[2].partition("<details><summary>")
+    assert shown.count("<li><strong>") == FIRST
+    assert folded.count("<li><strong>") == len(advice) - FIRST
+
+
+def test_every_word_is_defined_once_and_every_symbol_of_the_model_is(six):
+    terms = glossary(six)
+    words = [one.word for one in terms]
+    assert len(set(words)) == len(words)
+    model = six.after.model
+    symbols = {name.partition("@")[0].partition(".")[0] for name in model.names}
+    assert symbols <= set(words)
+    assert {"vs", "stribeck friction", "asymmetric friction"} <= set(words)
+    text = Elements(page(six)).text
+    for one in terms:
+        assert text.count(one.meaning) == 1

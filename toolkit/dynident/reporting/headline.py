@@ -1,0 +1,104 @@
+"""The verdict as a reader meets it first: a short sentence, with the mark and title that fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from dynident.diagnosis.result import Diagnosis
+from dynident.reporting.content import step_groups
+from dynident.tables import percent
+
+Mark = Literal["\u2713", "!", "?"]
+"""Nothing is left but noise; something is to be mended or remains; it cannot be said."""
+
+_COLOURS: dict[Mark, str] = {"\u2713": "nothing_missing", "!": "unexplained", "?": "unknown"}
+_NOT_KNOWN = "The noise is unknown, so more may be missing."
+
+
+@dataclass(frozen=True)
+class Headline:
+    """How the page opens.
+
+    Attributes
+    ----------
+    mark : the icon before the sentence.
+    title : of the page, after the robot's name.
+    sentence : the verdict in at most some thirty words; `Diagnosis.sentence` has all of it.
+    """
+
+    mark: Mark
+    title: str
+    sentence: str
+
+    @property
+    def colour(self) -> str:
+        """Class of the page by which it has its colour."""
+        return _COLOURS[self.mark]
+
+
+def headline(diagnosis: Diagnosis) -> Headline:
+    """Return the verdict of a diagnosis in short."""
+    if diagnosis.wiring:
+        return Headline("!", "recordings to mend", "The recordings are not what the study says.")
+    if diagnosis.impossible:
+        values = ", ".join(diagnosis.impossible[:2])
+        more = len(diagnosis.impossible) - 2
+        rest = f" and {more} more" if more > 0 else ""
+        said = f"No robot can have what the fit says: {values}{rest}."
+        return Headline("!", "impossible values", said)
+    found = _of_verdict(diagnosis)
+    if diagnosis.limit is None:
+        return found
+    said = f"{found.sentence} The search ended at its limit of {diagnosis.limit} additions."
+    return Headline(found.mark, found.title, said)
+
+
+def _of_verdict(diagnosis: Diagnosis) -> Headline:
+    added, fall = _added(diagnosis), _fall(diagnosis)
+    known = diagnosis.noise_source != "unknown"
+    if not diagnosis.steps:
+        return _nothing_added(diagnosis, known)
+    count = len(diagnosis.steps)
+    title = f"{count} effects found" if count > 1 else "one effect found"
+    if not known:
+        more = " More effects are significant." if diagnosis.verdict == "unexplained" else ""
+        return Headline("?", f"{title}, noise unknown", f"{added} {fall}.{more} {_NOT_KNOWN}")
+    if diagnosis.verdict == "unexplained":
+        said = f"{added} {fall}, and a residual beyond the noise remains unexplained."
+        return Headline("!", f"{title}, a residual remains", said)
+    left = max((joint.ratio_after or 0.0 for joint in diagnosis.joints), default=0.0)
+    nothing = left <= diagnosis.criteria.verdict.not_nothing
+    rest = "within the noise" if nothing else "smaller than the noise, though not nothing"
+    return Headline("\u2713", title, f"{added} {fall}; what remains is {rest}.")
+
+
+def _nothing_added(diagnosis: Diagnosis, known: bool) -> Headline:
+    if diagnosis.verdict == "unexplained":
+        if known:
+            said = (
+                "A residual beyond the noise remains, and no effect of the catalogue explains it."
+            )
+            return Headline("!", "a residual remains", said)
+        said = f"Effects are significant, and none was added. {_NOT_KNOWN}"
+        return Headline("?", "nothing added, noise unknown", said)
+    if known:
+        said = "Nothing is missing: what remains is within the noise."
+        return Headline("\u2713", "nothing is missing", said)
+    said = f"No effect of the catalogue would be of use. {_NOT_KNOWN}"
+    return Headline("?", "nothing found, noise unknown", said)
+
+
+def _added(diagnosis: Diagnosis) -> str:
+    groups = step_groups(diagnosis)
+    if len(groups) != 1:
+        return f"{len(diagnosis.steps)} effects take"
+    only = groups[0]
+    others = " or ".join(dict.fromkeys(one.title for one in only.others))
+    name = f"{only.title[0].upper()}{only.title[1:]}"
+    return f"{name} (or {others}) takes" if others else f"{name} takes"
+
+
+def _fall(diagnosis: Diagnosis) -> str:
+    error = diagnosis.test_error
+    return f"the torque error from {percent(error.before)} to {percent(error.after)}"
