@@ -36,7 +36,7 @@ _CONCEPTS: dict[str, str] = {
 
 
 @dataclass(frozen=True)
-class Term:
+class GlossaryEntry:
     """An entry of the glossary: its anchor in the page, the word, what it means."""
 
     anchor: str
@@ -54,7 +54,7 @@ def use_of(against: str) -> str:
     return _SHOWS.get(against, "")
 
 
-def glossary(diagnosis: Diagnosis) -> tuple[Term, ...]:
+def glossary(diagnosis: Diagnosis) -> tuple[GlossaryEntry, ...]:
     """Return the effects, symbols and other words of a report, in alphabetical order.
 
     Effects are those that are named as an answer, symbols those of the final model.
@@ -63,7 +63,7 @@ def glossary(diagnosis: Diagnosis) -> tuple[Term, ...]:
     words = {one.name.replace("_", " "): f"{meaning(one)}." for one in named}
     terms = {**_CONCEPTS, **words, **_symbols(diagnosis)}
     order = sorted(terms, key=str.lower)
-    return tuple(Term(f"term-{k}", word, terms[word]) for k, word in enumerate(order))
+    return tuple(GlossaryEntry(f"term-{k}", word, terms[word]) for k, word in enumerate(order))
 
 
 def _symbols(diagnosis: Diagnosis) -> dict[str, str]:
