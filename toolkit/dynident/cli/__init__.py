@@ -17,6 +17,7 @@ from typing import NoReturn
 import click
 
 from dynident.cli import (  # which add their commands to the group
+    comparing,
     demonstration,
     designs,
     fits,
@@ -34,6 +35,7 @@ from dynident.words import shortened
 
 __all__ = [
     "commands",
+    "comparing",
     "demonstration",
     "designs",
     "fits",

@@ -21,6 +21,7 @@ _ORDER = (
     "fit",
     "payload",
     "compare",
+    "changes",
     "add",
     "simulate",
     "report",

@@ -218,6 +218,17 @@ def _validation_page(validation: Validation, command: str) -> str:
     )
 
 
+def rendered(name: str, **parts: object) -> str:
+    """Fill a template of the page.
+
+    Parameters
+    ----------
+    name : of the template.
+    parts : what it shows, by the names that it has for them.
+    """
+    return _template(name).render(**parts)
+
+
 def _template(name: str) -> jinja2.Template:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("dynident.reporting"),

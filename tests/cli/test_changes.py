@@ -1,0 +1,44 @@
+"""The command that says what has changed between two estimates."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from dynident import fit
+from dynident.model import Model
+from dynident.recording import Dataset
+from study_files import recording
+from synthetic import arm
+
+
+@pytest.fixture(scope="module")
+def estimates(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("estimates")
+    for name, seed in (("old", 1), ("new", 2)):
+        model = Model(arm()) + "viscous_friction" + "coulomb_friction"
+        fit(model, Dataset((recording(seed),))).save(folder / f"{name}.json")
+    fit(Model(arm()) + "viscous_friction", Dataset((recording(3),))).save(folder / "other.json")
+    return folder
+
+
+def test_the_answer_is_json_and_a_page(run, estimates):
+    page = estimates / "changes.html"
+    old, new = estimates / "old.json", estimates / "new.json"
+    done = run("changes", str(old), str(new), "--to", str(page), "--json")
+    assert done.status == 0
+    found = json.loads(done.out)
+    assert {one["parameter"] for one in found["parameters"]} >= {"Fc@elbow", "Fv@shoulder"}
+    assert 0.0 <= found["chi_square"]["p_value"] <= 1.0
+    text = page.read_text(encoding="utf-8")
+    assert "What has changed at arm" in text and len(text) < 3e6
+    for name in ("Fc@elbow", "Fv@shoulder", "then and now".capitalize()):
+        assert name in text
+
+
+def test_other_effects_are_one_line_with_the_remedy(run, estimates):
+    done = run("changes", str(estimates / "old.json"), str(estimates / "other.json"))
+    assert done.status == 2 and done.out == ""
+    assert done.err.count("\n") == 1
+    assert "coulomb_friction@elbow" in done.err and "fit both with the same effects" in done.err

@@ -1,0 +1,53 @@
+"""The command that compares two estimates of one robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from dynident import files
+from dynident.cli.group import CommandAnswer, answered, commands
+from dynident.cli.output import progress
+from dynident.cli.work import TRUST, command_line, load_study
+
+_PATH = click.Path(path_type=Path)
+
+
+@commands.command()
+@click.argument("before", type=_PATH)
+@click.argument("after", type=_PATH)
+@click.option("--study", type=_PATH, help="Judge both by the test recordings of this study, too.")
+@click.option("--to", type=_PATH, help="Also write this HTML page.")
+@TRUST
+@answered
+def changes(before: Path, after: Path, study: Path | None, to: Path | None) -> CommandAnswer:
+    """Say what has changed between two estimates of one robot, beyond their joint uncertainty.
+
+    The estimates are files of `dynident fit --out`, of the same effects, from different recordings.
+
+    Example: dynident changes yesterday.json today.json --to changes.html
+    """
+    if to is not None:
+        files.require_place(to)
+    from dynident.fitting.estimate_file import load_estimate
+    from dynident.fitting.uncertainty.between_estimates import estimate_changes
+
+    with progress("reading"):
+        estimates = {"before": load_estimate(before), "after": load_estimate(after)}
+    found = estimate_changes(estimates["before"], estimates["after"])
+    content, errors = found.to_dict(), ()
+    if study is not None:
+        from dynident.evidence import compare
+
+        loaded = load_study(study, to)
+        with progress("judging"):
+            judged = compare(estimates, loaded.test, criteria=loaded.criteria)
+        content, errors = {**content, "held_out": judged.to_dict()}, judged.tables()[:1]
+    if to is not None:
+        from dynident.reporting.changes_page import changes_report
+
+        name = estimates["after"].model.robot.name
+        changes_report(found, to, robot=name, errors=errors, command=command_line())
+        click.echo(f"report: {to}", err=True)
+    return CommandAnswer(content=lambda: content, parts=lambda: (*found.tables(), *errors))
