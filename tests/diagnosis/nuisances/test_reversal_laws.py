@@ -39,7 +39,8 @@ def record(seed: int, lead: float, stribeck: float = 0.0) -> Recording:
     values = true_values(model, Fv__shoulder=1.0, Fv__elbow=0.6, Fc__shoulder=3.0)
     tau = model.torque(model.block(t, q, v, a), values)
     ahead = np.clip((v[:, 1] + lead * a[:, 1]) / WIDTH, -1.0, 1.0)
-    tau[:, 1] += ahead * (COULOMB + stribeck * np.exp(-((v[:, 1] / 0.2) ** 2)))
+    falling = np.tanh(v[:, 1] / WIDTH) * np.exp(-((v[:, 1] / 0.2) ** 2))
+    tau[:, 1] += COULOMB * ahead + stribeck * falling
     return Recording(
         t,
         q + 1e-5 * rng.normal(size=q.shape),
@@ -54,7 +55,7 @@ def dataset(*seeds: int, lead: float, stribeck: float = 0.0) -> Dataset:
     return Dataset(tuple(record(seed, lead, stribeck) for seed in seeds))
 
 
-@pytest.mark.parametrize("lead", [8e-3, -8e-3])
+@pytest.mark.parametrize("lead", [6e-3, -6e-3])
 def test_the_law_that_made_the_data_explains_more_than_an_effect_that_stands_in(
     lead: float,
 ) -> None:
@@ -62,16 +63,16 @@ def test_the_law_that_made_the_data_explains_more_than_an_effect_that_stands_in(
     fitted = fit_evidence(evidence, evidence.model)
     stands_in = StribeckFriction("elbow").on(evidence.model.robot)
     (one,) = rank(evidence, fitted, 0, only=(stands_in,)).scores
-    (law,) = laws_that_do_as_well(evidence, fitted, one)
+    (law,) = laws_that_do_as_well(evidence, fitted, one, 0)
     assert law.joint == "elbow"
     assert law.drop > one.drop
     ahead = re.search(r"([\d.]+) ms", law.words)
     assert ahead is not None
-    assert float(ahead[1]) == pytest.approx(8.0, rel=0.2)
+    assert float(ahead[1]) == pytest.approx(6.0, rel=0.2)
     assert ("before the joint" if lead > 0 else "after the joint") in law.words
 
 
-@pytest.mark.parametrize(("lead", "excused"), [(8e-3, ["elbow"]), (0.0, ["elbow"]), (-8e-3, [])])
+@pytest.mark.parametrize(("lead", "excused"), [(6e-3, ["elbow"]), (0.0, ["elbow"]), (-6e-3, [])])
 def test_what_no_effect_explains_is_excused_unless_friction_lags(
     lead: float, excused: list[str]
 ) -> None:
@@ -81,11 +82,11 @@ def test_what_no_effect_explains_is_excused_unless_friction_lags(
 
 
 def test_friction_that_falls_with_speed_is_more_than_any_law_of_dry_friction() -> None:
-    evidence = Evidence(given(), gather(dataset(0, 1, lead=8e-3, stribeck=1.0)))
+    evidence = Evidence(given(), gather(dataset(0, 1, lead=6e-3, stribeck=1.0)))
     fitted = fit_evidence(evidence, evidence.model)
     missing = StribeckFriction("elbow").on(evidence.model.robot)
     (one,) = rank(evidence, fitted, 0, only=(missing,)).scores
-    assert laws_that_do_as_well(evidence, fitted, one) == ()
+    assert laws_that_do_as_well(evidence, fitted, one, 0) == ()
 
 
 @pytest.mark.slow
@@ -93,8 +94,8 @@ def test_friction_that_falls_with_speed_is_more_than_any_law_of_dry_friction() -
 def test_a_robot_whose_friction_leads_lacks_what_it_lacks_beside(
     stribeck: float, found: list[str]
 ) -> None:
-    train = dataset(0, 1, 2, lead=8e-3, stribeck=stribeck)
-    said = di.diagnose(given(), train, dataset(7, lead=8e-3, stribeck=stribeck))
+    train = dataset(0, 1, 2, lead=6e-3, stribeck=stribeck)
+    said = di.diagnose(given(), train, dataset(7, lead=6e-3, stribeck=stribeck))
     assert [step.effect.label for step in said.steps] == found
     assert said.verdict == ("explained" if found else "nothing_missing")
-    assert any("another law of dry friction" in note for note in said.notes)
+    assert found or any("another law of dry friction" in note for note in said.notes)

@@ -206,7 +206,8 @@ def _extend(stage: Stage, task: DiagnosisTask) -> Stage:
             stage = _rank(doubtful, task)
             continue
         label = best.score.effect.label
-        laws = laws_that_do_as_well(stage.evidence, stage.fitted, best.score)
+        many = len(stage.found)
+        laws = laws_that_do_as_well(stage.evidence, stage.fitted, best.score, many)
         doubtful = without_their_reversals(stage, laws, label)
         if doubtful is not stage:
             stage = _rank(doubtful, task)

@@ -17,19 +17,19 @@ import numpy as np
 from scipy.optimize import minimize
 
 from dynident.diagnosis.nuisances.friction_width import missed_instead
-from dynident.diagnosis.search.ranking import joints_below_noise
+from dynident.diagnosis.search.ranking import joints_below_noise, rank
 from dynident.diagnosis.search.scoring import Score
 from dynident.effects import Block, JointEffect, Parameter, ShapeParameter
 from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import EvidenceFit
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.tables import number
 
 _WIDTHS = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4)
 _LEADS = (-8e-3, -4e-3, -2e-3, -1e-3, 0.0, 1e-3, 2e-3, 4e-3, 8e-3)
 _RANGE = (0.02, 15.0)
 """Narrowest and widest law that is tried, over the model's width."""
-_LATEST = 0.02
-"""s, the most by which friction may reverse before the joint, or after it."""
+_LATEST = 0.01
+"""s by which friction may reverse before the joint, or after it; a law that wants more is none."""
 _TURNED = 3.0
 """Speed over the width at which dry friction has turned: tanh(3) is 0.995."""
 _USUAL = 99.0
@@ -86,22 +86,29 @@ class ReversalLaw:
 
     Attributes
     ----------
-    joint : where.
+    column : the law, as what it has more than the model's.
     drop : of the squared systematic residual, whitened, all else fitted anew.
-    lead_s : by which it reverses before the joint.
     words : the law, a clause.
     within : rad/s or m/s, speed within which it is another one than the model's.
     """
 
-    joint: str
+    column: SmoothReversal
     drop: float
-    lead_s: float
     words: str
     within: float
 
+    @property
+    def joint(self) -> str:
+        return str(self.column.joint)
+
+    @property
+    def lead_s(self) -> float:
+        """By which it reverses before the joint."""
+        return self.column.shape[1]
+
 
 def laws_that_do_as_well(
-    evidence: Evidence, fitted: EvidenceFit, one: Score
+    evidence: Evidence, fitted: EvidenceFit, one: Score, added: int
 ) -> tuple[ReversalLaw, ...]:
     """Other laws of dry friction that explain together what an effect would, less its price.
 
@@ -109,19 +116,24 @@ def laws_that_do_as_well(
     ----------
     evidence, fitted : the training recordings, and the model as it fits them.
     one : the score of an effect that the model lacks.
+    added : number of effects added so far.
 
     Returns
     -------
     At joints where the effect acts and the model has dry friction, those that explain something;
-    empty where they explain less than the effect.
+    empty where they explain less than the effect, or it passes the gates beside them too.
     """
     model = fitted.model
     joints = [model.robot.names[j] for j in one.effect.acting_at(model.robot)]
     dry = [joint for joint in joints if f"coulomb_friction@{joint}" in model.slices]
     found = [_best_law(evidence, fitted, joint) for joint in dry]
-    found = [law for law in found if law.drop > 2.0 * np.log(fitted.rows)]
+    worth = 2.0 * np.log(fitted.rows)
+    found = [law for law in found if law.drop > worth and abs(law.lead_s) < _LATEST]
     if sum(law.drop for law in found) < one.penalised:
         return ()
+    beside = fit_evidence(evidence, fitted.model + tuple(law.column for law in found), fitted)
+    if rank(evidence, beside, added, only=(one.effect,)).passing:
+        return ()  # it explains something else than they do
     return tuple(found)
 
 
@@ -148,13 +160,14 @@ def laws_of_the_rest(evidence: Evidence, fitted: EvidenceFit) -> tuple[ReversalL
     quiet, names = joints_below_noise(evidence, fitted), fitted.model.robot.names
     dry = [one for one in names if f"coulomb_friction@{one}" in fitted.model.slices]
     every = (_best_law(evidence, fitted, joint) for joint in dry if joint not in quiet)
-    return tuple(law for law in every if law.drop >= least and law.lead_s > -_AT_ONCE)
+    return tuple(law for law in every if law.drop >= least and -_AT_ONCE < law.lead_s < _LATEST)
 
 
 def _best_law(evidence: Evidence, fitted: EvidenceFit, joint: str) -> ReversalLaw:
     """Return the law that misses least at a joint."""
     each = [_shaped(evidence, fitted, kind(joint)) for kind in (SmoothReversal, StraightReversal)]
-    missed, k, lead = min(each)
+    missed, column = min(each, key=lambda one: one[0])
+    k, lead = column.shape
     at = fitted.model.robot.names.index(joint)
     own = float(fitted.model.friction_widths[at])
     words = f"reverses over {number(k * own, 2)} {fitted.model.robot.units[at]}/s"
@@ -162,9 +175,8 @@ def _best_law(evidence: Evidence, fitted: EvidenceFit, joint: str) -> ReversalLa
         words += f", {number(1e3 * abs(lead), 2)} ms {'before' if lead > 0 else 'after'} the joint"
     fastest = max(float(np.percentile(np.abs(a), _USUAL)) for a in _accelerations(evidence, at))
     return ReversalLaw(
-        joint=joint,
+        column=column,
         drop=fitted.error_signal - missed,
-        lead_s=lead,
         words=words,
         within=_TURNED * max(k, 1.0) * own + abs(lead) * fastest,
     )
@@ -176,8 +188,8 @@ def _accelerations(evidence: Evidence, at: int) -> list[np.ndarray]:
 
 def _shaped(
     evidence: Evidence, fitted: EvidenceFit, column: SmoothReversal
-) -> tuple[float, float, float]:
-    """Return what is missed with the best shape of a law, and that shape."""
+) -> tuple[float, SmoothReversal]:
+    """Return what is missed with the best shape of a law, and that law."""
     shapes = list(product(_WIDTHS, _LEADS))
     missed = missed_instead(evidence, fitted, [column.shaped(*shape) for shape in shapes])
     k, lead = shapes[int(np.argmin(missed))]
@@ -199,4 +211,4 @@ def _shaped(
             "fatol": 0.5,
         },
     )
-    return float(found.fun), float(np.exp(found.x[0])), float(found.x[1])
+    return float(found.fun), column.shaped(float(np.exp(found.x[0])), float(found.x[1]))
