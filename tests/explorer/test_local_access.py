@@ -90,11 +90,6 @@ def test_only_this_machine_is_listened_to(server):
         pass
 
 
-def test_every_server_has_a_token_of_its_own(server):
-    assert len(server.token) >= 32
-    assert len({TabState.of(server.token), TabState.of("other")}) == 2
-
-
 def test_a_notebook_shows_it_and_says_how_to_stop(server):
     shown = server._repr_html_()
     assert f'src="{server.url}"' in shown and ".stop()" in shown
@@ -106,7 +101,7 @@ def test_alone_no_other_page_may_frame_it(server):
     alone = LocalServer(server.versions)
     answer = alone.flask.test_client().get("/")
     assert "frame-ancestors 'none'" in answer.headers["Content-Security-Policy"]
-    assert alone.token != server.token
+    assert alone.token != server.token and len(server.token) >= 32
     alone.stop()
 
 

@@ -292,6 +292,16 @@ def test_a_study_that_changes_underneath_is_left_alone(small, tab):
     one.page.get_by_text("The study cannot be read").wait_for()
 
 
+def test_a_tab_whose_version_is_gone_is_told(small, tab):
+    path, server = small
+    one = tab(server.url)
+    for round_ in range(5):
+        path.write_text(f"{STUDY}# {round_}\n")
+        server.versions.latest()
+    one.page.locator(".switch input").first.click()
+    one.page.locator("#fault", has_text="reload the page").wait_for()
+
+
 def test_a_killed_server_is_told(demo, tab):
     _, url, server = demo
     one = tab(url)

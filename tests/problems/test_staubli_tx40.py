@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynident import diagnose
+from dynident import LeastSquares, compare, diagnose, effects_of
 from dynident.data_files import find_data
 from dynident.diagnosis import Diagnosis
 from dynident.errors import FileError
+from dynident.explorer.switched_fit import Refitter
 from dynident.study import Study, load
 
 STUDY = Path(__file__).parents[2] / "problems" / "staubli_tx40" / "study.toml"
@@ -65,3 +66,16 @@ def test_the_error_falls_to_the_published_one_and_never_rises(found: Diagnosis) 
     wrist = {one.name: one.error_after for one in found.joints}
     assert wrist["joint5"] < 0.12 and wrist["joint6"] < 0.12
     assert found.wiring == () and not any("payload" in s.effect.label for s in found.steps)
+
+
+def test_six_joints_are_refitted_on_the_page_as_by_fit(study: Study) -> None:
+    """Nothing repeats; the coupled wrist switched on, as `dynident open` does it."""
+    couplings = ("joint_coupling@joint5:joint6", "joint_coupling@joint6:joint5")
+    effects = [effects_of(label, study.robot)[0] for label in couplings]
+    refitter = Refitter(study)
+    now = refitter.fit(effects)
+    wanted = LeastSquares(errors="independent").fit(now.model, study.train)
+    np.testing.assert_allclose(now.estimate.values, wanted.values, rtol=1e-9, atol=1e-9)
+    errors = compare(wanted, study.test).results[0].joint_errors
+    np.testing.assert_allclose(now.judged.joint_errors, errors, rtol=1e-9)
+    assert now.judged.error < 0.6 * refitter.fit().judged.error

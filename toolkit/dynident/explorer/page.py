@@ -8,7 +8,7 @@ from dash import ALL, Dash, Input, Output, State, ctx, html, no_update, set_prop
 from dash.exceptions import PreventUpdate
 from flask import Flask
 
-from dynident.errors import DynidentError
+from dynident.errors import DynidentError, StudyError
 from dynident.explorer.opened_study import OpenedStudy, StudyVersions
 from dynident.explorer.page_answers import Contrast, map_answer, value_table
 from dynident.explorer.page_figures import error_bars, zoomed
@@ -64,8 +64,10 @@ def page(server: Flask, token: str, versions: StudyVersions) -> Dash:
 
 
 def _told(error: Exception) -> None:
-    """Say on the page what nobody has foreseen."""
-    said = f"Unexpected {type(error).__name__}: {error}. Please report it with the study."
+    """Say on the page what no callback has an answer to."""
+    said = str(error)
+    if not isinstance(error, DynidentError):
+        said = f"Unexpected {type(error).__name__}: {error}. Please report it with the study."
     set_props("fault", {"children": said})
 
 
@@ -220,7 +222,8 @@ class _Callbacks:
         state = TabState.read(tab)
         opened = self._versions.of(state.opened)
         if opened is None:
-            raise PreventUpdate
+            what = "has changed often since this tab was opened"
+            raise StudyError(what, self._versions.path.name, "reload the page")
         return opened, state
 
     def _contrast(self, tab: object) -> tuple[OpenedStudy, Contrast]:
