@@ -41,6 +41,7 @@ _PATH = click.Path(path_type=Path)
 @click.option(
     "--show", multiple=True, metavar="EFFECT", help="Show what the recordings could not; likewise."
 )
+@click.option("--clearance", type=float, help="m, that links keep from each other.")
 @click.option("--limits", type=_PATH, help="A file of limits, [joints.NAME].")
 @click.option("--out", type=_PATH, help="Write reference.csv and experiment.toml here.")
 def design(study: Path, limits: Path | None, out: Path | None, **settings) -> CommandAnswer:

@@ -23,6 +23,7 @@ class DesignTask:
         of a group is taken for true. Of several groups, the one that is told least counts.
     show : effects that the recordings so far could not show.
     starts, seed : of the search.
+    clearance : m, that the robot's links keep from each other; None where that is not looked at.
     """
 
     duration: float = 10.0
@@ -33,6 +34,7 @@ class DesignTask:
     show: tuple[Effect, ...] = ()
     starts: int = 2
     seed: int = 0
+    clearance: float | None = None
 
     def __post_init__(self) -> None:
         for group in self.tell:

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from dynident.errors import DesignError
+from dynident.experiment_design.clearance import Clearance
 from dynident.experiment_design.design_question import Asked, DesignQuestion
 from dynident.experiment_design.design_task import DesignTask
 from dynident.experiment_design.information import Information
@@ -61,12 +62,13 @@ def design(
     task = task or DesignTask()
     progress = progress or logged("designing")
     limits = limits or MotionLimits.of(model.robot)
+    clearance = None if task.clearance is None else Clearance.of(model.robot, task.clearance)
     motions = PeriodicMotions(limits=limits, period=task.duration, harmonics=task.harmonics)
     progress("fitting what was recorded")
     questions = [DesignQuestion.of(model, recorded, task, told) for told in task.tell or ((),)]
     progress("writing the columns out")
     asked = [one.asked(recorded, motions) for one in questions]
-    program = _program(asked, motions)
+    program = _program(asked, motions, clearance)
     progress("comparing with usual motions")
     usual = _usual(program)
     found = program.solved(task.starts, task.seed, progress)
@@ -95,12 +97,15 @@ def design(
     )
 
 
-def _program(asked: list[Asked], motions: PeriodicMotions) -> MotionProgram:
+def _program(
+    asked: list[Asked], motions: PeriodicMotions, clearance: Clearance | None
+) -> MotionProgram:
     """The search; what no usual motion tells at all would hide what others are."""
     program = MotionProgram(
         informations=tuple(one.information for one in asked),
         motions=motions,
         softer=tuple(one.softer for one in asked),
+        clearance=clearance,
     )
     if len(asked) == 1:
         return program
@@ -115,6 +120,7 @@ def _program(asked: list[Asked], motions: PeriodicMotions) -> MotionProgram:
         informations=tuple(one.information for one in kept),
         motions=motions,
         softer=tuple(one.softer for one in kept),
+        clearance=clearance,
     )
 
 

@@ -109,6 +109,27 @@ class MotionLimits:
         )
         return found
 
+    def share(
+        self, q: np.ndarray, rates: tuple[np.ndarray, np.ndarray, np.ndarray], centre: np.ndarray
+    ) -> float:
+        """Return the largest share of a limit that a motion uses; infinite if it is no number.
+
+        Parameters
+        ----------
+        q : (T, n).
+        rates : speed, acceleration and torque, (T, n) each.
+        centre : (n,) position that the range is seen from.
+        """
+        moved = q - centre
+        limits = (self.speed, self.acceleration, self.torque)
+        shares = [
+            moved / np.where(moved > 0, self.upper - centre, centre - self.lower),
+            *(one / limit for one, limit in zip(rates, limits, strict=True)),
+        ]
+        used = np.abs(np.concatenate(shares, axis=1))
+        # What is no number is within no limit.
+        return float(used.max()) if np.all(np.isfinite(used)) else float("inf")
+
     def changed(
         self, values: Mapping[str, Mapping[str, float]], robot: Robot, where: str = "limits"
     ) -> MotionLimits:

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 
 from dynident.errors import DesignError
+from dynident.experiment_design.clearance import Clearance
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.motion_limits import MotionLimits
-from dynident.experiment_design.motion_solver import MotionSolver
+from dynident.experiment_design.motion_solver import DesignedMotion, MotionSolver
 from dynident.experiment_design.periodic import PeriodicMotions
 
 _PER_HARMONIC = 22  # instants
@@ -25,25 +27,9 @@ FINER = 10
 _TRIED = 150  # random motions for each start
 _ITERATIONS, _ITERATIONS_SOFT = 150, 60
 _SHRINKS = 100
+_SHRINKS_CLEAR, _SHRINK_CLEAR = 20, 0.85
+_CUTS = 6  # rounds of bounds that keep a motion clear
 _ROUNDING = 1e-9
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class DesignedMotion:
-    """A motion within limits, and how its program ended.
-
-    Attributes
-    ----------
-    variables : (n, 2 H - 1).
-    loss : of its information.
-    status : of Ipopt, in words.
-    iterations : of Ipopt.
-    """
-
-    variables: np.ndarray
-    loss: float
-    status: str
-    iterations: int
 
 
 def instants_of(motions: PeriodicMotions, *, narrow: int = 0) -> int:
@@ -67,11 +53,13 @@ class MotionProgram:
     motions : among which it is sought.
     softer : of each of these, the same with dry friction over wider ranges of speed, the widest
         first, through which the search goes; none where that makes no difference.
+    clearance : that is kept, if any.
     """
 
     informations: tuple[Information, ...]
     motions: PeriodicMotions
     softer: tuple[tuple[Information, ...], ...] = ()
+    clearance: Clearance | None = None
 
     @property
     def information(self) -> Information:
@@ -122,6 +110,26 @@ class MotionProgram:
         ----------
         variables : (n, 2 H - 1).
         """
+        found = self._limited(variables)
+        if found is None or self.clearance is None:
+            return found
+        if self.clearance.distance(self.motions.centre(found)) < self.clearance.margin:
+            return None  # no shrinking helps
+        # Most motions that are too near are so at few instants already, which cost little.
+        coarse, fine = (self.motions.times(k * self.instants) for k in (1, FINER))
+        for _ in range(_SHRINKS_CLEAR):
+            if self._is_clear(found, coarse) and self._is_clear(found, fine):
+                return found
+            found[:, 1:] *= _SHRINK_CLEAR
+        return None
+
+    def _is_clear(self, variables: np.ndarray, t: np.ndarray) -> bool:
+        assert self.clearance is not None
+        near = self.clearance.along(self.motions.fourier(variables).at(t)[0])
+        return bool(near.min() >= self.clearance.margin)
+
+    def _limited(self, variables: np.ndarray) -> np.ndarray | None:
+        """The motion within the limits, wherever it may touch the robot."""
         t = self.motions.times(FINER * self.instants)
         found = np.array(variables)
         found[:, 0] = np.clip(found[:, 0], -0.999, 0.999)
@@ -140,20 +148,9 @@ class MotionProgram:
         variables : (n, 2 H - 1).
         t : (T,) s, at which it is looked at.
         """
-        limits = self.limits
-        series = self.motions.fourier(variables)
-        q, v, a = series.at(t)
+        q, v, a = self.motions.fourier(variables).at(t)
         torque = self.information.columns.torque_along(t, q, v, a)
-        moved = q - series.centre
-        shares = [
-            moved / np.where(moved > 0, limits.upper - series.centre, series.centre - limits.lower),
-            np.abs(v) / limits.speed,
-            np.abs(a) / limits.acceleration,
-            np.abs(torque) / limits.torque,
-        ]
-        used = np.abs(np.concatenate(shares, axis=1))
-        # What is no number is within no limit.
-        return float(used.max()) if np.all(np.isfinite(used)) else float("inf")
+        return self.limits.share(q, (v, a, torque), self.motions.centre(variables))
 
     # --- the program --------------------------------------------------------------------------
 
@@ -183,7 +180,7 @@ class MotionProgram:
         found = list(begins)
         for number, begin in enumerate(begins, 1):
             progress(f"start {number} of {len(begins)}")
-            found += self._from(solver, begin.variables)
+            found += self._cleared(solver, begin.variables)
             if not stages:
                 continue
             progress(f"start {number} of {len(begins)}, narrow laws widened first")
@@ -191,10 +188,12 @@ class MotionProgram:
             for stage in stages:
                 for one in self._from(stage, variables):
                     variables = one.variables
-            found += self._from(solver, variables)
+            found += self._cleared(solver, variables)
         if not found:
-            remedy = "widen them, or shorten the motion's reach"
-            raise DesignError("no motion was found within the limits", remedy=remedy)
+            what = "no motion was found within the limits"
+            if self.clearance is not None:
+                what += f" that stays {self.clearance.margin:g} m clear"
+            raise DesignError(what, remedy="widen them, or shorten the motion's reach")
         # Narrow laws have many optima: what was found by chance may be better. And instants that
         # the program does not see count here.
         fine = [replace(one, loss=self.loss(one.variables, FINER)) for one in found]
@@ -214,16 +213,55 @@ class MotionProgram:
     def _begins(self, starts: int, seed: int) -> list[DesignedMotion]:
         """The best of many random motions within the limits."""
         rng = np.random.default_rng(seed)
-        found = []
-        for number in rng.integers(0, 2**31, starts * _TRIED):
-            variables = self.within(self.motions.random(int(number)))
-            if variables is not None:
-                status = "no better motion than a random one"
-                loss = self.loss(variables)
-                found.append(
-                    DesignedMotion(variables=variables, loss=loss, status=status, iterations=0)
-                )
-        return sorted(found, key=lambda one: one.loss)[:starts]
+        status = "no better motion than a random one"
+        some = (
+            self._limited(self.motions.random(int(number)))
+            for number in rng.integers(0, 2**31, starts * _TRIED)
+        )
+        found = [
+            DesignedMotion(variables=one, loss=self.loss(one), status=status, iterations=0)
+            for one in some
+            if one is not None
+        ]
+        found.sort(key=lambda one: one.loss)
+        # Distances are costly: they are looked at from the best motion on.
+        clear = (one for begin in found for one in self._within(begin))
+        return list(islice(clear, starts))
+
+    def _cleared(self, solver: MotionSolver, start: np.ndarray) -> list[DesignedMotion]:
+        """As `_from`, and clear: where a motion comes too near, it is moved away and solved again.
+
+        What is still too near then is made smaller.
+        """
+        found = self._from(solver, start)
+        if self.clearance is None:
+            return found
+        t, cuts = self.motions.times(FINER * self.instants), []
+        for _ in range(_CUTS):
+            if not found:
+                return []
+            variables = found[0].variables
+            new = self.clearance.cuts(t, self.motions.fourier(variables).at(t)[0])
+            if not new:
+                break
+            cuts += new
+            again = MotionSolver.of(
+                self.motions,
+                self.informations,
+                self.instants,
+                instants_of(self.motions),
+                _ITERATIONS,
+                cuts,
+            )
+            found = self._from(again, variables)
+        return [clear for one in found for clear in self._within(one)]
+
+    def _within(self, motion: DesignedMotion) -> list[DesignedMotion]:
+        """The motion, made smaller until it is clear; none where that fails."""
+        if self.clearance is None:
+            return [motion]
+        best = self.within(motion.variables)
+        return [] if best is None else [replace(motion, variables=best, loss=self.loss(best))]
 
     def _from(self, solver: MotionSolver, start: np.ndarray) -> list[DesignedMotion]:
         """The motion at which the search from a start ends; none where none is within limits."""
@@ -240,7 +278,7 @@ class MotionProgram:
             )
         stats = solver.function.stats()
         variables = result["x"].full().ravel()[: start.size].reshape(start.shape)
-        best = self.within(variables) if np.all(np.isfinite(variables)) else None
+        best = self._limited(variables) if np.all(np.isfinite(variables)) else None
         if best is None:
             return []
         motion = DesignedMotion(

@@ -2,16 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import lazy_loader
 import numpy as np
 
+from dynident.experiment_design.clearance import DistanceCut
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.periodic import PeriodicMotions
 
 ca: Any = lazy_loader.load("casadi")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DesignedMotion:
+    """A motion within limits, and how its program ended.
+
+    Attributes
+    ----------
+    variables : (n, 2 H - 1).
+    loss : of its information.
+    status : of Ipopt, in words.
+    iterations : of Ipopt.
+    """
+
+    variables: np.ndarray
+    loss: float
+    status: str
+    iterations: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +56,7 @@ class MotionSolver:
         instants: int,
         limit_instants: int,
         iterations: int,
+        cuts: Sequence[DistanceCut] = (),
     ) -> MotionSolver:
         """Write the program out.
 
@@ -46,6 +67,7 @@ class MotionSolver:
             is limited is what the model of the first predicts.
         instants, limit_instants : at which columns are evaluated, and limits imposed.
         iterations : at most.
+        cuts : bounds on the position at single instants.
 
         Returns
         -------
@@ -58,21 +80,20 @@ class MotionSolver:
         half = (limits.upper - limits.lower) / 2
         speed = ca.diag(ca.DM(limits.speed))
 
-        def along(count: int) -> tuple[Any, ...]:
-            """Position, speed and acceleration, (count, n) each, and all of an instant."""
-            t = motions.times(count)
+        def along(t: np.ndarray) -> tuple[Any, ...]:
+            """Position, speed and acceleration, (T, n) each, and all of an instant."""
             moved, v, a = (ca.DM(one) @ variables @ speed for one in motions.bases(t))
             centre = ca.DM(limits.lower + half).T + variables[0, :] * ca.DM(half).T
-            q = ca.repmat(centre, count, 1) + moved
+            q = ca.repmat(centre, len(t), 1) + moved
             return q, v, a, ca.vertcat(q.T, v.T, a.T, ca.DM(t).T)
 
-        *_, every = along(instants)
+        *_, every = along(motions.times(instants))
         losses = [
             one.symbolic_loss(one.columns.function.map(instants)(every), instants)
             for one in informations
         ]
         count = min(instants, limit_instants)
-        q, v, a, inputs = along(count)
+        q, v, a, inputs = along(motions.times(count))
         columns = informations[0].columns
         rows = LimitRows()
         rows.add(q / ca.repmat(ca.DM(half).T, count, 1), limits.lower / half, limits.upper / half)
@@ -84,18 +105,14 @@ class MotionSolver:
             torque = columns.torque.map(count)(inputs).T[:, limited.tolist()]
             torque = torque / ca.repmat(ca.DM(limits.torque[limited]).T, count, 1)
             rows.add(torque, -np.ones(len(limited)), np.ones(len(limited)))
-        options = {
-            "print_time": False,
-            "show_eval_warnings": False,
-            "ipopt": {
-                "print_level": 0,
-                "sb": "yes",
-                "tol": 1e-4,
-                "max_iter": iterations,
-                "hessian_approximation": "limited-memory",
-                "limited_memory_max_history": 20,
-            },
-        }
+        if cuts:
+            held, *_ = along(np.array([one.t for one in cuts]))
+            slopes = np.array([one.slope for one in cuts])
+            rows.add_bounds(
+                ca.sum2(held * ca.DM(slopes)),
+                np.array([one.least for one in cuts]),
+                np.full(len(cuts), np.inf),
+            )
         unknown, loss = z, losses[0]
         if len(losses) > 1:
             loss = ca.MX.sym("loss")  # the largest: none is above it
@@ -103,7 +120,23 @@ class MotionSolver:
             over = ca.vertcat(*losses).T - loss
             rows.add(over, np.full(len(losses), -np.inf), np.zeros(len(losses)))
         program = {"x": unknown, "f": loss, "g": ca.vertcat(*rows.parts)}
-        return cls(ca.nlpsol("design", "ipopt", program, options), rows)
+        return cls(ca.nlpsol("design", "ipopt", program, _options(iterations)), rows)
+
+
+def _options(iterations: int) -> dict[str, Any]:
+    """Of Ipopt, through CasADi."""
+    return {
+        "print_time": False,
+        "show_eval_warnings": False,
+        "ipopt": {
+            "print_level": 0,
+            "sb": "yes",
+            "tol": 1e-4,
+            "max_iter": iterations,
+            "hessian_approximation": "limited-memory",
+            "limited_memory_max_history": 20,
+        },
+    }
 
 
 class LimitRows:
@@ -123,6 +156,16 @@ class LimitRows:
         lower, upper : (n,) bounds of each column.
         """
         count = expression.shape[0]
-        self.parts.append(ca.vec(expression))
-        self.lower = np.concatenate([self.lower, np.repeat(lower, count)])
-        self.upper = np.concatenate([self.upper, np.repeat(upper, count)])
+        self.add_bounds(ca.vec(expression), np.repeat(lower, count), np.repeat(upper, count))
+
+    def add_bounds(self, expression: Any, lower: np.ndarray, upper: np.ndarray) -> None:
+        """Add rows, each with its own bounds.
+
+        Parameters
+        ----------
+        expression : (k,).
+        lower, upper : (k,).
+        """
+        self.parts.append(expression)
+        self.lower = np.concatenate([self.lower, lower])
+        self.upper = np.concatenate([self.upper, upper])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,8 @@ import numpy as np
 from dynident.closed_loop import Fourier
 from dynident.experiment_design.design_task import DesignTask
 from dynident.experiment_design.motion_limits import MotionLimits
-from dynident.experiment_design.motion_program import FINER, DesignedMotion, MotionProgram
+from dynident.experiment_design.motion_program import FINER, MotionProgram
+from dynident.experiment_design.motion_solver import DesignedMotion
 from dynident.fitting.estimate import Estimate
 from dynident.model import Model
 from dynident.tables import Shown, Table, finite, number, percent
@@ -198,7 +200,32 @@ class RecordingDesign(Shown):
         """Everything that `show` prints, in its order."""
         tail = (_CAVEAT, f"Ipopt: {self.motion.status}, {self.motion.iterations} iterations.")
         told = () if self.separations else (self.sigma_table(),)
-        return (self.sentence, *told, self.limit_table(), *tail)
+        near = () if self.least_distance is None else (self._clear_in_words(),)
+        return (self.sentence, *told, self.limit_table(), *near, *tail)
+
+    @cached_property
+    def least_distance(self) -> float | None:
+        """Least distance between links on a fine grid, m; None where it is not looked at.
+
+        What is a decimetre beyond the clearance that was asked for is that far.
+        """
+        clearance = self.program.clearance
+        if clearance is None:
+            return None
+        t = self.program.motions.times(FINER * self.program.instants)
+        return float(clearance.along(self.trajectory.at(t)[0]).min())
+
+    def _clear_in_words(self) -> str:
+        clearance, least = self.program.clearance, self.least_distance
+        assert clearance is not None and least is not None
+        words = (
+            f"By the collision geometry of the description the links stay {1000 * least:.0f} mm "
+            f"or more from each other ({1000 * clearance.margin:g} mm asked for)."
+        )
+        if clearance.ignored:
+            count = len(clearance.ignored)
+            words += f" Not looked at: {count} pairs of shapes that are as near wherever it stands."
+        return words
 
     def to_dict(self) -> dict[str, Any]:
         """The design as JSON has it."""
@@ -212,6 +239,7 @@ class RecordingDesign(Shown):
             "sine": series.sine.tolist(),
             "cosine": series.cosine.tolist(),
             "separations": [one.to_dict() for one in self.separations],
+            "least_distance": self.least_distance,
             "status": self.motion.status,
         }
 

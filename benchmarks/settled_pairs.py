@@ -1,0 +1,136 @@
+"""Pairs of effects that recordings leave open, and whether designed recordings settle them.
+
+    python benchmarks/settled_pairs.py --seeds 5
+
+A two-link arm has an effect that a few recordings of small motions cannot tell from another. The
+diagnosis names both; the next recording is designed, simulated in closed loop with the arm as it
+truly is, and the diagnosis repeated with it. Printed are, of the cases in which both were named:
+in how many the right effect alone is named afterwards; the separation that was predicted; and that
+which was measured, the square root of the drop of the weighted squared residual from the model with
+the other effect to that with the right one.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+import dynident as di
+from dynident.closed_loop import Experiment, ExperimentRun, Fourier, TrueEffect, load_experiment
+from dynident.experiment_design import DesignTask
+from dynident.experiment_design.virtual_recording import ClosedDesignLoop, close_design_loop
+from dynident.fitting.fit_model import fit
+from dynident.recording.dataset import numbered
+from dynident.tables import Table
+
+PROBLEM = Path(__file__).resolve().parents[1] / "problems" / "hidden_effect"
+TASK = DesignTask(duration=8.0, repeat=2, harmonics=5, starts=1)
+
+
+@dataclass(frozen=True)
+class OpenPair:
+    """An effect that is hidden, its values, and the one that it is taken for."""
+
+    hidden: str
+    values: tuple[float, ...]
+    rival: str
+
+
+PAIRS = (
+    OpenPair("quadratic_drag@elbow", (0.3,), "stribeck_friction@elbow"),
+    OpenPair("quadratic_drag@shoulder", (0.3,), "stribeck_friction@shoulder"),
+    OpenPair("joint_spring@elbow", (0.1, 0.0), "torque_ripple@elbow"),
+    OpenPair("torque_offset@shoulder", (0.3,), "torque_ripple@shoulder"),
+    OpenPair("joint_spring@shoulder", (5.0, 0.0), "torque_ripple@shoulder"),
+    OpenPair("joint_zero@shoulder", (0.1,), "base_tilt"),
+)
+
+
+def truth(base: Experiment, pair: OpenPair, seed: int) -> Experiment:
+    """The arm with a hidden effect, in three recordings of small motions."""
+    robot = base.robot
+    known = [one for one in base.effects if not one.hidden]
+    hidden = TrueEffect.of(pair.hidden, robot, pair.values, hidden=True)
+    runs = tuple(
+        ExperimentRun(
+            trajectory=Fourier.random(robot, 8.0, [seed, k], amplitude=0.5, speed=1.5),
+            duration=16.0,
+            file=f"small{k + 1}.csv",
+        )
+        for k in range(3)
+    )
+    return replace(base, effects=(*known, *hidden), runs=runs, seed=seed)
+
+
+def measured(loop: ClosedDesignLoop, recorded: di.Dataset, group: int) -> float:
+    """Standard deviations by which the recordings, with the designed one, prefer the first."""
+    first, *others = loop.designed.task.tell[group]
+    model = loop.before.after.model - first.label
+    (every,) = numbered(replace(recorded, recordings=(*recorded.recordings, loop.recording)))
+    right = fit(model + first, every)
+    wrong = [fit(model + one, every) for one in others]
+    noise = loop.designed.estimate.torque_std
+    rows = right.rows / len(noise)
+    drops = [
+        rows * float(np.sum((one.torque_std**2 - right.torque_std**2) / noise**2)) for one in wrong
+    ]
+    return float(np.sqrt(max(min(drops), 0.0)))
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--pairs", nargs="*", help="hidden effects; default: all")
+    asked = parser.parse_args()
+    study = di.load(PROBLEM / "study.toml")
+    base = load_experiment(PROBLEM / "experiment.toml")
+    rows = []
+    for pair in PAIRS:
+        if asked.pairs and pair.hidden not in asked.pairs:
+            continue
+        both, right, wrong, predicted, found, so_far = 0, 0, 0, [], [], []
+        for seed in range(asked.seeds):
+            made = truth(base, pair, seed)
+            recorded = replace(study.train, recordings=made.run())
+            try:
+                loop = close_design_loop(study.model, recorded, made, TASK, lambda _: None)
+            except di.DynidentError:
+                continue  # nothing was open
+            groups = [{one.label for one in group} for group in loop.designed.task.tell]
+            meant = [k for k, one in enumerate(groups) if {pair.hidden, pair.rival} <= one]
+            if not meant:
+                continue
+            both += 1
+            named = {step.effect.label: step for step in loop.after.steps}
+            own = named.get(pair.hidden)
+            settled = own is not None and not own.indistinguishable and pair.rival not in named
+            right += settled
+            wrong += own is None and pair.rival in named
+            separation = loop.designed.separations[meant[0]]
+            predicted.append(separation.designed)
+            so_far.append(separation.recorded)
+            if loop.designed.task.tell[meant[0]][0].label == pair.hidden:
+                found.append(measured(loop, recorded, meant[0]) / separation.designed)
+        middle = [f"{np.median(x):.2g}" if x else "" for x in (so_far, predicted, found)]
+        cells = (f"{both} of {asked.seeds}", str(right), str(wrong), *middle)
+        rows.append((pair.hidden, pair.rival, *cells))
+        print(rows[-1], flush=True)
+    heads = (
+        "hidden",
+        "taken for",
+        "open",
+        "then right alone",
+        "then wrong",
+        "sigma so far",
+        "predicted",
+        "measured over it",
+    )
+    print(Table("Pairs that a designed recording settles", heads, tuple(rows)))
+
+
+if __name__ == "__main__":
+    main()
