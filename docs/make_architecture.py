@@ -14,7 +14,17 @@ from package_map import FLOORS, PACKAGE, first_line, modules, reduced, room_impo
 
 PAGE = Path(__file__).resolve().parent / "architecture.md"
 NOT_DRAWN = {
-    *("errors", "words", "files", "tables", "settings", "data_files", "places", "threads"),
+    *(
+        "errors",
+        "words",
+        "files",
+        "tables",
+        "settings",
+        "data_files",
+        "places",
+        "threads",
+        "late_modules",
+    ),
     "clusters",
 }
 """Files of the ground floor, which serve every room."""

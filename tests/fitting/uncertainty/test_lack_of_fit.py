@@ -62,3 +62,12 @@ def test_the_wider_of_two_covariances_is_at_least_each() -> None:
         gap = (widened(one, other) - less) / np.outer(size, size)
         assert np.linalg.eigvalsh(gap)[0] > -1e-9
     np.testing.assert_allclose(widened(one, 0.5 * one), one, rtol=1e-9)
+
+
+def test_columns_that_are_alike_but_for_rounding_have_a_wider_covariance_too() -> None:
+    """Rounding may take the least eigenvalue of a covariance below zero."""
+    along = np.array([1.0, 1.0]) / np.sqrt(2.0)
+    across = np.array([1.0, -1.0]) / np.sqrt(2.0)
+    one = np.outer(along, along) - 1e-17 * np.outer(across, across)
+    wider = widened(one, 4.0 * one)
+    np.testing.assert_allclose(wider, 4.0 * one, rtol=1e-6, atol=1e-9)

@@ -10,13 +10,12 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
-import lazy_loader
-
 from dynident.batch.joint_tree import JointTree
 from dynident.batch.newton_euler import SIGNALS, Equations, TreeMotion, skew, torque_equations
 from dynident.batch.tape import Tape, tape_of
+from dynident.late_modules import LateModule
 
-ca: Any = lazy_loader.load("casadi")
+ca: Any = LateModule("casadi")
 
 
 _KEPT = 32  # tapes

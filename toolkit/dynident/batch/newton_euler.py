@@ -14,12 +14,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import lazy_loader
 import numpy as np
 
 from dynident.batch.joint_tree import JointTree
+from dynident.late_modules import LateModule
 
-ca: Any = lazy_loader.load("casadi")  # of few samples nothing is written out
+ca: Any = LateModule("casadi")  # of few samples nothing is written out
 
 SIGNALS = 5
 """Rows of input for each joint: cos q, sin q, q, v, a; see `dynident.batch.kernel`."""

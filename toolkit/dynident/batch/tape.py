@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import lazy_loader
 import numpy as np
 
 from dynident.batch.memory import side_by_side
 from dynident.batch.newton_euler import Equations
+from dynident.late_modules import LateModule
 
-ca: Any = lazy_loader.load("casadi")
+ca: Any = LateModule("casadi")
 
 BLOCK = 4096
 """Samples of a block at most: a call costs little beside them, and a few hundred slots of them

@@ -6,16 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import lazy_loader
 import numpy as np
 
 from dynident.batch.newton_euler import regressor_equations, torque_equations
 from dynident.effects import Effect
 from dynident.errors import DesignError, DynidentError
+from dynident.late_modules import LateModule
 from dynident.model import Model
 from dynident.robot import Robot
 
-ca: Any = lazy_loader.load("casadi")
+ca: Any = LateModule("casadi")
 _STEP = 1e-4  # of a change of the bodies, in its unit; the error of the slope is its square
 
 

@@ -12,12 +12,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import lazy_loader
 import numpy as np
 
 from dynident.experiment_design.column_function import ColumnFunction
+from dynident.late_modules import LateModule
 
-ca: Any = lazy_loader.load("casadi")
+ca: Any = LateModule("casadi")
 Objective = Literal["D", "A"]
 RIDGE = 1e-8
 """Added to the diagonal of the scaled information while a motion is sought: what nothing shows must

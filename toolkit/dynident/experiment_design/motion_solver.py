@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import lazy_loader
 import numpy as np
 
 from dynident.experiment_design.clearance import DistanceCut
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.periodic import PeriodicMotions
+from dynident.late_modules import LateModule
 
-ca: Any = lazy_loader.load("casadi")
+ca: Any = LateModule("casadi")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -28,12 +28,21 @@ NOW = "with what is switched on"
 _POINTS = 3000
 
 
+TORQUE_HEIGHT, MAP_HEIGHT = 470, 350
+"""Heights of the pictures of torque and of residuals, pixels."""
+
+
 def waiting() -> go.Figure:
     """Return what stands in the place of a picture that is being made."""
     words = {"text": "working ...", "showarrow": False, "font": {"size": 15}}
     empty = {"visible": False}
     figure = go.Figure(layout={"xaxis": empty, "yaxis": empty, "annotations": [words]})
     return dressed(figure, 300)
+
+
+def bars_height(joints: int) -> int:
+    """Height of the bars of so many joints and of all of them, pixels."""
+    return 120 + 62 * (joints + 1)
 
 
 def error_bars(before: SwitchedFit, now: SwitchedFit) -> go.Figure:
@@ -76,7 +85,7 @@ def error_bars(before: SwitchedFit, now: SwitchedFit) -> go.Figure:
     figure.update_xaxes(title="held-out torque error (%)", range=[0, 1.25 * top], fixedrange=True)
     figure.update_yaxes(autorange="reversed", automargin=True, fixedrange=True, showgrid=False)
     figure.update_layout(barmode="group", bargap=0.3, dragmode=False)
-    return dressed(figure, 120 + 62 * len(joints), top=34)
+    return dressed(figure, bars_height(before.model.robot.n), top=34)
 
 
 def measured_and_predicted(
@@ -116,7 +125,7 @@ def measured_and_predicted(
     figure.update_xaxes(title="time (s)", row=2, col=1)
     figure.update_yaxes(title=f"torque ({unit})", row=1, col=1)
     figure.update_yaxes(title=f"residual ({unit})", row=2, col=1)
-    figure = dressed(figure, 470, top=30)
+    figure = dressed(figure, TORQUE_HEIGHT, top=30)
     return figure.update_layout(legend={"y": -0.16, "yanchor": "top"})
 
 
@@ -154,7 +163,7 @@ def map_picture(one: ResidualMap) -> go.Figure:
     figure.update_xaxes(title=x_title(one), fixedrange=True)
     figure.update_yaxes(title=y_title(one), zeroline=True, fixedrange=True)
     figure.update_layout(dragmode=False)
-    figure = dressed(figure, 350, top=30)
+    figure = dressed(figure, MAP_HEIGHT, top=30)
     return figure.update_layout(legend={"y": -0.2, "yanchor": "top"})
 
 

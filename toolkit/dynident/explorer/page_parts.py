@@ -10,7 +10,7 @@ from dash import dcc, html
 
 from dynident.explorer.effect_choices import EffectChoice, Group
 from dynident.explorer.opened_study import OpenedStudy
-from dynident.explorer.page_figures import waiting
+from dynident.explorer.page_figures import MAP_HEIGHT, TORQUE_HEIGHT, bars_height, waiting
 from dynident.explorer.tab_state import TabState
 from dynident.tables import Table
 
@@ -51,7 +51,7 @@ def whole_page(opened: OpenedStudy, state: TabState) -> html.Main:
             html.Header([html.H1(str(opened.study.path.name)), html.P(what_to_do)]),
             html.P(id="fault", role="alert"),
             html.Div(id="search", role="status", className="card verdict"),
-            html.Div([html.Div([_missing(), _values()]), _errors()], className="pair"),
+            html.Div([html.Div([_missing(), _values()]), _errors(opened)], className="pair"),
             _where_it_fails(opened),
         ]
     )
@@ -81,16 +81,22 @@ def _values() -> html.Section:
     )
 
 
-def _errors() -> html.Section:
+def _errors(opened: OpenedStudy) -> html.Section:
     return html.Section(
         [
             html.H2("Error on held-out data"),
             html.P(id="said", role="status", className="said"),
-            dcc.Graph(id="errors", figure=waiting(), config=_STILL),
+            _picture("errors", bars_height(len(opened.study.robot.names)), _STILL),
             html.P(id="fitted-by", className="quiet"),
         ],
         className="card falling",
     )
+
+
+def _picture(name: str, height: int, config: Any) -> dcc.Graph:
+    # Its place is as high as the picture, also while a phone is turned and it is drawn anew.
+    style = {"minHeight": f"{height}px"}
+    return dcc.Graph(id=name, figure=waiting(), config=config, style=style)
 
 
 def _where_it_fails(opened: OpenedStudy) -> html.Section:
@@ -99,7 +105,7 @@ def _where_it_fails(opened: OpenedStudy) -> html.Section:
         [
             html.H3("Measured and predicted torque"),
             html.P(id="held", className="quiet"),
-            dcc.Graph(id="torque", figure=waiting(), config=_ZOOMED),
+            _picture("torque", TORQUE_HEIGHT, _ZOOMED),
         ]
     )
     residual = html.Div(
@@ -107,7 +113,7 @@ def _where_it_fails(opened: OpenedStudy) -> html.Section:
             html.H3("Mean residual against"),
             _choice("against", "", []),
             html.P(id="seen", className="quiet"),
-            dcc.Graph(id="map", figure=waiting(), config=_STILL),
+            _picture("map", MAP_HEIGHT, _STILL),
         ]
     )
     return html.Section(
@@ -250,7 +256,7 @@ def fitted_by(opened: OpenedStudy) -> str:
     found = opened.search.diagnosis
     if not len(opened.study.test):
         return "Blocks of time are held out, each predicted by the fit to all others."
-    said = "Here models are fitted by least squares, weighted per joint, as `dynident fit` does."
+    said = "Here models are fitted by least squares, weighted per joint, as dynident fit does."
     if found is None:
         return said
     return (

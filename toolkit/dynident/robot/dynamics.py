@@ -9,15 +9,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import lazy_loader
 import numpy as np
 
 from dynident.batch import JointTree, regressor_kernel, torque_kernel
 from dynident.inertia import to_pinocchio
+from dynident.late_modules import LateModule
 from dynident.robot.tree import Array, Joint
 
 # Slow to load, and not needed to read or check a description; the bindings carry no types.
-pin: Any = lazy_loader.load("pinocchio")
+pin: Any = LateModule("pinocchio")
 
 # Samples of one call for which a function of many samples pays. Measured: making it takes as long
 # as 3000 (30 or 60 joints) to 7000 (2 joints) samples through Pinocchio, once for all calls, and

@@ -10,18 +10,18 @@ from __future__ import annotations
 from copy import deepcopy
 from typing import Any
 
-import lazy_loader
 import numpy as np
 
 from dynident.errors import RobotError
 from dynident.inertia import from_drake
+from dynident.late_modules import LateModule
 from dynident.robot.formats.reading import Opened, open_description
 from dynident.robot.formats.tree_assembly import WORLD, drake_bodies, drake_plant, quiet
 from dynident.robot.formats.xmltree import Element, to_text
 from dynident.robot.robot import Robot
 from dynident.robot.tree import Array
 
-pin: Any = lazy_loader.load("pinocchio")  # as in `dynamics`
+pin: Any = LateModule("pinocchio")  # as in `dynamics`
 _SAME = 1e-9  # of a link's largest parameter: what a parser's own arithmetic may change
 _TORQUE = 1e-8  # likewise, of the torque
 _SAMPLES = 20

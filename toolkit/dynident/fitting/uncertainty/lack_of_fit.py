@@ -195,12 +195,14 @@ def widened(covariance: np.ndarray, other: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    covariance : (r, r), positive definite.
+    covariance : (r, r), positive definite but for rounding.
     other : (r, r).
     """
     size = np.sqrt(np.diag(covariance))
-    root = np.linalg.cholesky(covariance / np.outer(size, size))
-    inside = np.linalg.solve(root, np.linalg.solve(root, other / np.outer(size, size)).T)
+    lengths, axes = np.linalg.eigh(covariance / np.outer(size, size))
+    # Of columns that are nearly alike rounding may leave no positive length.
+    lengths = np.sqrt(np.maximum(lengths, len(size) * np.finfo(float).eps * lengths[-1]))
+    inside = axes.T @ (other / np.outer(size, size)) @ axes / np.outer(lengths, lengths)
     values, vectors = np.linalg.eigh((inside + inside.T) / 2)
-    half = size[:, None] * (root @ (vectors * np.sqrt(np.maximum(values, 1.0))))
+    half = size[:, None] * ((axes * lengths) @ (vectors * np.sqrt(np.maximum(values, 1.0))))
     return half @ half.T
