@@ -8,6 +8,10 @@ import numpy as np
 
 from dynident.criteria import Criteria
 from dynident.diagnosis.proposals.law_search import LawSearch
+from dynident.diagnosis.search.scoring import Score
+from dynident.diagnosis.search.selection import AddedEffect
+from dynident.diagnosis.search.shaped_fit import refitted
+from dynident.diagnosis.search.withdrawal import Path, judged_on
 from dynident.effects import Law, law_effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
@@ -42,10 +46,15 @@ def with_law(model: Model, torque: str, joint: str = "elbow") -> Model:
 
 
 def recordings(
-    torques: dict[str, float], motion: Callable[[int], Motion] = apart
+    torques: dict[str, float],
+    motion: Callable[[int], Motion] = apart,
+    spring: float = 0.0,
 ) -> list[Recording]:
-    """Three recordings in which laws act at the elbow, each with one coefficient c."""
-    full, values = MODEL, dict(FRICTION)
+    """Three recordings in which laws act at the elbow, each with one coefficient c.
+
+    Of the catalogue a spring (N m/rad) may act there, too.
+    """
+    full, values = MODEL + "joint_spring@elbow", FRICTION | {"k__elbow": spring}
     for torque, value in torques.items():
         values[f"law{len(full.effects)}.c__elbow"] = value
         full = with_law(full, torque)
@@ -68,3 +77,16 @@ def searched(made: list[Recording], model: Model = MODEL) -> tuple[LawSearch, Ev
         for some in (made[:-1], made[-1:])
     )
     return LawSearch(evidence=evidence, held=held), fit_evidence(evidence, model)
+
+
+def path(search: LawSearch, start: EvidenceFit, *labels: str) -> Path:
+    """The way from a model by effects of the catalogue, right or wrong, one after the other."""
+    stages, found = [start], []
+    for label in labels:
+        wider = refitted(search.evidence, stages[-1].model + label, stages[-1])
+        effect = next(one for one in wider.model.effects if one.label == label)
+        score = Score(effect=effect, payload_recordings=None, not_identifiable=False)
+        stages.append(wider)
+        found.append(AddedEffect(score=score, p_value=0.0, indistinguishable=()))
+    judged = tuple(judged_on(search.evidence, search.held, one) for one in stages)
+    return Path(found=tuple(found), stages=tuple(stages), judged=judged)

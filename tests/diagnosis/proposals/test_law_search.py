@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from laws_hidden import MODEL, recordings, searched, together, with_law
+from dynident.diagnosis.proposals.proposals_of import proposals_of
+from laws_hidden import MODEL, path, recordings, searched, together, with_law
 
 
-def proposals(torques: dict[str, float], **motion):
-    search, fitted = searched(recordings(torques, **motion))
-    return search.proposals(fitted)
+def proposals(torques: dict[str, float], *added: str, **how):
+    """What is proposed where the catalogue has added effects."""
+    search, fitted = searched(recordings(torques, **how))
+    return proposals_of(search, path(search, fitted, *added))
 
 
 def test_a_hidden_law_is_proposed_with_its_coefficient() -> None:
@@ -56,4 +58,34 @@ def test_nothing_is_proposed_for_noise() -> None:
 
 def test_nothing_is_proposed_where_the_law_is_in_the_model() -> None:
     search, fitted = searched(recordings({"c*v*q": 0.5}), with_law(MODEL, "c*v*q"))
-    assert search.proposals(fitted) == ()
+    assert list(search.found(fitted)) == []
+
+
+DRUM = {"c*q*load": 0.08}
+RIPPLE = "torque_ripple@elbow"
+
+
+@pytest.mark.slow
+def test_a_law_that_a_wrong_effect_hides_is_proposed_instead_of_it() -> None:
+    (found,) = proposals(DRUM, RIPPLE)
+    assert (found.torque, found.instead_of) == ("c*q*load", (RIPPLE,))
+    assert found.values[0] == pytest.approx(0.08, abs=4 * found.sigma[0])
+    assert found.is_explanation
+    assert found.sentence.startswith(f"Instead of {RIPPLE}, a law that no catalogue has would exp")
+    assert found.to_dict()["instead_of"] == [RIPPLE]
+
+
+@pytest.mark.slow
+def test_only_the_wrong_one_of_two_effects_is_replaced() -> None:
+    (found,) = proposals(DRUM, "joint_spring@elbow", RIPPLE, spring=8.0)
+    assert (found.torque, found.instead_of) == ("c*q*load", (RIPPLE,))
+
+
+@pytest.mark.parametrize("spring", [8.0, 1.0])
+def test_a_right_effect_stays_beside_a_law(spring: float) -> None:
+    found = proposals({"c*v*q": 0.5}, "joint_spring@elbow", spring=spring)[0]
+    assert (found.torque, found.instead_of) == ("c*v*q", ())
+
+
+def test_nothing_is_proposed_instead_of_what_explains_it() -> None:
+    assert proposals({}, "joint_spring@elbow", spring=8.0) == ()

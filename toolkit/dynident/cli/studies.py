@@ -206,11 +206,15 @@ def payload(study: Path) -> CommandAnswer:
 @click.argument("labels", metavar="EFFECT[@JOINT[:SOURCE]]...", nargs=-1)
 @click.option("--proposal", type=click.IntRange(min=1), help="Write this proposed law.")
 @answered
-def add(study: Path, labels: tuple[str, ...], proposal: int | None) -> CommandAnswer:
+@MOST
+def add(
+    study: Path, labels: tuple[str, ...], proposal: int | None, most: int | None
+) -> CommandAnswer:
     """Write effects into the study file; print the error before and after.
 
-    A proposal is written with all that it was found beside: the effects that `explain` adds, and
-    the proposals before it.
+    A proposal is written with all that it was found beside: the effects that `explain` adds, but
+    those that it is proposed instead of, and the proposals before it. It is sought again: with
+    --most as `explain` was told.
 
     Example: dynident add study.toml stribeck_friction@elbow
     """
@@ -219,15 +223,18 @@ def add(study: Path, labels: tuple[str, ...], proposal: int | None) -> CommandAn
 
     if bool(labels) == (proposal is not None):
         raise StudyError("name effects, or --proposal K", str(study), "see `dynident add --help`")
+    if most is not None and proposal is None:
+        raise StudyError("--most is of --proposal", str(study), "leave it out")
     loaded = load_study(study)
     files.require_place(study)
     laws: tuple[Law, ...] = ()
     if proposal is not None:
-        diagnosis = diagnosis_of(loaded, propose="always")
+        diagnosis = diagnosis_of(loaded, most, propose="always")
         laws = proposed_laws(diagnosis, proposal, study)
         wider = replace(loaded.model, laws=(*loaded.model.laws, *laws))
         loaded = replace(loaded, model=wider)
-        steps = (one.effect.label for one in diagnosis.steps)
+        instead_of = diagnosis.proposals[proposal - 1].instead_of
+        steps = (e.label for e in (s.effect for s in diagnosis.steps) if e.label not in instead_of)
         new = (one.effect.label for one in diagnosis.proposals[:proposal])
         labels = (*steps, *new)
     every = (one for label in labels for one in effects_of(label, loaded.robot, loaded.model.laws))

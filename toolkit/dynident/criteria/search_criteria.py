@@ -319,6 +319,22 @@ class ProposalCriteria(CriteriaGroup):
     least_share: float = criterion(
         0.1, "1", "share of the systematic square that a law takes at least", over=0, most=1
     )
+    replacing_share: float = criterion(
+        0.98,
+        "1",
+        "share of the held-out square that the catalogue's effects take, and laws beside them, "
+        "which a law takes at least that is proposed instead of them",
+        over=0,
+        most=1,
+    )
+    replacing_left: float = criterion(
+        0.5,
+        "1",
+        "share of the square that the catalogue's effects leave above the noise, which such a law "
+        "leaves at most",
+        over=0,
+        most=1,
+    )
     rival_level: float = criterion(
         0.01,
         "1",

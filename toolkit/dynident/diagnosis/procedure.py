@@ -40,6 +40,7 @@ from dynident.diagnosis.nuisances.quantisation import nothing_but_rounding
 from dynident.diagnosis.nuisances.reversal_laws import laws_of_the_rest, laws_that_do_as_well
 from dynident.diagnosis.nuisances.sticking import left_out_at, without_reversals, without_sticking
 from dynident.diagnosis.proposals.law_search import LawSearch
+from dynident.diagnosis.proposals.proposals_of import proposals_of
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.reversals import as_much, without_their_reversals
 from dynident.diagnosis.search.global_search import global_search
@@ -350,7 +351,7 @@ def _judge(stage: Stage, path: Path, task: DiagnosisTask) -> Diagnosis:
     if not _asks_for_laws(answer, task):
         return answer
     laws = LawSearch(evidence=stage.evidence, held=held, progress=task.progress)
-    return replace(answer, proposals=laws.proposals(path.final))
+    return replace(answer, proposals=proposals_of(laws, path))
 
 
 def _asks_for_laws(answer: Diagnosis, task: DiagnosisTask) -> bool:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count, islice
-from typing import Any
 
 import numpy as np
 
 from dynident.diagnosis.proposals.proposal import LawPicture, Proposal
 from dynident.diagnosis.proposals.term_library import LibraryTerm, centred, extended, library
 from dynident.diagnosis.proposals.term_screen import Screened, screen
+from dynident.diagnosis.search.cross_validation import signed_rank
 from dynident.diagnosis.search.ranking import judged
 from dynident.diagnosis.search.scoring import Score, candidate_moments, score
 from dynident.diagnosis.search.shaped_fit import refitted
@@ -23,7 +23,6 @@ from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_
 from dynident.evidence.held_out import HeldOut
 from dynident.fitting.uncertainty.shape_errors import ShapeSlope
 
-_SAME = 1e-9
 _SAME_SHAPE = 0.1
 _AT_BOUND = 1e-3
 _CLASS = 10  # rows of a class in the picture, at least
@@ -44,14 +43,13 @@ class LawSearch:
     held: Evidence | None
     progress: Callable[[str], None] = lambda _: None
 
-    def proposals(self, fitted: EvidenceFit) -> tuple[Proposal, ...]:
-        """Return laws for what a model leaves, one after the other.
+    def found(self, fitted: EvidenceFit) -> Iterator[FoundLaw]:
+        """Yield laws for what a model leaves, each beside those before it.
 
         Parameters
         ----------
-        fitted : the model with all that the catalogue has for it.
+        fitted : the model to which they are added.
         """
-        found: list[Proposal] = []
         before = self._judged(fitted)
         known = {law.name for law in fitted.model.laws}
         names = (f"proposal{k}" for k in count(1))
@@ -59,19 +57,14 @@ class LawSearch:
         for name in islice(free, self.evidence.criteria.proposals.most):
             best = self._best(fitted, before, name)
             if best is None:
-                break
+                return
             wider = refitted(self.evidence, fitted.model + best.effect, fitted)
             after = self._judged(wider)
             proposal = self._proposal(best, (fitted, wider), (before, after))
             if proposal is None:
-                break
-            # An explanation stands alone: several terms can follow any law, as a series does.
-            if found:
-                found = [replace(one, is_explanation=False) for one in found]
-                proposal = replace(proposal, is_explanation=False)
-            found.append(proposal)
+                return
+            yield FoundLaw(proposal=proposal, fitted=wider)
             fitted, before = wider, after
-        return tuple(found)
 
     # --- one law ------------------------------------------------------------------------------
 
@@ -219,6 +212,14 @@ class LawSearch:
 
 
 @dataclass(frozen=True, kw_only=True)
+class FoundLaw:
+    """A law that is proposed, and the fit of the model with it and those before it."""
+
+    proposal: Proposal
+    fitted: EvidenceFit
+
+
+@dataclass(frozen=True, kw_only=True)
 class _BestLaws:
     """The laws that pass, best first, all in one metric.
 
@@ -240,16 +241,11 @@ class _BestLaws:
 
     def rivals(self, level: float) -> tuple[LawEffect, ...]:
         """Return the others that no signed-rank test over the held-out blocks tells from it."""
-        from scipy.stats import wilcoxon
-
         best, *others = self.scores
         found = []
         for other in others:
             assert best.losses is not None and other.losses is not None
-            worse = other.losses - best.losses
-            same = np.abs(worse).max() <= _SAME * np.abs(best.losses).max()
-            told: Any = None if same else wilcoxon(worse, alternative="greater")
-            if same or told.pvalue >= level:
+            if signed_rank(other.losses, best.losses) >= level:
                 assert isinstance(other.effect, LawEffect)
                 found.append(other.effect)
         return tuple(found)

@@ -47,6 +47,8 @@ class Proposal:
     tried : how many terms that were.
     test_error_before, test_error_after : relative error on held-out data.
     noise_floor : the least that a model can reach; None where the noise is unknown.
+    instead_of : labels of effects that the catalogue has added and that it makes superfluous: it
+        was found without them, with fewer parameters.
     rivals : laws that do as well on the held-out blocks, as far as can be told, best first.
     remark : on what it rests, where that is doubtful.
     picture : to be drawn; None where there is none.
@@ -70,6 +72,7 @@ class Proposal:
     test_error_before: float
     test_error_after: float
     noise_floor: float | None
+    instead_of: tuple[str, ...] = ()
     rivals: tuple[LawEffect, ...] = ()
     remark: str = ""
     picture: LawPicture | None = None
@@ -91,8 +94,11 @@ class Proposal:
     def sentence(self) -> str:
         """What it does, in plain words."""
         does = "would explain it" if self.is_explanation else "would help, and not explain it"
+        law = "A law that no catalogue has"
+        if self.instead_of:
+            law = f"Instead of {', '.join(self.instead_of)}, a law that no catalogue has"
         parts = [
-            f"A law that no catalogue has {does}: at {self.effect.joint} the torque "
+            f"{law} {does}: at {self.effect.joint} the torque "
             f"{self.torque} takes {percent(self.explains, 0)} of the systematic square, and the "
             f"held-out error falls from {percent(self.test_error_before)} to "
             f"{percent(self.test_error_after)}",
@@ -141,6 +147,7 @@ class Proposal:
             "test_error_before": self.test_error_before,
             "test_error_after": self.test_error_after,
             "noise_floor": self.noise_floor,
+            "instead_of": list(self.instead_of),
             "rivals": [_words(one) for one in self.rivals],
         }
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import regress
+
+_SAME = 1e-9
 
 
 def cross_validate(
@@ -36,6 +39,27 @@ def cross_validate(
     blocks = range(len(both.total))
     wider = [regress(both.without(block), reliable).values for block in blocks]
     return _losses(fitted.moments, fitted.without_each_block), _losses(both, wider)
+
+
+def left_out_losses(fitted: EvidenceFit) -> np.ndarray:
+    """Return the squared residual of each block by the fit to all others, whitened, (B,)."""
+    return _losses(fitted.moments, fitted.without_each_block)
+
+
+def signed_rank(losses: np.ndarray, least: np.ndarray) -> float:
+    """Return the p value of Wilcoxon's one-sided test that held-out losses are no larger.
+
+    Parameters
+    ----------
+    losses, least : (B,) of the same blocks, in the same metric, by two models.
+    """
+    from scipy.stats import wilcoxon
+
+    worse = losses - least
+    if np.abs(worse).max() <= _SAME * np.abs(least).max():
+        return 1.0
+    told: Any = wilcoxon(worse, alternative="greater")
+    return float(told.pvalue)
 
 
 def _losses(summed: SecondMoments, values: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
