@@ -18,7 +18,7 @@ FACADES = ("__init__.py", "__init__.pyi")
 FLOORS = (
     ("errors", "words"),
     ("files", "tables"),
-    ("progress", "settings", "data_files", "places", "threads", "late_modules"),
+    ("arguments", "late_modules", "progress", "settings", "data_files", "places", "threads"),
     ("criteria", "clusters"),
     ("inertia", "moments", "batch"),
     ("recording",),

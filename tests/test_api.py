@@ -9,11 +9,14 @@ import pydoc
 import subprocess
 import sys
 from types import ModuleType
+from typing import Any
 
 import cloudpickle
+import numpy as np
 import pytest
 
 import dynident as di
+from study_files import recording, true_model
 
 NAMES = [name for name in dir(di) if not name.startswith("_")]
 CORE = [name for name in NAMES if not isinstance(getattr(di, name), ModuleType)]
@@ -42,6 +45,24 @@ def test_every_name_has_help_worth_reading(name: str) -> None:
 def test_the_package_itself_has_help() -> None:
     text = pydoc.plain(pydoc.render_doc(di))
     assert "import dynident as di" in text and "study.toml" in text
+
+
+def test_arguments_are_checked_at_the_edge_and_nothing_welcome_is_refused() -> None:
+    class Own:
+        name = "my own estimator"
+
+        def fit(self, model, dataset):
+            return di.LeastSquares().fit(model, dataset)
+
+    data, model = recording(0), true_model()
+    found = di.fit(model, di.Dataset([data]), Own())  # pyright: ignore
+    assert found.names == di.fit(model, data).names
+    welcome: dict[str, Any] = {"cutoff_hz": np.float32(9), "rate_hz": np.int64(50)}
+    assert di.Filter(**welcome).rate_hz == 50
+    with pytest.raises(TypeError, match="method is the class Own itself"):
+        di.fit(model, data, Own)  # pyright: ignore
+    assert str(inspect.signature(di.fit)).startswith("(model: 'Model', data:")
+    assert pickle.loads(pickle.dumps(di.Filter(cutoff_hz=9.0))) == di.Filter(cutoff_hz=9.0)
 
 
 def test_a_name_may_be_replaced(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -30,6 +30,13 @@ class HostileCase:
     message: str
     files: dict[str, Content]
 
+    @property
+    def run(self) -> Callable[[tuple[str, ...]], object]:
+        """What is given the words of a command."""
+        from dynident.cli import main
+
+        return main
+
     def write(self, folder: Path) -> None:
         """Write the small study, and the hostile files over it."""
         write_study(folder)

@@ -6,8 +6,8 @@ from importlib import import_module
 
 from hostile.case import HostileCase
 
-KINDS = ("robots", "recordings", "studies", "experiments", "estimates", "arguments")
-"""Modules with a table CASES; calls of the public API have a frame of their own."""
+KINDS = ("robots", "recordings", "studies", "experiments", "estimates", "arguments", "calls")
+"""Modules with a table CASES."""
 
 
 def corpus(kind: str) -> dict[str, HostileCase]:

@@ -15,7 +15,7 @@ import resource
 import sys
 import tempfile
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -93,16 +93,16 @@ def _tried(case: HostileCase) -> Iterator[Outcome]:
             gc.collect()  # what the last one left in circles is no memory of this one
             limit_time()
             with contextlib.chdir(folder):
-                status, out, err = run(arguments)
+                status, out, err = run(case.run, arguments)
             after = listing(folder)
             changed = sorted(key for key in before | after if before.get(key) != after.get(key))
             yield Outcome(status=status, out=out, err=err, changed=changed)
 
 
-def run(arguments: tuple[str, ...]) -> tuple[int, str, str]:
+def run(
+    command: Callable[[tuple[str, ...]], object], arguments: tuple[str, ...]
+) -> tuple[int, str, str]:
     """Run a command here; return its status and what it wrote, native code too."""
-    from dynident.cli import main as command
-
     with _captured() as said, warnings.catch_warnings():
         try:
             command(arguments)

@@ -25,6 +25,10 @@ class DynidentError(Exception):
         super().__init__(f"{message}. {remedy}" if remedy else message)
 
 
+class ArgumentError(DynidentError, TypeError):
+    """A function or class of the package is called with what it does not take."""
+
+
 class FileError(DynidentError):
     """A file cannot be read or written."""
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dynident import files
+from dynident.arguments import checked
 from dynident.consistency.checked_bodies import CheckedBody, of_links
 from dynident.consistency.findings import Check
 from dynident.consistency.hints import hints
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from dynident.fitting import Estimate
 
 
+@checked
 def check(what: Robot | Estimate | str | Path | Any) -> Check:
     """Check whether a robot can exist: the margin of every rule, link by link.
 

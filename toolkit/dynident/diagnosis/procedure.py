@@ -28,6 +28,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from dynident.arguments import checked
 from dynident.closed_loop import Controller
 from dynident.criteria import DEFAULTS, Criteria
 from dynident.diagnosis.assembly import Search, assemble
@@ -65,6 +66,7 @@ from dynident.diagnosis.stage import AskedSwitches, DiagnosisTask, Propose, Stag
 from dynident.diagnosis.switches import switches_of
 from dynident.diagnosis.wiring_answer import answered_by
 from dynident.effects import Effect
+from dynident.errors import FitError
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import on_blocks, on_recordings
@@ -78,6 +80,7 @@ from dynident.threads import single_threaded
 from dynident.wiring import check_wiring
 
 
+@checked
 @single_threaded
 def diagnose(
     model: Model | Estimate,
@@ -118,9 +121,13 @@ def diagnose(
 
     Raises
     ------
+    FitError
+        If there is no recording.
     RecordingError
         If a recording is too short, or does not repeat with its period.
     """
+    if not train.recordings:
+        raise FitError("no recording to diagnose", remedy='mark some recordings use = "train"')
     given = model.model if isinstance(model, Estimate) else model
     if most is None:
         per_joint = criteria.search.most_effects_per_joint * given.robot.n

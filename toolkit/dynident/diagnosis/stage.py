@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from dynident.arguments import checked
 from dynident.diagnosis.nuisances.contacts import Contacts
 from dynident.diagnosis.search.global_search import RankedModel
 from dynident.diagnosis.search.ranking import Ranking
@@ -22,6 +23,7 @@ AskedSwitches = Literal["none", "all"]
 """Whether every choice among the effects added is fitted and judged, too."""
 
 
+@checked
 @dataclass(frozen=True, kw_only=True)
 class DiagnosisTask:
     """What is asked: see `dynident.diagnosis.procedure.diagnose`."""

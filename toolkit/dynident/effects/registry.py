@@ -11,6 +11,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import MappingProxyType
 
+from dynident.arguments import checked
 from dynident.effects.effect import Effect
 from dynident.effects.known_effects import known_effects, unchanged_if_it_fails
 from dynident.effects.laws import PREFIX, Law, LawEffect, law_effect
@@ -22,6 +23,7 @@ ENTRY_POINTS = "dynident.effects"
 _asked: set[EntryPoint] = set()
 
 
+@checked
 def catalogue() -> MappingProxyType[str, type[Effect]]:
     """Return every effect that is defined by now, by its name, in alphabetical order.
 
@@ -64,6 +66,7 @@ def _load_packages() -> None:
             warnings.warn(said, DynidentWarning, stacklevel=2)
 
 
+@checked
 def effects_of(label: str, robot, laws: Sequence[Law] = ()) -> tuple[Effect, ...]:
     """Return the effects that a label stands for: `name@joint` one, `name` one per place.
 

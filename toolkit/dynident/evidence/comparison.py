@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from dynident.arguments import checked
 from dynident.closed_loop import Controller
 from dynident.criteria import DEFAULTS, Criteria
 from dynident.errors import FitError
@@ -126,6 +127,7 @@ class Comparison(Shown):
         return (*first, Table(title, ("joint", "against", "what is seen"), where))
 
 
+@checked
 @single_threaded
 def compare(
     estimates: Estimate | Mapping[str, Estimate],

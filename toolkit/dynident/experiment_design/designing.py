@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import brentq
 
+from dynident.arguments import checked
 from dynident.errors import DesignError
 from dynident.experiment_design.clearance import Clearance
 from dynident.experiment_design.design_question import Asked, DesignQuestion
@@ -27,6 +28,7 @@ _MOST_TIMES = 1000.0
 _HOPELESS = 0.01  # standard deviations with the best usual motion: told by none
 
 
+@checked
 @single_threaded
 def design(
     model: Model,

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from dynident import files
+from dynident.arguments import checked
 from dynident.errors import FitError
 from dynident.fitting.estimate_schema import FORMAT, basis_part, model_part
 from dynident.fitting.history import Convergence
@@ -51,6 +52,7 @@ class ShapeValue:
     unit: str
 
 
+@checked
 @dataclass(frozen=True, kw_only=True)
 class Estimate(Shown):
     """Identified parameters of a model.

@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from dynident import files
+from dynident.arguments import checked
 from dynident.effects import Law, Origin, catalogue, law_effect
 from dynident.errors import DynidentError, EffectError, FitError
 from dynident.fitting.estimate import DataSource, Estimate, ShapeValue
@@ -29,6 +30,7 @@ _TRIED = re.compile(r"(constrained-|list\[)")
 _SKEW = 1e-6
 
 
+@checked
 def load_estimate(path: str | Path) -> Estimate:
     """Read an estimate that `Estimate.save` wrote.
 

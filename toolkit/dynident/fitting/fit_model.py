@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import ClassVar, Protocol
 
+from dynident.arguments import checked
 from dynident.clusters import Cluster, working_on
 from dynident.errors import FitError
 from dynident.fitting.estimate import Estimate
@@ -42,6 +43,7 @@ class Method(Protocol):
         ...
 
 
+@checked
 @single_threaded
 def fit(
     model: Model,

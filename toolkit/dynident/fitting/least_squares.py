@@ -7,6 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from dynident.arguments import checked
 from dynident.clusters import over_recordings
 from dynident.errors import FitError
 from dynident.fitting.estimate import DataSource, Estimate
@@ -36,6 +37,7 @@ _ROUNDS = 30  # of columns that depend on the model's own values, until they set
 _TOLERANCE = 1e-9
 
 
+@checked
 @dataclass(frozen=True)
 class LeastSquares:
     """Least squares for models that are linear in their parameters.

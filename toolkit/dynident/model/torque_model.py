@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dynident.arguments import checked
 from dynident.batch import side_by_side
 from dynident.effects import Block, Effect, Needs
 from dynident.model.parametrised_robot import ParametrisedRobot
 
 
+@checked
 @dataclass(frozen=True)
 class Model(ParametrisedRobot):
     """A robot and its effects, as a torque that is linear in its parameters.

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from dynident.arguments import checked
 from dynident.errors import RecordingError
 from dynident.recording.filters import Filter
 from dynident.recording.recording import Recording
@@ -30,6 +31,7 @@ class Noise:
     torque_std: np.ndarray
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Dataset:
     """Recordings of the same joints, and how to filter them.

@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from dynident.arguments import checked
 from dynident.errors import RecordingError
 from dynident.recording.sections import butterworth_sections, slowest_pole
 from dynident.recording.zero_phase import zero_phase
@@ -19,6 +20,7 @@ _LEAST_SHARE = 1e-6
 """Cut-off over sampling rate below which a filter's coefficients run out of digits."""
 
 
+@checked
 @dataclass(frozen=True, kw_only=True)
 class Filter:
     """How a recording is filtered, differentiated and decimated.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from dataclasses import replace as _replace
 from itertools import pairwise
@@ -334,7 +334,8 @@ class Recording:
         if not math.isfinite(_number(self.start)):
             raise RecordingError(f"start = {self.start!r}", self.where, "give a time in s")
         if self.window is not None:
-            window = tuple(_number(limit) for limit in self.window)
+            given = self.window if isinstance(self.window, Iterable) else ()
+            window = tuple(_number(limit) for limit in given)
             if len(window) != 2 or not window[0] < window[1]:
                 remedy = "give two times in s, the earlier one first"
                 raise RecordingError(f"window = {self.window!r}", self.where, remedy)
@@ -389,6 +390,8 @@ def _joint_names(joints: Any, where: str) -> tuple[str, ...]:
         raise RecordingError(
             f"joints = {joints!r} is one text", where, f'write a list: ["{joints}"]'
         )
+    if not isinstance(joints, Iterable):
+        raise RecordingError(f"joints = {joints!r} is no list", where, 'write a list: ["elbow"]')
     names = tuple(joints)
     if not names:
         raise RecordingError("no joints are named", where, "name at least one")

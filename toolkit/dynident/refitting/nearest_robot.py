@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
+from dynident.arguments import checked
 from dynident.constraints import Within
 from dynident.errors import FitError
 from dynident.evidence import compare
@@ -26,12 +26,11 @@ from dynident.refitting.refit_subject import (
     require_usable,
 )
 from dynident.robot import Robot
+from dynident.study import Study
 from dynident.threads import single_threaded
 
-if TYPE_CHECKING:
-    from dynident.study import Study
 
-
+@checked
 @single_threaded
 def refit(
     what: Robot | Estimate | GivenParameters | RefitSubject | str | Path,

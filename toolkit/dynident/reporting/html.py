@@ -9,6 +9,7 @@ from pathlib import Path
 import jinja2
 
 from dynident import files
+from dynident.arguments import checked
 from dynident.diagnosis.dependence.residual_dependence import dependence_table
 from dynident.diagnosis.detection_limits import limit_table
 from dynident.diagnosis.result import Diagnosis
@@ -73,6 +74,7 @@ class _JointMaps:
     maps: tuple[tuple[str, ResidualMap], ...]
 
 
+@checked
 def report(
     found: Diagnosis | Validation,
     to: str | Path = "report.html",

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynident import files
+from dynident.arguments import checked
 from dynident.batch import JointTree
 from dynident.errors import RobotError
 from dynident.inertia import PARAMETERS, UNITS, frame_change
@@ -20,6 +21,7 @@ from dynident.robot.formats.reading import read_tree
 from dynident.robot.tree import GRAVITY, Array, Description, Joint, Link, frozen, random_motion
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Robot:
     """A tree of moving joints, the links they carry, and gravity.

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dynident.arguments import checked
 from dynident.closed_loop import Controller
 from dynident.criteria import DEFAULTS, Criteria
 from dynident.effect_modules import Permission, import_effects, require_sound
@@ -65,6 +66,7 @@ class Study:
         return self.model.robot
 
 
+@checked
 def load(path: str | Path, *, modules: Permission = "trusted") -> Study:
     """Read a study file and everything that it names.
 

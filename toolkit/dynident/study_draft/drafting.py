@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from dynident.arguments import checked
 from dynident.data_files import find_all
 from dynident.errors import DynidentWarning, RecordingError
 from dynident.recording import (
@@ -45,6 +46,7 @@ _FOLLOWS = 0.7
 """Correlation of a position with the reference that it follows, be it late."""
 
 
+@checked
 @single_threaded
 def draft_study(
     robot: str | Path,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dynident.arguments import checked
 from dynident.closed_loop import Controller, Mechanism
 from dynident.criteria import DEFAULTS, Criteria, LoopCriteria
 from dynident.errors import DynidentError, DynidentWarning, RecordingError, SimulationError
@@ -34,6 +35,7 @@ _ROUNDING = 1.05
 """Share of the limit that noise and resolution of a torque may add to it."""
 
 
+@checked
 @single_threaded
 def validate(
     estimate: Estimate,

@@ -7,6 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from dynident.arguments import checked
 from dynident.constraints import ParameterSpace, Within
 from dynident.errors import FitError
 from dynident.fitting.consistent.active import active_set
@@ -30,6 +31,7 @@ from dynident.tables import percent
 from dynident.threads import single_threaded
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Constrained:
     """Least squares under constraints, with a prior where the data leave parameters open.
@@ -56,9 +58,6 @@ class Constrained:
 
     def __post_init__(self) -> None:
         require_solver(self.solver)
-        if not isinstance(self.within, Within):
-            remedy = 'give Within("full") or Within("semi")'
-            raise FitError(f"a {type(self.within).__name__} is no set", "within", remedy)
 
     @single_threaded
     def fit(self, model: Model, dataset: Dataset) -> Estimate:

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from scipy.linalg import eigh
 
+from dynident.arguments import checked
 from dynident.constraints import ParameterSpace
 from dynident.errors import FitError
 from dynident.inertia import distance_rows, pseudo_inertia
@@ -24,6 +25,7 @@ _THIN = 1e-4
 """Second moment relative to that of a body of the link's size, below which a link is too thin."""
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Prior:
     """A prior of the inertial parameters of every link.
@@ -48,9 +50,6 @@ class Prior:
     spread: float = 0.3
 
     def __post_init__(self) -> None:
-        if not isinstance(self.robot, Robot):
-            remedy = "give a Robot: Robot.from_file(...)"
-            raise FitError(f"a {type(self.robot).__name__} is no prior", remedy=remedy)
         if self.distance not in ("quadratic", "entropic"):
             remedy = "choose quadratic or entropic"
             raise FitError(f"no distance '{self.distance}' of a prior", remedy=remedy)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dynident.arguments import checked
 from dynident.constraints import ParameterSpace, Within
 from dynident.errors import FitError
 from dynident.fitting.consistent.active import active_set
@@ -149,6 +150,7 @@ class Projection(Shown):
         }
 
 
+@checked
 @single_threaded
 def project(
     what: Estimate | Robot | Projection,

@@ -7,6 +7,7 @@ from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
+from dynident.arguments import checked
 from dynident.closed_loop import Controller
 from dynident.errors import FitError
 from dynident.fitting.estimate import Estimate
@@ -29,6 +30,7 @@ Start = Literal["least_squares", "description", "regular"]
 START_NAMES: tuple[str, ...] = get_args(Start)
 
 
+@checked
 @dataclass(frozen=True)
 class IV:
     """Instrumental variables: x = (V' W)^-1 V' y, V from motion that has not the measured noise.

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dynident.arguments import checked
 from dynident.errors import RecordingError
 from dynident.recording.formats.column_names import (
     OPTIONAL,
@@ -28,6 +29,7 @@ SUFFIXES = (".csv", ".npz", ".mat", ".parquet")
 """Suffixes of the files that are read and written; more are read, see `open_table.READABLE`."""
 
 
+@checked
 def read(
     path: str | Path,
     joints: Sequence[str] | None = None,

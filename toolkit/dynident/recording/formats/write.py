@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from dynident import files
+from dynident.arguments import checked
 from dynident.errors import RecordingError
 from dynident.recording.formats.arrays.parquet_file import pyarrow_parquet
 from dynident.recording.formats.column_names import plain
@@ -17,6 +18,7 @@ from dynident.recording.recording import SIGNALS, Recording
 _LONGEST_MATLAB_NAME = 63
 
 
+@checked
 def write(recording: Recording, path: str | Path) -> Path:
     """Write the samples of a recording; the file's suffix says its format.
 
