@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import copy
 import os
 import re
@@ -88,6 +89,18 @@ def test_it_names_no_machine_and_is_small(path: Path) -> None:
     words = re.sub(r'"image/png": "[^"]*"', "", text)
     found = [line for line in words.splitlines() if MACHINE_PATH.search(line)]
     assert found == []
+
+
+@each_notebook
+def test_it_ends_with_two_exercises_whose_answers_are_folded(path: Path) -> None:
+    last = read(path).cells[-1]
+    assert last.cell_type == "markdown"
+    _, found, exercises = last.source.partition("## Exercises\n")
+    assert found
+    assert re.findall(r"^\*\*(\d)\. ", exercises, re.MULTILINE) == ["1", "2"]
+    assert exercises.count("<details><summary>") == exercises.count("</details>") == 2
+    for code in re.findall(r"```python\n(.*?)```", exercises, re.DOTALL):
+        ast.parse(code)
 
 
 def complaints(cell: nbformat.NotebookNode) -> list[str]:
