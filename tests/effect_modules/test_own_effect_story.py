@@ -105,7 +105,9 @@ def test_an_estimate_says_what_is_missing(saved):
     without("cable_sag")
     with pytest.raises(FitError) as told:
         di.load_estimate(saved)
-    wanted = "effect 'cable_sag' came from mine.py: import it or name it in effect_modules"
+    wanted = (
+        "effect 'cable_sag' came from mine.py: import it, or name it in effect_modules (--effects)"
+    )
     assert str(told.value) == f"{saved}: {wanted}"
     di.load(saved.with_name("study.toml"), modules="run")
     assert "cable_sag@elbow" in di.load_estimate(saved).model

@@ -9,7 +9,7 @@ import click
 from dynident import files
 from dynident.cli.group import CommandAnswer, answered, commands
 from dynident.cli.output import progress
-from dynident.cli.work import TRUST, command_line, load_study
+from dynident.cli.work import command_line, import_named_effects, load_study, with_effects
 
 _PATH = click.Path(path_type=Path)
 
@@ -19,7 +19,7 @@ _PATH = click.Path(path_type=Path)
 @click.argument("after", type=_PATH)
 @click.option("--study", type=_PATH, help="Judge both by the test recordings of this study, too.")
 @click.option("--to", type=_PATH, help="Also write this HTML page.")
-@TRUST
+@with_effects
 @answered
 def changes(before: Path, after: Path, study: Path | None, to: Path | None) -> CommandAnswer:
     """Say what has changed between two estimates of one robot, beyond their joint uncertainty.
@@ -33,14 +33,15 @@ def changes(before: Path, after: Path, study: Path | None, to: Path | None) -> C
     from dynident.fitting.estimate_file import load_estimate
     from dynident.fitting.uncertainty.between_estimates import estimate_changes
 
+    import_named_effects()
+    loaded = None if study is None else load_study(study, to)  # with the effects that it names
     with progress("reading"):
         estimates = {"before": load_estimate(before), "after": load_estimate(after)}
     found = estimate_changes(estimates["before"], estimates["after"])
     content, errors = found.to_dict(), ()
-    if study is not None:
+    if loaded is not None:
         from dynident.evidence import compare
 
-        loaded = load_study(study, to)
         with progress("judging"):
             judged = compare(estimates, loaded.test, criteria=loaded.criteria)
         content, errors = {**content, "held_out": judged.to_dict()}, judged.tables()[:1]

@@ -11,7 +11,7 @@ import click
 from dynident import files
 from dynident.cli.group import CommandAnswer, answered, collected, commands
 from dynident.cli.output import progress
-from dynident.cli.work import TRUST, load_study
+from dynident.cli.work import import_named_effects, load_study, with_effects
 
 if TYPE_CHECKING:
     from dynident.fitting import Prior
@@ -25,6 +25,7 @@ _PATH = click.Path(path_type=Path)
 @commands.command()
 @click.argument("robot", metavar="ROBOT|ESTIMATE", type=_PATH)
 @click.option("--all", "every_rule", is_flag=True, help="Print the margin of every rule, too.")
+@with_effects
 @answered
 def check(robot: Path, every_rule: bool) -> CommandAnswer:
     """Say whether a robot can exist: the margin of every rule, link by link, worst first.
@@ -36,6 +37,7 @@ def check(robot: Path, every_rule: bool) -> CommandAnswer:
     """
     from dynident.consistency import check as check_robot
 
+    import_named_effects()
     with progress("checking"):
         found = check_robot(robot)
     return CommandAnswer(
@@ -89,7 +91,7 @@ class _Problem:
 @click.argument("what", metavar="ROBOT|ESTIMATE|CSV", type=_PATH)
 @click.option("--out", type=_PATH, required=True, help="The robot description to write.")
 @click.option("--study", type=_PATH, help="Recordings: move what they do not mind.")
-@TRUST
+@with_effects
 @click.option("--robot", type=_PATH, help="Prior; also the description whose parameters a CSV has.")
 @click.option("--order", help="Of a CSV without names: dynident or paper.")
 @click.option(
@@ -123,6 +125,7 @@ def refit(what: Path, out: Path, inputs: _Inputs, problem: _Problem) -> CommandA
     from dynident.robot.verify import require_format
 
     files.require_place(out)
+    import_named_effects()
     subject, loaded, centre = inputs.read(what)
     require_format(subject.robot, out)
     with progress("refitting"):

@@ -31,8 +31,30 @@ TRUST = click.option(
     is_flag=True,
     expose_value=False,
     callback=lambda context, _, given: context.meta.update({_TRUST: given}),
-    help="Run the study's effect_modules, which are code, without asking.",
+    help="Run the effect_modules that are named, which are code, without asking.",
 )
+_EFFECTS = "dynident.effects"
+
+
+def with_effects(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command that takes an estimate the option that says where its effects come from."""
+    option = click.option(
+        "--effects",
+        type=click.Path(path_type=Path),
+        multiple=True,
+        expose_value=False,
+        callback=lambda context, _, given: context.meta.update({_EFFECTS: given}),
+        help="A file of effects that an estimate has; may be repeated.",
+    )
+    return option(TRUST(command))
+
+
+def import_named_effects() -> None:
+    """Import the files of --effects, which may be asked for first; see `permitted`."""
+    from dynident.effect_modules import import_files
+
+    paths = click.get_current_context().meta[_EFFECTS]
+    permitted(lambda modules: import_files(paths, "--effects", modules))
 
 
 def _with_study(command: Callable[..., Any]) -> Callable[..., Any]:

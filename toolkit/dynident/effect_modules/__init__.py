@@ -5,13 +5,19 @@ joined the catalogue, or one line that says why not. What a user has once said y
 by its content (`trust`).
 """
 
-from dynident.effect_modules.import_effects import Permission, import_effects, require_sound
+from dynident.effect_modules.import_effects import (
+    Permission,
+    import_effects,
+    import_files,
+    require_sound,
+)
 from dynident.effect_modules.trust import remember
 from dynident.effect_modules.user_module import line_of_a_module, module_file
 
 __all__ = [
     "Permission",
     "import_effects",
+    "import_files",
     "line_of_a_module",
     "module_file",
     "remember",

@@ -43,15 +43,35 @@ def import_effects(
     DynidentError
         If a file is unusable or fails: with its name, and the line.
     """
-    found = [UserModule.read(settings.parent / name) for name in dict.fromkeys(names)]
+    paths = [settings.parent / name for name in dict.fromkeys(names)]
+    return import_files(paths, f"{settings}: effect_modules", modules)
+
+
+def import_files(paths: Sequence[Path], where: str, modules: Permission) -> tuple[KnownEffect, ...]:
+    """Import effect modules, each content once.
+
+    Parameters
+    ----------
+    paths : of the files.
+    where : they are named, for messages.
+    modules : as in `import_effects`.
+
+    Returns
+    -------
+    The effects that they brought.
+
+    Raises
+    ------
+    UntrustedError, DynidentError
+        As `import_effects` does.
+    """
+    found = [UserModule.read(path) for path in paths]
     if modules not in ("trusted", "run"):
         raise StudyError(f"modules = {modules!r}", remedy="say 'trusted' or 'run'")
     if modules == "trusted":
         asked = [one for one in found if one.brought is None and not is_trusted(one.sha256)]
         if asked:
-            raise UntrustedError(
-                tuple((str(one.path), one.sha256) for one in asked), f"{settings}: effect_modules"
-            )
+            raise UntrustedError(tuple((str(one.path), one.sha256) for one in asked), where)
     return tuple(effect for one in found for effect in one.run())
 
 

@@ -33,7 +33,7 @@ class Origin:
         if self.package:
             return f"effect '{name}' came from the package {self.package}: install it"
         if self.file:
-            remedy = "import it or name it in effect_modules"
+            remedy = "import it, or name it in effect_modules (--effects)"
             return f"effect '{name}' came from {self.file}: {remedy}"
         return f"effect '{name}' came from a notebook or a console: define it again before"
 
