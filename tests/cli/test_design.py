@@ -30,6 +30,8 @@ def test_the_design_is_written_and_can_be_simulated(run, tmp_path) -> None:
     done = run("simulate", tmp_path / "next" / "experiment.toml", "--out", "made")
     assert done.status == 0, done.err
     made = pd.read_csv(tmp_path / "made" / "designed.csv")
+    page = (tmp_path / "next" / "motion.html").read_text()
+    assert "4 s from rest to rest, to be followed 2 times" in page and len(page) < 4e6
     reference = made["q_ref.shoulder"].to_numpy()
     np.testing.assert_allclose(reference, table["q_ref.shoulder"][: len(reference)], atol=1e-8)
 

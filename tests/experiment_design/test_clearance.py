@@ -9,7 +9,7 @@ import pytest
 
 from dynident.errors import DesignError
 from dynident.experiment_design import DesignTask, MotionLimits, design
-from dynident.experiment_design.clearance import Clearance
+from dynident.experiment_design.geometry.clearance import Clearance
 from dynident.experiment_design.motion_program import FINER
 from dynident.model import Model
 from dynident.recording import Dataset

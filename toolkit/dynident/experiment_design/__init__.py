@@ -1,9 +1,9 @@
 """The recording to make: motions within a robot's limits that tell the most.
 
 `design` is the verb. `motion_limits` says what a motion may do, `periodic` which motions there are,
-`column_function` what their instants tell, `information` how much that is, `clearance` how far the
-links stay from each other, `motion_program` which motion tells the most, and `recording_design`
-what comes of it.
+`column_function` what their instants tell, `information` how much that is, `geometry` where the
+bodies are and how far they stay apart, `motion_program` which motion tells the most, and
+`recording_design` what comes of it.
 """
 
 from dynident.experiment_design.design_task import DesignTask

@@ -9,9 +9,9 @@ from scipy.optimize import brentq
 
 from dynident.arguments import checked
 from dynident.errors import DesignError
-from dynident.experiment_design.clearance import Clearance
 from dynident.experiment_design.design_question import Asked, DesignQuestion
 from dynident.experiment_design.design_task import DesignTask
+from dynident.experiment_design.geometry.clearance import Clearance
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.motion_limits import MotionLimits
 from dynident.experiment_design.motion_program import MotionProgram

@@ -14,7 +14,7 @@ from itertools import islice
 import numpy as np
 
 from dynident.errors import DesignError
-from dynident.experiment_design.clearance import Clearance
+from dynident.experiment_design.geometry.clearance import Clearance
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.motion_limits import MotionLimits
 from dynident.experiment_design.motion_solver import DesignedMotion, MotionSolver

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dynident.experiment_design.clearance import DistanceCut
+from dynident.experiment_design.geometry.clearance import DistanceCut
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.periodic import PeriodicMotions
 from dynident.late_modules import LateModule

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from dynident.errors import DesignError
+from dynident.experiment_design.geometry.robot_shapes import RobotShapes
 from dynident.robot import Robot
 
 _SEEN = 0.1
 """m beyond the margin, within which distances are worked out: what is farther does not matter."""
 _SAMPLES = 40  # random positions: what is too near at all of them, a motion does not change
 _STEP = 1e-5  # rad or m, of a slope
-_SUFFIX = {"urdf": "urdf", "sdf": "sdf", "mjcf": "xml"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,17 +40,16 @@ class Clearance:
     Attributes
     ----------
     margin : m, that is kept.
-    plant, context : of Drake, with the geometry; the context is that of the plant.
+    shapes : of the robot.
+    context : of their plant.
     whole : context of the diagram that owns it.
-    places : (n,) of the joints among the plant's positions.
     ignored : pairs of geometries that are too near wherever the robot stands.
     """
 
     margin: float
-    plant: Any
+    shapes: RobotShapes
     context: Any
     whole: Any
-    places: np.ndarray
     ignored: frozenset[tuple[int, int]]
 
     @classmethod
@@ -72,43 +70,19 @@ class Clearance:
             If the margin is not positive, or the description states no geometry that can collide,
             or none that can be read.
         """
-        from pydrake.multibody.parsing import Parser
-        from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
-        from pydrake.systems.framework import DiagramBuilder
-
-        description = robot.description
         if not (margin > 0 and np.isfinite(margin)):
             raise DesignError(f"clearance = {margin:g} m", remedy="choose it above 0")
-        if description is None:
-            raise DesignError("no clearance can be kept", remedy="read the robot from a file")
-        builder = DiagramBuilder()
-        plant, scene = AddMultibodyPlantSceneGraph(builder, 0.0)
-        parser, path = Parser(plant), Path(description.path)
-        try:
-            if path.is_file():
-                parser.package_map().PopulateFromFolder(path.absolute().parent)
-                parser.AddModels(path)
-            else:
-                parser.AddModelsFromString(description.text, _SUFFIX[description.format])
-            plant.Finalize()
-            places = [plant.GetJointByName(name).position_start() for name in robot.names]
-        except Exception as error:  # Drake's readers fail in as many ways as files do
-            said = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise DesignError(f"geometry cannot be read: {said}", description.path) from None
-        if not scene.model_inspector().GetCollisionCandidates():
+        shapes = RobotShapes.of(robot)
+        if not shapes.scene.model_inspector().GetCollisionCandidates():
             what = "states no collision geometry of links that could meet"
-            raise DesignError(what, description.path, "leave the clearance out")
-        diagram = builder.Build()
-        whole = diagram.CreateDefaultContext()
-        context = plant.GetMyMutableContextFromRoot(whole)
-        found = cls(
-            margin=margin,
-            plant=plant,
-            context=context,
-            whole=whole,
-            places=np.array(places),
-            ignored=frozenset(),
-        )
+            raise DesignError(
+                what,
+                robot.description.path if robot.description else None,
+                "leave the clearance out",
+            )
+        whole = shapes.builder.Build().CreateDefaultContext()
+        context = shapes.plant.GetMyMutableContextFromRoot(whole)
+        found = cls(margin=margin, shapes=shapes, context=context, whole=whole, ignored=frozenset())
         return replace(found, ignored=found._always(robot))
 
     def _always(self, robot: Robot) -> frozenset[tuple[int, int]]:
@@ -117,10 +91,10 @@ class Clearance:
 
     def _pairs(self, q: np.ndarray, within: float) -> dict[tuple[int, int], float]:
         """Pairs of geometries nearer than that, and their distances."""
-        positions = self.plant.GetPositions(self.context).copy()
-        positions[self.places] = q
-        self.plant.SetPositions(self.context, positions)
-        query = self.plant.get_geometry_query_input_port().Eval(self.context)
+        plant = self.shapes.plant
+        others = plant.GetPositions(self.context)
+        plant.SetPositions(self.context, self.shapes.positions(q, others))
+        query = plant.get_geometry_query_input_port().Eval(self.context)
         found = query.ComputeSignedDistancePairwiseClosestPoints(within)
         return {(one.id_A.get_value(), one.id_B.get_value()): float(one.distance) for one in found}
 
