@@ -24,7 +24,7 @@ JOINT = "elbow"
 def main() -> None:
     """Run the loop on the study and draw what it found."""
     study = di.load(STUDY)
-    diagnosis = di.diagnose(study.model, study.train, study.test)
+    diagnosis = di.diagnose(study.model, study.train, study.test, switches="all")
     missing_effect(diagnosis)
     report_page(diagnosis)
     impossible_links()
