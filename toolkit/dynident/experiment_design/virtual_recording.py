@@ -72,21 +72,28 @@ class ClosedDesignLoop(Shown):
     def settled(self) -> tuple[str, ...]:
         """Of each group that was open, what the recording settled, in plain words."""
         found = []
-        left = {step.effect.label: step for step in self.after.steps}
+        steps = [
+            (step.effect.label, *(one.label for one in step.indistinguishable))
+            for step in self.after.steps
+        ]
         for group in self.designed.task.tell:
             labels = [one.label for one in group]
             names = " or ".join(labels)
-            now = [label for label in labels if label in left]
-            still = {one.label for label in now for one in left[label].indistinguishable}
-            both = [one for one in labels if one in now or one in still]
-            if not both:
+            left = [one for step in steps if set(step) & set(labels) for one in step]
+            kept = [one for one in labels if one in left]
+            gone = " or ".join(one for one in labels if one not in left)
+            rivals = list(dict.fromkeys(one for one in left if one not in labels))
+            if not kept:
                 found.append(f"{names}: none of them is needed now.")
-            elif len(both) == 1:
-                found.append(f"{names}: settled, it is {both[0]}.")
-            elif len(both) < len(labels):
-                found.append(f"{names}: settled in part, it is {' or '.join(both)}.")
+            elif not gone:
+                beside = f" beside {' or '.join(rivals)}" if rivals else ""
+                found.append(f"{names}: still open{beside}.")
+            elif rivals:
+                found.append(f"{names}: not {gone}; {' or '.join(kept + rivals)} is still open.")
+            elif len(kept) == 1:
+                found.append(f"{names}: settled, it is {kept[0]}.")
             else:
-                found.append(f"{names}: still open.")
+                found.append(f"{names}: settled in part, it is {' or '.join(kept)}.")
         return tuple(found)
 
     def tables(self) -> tuple[Table | str, ...]:
