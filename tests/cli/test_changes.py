@@ -9,7 +9,7 @@ import pytest
 from dynident import fit
 from dynident.model import Model
 from dynident.recording import Dataset
-from study_files import recording
+from study_files import edited, recording, write_study
 from synthetic import arm
 
 
@@ -42,3 +42,17 @@ def test_other_effects_are_one_line_with_the_remedy(run, estimates):
     assert done.status == 2 and done.out == ""
     assert done.err.count("\n") == 1
     assert "coulomb_friction@elbow" in done.err and "fit both with the same effects" in done.err
+
+
+def test_recordings_that_an_estimate_was_fitted_to_do_not_judge_it(run, estimates, tmp_path):
+    study = write_study(tmp_path)
+    old, new = tmp_path / "old.json", tmp_path / "new.json"
+    assert run("fit", str(study), "--out", str(old)).status == 0
+    exchanged = [(f"{use}.csv", f"{use}_") for use in ("train", "test")]
+    text = edited(*exchanged, text=study.read_text())
+    other = tmp_path / "other.toml"
+    other.write_text(edited(("train_", "test.csv"), ("test_", "train.csv"), text=text))
+    assert run("fit", str(other), "--out", str(new)).status == 0
+    done = run("changes", str(old), str(new), "--study", str(study))
+    assert done.status == 2 and done.out == "" and done.err.count("\n") == 1
+    assert "test.csv, a test recording" in done.err and "neither estimate has seen" in done.err

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -10,6 +12,11 @@ from dynident import files
 from dynident.cli.group import CommandAnswer, answered, commands
 from dynident.cli.output import progress
 from dynident.cli.work import command_line, import_named_effects, load_study, with_effects
+from dynident.errors import StudyError
+
+if TYPE_CHECKING:
+    from dynident.fitting.estimate import Estimate
+    from dynident.study import Study
 
 _PATH = click.Path(path_type=Path)
 
@@ -37,6 +44,8 @@ def changes(before: Path, after: Path, study: Path | None, to: Path | None) -> C
     loaded = None if study is None else load_study(study, to)  # with the effects that it names
     with progress("reading"):
         estimates = {"before": load_estimate(before), "after": load_estimate(after)}
+    if loaded is not None:
+        _require_held_out(loaded, estimates.values())
     found = estimate_changes(estimates["before"], estimates["after"])
     content, errors = found.to_dict(), ()
     if loaded is not None:
@@ -52,3 +61,13 @@ def changes(before: Path, after: Path, study: Path | None, to: Path | None) -> C
         changes_report(found, to, robot=name, errors=errors, command=command_line())
         click.echo(f"report: {to}", err=True)
     return CommandAnswer(content=lambda: content, parts=lambda: (*found.tables(), *errors))
+
+
+def _require_held_out(study: Study, estimates: Iterable[Estimate]) -> None:
+    """Refuse to judge estimates by recordings that one of them was fitted to."""
+    fitted = {source.sha256 for one in estimates for source in one.sources} - {""}
+    for recording in study.test.recordings:
+        if recording.provenance.sha256 in fitted:
+            what = f"an estimate was fitted to {recording.name}, a test recording of this study"
+            remedy = "name a study whose test recordings neither estimate has seen"
+            raise StudyError(what, str(study.path), remedy)

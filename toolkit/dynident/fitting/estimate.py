@@ -24,6 +24,8 @@ from dynident.tables import Shown, Table, number, percent
 
 _MUCH_LEFT = 0.2
 """Share of a joint's torque beyond which a fit says that something may be missing."""
+_INDEPENDENT = "sigma takes the errors of the equations as independent"
+"""How the words of such a sigma begin, in files, too."""
 
 
 @dataclass(frozen=True)
@@ -248,9 +250,14 @@ class Estimate(Shown):
         if not np.any(self.covariance):
             return "No sigma: the method has none to give."
         return (
-            "sigma takes the errors of the equations as independent, which those of rows behind a "
-            "low-pass are not; what the model lacks is not in it."
+            f"{_INDEPENDENT}, which those of rows behind a low-pass are not; what the model lacks "
+            "is not in it."
         )
+
+    @property
+    def takes_rows_as_independent(self) -> bool:
+        """Whether the standard deviations leave out that rows behind a low-pass share noise."""
+        return self.words_of_sigma.startswith(_INDEPENDENT)
 
     # --- files ---------------------------------------------------------------------------------
 

@@ -49,9 +49,7 @@ def changes_report(
         If the folder is missing or may not be written.
     """
     mark_, colour = (
-        ("!", "unexplained")
-        if changes.p_value < LEVEL or changes.changed
-        else ("\u2713", "nothing_missing")
+        ("!", "unexplained") if changes.p_value < LEVEL else ("\u2713", "nothing_missing")
     )
     text = rendered(
         "changes.html",

@@ -1,9 +1,10 @@
 """Yesterday's robot and today's: which parameters have changed beyond their joint uncertainty.
 
 Two estimates from recordings that have nothing in common are independent, so the difference d of
-what both identify has the covariance S = S_old + S_new. Whether anything has changed is asked once,
-by d' S^-1 d, which is chi-square where nothing has; which parameter, by z = d / sigma(d), with the
-p values corrected by Holm for their number.
+what both identify has the covariance S = S_old + S_new. Whether anything has changed is asked of
+all together, by d' S^-1 d, which is chi-square where nothing has. Only where that rejects are
+parameters named, by z = d / sigma(d), with the p values corrected by Holm for their number: where
+nothing has changed, any claim at all is as rare as the first test alone makes it.
 
 What a model lacks biases both estimates; where the motions differ so do the biases, and the
 difference has a part that no covariance holds. Estimates whose sigma contains lack of fit carry it.
@@ -20,10 +21,11 @@ from scipy.special import chdtrc, ndtr
 from dynident.errors import FitError
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.uncertainty.between_robots import common_basis, holm
+from dynident.fitting.uncertainty.comparable_estimates import require_comparable
 from dynident.tables import Shown, Table, json_row, number, p_value
 
 LEVEL = 0.05
-"""Probability that any parameter is said to have changed where none has."""
+"""Probability that anything is said to have changed where nothing has."""
 _NOTHING = 1e-10
 """Share of the largest eigenvalue of a correlation below which a direction has no variance."""
 _INTERVAL = 1.959964
@@ -41,6 +43,7 @@ class ParameterChange:
     sigma : standard deviation of the difference.
     z : the difference over it.
     p_adjusted : that any of all parameters seems to have changed as much, by Holm.
+    has_changed : beyond the joint uncertainty, by this and by the test of all together.
     """
 
     parameter: str
@@ -51,11 +54,7 @@ class ParameterChange:
     sigma: float
     z: float
     p_adjusted: float
-
-    @property
-    def has_changed(self) -> bool:
-        """Whether it has changed beyond the joint uncertainty."""
-        return self.p_adjusted < LEVEL
+    has_changed: bool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,9 +105,7 @@ class EstimateChanges(Shown):
                 "freedom": self.freedom,
                 "p_value": self.p_value,
             },
-            "parameters": [
-                {**json_row(one), "has_changed": one.has_changed} for one in self.parameters
-            ],
+            "parameters": [json_row(one) for one in self.parameters],
             "caveats": list(self.caveats),
         }
 
@@ -143,7 +140,10 @@ class EstimateChanges(Shown):
             f"All together: chi-square {number(self.statistic, 4)} with {self.freedom} degrees of "
             f"freedom, p {p_value(self.p_value)}."
         )
-        each = f"p: corrected (Holm) for all parameters; below {LEVEL:g} one has changed."
+        each = (
+            "p: corrected (Holm) for all parameters. One is said to have changed where both p, its "
+            f"own and that of all together, are below {LEVEL:g}."
+        )
         return Table("Parameters then and now", head, rows, (overall, each))
 
     def tables(self) -> tuple[Table | str, ...]:
@@ -161,10 +161,10 @@ def estimate_changes(before: Estimate, after: Estimate) -> EstimateChanges:
     Raises
     ------
     FitError
-        If they are of other robots or of other effects, rest on a recording in common (they are
-        then not independent), have no covariance, or identify nothing in common.
+        If they are of other robots, effects or friction widths, rest on a recording in common
+        (they are then not independent), have no covariance, or identify nothing in common.
     """
-    _require_comparable(before, after)
+    require_comparable(before, after)
     basis = common_basis([before.basis, after.basis])
     if not basis.rank:
         raise FitError("the two estimates identify no combination of parameters in common")
@@ -177,6 +177,7 @@ def estimate_changes(before: Estimate, after: Estimate) -> EstimateChanges:
     z = difference / sigma[known]
     adjusted = holm(2.0 * ndtr(-np.abs(z)))
     statistic, freedom = _mahalanobis(z, S[np.ix_(known, known)])
+    p_of_all = float(chdtrc(freedom, statistic))
     places = np.flatnonzero(known)
     found = [
         ParameterChange(
@@ -190,6 +191,7 @@ def estimate_changes(before: Estimate, after: Estimate) -> EstimateChanges:
             sigma=float(sigma[k]),
             z=float(z[i]),
             p_adjusted=float(adjusted[i]),
+            has_changed=bool(max(p_of_all, adjusted[i]) < LEVEL),
         )
         for i, k in enumerate(places)
     ]
@@ -197,7 +199,7 @@ def estimate_changes(before: Estimate, after: Estimate) -> EstimateChanges:
         parameters=tuple(sorted(found, key=lambda one: (one.p_adjusted, -abs(one.z)))),
         statistic=statistic,
         freedom=freedom,
-        p_value=float(chdtrc(freedom, statistic)),
+        p_value=p_of_all,
         caveats=_caveats(before, after),
     )
 
@@ -209,29 +211,6 @@ def _mahalanobis(z: np.ndarray, S: np.ndarray) -> tuple[float, int]:
     kept = sizes > _NOTHING * sizes[-1]
     parts = directions[:, kept].T @ z
     return float(np.sum(parts**2 / sizes[kept])), int(kept.sum())
-
-
-def _require_comparable(before: Estimate, after: Estimate) -> None:
-    old, new = before.model, after.model
-    if old.robot.names != new.robot.names or old.base.names != new.base.names:
-        remedy = "compare two estimates from one description"
-        raise FitError("the two estimates are of different robots", remedy=remedy)
-    effects = [{one.label for one in model.effects} for model in (old, new)]
-    if effects[0] != effects[1]:
-        only = sorted(effects[0] ^ effects[1])
-        named = ", ".join(only[:3]) + (f" and {len(only) - 3} more" if len(only) > 3 else "")
-        what = f"only one of the two estimates has {named}: beside other effects, values differ"
-        raise FitError(what, remedy="fit both with the same effects")
-    if before.names != after.names:
-        what = "the two estimates have other base parameters: the descriptions differ"
-        raise FitError(what, remedy="compare two estimates from one description")
-    if not (np.any(before.covariance) and np.any(after.covariance)):
-        raise FitError("an estimate has no covariance", remedy="take a method that has one")
-    shared = {one.sha256 for one in before.sources} & {one.sha256 for one in after.sources} - {""}
-    if shared:
-        file = next(one.file for one in after.sources if one.sha256 in shared)
-        what = f"both estimates rest on {file}: they are not independent"
-        raise FitError(what, remedy="fit each to recordings of its own")
 
 
 def _caveats(before: Estimate, after: Estimate) -> tuple[str, ...]:
@@ -249,5 +228,11 @@ def _caveats(before: Estimate, after: Estimate) -> tuple[str, ...]:
         found.append(
             "A model is rejected: what it lacks may differ between the two motions, and show as a "
             "change that is none."
+        )
+    if any(one.takes_rows_as_independent for one in (before, after)):
+        found.append(
+            "An estimate's sigma takes the errors of its equations as independent, which those of "
+            "rows behind a low-pass are not: it may be too small, and changes are then found that "
+            "are none. Fit with a method whose sigma counts what rows share."
         )
     return tuple(found)
