@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import random
 import signal
@@ -114,7 +115,9 @@ def content(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in files}
 
 
-def started(words: tuple[str, ...], folder: Path, line: int | None = None) -> int:
+def started(
+    words: tuple[str, ...], folder: Path, line: int | None = None, errors: int | None = None
+) -> int:
     """Run a command in a child of this process; return its number.
 
     Parameters
@@ -123,6 +126,7 @@ def started(words: tuple[str, ...], folder: Path, line: int | None = None) -> in
     folder : where it runs.
     line : that many lines of the code that writes files are run before the child kills itself;
         None for never.
+    errors : the descriptor that errors go to; None for nowhere.
     """
     sys.stdout.flush()
     child = os.fork()
@@ -133,13 +137,18 @@ def started(words: tuple[str, ...], folder: Path, line: int | None = None) -> in
         os.chdir(folder)
         silent = os.open(os.devnull, os.O_WRONLY)
         os.dup2(silent, 1)
-        os.dup2(silent, 2)
+        os.dup2(silent if errors is None else errors, 2)
+        if errors is not None:  # pytest has put streams of its own in their place
+            sys.stdout = os.fdopen(1, "w", closefd=False)
+            sys.stderr = os.fdopen(2, "w", closefd=False)
         if line is not None:
             sys.settrace(_killer(line))
         command(words)
     except SystemExit as stop:
         status = int(stop.code or 0)
     finally:
+        with contextlib.suppress(OSError):
+            sys.stderr.flush()
         os._exit(status)
 
 

@@ -167,6 +167,7 @@ def _by_scipy(x: np.ndarray, sections: np.ndarray, padding: int) -> np.ndarray:
     # As sosfiltfilt, to the last bit, but for one or two columns in half the time: the filter's
     # state at rest is kept, and each column lies in one piece.
     columns = x.T
+    sections = sections.copy()  # SciPy takes none that is read-only
     y = np.empty((len(columns), len(x) + 2 * padding))
     y[:, padding : padding + len(x)] = columns
     y[:, :padding] = 2 * columns[:, :1] - columns[:, padding:0:-1]

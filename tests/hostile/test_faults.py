@@ -1,0 +1,149 @@
+"""No room on the disk, a folder that may not be written, two at once, no reader, no HOME."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import dynident as di
+from hostile.kills import WRITERS, Writer, content, finished, prepare, started
+from hostile.worker import load_libraries
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks here")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def libraries() -> None:
+    """Have them before a limit that would stop what they write for themselves."""
+    load_libraries()
+    b"".decode("utf-8-sig")
+
+
+def run_with(fault: Callable[[], object], writer: Writer, folder: Path) -> tuple[int, str]:
+    """Run a command in a child that suffers a fault; return its status and what it said."""
+    said = folder.with_name("said")
+    child = os.fork()
+    if not child:
+        status = 3
+        try:
+            fault()
+            with said.open("wb") as stream:
+                os.dup2(stream.fileno(), 2)
+            status = finished(started(writer.words, folder, errors=2))
+        finally:
+            os._exit(status if status >= 0 else 9)
+    return finished(child), said.read_text(errors="replace")
+
+
+def no_room() -> None:
+    """Let no file grow beyond some bytes, as a full disk does not."""
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (300, 300))
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_no_room_leaves_the_old_files_and_one_line(name: str, tmp_path: Path) -> None:
+    folder = tmp_path / "study"
+    folder.mkdir()
+    prepare(folder)
+    before = content(folder)
+    status, said = run_with(no_room, WRITERS[name], folder)
+    assert status == 2
+    lines = [line for line in said.splitlines() if line.startswith("error: ")]
+    assert len(lines) == 1 and "Traceback" not in said, said
+    # A virtual experiment may have written what was small enough.
+    assert {k: v for k, v in content(folder).items() if not k.startswith("virtual/")} == before
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_a_folder_that_may_not_be_written_stays_as_it_is(name: str, tmp_path: Path) -> None:
+    folder = tmp_path / "study"
+    folder.mkdir()
+    prepare(folder)
+    before = content(folder)
+    os.chmod(folder, 0o555)
+    os.chmod(tmp_path, 0o777)
+    (tmp_path / "said").touch(mode=0o666)
+    os.chmod(tmp_path / "said", 0o666)
+    for above in tmp_path.parents:
+        if above.stat().st_mode & 0o005 != 0o005 and above.stat().st_uid == os.getuid():
+            os.chmod(above, above.stat().st_mode | 0o055)
+    nobody = 65534
+    try:
+        status, said = run_with(
+            (lambda: os.setuid(nobody)) if os.getuid() == 0 else (lambda: None),
+            WRITERS[name],
+            folder,
+        )
+    finally:
+        os.chmod(folder, 0o755)
+    assert status == 2 and "error: " in said and "Traceback" not in said, said
+    assert content(folder) == before
+
+
+def test_two_that_add_at_once_leave_one_answer_or_both(tmp_path: Path) -> None:
+    for round_ in range(5):
+        folder = tmp_path / str(round_)
+        folder.mkdir()
+        prepare(folder)
+        asked = ("coulomb_friction@elbow", "joint_spring@shoulder")
+        children = [started(("add", "study.toml", one), folder) for one in asked]
+        statuses = [finished(child) for child in children]
+        there = {effect.label for effect in di.load(folder / "study.toml").model.effects}
+        for one, status in zip(asked, statuses, strict=True):
+            # Whoever was told that it is written finds it; whoever was refused does not.
+            assert status in (0, 2) and (one in there) == (status == 0), (statuses, there)
+        assert 0 in statuses and not [k for k in content(folder) if Path(k).name.startswith(".")]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "around",
+    [
+        {"LC_ALL": "tr_TR.UTF-8"},
+        {"LC_ALL": "C", "PYTHONIOENCODING": "ascii"},
+        {"HOME": "/nowhere/at/all", "XDG_CACHE_HOME": "/dev/null/x", "XDG_CONFIG_HOME": ""},
+        {"HOME": ""},
+    ],
+    ids=["Turkish", "ASCII", "no HOME", "an empty HOME"],
+)
+def test_odd_surroundings_change_no_file(around: dict[str, str], tmp_path: Path) -> None:
+    written = []
+    for place, more in (("usual", {}), ("odd", around)):
+        folder = tmp_path / place
+        folder.mkdir()
+        prepare(folder)
+        for words in (WRITERS["add"].words, WRITERS["fit"].words):
+            done = subprocess.run(
+                [sys.executable, "-m", "dynident.cli", *words],
+                cwd=folder,
+                env={**os.environ, **more},
+                capture_output=True,
+                timeout=120,
+            )
+            assert done.returncode in (0, 1) and b"Traceback" not in done.stderr, done.stderr
+        study, robot = (folder / name for name in ("study.toml", "fit.urdf"))
+        written.append((study.read_bytes(), robot.read_bytes()))
+    assert written[0] == written[1]
+
+
+def test_a_reader_that_has_gone_loses_no_file(tmp_path: Path) -> None:
+    prepare(tmp_path)
+    end, start = os.pipe()
+    os.close(end)
+    words = WRITERS["fit"].words
+    command = [sys.executable, "-m", "dynident.cli", *words]
+    with os.fdopen(start, "wb") as gone:
+        done = subprocess.run(
+            command, cwd=tmp_path, stdout=gone, stderr=subprocess.PIPE, timeout=120
+        )
+    assert b"Traceback" not in done.stderr and b"Exception ignored" not in done.stderr
+    for name, reads in WRITERS["fit"].results.items():
+        reads(tmp_path / name)
