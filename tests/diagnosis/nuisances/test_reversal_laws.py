@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
+from dynident.reporting.headline import headline
 from synthetic import arm, smooth_motion, true_values
 
 RATE_HZ = 500.0
@@ -98,4 +100,23 @@ def test_a_robot_whose_friction_leads_lacks_what_it_lacks_beside(
     said = di.diagnose(given(), train, dataset(7, lead=6e-3, stribeck=stribeck))
     assert [step.effect.label for step in said.steps] == found
     assert said.verdict == ("explained" if found else "nothing_missing")
-    assert found or any("another law of dry friction" in note for note in said.notes)
+    if not found:
+        assert 0.1 < said.reversals_left_out["elbow"] < 0.5
+        assert "the reversals of elbow" in said.sentence
+        assert headline(said).mark == "?"
+        assert any("another law" in note for note in said.notes)
+
+
+@pytest.mark.slow
+def test_friction_that_lags_is_never_nothing() -> None:
+    """It has a memory: neither a rival's name nor rows left out make that go away."""
+    said = di.diagnose(given(), dataset(0, 1, lead=-6e-3), dataset(7, lead=-6e-3))
+    assert said.verdict == "unexplained" or said.steps
+    assert not said.reversals_left_out
+
+
+def test_a_study_that_asks_for_every_row_keeps_it() -> None:
+    every = di.Filter(position_cutoff_hz=40.0, ends="keep")
+    train = replace(dataset(0, 1, lead=6e-3), filter=every)
+    said = di.diagnose(given(), train, most=1)
+    assert not said.reversals_left_out

@@ -17,6 +17,7 @@ from dynident.diagnosis.details import Candidate, JointResult, Status, Step, Tes
 from dynident.diagnosis.detection_limits import detection_limits
 from dynident.diagnosis.nuisances.contacts import Disturbance, contact_candidates
 from dynident.diagnosis.nuisances.quantisation import rounding_notes, with_rounding
+from dynident.diagnosis.nuisances.sticking import shares_left_out
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.search.refusal import impossible_joints_of
@@ -51,6 +52,7 @@ class Search:
     Attributes
     ----------
     disturbances : contacts, left out of the evidence.
+    doubtful : joints whose reversals are left out as their dry friction may follow another law.
     notes : on its instruments, where they come from a simulation or could not.
     limit : effects that were allowed, where more of them pass every gate; None elsewhere.
     """
@@ -59,6 +61,7 @@ class Search:
     path: Path
     rounds: tuple[Ranking, ...]
     disturbances: tuple[Disturbance, ...] = ()
+    doubtful: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     limit: int | None = None
 
@@ -106,7 +109,7 @@ def assemble(
     if verdict != "unexplained":
         impossible = impossible_joints_of(evidence, final.model, final.values, final.covariance)
         verdict = "unexplained" if impossible else verdict
-    complete = verdict == "nothing_missing"
+    complete, left = verdict == "nothing_missing", shares_left_out(evidence)
     limits = detection_limits(evidence, held, stages[-1], rounds[-1]) if complete else ()
     pushed = contact_candidates(given, evidence, search.disturbances)
     first = _merged(_candidates(rounds[0], before.error, start), pushed)
@@ -123,7 +126,7 @@ def assemble(
         maps=residual_maps(given, before, after, evidence.criteria.maps),
         traces=_traces(given, before, after),
         notes=(
-            *notes_on(evidence, held, stages[-1], source),
+            *notes_on(evidence, held, stages[-1], source, search.doubtful),
             *rounding_notes(after, given.robot.names, evidence.criteria.verdict),
             *path.notes,
             *search.notes,
@@ -135,6 +138,7 @@ def assemble(
         rows=rows_of_recordings(train if test is None else train + test),
         limit=search.limit,
         detection_limits=limits,
+        reversals_left_out={joint: left[joint] for joint in search.doubtful},
     )
 
 

@@ -43,7 +43,7 @@ from dynident.diagnosis.nuisances.sticking import left_out_at, without_reversals
 from dynident.diagnosis.proposals.law_search import LawSearch
 from dynident.diagnosis.proposals.proposals_of import proposals_of
 from dynident.diagnosis.result import Diagnosis
-from dynident.diagnosis.reversals import as_much, without_their_reversals
+from dynident.diagnosis.reversals import as_much, left_out, without_their_reversals
 from dynident.diagnosis.search.global_search import global_search
 from dynident.diagnosis.search.payload_recordings import (
     marked,
@@ -213,21 +213,25 @@ def _extend(stage: Stage, task: DiagnosisTask) -> Stage:
                 break
             stage = _rank(doubtful, task)
             continue
-        label = best.score.effect.label
-        many = len(stage.found)
+        label, many = best.score.effect.label, len(stage.found)
         laws = laws_that_do_as_well(stage.evidence, stage.fitted, best.score, many)
         doubtful = without_their_reversals(stage, laws, label)
         if doubtful is not stage:
             stage = _rank(doubtful, task)
             continue
+        if laws:
+            why = as_much(laws, label)
+            stage = _refusing(replace(stage, notes=(*stage.notes, f"{why}.")), label, why)
+            continue
         wider, why = _tried(stage, best, task)
-        why = as_much(laws, label) if laws else why
-        if why:
-            ranking = stage.rounds[-1].refusing({label: why})
-            stage = replace(stage, rounds=(*stage.rounds[:-1], ranking))
-        else:
-            stage = _rank(wider, task)
+        stage = _refusing(stage, label, why) if why else _rank(wider, task)
     return stage
+
+
+def _refusing(stage: Stage, label: str, why: str) -> Stage:
+    """Return a stage whose latest ranking refuses an effect."""
+    ranking = stage.rounds[-1].refusing({label: why})
+    return replace(stage, rounds=(*stage.rounds[:-1], ranking))
 
 
 def _tried(stage: Stage, best: AddedEffect, task: DiagnosisTask) -> tuple[Stage, str]:
@@ -238,7 +242,7 @@ def _tried(stage: Stage, best: AddedEffect, task: DiagnosisTask) -> tuple[Stage,
     wider = _seen_anew(stage, added)
     why = newly_impossible(wider.evidence, stage.fitted, wider.fitted)
     gone = left_out_at(wider.evidence)
-    narrow = tuple(without_reversals(one, gone) for one in stage.narrow)
+    narrow = tuple(without_reversals(one, gone, stage.doubtful) for one in stage.narrow)
     why = why or follows_the_filter(wider.evidence, narrow, wider.fitted, best.score.effect)
     return wider, why
 
@@ -277,6 +281,9 @@ def _search_globally(start: Stage, extended: Stage, task: DiagnosisTask) -> Stag
     if not task.most or start.loop.runs:
         return extended  # simulated motions are renewed as the model grows: there is no way back
     first = replace(start, rounds=extended.rounds[:1])
+    if extended.doubtful:  # both branches are to be judged on the same rows
+        start = left_out(start, extended.doubtful)
+        first = _rank(replace(start, rounds=()), task)
     missed = global_search(extended.evidence, first.ranked, extended.ranked, task.progress)
     if missed is None:
         return extended
@@ -286,7 +293,7 @@ def _search_globally(start: Stage, extended: Stage, task: DiagnosisTask) -> Stag
         base = replace(first, evidence=start.evidence.looked_at_anew())
     other = _extend(replace(base, rounds=(*base.rounds[:-1], missed.ranking)), task)
     better = other.fitted.misfit(start.start) < extended.fitted.misfit(start.start)
-    return other if better else extended
+    return other if better and set(other.doubtful) == set(extended.doubtful) else extended
 
 
 def _settle(stage: Stage, task: DiagnosisTask) -> tuple[Stage, Path]:
@@ -348,6 +355,7 @@ def _judge(stage: Stage, path: Path, task: DiagnosisTask) -> Diagnosis:
         path=path,
         rounds=stage.rounds,
         disturbances=stage.contacts.disturbances(stage.evidence, held, stage.start),
+        doubtful=tuple(stage.doubtful),
         notes=(*stage.loop.notes, *stage.notes),
         limit=task.most if reached and stage.rounds[-1].passing else None,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -74,6 +75,8 @@ class Diagnosis(Shown):
     limit : effects that were allowed, where the search ended there; None where it ended by itself.
     residual_dependence : where the verdict is "unexplained" (or laws are asked for), what the
         residual depends on, before any proposal, at each joint at which something is left.
+    reversals_left_out : share of the rows, for joints whose dry friction may follow another law at
+        its reversals: these rows count neither in the fit nor in the errors.
     switches : every choice among the effects added, fitted and judged, where that was asked for.
     """
 
@@ -99,6 +102,7 @@ class Diagnosis(Shown):
     limit: int | None = None
     rows: RowCount = field(default_factory=RowCount)
     residual_dependence: tuple[JointDependence, ...] = ()
+    reversals_left_out: Mapping[str, float] = field(default_factory=dict)
     switches: Switches | None = None
 
     @property
@@ -117,11 +121,24 @@ class Diagnosis(Shown):
         if self.wiring:
             faults = " ".join(fault.sentence for fault in self.wiring)
             return f"The recordings are not what the study says, and nothing was sought. {faults}"
+        said = " ".join([self._verdict_in_words, *self.left_out_in_words])
         if self.limit is None:
-            return self._verdict_in_words
+            return said
         return (
-            f"{self._verdict_in_words} The search ended at its limit of {self.limit} additions, "
+            f"{said} The search ended at its limit of {self.limit} additions, "
             "and more effects are significant and relevant: allow more (--most)."
+        )
+
+    @property
+    def left_out_in_words(self) -> tuple[str, ...]:
+        """What a verdict does not speak of; empty where it speaks of all rows."""
+        shares = self.reversals_left_out.items()
+        each = [f"{joint} ({percent(x, 0)} of its rows)" for joint, x in shares]
+        if not each:
+            return ()
+        return (
+            f"That leaves out the reversals of {', '.join(each)}, where dry friction may follow "
+            "another law than the model's.",
         )
 
     @property

@@ -51,8 +51,8 @@ class Stage:
     found : these effects.
     rounds : the ranking after each of them, the first one before any.
     refused : labels of effects that were withdrawn, with the reason: they are not tried again.
-    doubtful : joints around whose reversals rows were left out because dry friction may follow
-        another law there.
+    doubtful : joints whose dry friction may follow another law at their reversals, with the speed
+        (rad/s or m/s) within which rows were left out for that.
     notes : what was left out on the way, in plain words.
     """
 
@@ -66,7 +66,7 @@ class Stage:
     found: tuple[AddedEffect, ...] = ()
     rounds: tuple[Ranking, ...] = ()
     refused: Mapping[str, str] = field(default_factory=dict)
-    doubtful: frozenset[str] = frozenset()
+    doubtful: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
     @property

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from dynident.criteria import VerdictCriteria
@@ -59,7 +61,9 @@ def noise_source(evidence: Evidence, held: Evidence | None) -> NoiseSource:
     return "given" if "noise_augmented" in kinds else "unknown"
 
 
-def notes_on(evidence, held, fitted: EvidenceFit, source: NoiseSource) -> tuple[str, ...]:
+def notes_on(
+    evidence, held, fitted: EvidenceFit, source: NoiseSource, doubtful: Collection[str] = ()
+) -> tuple[str, ...]:
     """Return the caveats that belong to a verdict, in plain words.
 
     Parameters
@@ -67,6 +71,7 @@ def notes_on(evidence, held, fitted: EvidenceFit, source: NoiseSource) -> tuple[
     evidence, held : of the training and of the test recordings; `held` may be None.
     fitted : the final model.
     source : where the noise floor comes from.
+    doubtful : joints whose reversals are left out as their dry friction may follow another law.
     """
     notes = []
     if held is None:
@@ -98,4 +103,4 @@ def notes_on(evidence, held, fitted: EvidenceFit, source: NoiseSource) -> tuple[
             "it into the study, set payload = true in the [[recordings]] of these, and false in "
             "the others."
         )
-    return (*notes, *sticking_notes(evidence), *friction_width_notes(evidence, fitted))
+    return (*notes, *sticking_notes(evidence, doubtful), *friction_width_notes(evidence, fitted))

@@ -48,6 +48,11 @@ def headline(diagnosis: Diagnosis) -> Headline:
         said = f"No robot can have what the fit says: {values}{rest}."
         return Headline("!", "impossible values", said)
     found = _of_verdict(diagnosis)
+    if diagnosis.reversals_left_out:
+        mark = "?" if found.mark == "\u2713" else found.mark
+        where = " and ".join(diagnosis.reversals_left_out)
+        said = f"{found.sentence} The reversals of {where} are left out: see the notes."
+        found = Headline(mark, found.title, said)
     if diagnosis.limit is None:
         return found
     said = f"{found.sentence} The search ended at its limit of {diagnosis.limit} additions."

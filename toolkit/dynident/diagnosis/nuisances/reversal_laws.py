@@ -102,6 +102,11 @@ class ReversalLaw:
         return str(self.column.joint)
 
     @property
+    def lags(self) -> bool:
+        """Whether it reverses after the joint."""
+        return self.lead_s <= -_AT_ONCE
+
+    @property
     def lead_s(self) -> float:
         """By which it reverses before the joint."""
         return self.column.shape[1]
@@ -160,7 +165,9 @@ def laws_of_the_rest(evidence: Evidence, fitted: EvidenceFit) -> tuple[ReversalL
     quiet, names = joints_below_noise(evidence, fitted), fitted.model.robot.names
     dry = [one for one in names if f"coulomb_friction@{one}" in fitted.model.slices]
     every = (_best_law(evidence, fitted, joint) for joint in dry if joint not in quiet)
-    return tuple(law for law in every if law.drop >= least and -_AT_ONCE < law.lead_s < _LATEST)
+    return tuple(
+        law for law in every if law.drop >= least and not law.lags and law.lead_s < _LATEST
+    )
 
 
 def _best_law(evidence: Evidence, fitted: EvidenceFit, joint: str) -> ReversalLaw:

@@ -12,7 +12,7 @@ takes to pass through zero), or if the friction width that the data call for is 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -66,8 +66,8 @@ def sticking_joints(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
     In the order of the robot's joints; only those with dry friction in the model, of which enough
     rows are left. None where the study asks for every row (`Filter.ends` is "keep").
     """
-    if any(run.replicates[0].parallel.filter.ends == "keep" for run in evidence.runs):
-        return ()  # a published recipe uses every row
+    if every_row_is_asked_for(evidence):
+        return ()
     criteria, nuisances = evidence.criteria.sticking, evidence.criteria.nuisances
     model, given = fitted.model, evidence.model
     noise = np.max([_speed_noise(evidence, run.replicates[0]) for run in evidence.runs], axis=0)
@@ -80,6 +80,11 @@ def sticking_joints(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
         and (model.friction_widths[j] <= resolved[j] or _stands(evidence, j, criteria))
         and _share(evidence, j) <= criteria.most
     )
+
+
+def every_row_is_asked_for(evidence: Evidence) -> bool:
+    """Whether the study asks for every row, as a published recipe does."""
+    return any(run.replicates[0].parallel.filter.ends == "keep" for run in evidence.runs)
 
 
 def without_reversals(
@@ -116,17 +121,27 @@ def left_out_at(evidence: Evidence) -> tuple[str, ...]:
     return tuple(joint for joint, whole in zip(names, certain.tolist(), strict=True) if not whole)
 
 
-def sticking_notes(evidence: Evidence) -> tuple[str, ...]:
-    """Joints that stick, and how many of their rows that makes useless, in plain words."""
-    if all(run.uncertain is None for run in evidence.runs):
-        return ()
-    uncertain = ~np.concatenate([run.certain_rows for run in evidence.runs])
+def shares_left_out(evidence: Evidence) -> dict[str, float]:
+    """Return the share of rows around its reversals that is left out, for joints that have any."""
+    shares = 1.0 - np.concatenate([run.certain_rows for run in evidence.runs]).mean(axis=0)
+    every = zip(evidence.model.robot.names, shares.tolist(), strict=True)
+    return {joint: share for joint, share in every if share > 0}
+
+
+def sticking_notes(evidence: Evidence, others: Collection[str] = ()) -> tuple[str, ...]:
+    """Joints that stick, and how many of their rows that makes useless, in plain words.
+
+    Parameters
+    ----------
+    evidence : of the training recordings.
+    others : joints whose rows are left out for another reason.
+    """
     return tuple(
-        f"{joint} stands still at many of its stops, or the data do not tell how its dry friction "
-        f"reverses there: {percent(share, 0)} of the joint's rows, those around its stops, count "
-        "neither in the fit nor in the errors."
-        for joint, share in zip(evidence.model.robot.names, uncertain.mean(axis=0), strict=True)
-        if share
+        f"{joint} stands still at many of its stops, or its dry friction reverses within the noise "
+        f"of its speed: no data tell that friction, and {percent(share, 0)} of the joint's rows, "
+        "those around its stops, count neither in the fit nor in the errors."
+        for joint, share in shares_left_out(evidence).items()
+        if joint not in others
     )
 
 
