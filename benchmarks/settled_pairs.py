@@ -113,7 +113,8 @@ def main() -> None:
             separation = loop.designed.separations[meant[0]]
             predicted.append(separation.designed)
             so_far.append(separation.recorded)
-            if loop.designed.task.tell[meant[0]][0].label == pair.hidden:
+            told = separation.designed > 0
+            if told and loop.designed.task.tell[meant[0]][0].label == pair.hidden:
                 found.append(measured(loop, recorded, meant[0]) / separation.designed)
         middle = [f"{np.median(x):.2g}" if x else "" for x in (so_far, predicted, found)]
         cells = (f"{both} of {asked.seeds}", str(right), str(wrong), *middle)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pandas as pd
@@ -54,6 +55,50 @@ def test_what_cannot_be_designed_is_one_line(run, tmp_path) -> None:
         assert done.status == 2
         assert done.err.count("\n") == 1, done.err
         assert not (tmp_path / "next").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[joints.elbow]\nlower = 1.0\nupper = 1.0\n", "lower below upper"),
+        ("[[obstacles]]\ncentre = [0, 0, 0]\nradius = 9\n", "ask for a clearance"),
+        (
+            '[[boxes]]\njoint = "elbow"\nlower = [50, 50, 50]\nupper = [51, 51, 51]\n',
+            "stays in its boxes",
+        ),
+        ('[[boxes]]\njoint = "elbow"\nlower = [1, 1]\nupper = [2, 2, 2]\n', "lower"),
+    ],
+)
+def test_limits_that_no_motion_keeps_are_one_line(run, tmp_path, text, said) -> None:
+    study = write_loop_study(tmp_path)
+    (tmp_path / "limits.toml").write_text(text)
+    done = run("design", study, "--limits", "limits.toml", "--starts", "1", "--out", "next")
+    assert done.status == 2
+    assert done.err.count("\n") == 1 and said in done.err, done.err
+    assert not (tmp_path / "next").exists()
+
+
+def test_an_obstacle_around_the_start_is_one_line(run, tmp_path) -> None:
+    study = write_loop_study(tmp_path)
+    ball = '<collision><geometry><sphere radius="0.02"/></geometry></collision></link>'
+    for path in tmp_path.glob("*.urdf"):
+        path.write_text(path.read_text().replace("</link>", ball))
+    (tmp_path / "limits.toml").write_text("[[obstacles]]\ncentre = [0, 0, 0]\nsize = [9, 9, 9]\n")
+    asked = ("--limits", "limits.toml", "--clearance", "0.01", "--out", "next")
+    done = run("design", study, *asked)
+    assert done.status == 2 and done.err.count("\n") == 1, done.err
+    assert "wherever the robot stands" in done.err
+    assert not (tmp_path / "next").exists()
+
+
+def test_a_joint_without_range_is_one_line(run, tmp_path) -> None:
+    study = write_loop_study(tmp_path)
+    for path in tmp_path.glob("*.urdf"):
+        text = re.sub(r'lower="[^"]*"', 'lower="0.5"', path.read_text())
+        path.write_text(re.sub(r'upper="[^"]*"', 'upper="0.5"', text))
+    done = run("design", study, "--starts", "1", "--out", "next")
+    assert done.status == 2 and done.err.count("\n") == 1, done.err
+    assert not (tmp_path / "next").exists()
 
 
 @pytest.mark.slow

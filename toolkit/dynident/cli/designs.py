@@ -43,7 +43,7 @@ _PAGE = "motion.html"
     "--show", multiple=True, metavar="EFFECT", help="Show what the recordings could not; likewise."
 )
 @click.option("--clearance", type=float, help="m, that links keep from each other.")
-@click.option("--limits", type=_PATH, help="A file of limits, [joints.NAME].")
+@click.option("--limits", type=_PATH, help="A file of limits, [joints.NAME], boxes and obstacles.")
 @click.option(
     "--out", type=_PATH, help="Write reference.csv, experiment.toml and motion.html here."
 )

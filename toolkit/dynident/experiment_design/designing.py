@@ -12,6 +12,7 @@ from dynident.errors import DesignError
 from dynident.experiment_design.design_question import Asked, DesignQuestion
 from dynident.experiment_design.design_task import DesignTask
 from dynident.experiment_design.geometry.clearance import Clearance
+from dynident.experiment_design.geometry.workspace import Workspace
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.motion_limits import MotionLimits
 from dynident.experiment_design.motion_program import MotionProgram
@@ -20,6 +21,7 @@ from dynident.experiment_design.recording_design import DECIDES, RecordingDesign
 from dynident.model import Model
 from dynident.progress import logged
 from dynident.recording import Dataset
+from dynident.robot import Robot
 from dynident.threads import single_threaded
 
 _FIRST_USUAL = 10_000  # seed
@@ -64,13 +66,14 @@ def design(
     task = task or DesignTask()
     progress = progress or logged("designing")
     limits = limits or MotionLimits.of(model.robot)
-    clearance = None if task.clearance is None else Clearance.of(model.robot, task.clearance)
+    limits.require_ranges(model.robot)
+    workspace = _workspace(model.robot, task, limits)
     motions = PeriodicMotions(limits=limits, period=task.duration, harmonics=task.harmonics)
     progress("fitting what was recorded")
     questions = [DesignQuestion.of(model, recorded, task, told) for told in task.tell or ((),)]
     progress("writing the columns out")
     asked = [one.asked(recorded, motions) for one in questions]
-    program = _program(asked, motions, clearance)
+    program = _program(asked, motions, workspace)
     progress("comparing with usual motions")
     usual = _usual(program)
     found = program.solved(task.starts, task.seed, progress)
@@ -99,15 +102,23 @@ def design(
     )
 
 
-def _program(
-    asked: list[Asked], motions: PeriodicMotions, clearance: Clearance | None
-) -> MotionProgram:
+def _workspace(robot: Robot, task: DesignTask, limits: MotionLimits) -> Workspace:
+    """Where the robot may be, by its task and the limits."""
+    if task.clearance is not None:
+        clearance = Clearance.of(robot, task.clearance, limits.obstacles)
+        return Workspace(clearance, limits.boxes)
+    if limits.obstacles:
+        raise DesignError("obstacles, and no clearance from them", remedy="ask for a clearance")
+    return Workspace(None, limits.boxes)
+
+
+def _program(asked: list[Asked], motions: PeriodicMotions, workspace: Workspace) -> MotionProgram:
     """The search; what no usual motion tells at all would hide what others are."""
     program = MotionProgram(
         informations=tuple(one.information for one in asked),
         motions=motions,
         softer=tuple(one.softer for one in asked),
-        clearance=clearance,
+        workspace=workspace,
     )
     if len(asked) == 1:
         return program
@@ -122,7 +133,7 @@ def _program(
         informations=tuple(one.information for one in kept),
         motions=motions,
         softer=tuple(one.softer for one in kept),
-        clearance=clearance,
+        workspace=workspace,
     )
 
 
@@ -136,7 +147,11 @@ def _usual(program: MotionProgram) -> np.ndarray:
     """Variables of the median of some random motions within the limits."""
     possible = sorted(_some_usual(program), key=program.loss)
     if not possible:
-        raise DesignError("no usual motion is within the limits", remedy="widen them")
+        kept = program.workspace.in_words()
+        what = "no usual motion is within the limits" + (f" and {kept}" if kept else "")
+        raise DesignError(
+            what, remedy="widen them, or move the joints' ranges to where there is room"
+        )
     return possible[len(possible) // 2]
 
 

@@ -10,6 +10,12 @@ import numpy as np
 from pydantic import Field
 
 from dynident.errors import DesignError
+from dynident.experiment_design.geometry.surroundings import (
+    BoxEntry,
+    Obstacle,
+    ObstacleEntry,
+    StayBox,
+)
 from dynident.robot import Robot
 from dynident.settings import SettingsTable, nearest, read_toml
 
@@ -37,9 +43,11 @@ class _JointLimits(SettingsTable):
 
 
 class _LimitsFile(SettingsTable):
-    """A file of limits: a table for each joint."""
+    """A file of limits: a table for each joint, and what is around the robot."""
 
-    joints: dict[str, _JointLimits]
+    joints: dict[str, _JointLimits] = Field(default_factory=dict)
+    boxes: list[BoxEntry] = Field(default_factory=list)
+    obstacles: list[ObstacleEntry] = Field(default_factory=list)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -51,6 +59,8 @@ class MotionLimits:
     lower, upper : rad or m.
     speed, acceleration : rad/s or m/s, and per s.
     torque : N m or N; infinite where none is known.
+    boxes : that points of the robot stay in.
+    obstacles : that it stays clear of.
     """
 
     lower: np.ndarray
@@ -58,6 +68,8 @@ class MotionLimits:
     speed: np.ndarray
     acceleration: np.ndarray
     torque: np.ndarray
+    boxes: tuple[StayBox, ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
 
     @classmethod
     def of(cls, robot: Robot, margin: float = MARGIN) -> MotionLimits:
@@ -96,18 +108,20 @@ class MotionLimits:
     def from_file(cls, path: str | Path, robot: Robot) -> MotionLimits:
         """Read limits: `[joints.elbow]` with `lower`, `upper`, `speed`, `acceleration`, `torque`.
 
+        Besides `[[boxes]]` that points of the robot stay in, and `[[obstacles]]`.
+
         Raises
         ------
         DynidentError
             If the file cannot be read, names a joint that the robot has not, or leaves no room.
         """
-        said = read_toml(path, _LimitsFile).joints
-        found = cls.of(robot).changed(
-            {name: one.model_dump(exclude_none=True) for name, one in said.items()},
-            robot,
-            str(path),
+        said, where = read_toml(path, _LimitsFile), str(path)
+        joints = {name: one.model_dump(exclude_none=True) for name, one in said.joints.items()}
+        return replace(
+            cls.of(robot).changed(joints, robot, where),
+            boxes=tuple(StayBox.of(one, robot, where) for one in said.boxes),
+            obstacles=tuple(Obstacle.of(one, where) for one in said.obstacles),
         )
-        return found
 
     def share(
         self, q: np.ndarray, rates: tuple[np.ndarray, np.ndarray, np.ndarray], centre: np.ndarray
@@ -158,11 +172,21 @@ class MotionLimits:
             for name, value in own.items():
                 arrays[name][robot.names.index(joint)] = value
         found = replace(self, **arrays)
-        for j, joint in enumerate(robot.names):
-            if not found.lower[j] < found.upper[j]:
-                what = f"the range of {joint} is {found.lower[j]:g} to {found.upper[j]:g}"
-                raise DesignError(what, where, "give lower below upper")
+        found.require_ranges(robot, where)
         return found
+
+    def require_ranges(self, robot: Robot, where: str | None = None) -> None:
+        """Raise `DesignError` if a joint has no range to move in.
+
+        Parameters
+        ----------
+        robot : whose joints they are.
+        where : for messages.
+        """
+        for j, joint in enumerate(robot.names):
+            if not self.lower[j] < self.upper[j]:
+                what = f"the range of {joint} is {self.lower[j]:g} to {self.upper[j]:g}"
+                raise DesignError(what, where, "give lower below upper")
 
 
 def _stated(numbers: list[float]) -> np.ndarray:

@@ -8,13 +8,13 @@ on ten times as many, and made smaller about its centre until none is exceeded t
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import islice
 
 import numpy as np
 
 from dynident.errors import DesignError
-from dynident.experiment_design.geometry.clearance import Clearance
+from dynident.experiment_design.geometry.workspace import Workspace
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.motion_limits import MotionLimits
 from dynident.experiment_design.motion_solver import DesignedMotion, MotionSolver
@@ -28,7 +28,7 @@ _TRIED = 150  # random motions for each start
 _ITERATIONS, _ITERATIONS_SOFT = 150, 60
 _SHRINKS = 100
 _SHRINKS_CLEAR, _SHRINK_CLEAR = 20, 0.85
-_CUTS = 6  # rounds of bounds that keep a motion clear
+_CUTS = 6  # rounds of bounds that keep a motion in the workspace
 _ROUNDING = 1e-9
 
 
@@ -53,13 +53,13 @@ class MotionProgram:
     motions : among which it is sought.
     softer : of each of these, the same with dry friction over wider ranges of speed, the widest
         first, through which the search goes; none where that makes no difference.
-    clearance : that is kept, if any.
+    workspace : that the robot stays in.
     """
 
     informations: tuple[Information, ...]
     motions: PeriodicMotions
     softer: tuple[tuple[Information, ...], ...] = ()
-    clearance: Clearance | None = None
+    workspace: Workspace = field(default_factory=Workspace)
 
     @property
     def information(self) -> Information:
@@ -111,25 +111,23 @@ class MotionProgram:
         variables : (n, 2 H - 1).
         """
         found = self._limited(variables)
-        if found is None or self.clearance is None:
+        if found is None or self.workspace.is_free:
             return found
-        if self.clearance.distance(self.motions.centre(found)) < self.clearance.margin:
+        if not self.workspace.admits(self.motions.centre(found)[None]):
             return None  # no shrinking helps
-        # Most motions that are too near are so at few instants already, which cost little.
+        # Most motions that leave the workspace do so at few instants already, which cost little.
         coarse, fine = (self.motions.times(k * self.instants) for k in (1, FINER))
         for _ in range(_SHRINKS_CLEAR):
-            if self._is_clear(found, coarse) and self._is_clear(found, fine):
+            if self._is_inside(found, coarse) and self._is_inside(found, fine):
                 return found
             found[:, 1:] *= _SHRINK_CLEAR
         return None
 
-    def _is_clear(self, variables: np.ndarray, t: np.ndarray) -> bool:
-        assert self.clearance is not None
-        near = self.clearance.along(self.motions.fourier(variables).at(t)[0])
-        return bool(near.min() >= self.clearance.margin)
+    def _is_inside(self, variables: np.ndarray, t: np.ndarray) -> bool:
+        return self.workspace.admits(self.motions.fourier(variables).at(t)[0])
 
     def _limited(self, variables: np.ndarray) -> np.ndarray | None:
-        """The motion within the limits, wherever it may touch the robot."""
+        """The motion within the limits, in the workspace or not."""
         t = self.motions.times(FINER * self.instants)
         found = np.array(variables)
         found[:, 0] = np.clip(found[:, 0], -0.999, 0.999)
@@ -191,8 +189,8 @@ class MotionProgram:
             found += self._cleared(solver, variables)
         if not found:
             what = "no motion was found within the limits"
-            if self.clearance is not None:
-                what += f" that stays {self.clearance.margin:g} m clear"
+            if not self.workspace.is_free:
+                what += f" that {self.workspace.in_words()}"
             raise DesignError(what, remedy="widen them, or shorten the motion's reach")
         # Narrow laws have many optima: what was found by chance may be better. And instants that
         # the program does not see count here.
@@ -229,19 +227,19 @@ class MotionProgram:
         return list(islice(clear, starts))
 
     def _cleared(self, solver: MotionSolver, start: np.ndarray) -> list[DesignedMotion]:
-        """As `_from`, and clear: where a motion comes too near, it is moved away and solved again.
+        """As `_from`, in the workspace: what leaves it is moved back and solved again.
 
-        What is still too near then is made smaller.
+        What still leaves it then is made smaller.
         """
         found = self._from(solver, start)
-        if self.clearance is None:
+        if self.workspace.is_free:
             return found
         t, cuts = self.motions.times(FINER * self.instants), []
         for _ in range(_CUTS):
             if not found:
                 return []
             variables = found[0].variables
-            new = self.clearance.cuts(t, self.motions.fourier(variables).at(t)[0])
+            new = self.workspace.cuts(t, self.motions.fourier(variables).at(t)[0])
             if not new:
                 break
             cuts += new
@@ -257,8 +255,8 @@ class MotionProgram:
         return [clear for one in found for clear in self._within(one)]
 
     def _within(self, motion: DesignedMotion) -> list[DesignedMotion]:
-        """The motion, made smaller until it is clear; none where that fails."""
-        if self.clearance is None:
+        """The motion, made smaller until it is in the workspace; none where that fails."""
+        if self.workspace.is_free:
             return [motion]
         best = self.within(motion.variables)
         return [] if best is None else [replace(motion, variables=best, loss=self.loss(best))]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dynident.experiment_design.geometry.clearance import DistanceCut
+from dynident.experiment_design.geometry.workspace import RoomCut
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.periodic import PeriodicMotions
 from dynident.late_modules import LateModule
@@ -56,7 +56,7 @@ class MotionSolver:
         instants: int,
         limit_instants: int,
         iterations: int,
-        cuts: Sequence[DistanceCut] = (),
+        cuts: Sequence[RoomCut] = (),
     ) -> MotionSolver:
         """Write the program out.
 

@@ -209,18 +209,19 @@ class RecordingDesign(Shown):
 
         What is a decimetre beyond the clearance that was asked for is that far.
         """
-        clearance = self.program.clearance
+        clearance = self.program.workspace.clearance
         if clearance is None:
             return None
         t = self.program.motions.times(FINER * self.program.instants)
         return float(clearance.along(self.trajectory.at(t)[0]).min())
 
     def _clear_in_words(self) -> str:
-        clearance, least = self.program.clearance, self.least_distance
+        clearance, least = self.program.workspace.clearance, self.least_distance
         assert clearance is not None and least is not None
+        around = " and from the obstacles" if self.limits.obstacles else ""
         words = (
             f"By the collision geometry of the description the links stay {1000 * least:.0f} mm "
-            f"or more from each other ({1000 * clearance.margin:g} mm asked for)."
+            f"or more from each other{around} ({1000 * clearance.margin:g} mm asked for)."
         )
         if clearance.ignored:
             count = len(clearance.ignored)

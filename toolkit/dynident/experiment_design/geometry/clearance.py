@@ -1,4 +1,4 @@
-"""How far a robot stays from itself, by its own collision geometry, as Drake sees it."""
+"""How far a robot stays from itself and from obstacles, by its collision geometry in Drake."""
 
 from __future__ import annotations
 
@@ -9,28 +9,12 @@ import numpy as np
 
 from dynident.errors import DesignError
 from dynident.experiment_design.geometry.robot_shapes import RobotShapes
+from dynident.experiment_design.geometry.surroundings import Obstacle
 from dynident.robot import Robot
 
 _SEEN = 0.1
 """m beyond the margin, within which distances are worked out: what is farther does not matter."""
 _SAMPLES = 40  # random positions: what is too near at all of them, a motion does not change
-_STEP = 1e-5  # rad or m, of a slope
-
-
-@dataclass(frozen=True, eq=False)
-class DistanceCut:
-    """A bound on the position at an instant, by which a distance is kept near a known position.
-
-    Attributes
-    ----------
-    t : s.
-    slope : (n,) of the distance, m per rad or m.
-    least : of slope @ q(t).
-    """
-
-    t: float
-    slope: np.ndarray
-    least: float
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -53,7 +37,7 @@ class Clearance:
     ignored: frozenset[tuple[int, int]]
 
     @classmethod
-    def of(cls, robot: Robot, margin: float) -> Clearance:
+    def of(cls, robot: Robot, margin: float, obstacles: tuple[Obstacle, ...] = ()) -> Clearance:
         """Read the collision geometry of a robot's description.
 
         Links joined to each other are not looked at, nor what is too near at every one of many
@@ -63,16 +47,21 @@ class Clearance:
         ----------
         robot : with the description that it was read from.
         margin : m, to be kept.
+        obstacles : around the robot, none of which is left out.
+
+        Returns
+        -------
+        The distances to be kept.
 
         Raises
         ------
         DesignError
             If the margin is not positive, or the description states no geometry that can collide,
-            or none that can be read.
+            or none that can be read; or if an obstacle is too near wherever the robot stands.
         """
         if not (margin > 0 and np.isfinite(margin)):
             raise DesignError(f"clearance = {margin:g} m", remedy="choose it above 0")
-        shapes = RobotShapes.of(robot)
+        shapes = RobotShapes.of(robot, obstacles)
         if not shapes.scene.model_inspector().GetCollisionCandidates():
             what = "states no collision geometry of links that could meet"
             raise DesignError(
@@ -83,7 +72,14 @@ class Clearance:
         whole = shapes.builder.Build().CreateDefaultContext()
         context = shapes.plant.GetMyMutableContextFromRoot(whole)
         found = cls(margin=margin, shapes=shapes, context=context, whole=whole, ignored=frozenset())
-        return replace(found, ignored=found._always(robot))
+        always = found._always(robot)
+        fixed = {one.get_value() for one in shapes.obstacles}
+        if any(fixed.intersection(pair) for pair in always):
+            what = f"an obstacle is nearer than {margin:g} m wherever the robot stands"
+            raise DesignError(
+                what, remedy="check its centre and its size, or ask for less clearance"
+            )
+        return replace(found, ignored=always)
 
     def _always(self, robot: Robot) -> frozenset[tuple[int, int]]:
         near = [set(self._pairs(q, self.margin)) for q in robot.random_motion(0, _SAMPLES)[0]]
@@ -118,29 +114,3 @@ class Clearance:
         q : (T, n).
         """
         return np.array([self.distance(one) for one in q])
-
-    def cuts(self, t: np.ndarray, q: np.ndarray) -> list[DistanceCut]:
-        """Return bounds that move a motion away from where it comes too near.
-
-        At each instant that is nearer than its neighbours, the distance as a linear function of
-        the position.
-
-        Parameters
-        ----------
-        t : (T,) s, of a period.
-        q : (T, n).
-        """
-        near = self.along(q)
-        lowest = (near <= np.roll(near, 1)) & (near < np.roll(near, -1)) & (near < self.margin)
-        found = []
-        for k in np.flatnonzero(lowest):
-            slope = np.array(
-                [
-                    (self.distance(q[k] + step) - self.distance(q[k] - step)) / (2 * _STEP)
-                    for step in _STEP * np.eye(len(q[k]))
-                ]
-            )
-            if np.any(slope):
-                least = self.margin - near[k] + float(slope @ q[k])
-                found.append(DistanceCut(float(t[k]), slope, least))
-        return found

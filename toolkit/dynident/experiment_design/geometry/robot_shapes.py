@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from dynident.errors import DesignError
+from dynident.experiment_design.geometry.surroundings import Obstacle
 from dynident.robot import Robot
 from dynident.robot.formats.tree_assembly import quiet
 
 _SUFFIX = {"urdf": "urdf", "sdf": "sdf", "mjcf": "xml"}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class RobotShapes:
     """A robot with its visual and collision geometry, before its diagram is built.
 
@@ -23,20 +24,23 @@ class RobotShapes:
     ----------
     builder, plant, scene : of Drake; the plant is finalized.
     places : (n,) of the robot's joints among the plant's positions.
+    obstacles : geometries of what is around it.
     """
 
     builder: Any
     plant: Any
     scene: Any
     places: np.ndarray
+    obstacles: tuple[Any, ...] = ()
 
     @classmethod
-    def of(cls, robot: Robot) -> RobotShapes:
+    def of(cls, robot: Robot, obstacles: tuple[Obstacle, ...] = ()) -> RobotShapes:
         """Read the geometry of a robot's description.
 
         Parameters
         ----------
         robot : with the description that it was read from.
+        obstacles : fixed to its base.
 
         Raises
         ------
@@ -60,12 +64,15 @@ class RobotShapes:
                     parser.AddModels(path)
                 else:
                     parser.AddModelsFromString(description.text, _SUFFIX[description.format])
+            around = tuple(_placed(plant, one, f"obstacle {k}") for k, one in enumerate(obstacles))
             plant.Finalize()
             places = [plant.GetJointByName(name).position_start() for name in robot.names]
         except Exception as error:  # Drake's readers fail in as many ways as files do
             said = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise DesignError(f"geometry cannot be read: {said}", description.path) from None
-        return cls(builder, plant, scene, np.array(places))
+        return cls(
+            builder=builder, plant=plant, scene=scene, places=np.array(places), obstacles=around
+        )
 
     def positions(self, q: np.ndarray, others: np.ndarray) -> np.ndarray:
         """Return the plant's positions; what is no joint of the robot stays where it is.
@@ -78,3 +85,15 @@ class RobotShapes:
         found = np.array(others)
         found[self.places] = q
         return found
+
+
+def _placed(plant: Any, one: Obstacle, name: str) -> Any:
+    """Add an obstacle to a plant; return its geometry."""
+    from pydrake.geometry import Box, Sphere
+    from pydrake.math import RigidTransform
+    from pydrake.multibody.plant import CoulombFriction
+
+    shape = Sphere(one.size[0]) if len(one.size) == 1 else Box(*one.size)
+    centre: Any = one.centre  # the stubs of Drake take no array
+    pose, body = RigidTransform(centre), plant.world_body()
+    return plant.RegisterCollisionGeometry(body, pose, shape, name, CoulombFriction(0.0, 0.0))
