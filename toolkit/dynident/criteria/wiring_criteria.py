@@ -49,6 +49,14 @@ class WiringCriteria(CriteriaGroup):
     described_z: float = criterion(
         6.0, "1", "standard deviations by which the described torque shows in the measured one"
     )
+    described_share: float = criterion(
+        0.3,
+        "1",
+        "part of one joint's torque that the described one makes, from which its size is compared "
+        "with that of the others",
+        least=0,
+        most=1,
+    )
     milli: tuple[float, ...] = criterion(
         (200.0, 5000.0),
         "1",
@@ -71,7 +79,11 @@ class WiringCriteria(CriteriaGroup):
         20.0, "1", "factor by which one joint's torque is off, the others being right", over=1
     )
     beyond_effort: float = criterion(
-        3.0, "1", "rms of a torque over the limit in the description that no drive has", over=1
+        20.0,
+        "1",
+        "rms of a torque over the limit in the description from which its unit is N mm or mN m: in "
+        "these a drive at a fiftieth of its limit is there",
+        over=1,
     )
     shared: float = criterion(
         0.2,

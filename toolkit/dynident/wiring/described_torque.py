@@ -21,11 +21,13 @@ class DescribedScale:
     ----------
     factor : (n,) measured over described torque, friction, rotors, springs and offsets apart.
     known : (n,) whether the described torque shows in the measured one at all.
+    share : (n,) the described torque's part in the measured one, of their rms.
     over_effort : (n,) rms of the torque over the limit in the description; 0 where none is stated.
     """
 
     factor: np.ndarray
     known: np.ndarray
+    share: np.ndarray
     over_effort: np.ndarray
 
     @classmethod
@@ -48,7 +50,8 @@ class DescribedScale:
         motion = rows.moved(now.change)
         tau = rows.tau[:, now.torque_of] * now.torque_scale
         described = robot.inverse_dynamics(motion.q, motion.v, motion.a)
-        factor, known = np.zeros(robot.n), np.zeros(robot.n, dtype=bool)
+        factor, share = np.zeros((2, robot.n))
+        known = np.zeros(robot.n, dtype=bool)
         for j in range(robot.n):
             q, v, a = motion.q[:, j], motion.v[:, j], motion.a[:, j]
             own = [v, np.tanh(v / model.friction_widths[j]), a, q, np.ones(len(q))]
@@ -62,9 +65,10 @@ class DescribedScale:
             std = np.sqrt(max(left * inverse[0, 0], 1e-300))
             factor[j] = found[0] / size[0]
             known[j] = found[0] > criteria.described_z * std
+            share[j] = abs(found[0]) / max(float(np.linalg.norm(tau[:, j])), 1e-300)
         efforts = np.array([joint.effort for joint in robot.joints])
         rms = np.sqrt(np.mean(tau**2, axis=0))
-        return cls(factor=factor, known=known, over_effort=rms / efforts)
+        return cls(factor=factor, known=known, share=share, over_effort=rms / efforts)
 
     def confirmed(self, criteria: WiringCriteria) -> bool:
         """Whether the described torques show at most joints, in about their size."""
@@ -99,7 +103,9 @@ class DescribedScale:
                     mended = mended.torques_scaled(float(factor), j)
                 given = tuple(float(x) for x in factors)
                 return Hypothesis(kind="torque_scale", joints=every, mended=mended, ratios=given)
-            for j in known[np.abs(np.log(self.factor[known] / typical)) > np.log(criteria.odd_one)]:
+            odd = np.abs(np.log(self.factor[known] / typical)) > np.log(criteria.odd_one)
+            # What the model lacks may look a little like a small described torque.
+            for j in known[odd & (self.share[known] > criteria.described_share)]:
                 factor = typical / float(self.factor[j])
                 mended = now.torques_scaled(factor, int(j))
                 return Hypothesis(
