@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from dynident.closed_loop import Fourier
+from dynident.experiment_design.geometry.surroundings import Obstacle
 from dynident.reporting.pictures.motion_in_3d import motion_page
 from dynident.robot import Robot
 
@@ -80,3 +81,12 @@ def test_the_page_may_fetch_nothing() -> None:
     said = html[policy : html.index(">", policy)]
     assert "default-src 'none'" in said and "http" not in said and "*" not in said
     assert not re.findall(r"<(?:script|link|img)[^>]*(?:src|href)\s*=", html)
+
+
+def test_obstacles_are_drawn() -> None:
+    around = (
+        Obstacle(np.array([0.5, 0.0, 0.0]), np.array([0.1])),
+        Obstacle(np.array([0.0, 0.5, 0.0]), np.array([0.2, 0.2, 0.2])),
+    )
+    told = messages(motion_page(bar(f"<visual>{BOX}</visual>"), motion(), "", around).html)
+    assert b"obstacles/1" in told and b"obstacles/2" in told and b"SphereGeometry" in told

@@ -89,11 +89,9 @@ class RobotShapes:
 
 def _placed(plant: Any, one: Obstacle, name: str) -> Any:
     """Add an obstacle to a plant; return its geometry."""
-    from pydrake.geometry import Box, Sphere
     from pydrake.math import RigidTransform
     from pydrake.multibody.plant import CoulombFriction
 
-    shape = Sphere(one.size[0]) if len(one.size) == 1 else Box(*one.size)
     centre: Any = one.centre  # the stubs of Drake take no array
     pose, body = RigidTransform(centre), plant.world_body()
-    return plant.RegisterCollisionGeometry(body, pose, shape, name, CoulombFriction(0.0, 0.0))
+    return plant.RegisterCollisionGeometry(body, pose, one.shape(), name, CoulombFriction(0.0, 0.0))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -63,6 +63,12 @@ class Obstacle:
             raise DesignError(what, where, "give one of them")
         size = [entry.radius] if entry.size is None else entry.size
         return cls(np.array(entry.centre), np.array(size, dtype=float))
+
+    def shape(self) -> Any:
+        """Return its shape, as Drake has it."""
+        from pydrake.geometry import Box, Sphere
+
+        return Sphere(self.size[0]) if len(self.size) == 1 else Box(*self.size)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

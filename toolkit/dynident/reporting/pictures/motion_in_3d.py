@@ -12,6 +12,7 @@ from dynident.closed_loop import Fourier
 from dynident.errors import DesignError, DynidentError
 from dynident.experiment_design import RecordingDesign
 from dynident.experiment_design.geometry.robot_shapes import RobotShapes
+from dynident.experiment_design.geometry.surroundings import Obstacle
 from dynident.reporting.pictures.solids import poses, solid
 from dynident.robot import Robot
 from dynident.robot.formats.tree_assembly import quiet
@@ -55,10 +56,12 @@ def design_page(design: RecordingDesign) -> MotionPage:
         f"Designed motion: {task.duration:g} s from rest to rest, to be followed {task.repeat} "
         f"times, shown in an endless loop. {clear}"
     )
-    return motion_page(design.model.robot, design.trajectory, caption)
+    return motion_page(design.model.robot, design.trajectory, caption, design.limits.obstacles)
 
 
-def motion_page(robot: Robot, motion: Fourier, caption: str) -> MotionPage:
+def motion_page(
+    robot: Robot, motion: Fourier, caption: str, obstacles: tuple[Obstacle, ...] = ()
+) -> MotionPage:
     """Return a page on which a robot repeats a period of a motion.
 
     Links have the shapes of the description, those to be seen or else those that collide; where it
@@ -69,13 +72,19 @@ def motion_page(robot: Robot, motion: Fourier, caption: str) -> MotionPage:
     robot : with its description.
     motion : a period, rad or m.
     caption : what it is, plain text.
+    obstacles : that are drawn, in red.
+
+    Returns
+    -------
+    The page, and what the links are drawn as.
 
     Raises
     ------
     DesignError
         If Drake's viewer cannot be started.
     """
-    from pydrake.geometry import Meshcat, MeshcatAnimation, MeshcatParams
+    from pydrake.geometry import Meshcat, MeshcatAnimation, MeshcatParams, Rgba
+    from pydrake.math import RigidTransform
 
     period = float(motion.period)
     rate = max(min(_RATE, int(_MOST_FRAMES / period)), 1)
@@ -92,6 +101,10 @@ def motion_page(robot: Robot, motion: Fourier, caption: str) -> MotionPage:
                 shows = ""
             shows = shows or _with_ellipsoids(viewer, robot, t, q)
             viewer.StopRecording()
+            for k, one in enumerate(obstacles):
+                centre: Any = one.centre
+                viewer.SetObject(f"obstacles/{k + 1}", one.shape(), Rgba(0.8, 0.2, 0.1, 0.5))
+                viewer.SetTransform(f"obstacles/{k + 1}", RigidTransform(centre))
             recording = viewer.get_mutable_recording()
             recording.set_loop_mode(MeshcatAnimation.LoopMode.kLoopRepeat)
             viewer.PublishRecording()
