@@ -14,6 +14,7 @@ import dynident as di
 from code_blocks import PAGES, ROOT, CodeBlock, Typed, blocks, told
 from dynident.cli import commands, main
 from dynident.closed_loop.experiments.experiment_file import ExperimentFile
+from dynident.experiment_design.motion_limits import LimitsFile
 from dynident.study.study_file import StudyFile
 
 BLOCKS = [(page.relative_to(ROOT).as_posix(), one) for page in PAGES for one in blocks(page)]
@@ -59,10 +60,13 @@ def test_every_name_of_the_package_is_there() -> None:
 
 
 def test_every_setting_is_a_key() -> None:
-    """Pieces of studies and experiments, with what they leave out put in."""
+    """Pieces of studies, experiments and limits, with what they leave out put in."""
     for _, one in of_kind("toml"):
         said = tomllib.loads(one.text)
         if "project" in said:  # of a package's own file
+            continue
+        if "boxes" in said:
+            LimitsFile.model_validate(said)
             continue
         for entry in said.get("recordings", ()):
             entry.setdefault("file", "run.csv")

@@ -42,7 +42,7 @@ class _JointLimits(SettingsTable):
     torque: float | None = Field(default=None, gt=0)
 
 
-class _LimitsFile(SettingsTable):
+class LimitsFile(SettingsTable):
     """A file of limits: a table for each joint, and what is around the robot."""
 
     joints: dict[str, _JointLimits] = Field(default_factory=dict)
@@ -115,7 +115,7 @@ class MotionLimits:
         DynidentError
             If the file cannot be read, names a joint that the robot has not, or leaves no room.
         """
-        said, where = read_toml(path, _LimitsFile), str(path)
+        said, where = read_toml(path, LimitsFile), str(path)
         joints = {name: one.model_dump(exclude_none=True) for name, one in said.joints.items()}
         return replace(
             cls.of(robot).changed(joints, robot, where),
