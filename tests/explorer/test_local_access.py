@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 from flask.testing import FlaskClient
 
 import dynident as di
+from dynident.effect_modules import Permission
 from dynident.errors import DynidentError
 from dynident.explorer import explore
 from dynident.explorer.local_access import ADDRESS
 from dynident.explorer.local_server import LocalServer
 from dynident.explorer.tab_state import TabState
-from study_files import edited, listing, write_study
+from study_files import STUDY, edited, listing, write_study
 
 
 @pytest.fixture(scope="module")
@@ -109,8 +111,32 @@ def test_a_study_that_was_changed_since_is_not_explored(tmp_path):
     path = write_study(tmp_path)
     study = di.load(path)
     path.write_text(edited(('"viscous_friction"', '"coulomb_friction"')))
-    with pytest.raises(DynidentError, match="has other effects by now"):
-        explore(study)
+    for text in (path.read_text(), STUDY + "# somebody else was here\n"):
+        path.write_text(text)
+        with pytest.raises(DynidentError, match="has changed since it was loaded"):
+            explore(study)
+    # Nor is a model that the file does not have.
+    path.write_text(STUDY)
+    other = replace(study, model=study.model + "coulomb_friction@elbow")
+    with pytest.raises(DynidentError, match="has other effects than the model"):
+        explore(other)
+
+
+def test_what_a_study_may_run_it_may_when_it_is_read_again(tmp_path, monkeypatch):
+    study, told = di.load(write_study(tmp_path), modules="run"), []
+
+    def load(path, *, modules: Permission = "trusted"):
+        told.append(modules)
+        return di.load(path, modules=modules)
+
+    monkeypatch.setattr("dynident.study.load", load)
+    explore(study, di.diagnose(study.model, study.train, study.test)).stop()
+    assert set(told) == {"run"}
+
+
+def test_who_chooses_by_an_error_is_told_that_it_is_too_small(client, server, home):
+    layout = client.get(f"/{server.token}/_dash-layout", headers=home).get_data(as_text=True)
+    assert "Choosing effects by this error makes it too small" in layout
 
 
 @pytest.mark.parametrize(

@@ -279,6 +279,18 @@ def test_two_tabs_choose_for_themselves_and_the_second_to_write_is_told(small, t
     assert path.read_text() == after == edited(('friction"]', f'friction", "{HIDDEN}"]'))
 
 
+def test_a_double_click_writes_once_and_says_so(small, tab):
+    path, server = small
+    one = tab(server.url)
+    one.switch()
+    one.page.locator("#write:not([disabled])").dblclick()
+    one.page.locator("#written", has_text="Written into").wait_for()
+    one.page.wait_for_load_state("networkidle")
+    assert one.page.locator("#written").inner_text().startswith("Written into")
+    assert one.page.locator("#write").is_disabled()
+    assert path.read_text() == edited(('friction"]', f'friction", "{HIDDEN}"]'))
+
+
 def test_a_study_that_changes_underneath_is_left_alone(small, tab):
     path, server = small
     one = tab(server.url)

@@ -141,7 +141,7 @@ def _for_ever(progress):
 
 
 def versions(path: Path, diagnosis: Diagnosis) -> StudyVersions:
-    first = OpenedStudy(di.load(path), study_digest(path), diagnosis)
+    first = OpenedStudy(di.load(path), diagnosis)
     return StudyVersions(path, lambda: di.load(path), first)
 
 
@@ -149,7 +149,7 @@ def test_what_is_switched_on_is_written(tmp_path, diagnosis):
     path = write_study(tmp_path)
     opened = versions(path, diagnosis)
     first = opened.latest()
-    digest = opened.write(first.chosen([HIDDEN]), first.digest)
+    digest = opened.write(first.chosen([HIDDEN]), first.digest, "a tab")
     assert path.read_text() == edited(
         ('["viscous_friction"]', f'["viscous_friction", "{HIDDEN}"]'), text=STUDY
     )
@@ -165,8 +165,19 @@ def test_a_study_that_has_changed_is_left_alone(tmp_path, diagnosis):
     first = opened.latest()
     path.write_text(STUDY + "# mine\n")
     with pytest.raises(StudyError, match="has changed since it was read"):
-        opened.write(first.chosen([HIDDEN]), first.digest)
+        opened.write(first.chosen([HIDDEN]), first.digest, "a tab")
     assert path.read_text() == STUDY + "# mine\n"
+
+
+def test_what_a_tab_asks_twice_is_written_once_and_answered_alike(tmp_path, diagnosis):
+    path = write_study(tmp_path)
+    opened = versions(path, diagnosis)
+    first = opened.latest()
+    chosen = first.chosen([HIDDEN])
+    answers = [opened.write(chosen, first.digest, "a tab") for _ in range(2)]
+    assert answers[0] == answers[1] == study_digest(path)
+    with pytest.raises(StudyError, match="has changed since it was read"):
+        opened.write(chosen, first.digest, "another tab")
 
 
 def test_labels_that_nobody_offered_choose_nothing(tmp_path, diagnosis):
@@ -180,7 +191,7 @@ def test_a_law_is_written_with_its_formula(tmp_path, diagnosis, study):
     law = Law(name="drum", torque="c*v*sin(q)")
     (effect,) = di.effects_of("law:drum@elbow", study.robot, (law,))
     choice = EffectChoice(effect=effect, group="proposed", words="", laws=(law,))
-    opened.write([choice], opened.latest().digest)
+    opened.write([choice], opened.latest().digest, "a tab")
     assert "law:drum@elbow" in [one.label for one in di.load(path).model.effects]
     fitted = Refitter(study).fit([effect])
     wanted = di.fit(study.model + effect, study.train)

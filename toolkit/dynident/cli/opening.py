@@ -31,10 +31,10 @@ def open_study(study: Path, no_browser: bool) -> int:
     require_app()
     from dynident.explorer.local_server import LocalServer
     from dynident.explorer.opened_study import OpenedStudy, StudyVersions
-    from dynident.study import load, study_digest
+    from dynident.study import load
 
-    digest, modules = study_digest(study), permission_given()
-    first = OpenedStudy(load_study(study), digest)
+    modules = permission_given()
+    first = OpenedStudy(load_study(study))
     server = LocalServer(StudyVersions(study, lambda: load(study, modules=modules), first))
     say(f"{study} is open at {server.url} (Ctrl-C ends it)")
     if not no_browser:

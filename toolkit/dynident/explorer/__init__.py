@@ -54,7 +54,8 @@ def explore(study: Study, diagnosis: Diagnosis | None = None) -> LocalServer:
     Raises
     ------
     DynidentError
-        If Dash is not installed, or the study's file is another one by now.
+        If Dash is not installed, the study's file has changed since it was loaded, or the file has
+        other effects than the model.
 
     Examples
     --------
@@ -67,12 +68,17 @@ def explore(study: Study, diagnosis: Diagnosis | None = None) -> LocalServer:
     from dynident.explorer.opened_study import OpenedStudy, StudyVersions
     from dynident.study import load, study_digest
 
-    digest = study_digest(study.path)
-    now = [effect.label for effect in load(study.path).model.effects]
-    if now != [effect.label for effect in study.model.effects]:
-        raise DynidentError("has other effects by now", str(study.path), "load it again")
-    first = OpenedStudy(study, digest, diagnosis)
-    versions = StudyVersions(study.path, lambda: load(study.path), first)
+    if study_digest(study.path) != study.digest:
+        raise DynidentError("has changed since it was loaded", str(study.path), "load it again")
+
+    def read() -> Study:
+        return load(study.path, modules=study.modules)
+
+    labels = [[effect.label for effect in one.model.effects] for one in (read(), study)]
+    if labels[0] != labels[1]:
+        what = "has other effects than the model that is shown"
+        raise DynidentError(what, str(study.path), "add them, or load it again")
+    versions = StudyVersions(study.path, read, OpenedStudy(study, diagnosis))
     server = LocalServer(versions, "in a notebook")
     server.start()
     return server

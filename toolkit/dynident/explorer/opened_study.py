@@ -27,12 +27,11 @@ class OpenedStudy:
     Parameters
     ----------
     study : as it was read.
-    digest : of the file then, see `study_digest`.
     diagnosis : where there is one already.
     """
 
-    def __init__(self, study: Study, digest: str, diagnosis: Diagnosis | None = None) -> None:
-        self.study, self.digest = study, digest
+    def __init__(self, study: Study, diagnosis: Diagnosis | None = None) -> None:
+        self.study, self.digest = study, study.digest
         self.search = SearchThread(study, diagnosis)
         self.given = Refitter(study)
 
@@ -85,6 +84,7 @@ class StudyVersions:
     def __init__(self, path: Path, read: Callable[[], Study], first: OpenedStudy) -> None:
         self.path, self._read, self._lock = path, read, RLock()
         self._opened = OrderedDict({first.digest: first})
+        self._written: dict[tuple[str, str, tuple[str, ...]], str] = {}
 
     def latest(self) -> OpenedStudy:
         """Return the study as the file is now, read anew if it is another one.
@@ -97,7 +97,9 @@ class StudyVersions:
         with self._lock:
             digest = study_digest(self.path)
             if digest not in self._opened:
-                self._opened[digest] = OpenedStudy(self._read(), digest)
+                read = OpenedStudy(self._read())
+                digest = read.digest  # another one, where the file has changed meanwhile
+                self._opened.setdefault(digest, read)
             self._opened.move_to_end(digest)
             while len(self._opened) > _KEPT:
                 _, old = self._opened.popitem(last=False)
@@ -108,13 +110,14 @@ class StudyVersions:
         """Return a version; None where it has been forgotten."""
         return self._opened.get(digest)
 
-    def write(self, choices: Sequence[EffectChoice], digest: str) -> str:
-        """Write effects into the study, as `dynident add` does.
+    def write(self, choices: Sequence[EffectChoice], digest: str, tab: str) -> str:
+        """Write effects into the study, as `dynident add` does; what a tab asks twice, once.
 
         Parameters
         ----------
         choices : what is added.
         digest : of the file that they are added to.
+        tab : the name of the tab that asks.
 
         Returns
         -------
@@ -127,8 +130,13 @@ class StudyVersions:
         """
         laws: dict[str, Law] = {law.name: law for one in choices for law in one.laws}
         effects = tuple(one.effect for one in choices)
-        add_effects(self.path, effects, tuple(laws.values()), digest=digest)
-        return study_digest(self.path)
+        asked = tab, digest, tuple(effect.label for effect in effects)
+        with self._lock:
+            if asked not in self._written:
+                self._written[asked] = add_effects(
+                    self.path, effects, tuple(laws.values()), digest=digest
+                )
+            return self._written[asked]
 
     def stop(self) -> None:
         """End what still runs in the background."""

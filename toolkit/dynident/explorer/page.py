@@ -135,6 +135,7 @@ class _Callbacks:
             Input("write", "n_clicks"),
             tab,
             prevent_initial_call=True,
+            running=[(Output("write", "disabled"), True, False)],
         )(self.written)
 
     def searched(self, ticks: int | None, tab: object) -> tuple[Any, ...]:
@@ -211,7 +212,7 @@ class _Callbacks:
             raise PreventUpdate
         labels = [one.label for one in chosen]
         try:
-            digest = self._versions.write(chosen, state.file)
+            digest = self._versions.write(chosen, state.file, state.name)
         except DynidentError as error:
             return [f"Not written: {error}. ", *_reload()], no_update, no_update
         after = state.after_write(labels, digest)

@@ -24,6 +24,10 @@ _ZOOMED: Any = {
     "displayModeBar": True,
     "modeBarButtonsToRemove": ["select2d", "lasso2d", "toImage", "pan2d"],
 }
+_CHOSEN_BY = (
+    "Choosing effects by this error makes it too small: judge the model that you choose by new "
+    "recordings."
+)
 _HEADS: dict[Group, str] = {
     "added": "Missing, says the diagnosis",
     "proposed": "Laws proposed for what the catalogue leaves",
@@ -87,6 +91,7 @@ def _errors(opened: OpenedStudy) -> html.Section:
             html.H2("Error on held-out data"),
             html.P(id="said", role="status", className="said"),
             _picture("errors", bars_height(len(opened.study.robot.names)), _STILL),
+            html.P(_CHOSEN_BY, className="quiet"),
             html.P(id="fitted-by", className="quiet"),
         ],
         className="card falling",

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
+from secrets import token_hex
 from typing import Any, Self
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class TabState:
     """What a tab shows, and what it would write to.
 
@@ -17,27 +18,30 @@ class TabState:
     file : digest that the file must have for the tab to write to it: after a write another one.
     on : labels of effects that are switched on.
     written : those of them that are in the file by now.
+    name : of the tab, which no other has.
     """
 
     opened: str
     file: str
     on: tuple[str, ...] = ()
     written: tuple[str, ...] = ()
+    name: str = ""
 
     @classmethod
     def of(cls, digest: str) -> Self:
         """Return the state of a tab that has just been opened."""
-        return cls(digest, digest)
+        return cls(opened=digest, file=digest, name=token_hex(8))
 
     @classmethod
     def read(cls, sent: object) -> Self:
         """Return a state as a tab sends it; whatever is no state is one that shows nothing."""
         said: Mapping[str, Any] = sent if isinstance(sent, Mapping) else {}
         return cls(
-            str(said.get("opened", "")),
-            str(said.get("file", "")),
-            _labels(said.get("on")),
-            _labels(said.get("written")),
+            opened=str(said.get("opened", "")),
+            file=str(said.get("file", "")),
+            on=_labels(said.get("on")),
+            written=_labels(said.get("written")),
+            name=str(said.get("name", "")),
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -35,7 +35,7 @@ def add_effects(
     laws: tuple[Law, ...] = (),
     *,
     digest: str | None = None,
-) -> None:
+) -> str:
     """Write effects into a study file, comments and order untouched.
 
     Parameters
@@ -44,6 +44,10 @@ def add_effects(
     effects : to add to its list.
     laws : of theirs that it does not have, to be written as tables at its end.
     digest : `study_digest` of the file that is meant; None for whatever it is by now.
+
+    Returns
+    -------
+    `study_digest` of the file as it was written here, whoever writes to it next.
 
     Raises
     ------
@@ -56,7 +60,7 @@ def add_effects(
         text = files.read_text(path)
         if digest is not None and _digest(text) != digest:
             raise StudyError("has changed since it was read", str(path), "nothing was written")
-        _add(path, text, [effect.label for effect in effects], laws)
+        return _digest(_add(path, text, [effect.label for effect in effects], laws))
 
 
 def add_recording(path: str | Path, recording: Recording) -> None:
@@ -97,8 +101,8 @@ def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _add(path: Path, text: str, labels: list[str], laws: tuple[Law, ...]) -> None:
-    """Write labels of effects into a study file of this text that nobody else writes."""
+def _add(path: Path, text: str, labels: list[str], laws: tuple[Law, ...]) -> str:
+    """Write labels of effects into a file of this text that nobody else writes; its new text."""
     wanted = tomllib.loads(text)
     twice = [one for one in labels if one in wanted.get("effects", [])]
     if twice:
@@ -118,7 +122,7 @@ def _add(path: Path, text: str, labels: list[str], laws: tuple[Law, ...]) -> Non
             continue
         if {**said, "effects": sorted(said.get("effects", []))} == wanted:
             files.write_text(path, candidate)
-            return
+            return candidate
     remedy = f"write them into it: {', '.join(labels)}"
     raise StudyError("the effects cannot be added to this file", str(path), remedy)
 

@@ -30,6 +30,7 @@ from dynident.recording import (
 )
 from dynident.robot import Robot
 from dynident.settings import read_toml
+from dynident.study.adding import study_digest
 from dynident.study.named_files import filter_of, naming, recordings_of, robot_of
 from dynident.study.study_file import StudyFile
 
@@ -50,6 +51,8 @@ class Study:
     controller : of the closed loop, where the study states one.
     criteria : the numbers that decide a diagnosis, with those that the study wants otherwise: a
         table for each group, as `[criteria.gates] level = 0.005`; see `dynident.criteria`.
+    digest : SHA-256 of the file's text as it was read, by which a change of it is seen.
+    modules : what might be run of its `effect_modules`, as `load` was told.
     """
 
     path: Path
@@ -59,6 +62,8 @@ class Study:
     drives: DriveGains | None = None
     controller: Controller | None = None
     criteria: Criteria = DEFAULTS
+    digest: str = ""
+    modules: Permission = "trusted"
 
     @property
     def robot(self) -> Robot:
@@ -86,6 +91,7 @@ def load(path: str | Path, *, modules: Permission = "trusted") -> Study:
         If the robot or a recording that it names is unusable.
     """
     path = Path(path)
+    digest = study_digest(path)  # first: what changes from here on is another file
     said = read_toml(path, StudyFile)
     if not said.recordings:
         raise StudyError("no [[recordings]]", str(path), "add at least one")
@@ -109,12 +115,7 @@ def load(path: str | Path, *, modules: Permission = "trusted") -> Study:
         settings = filter_of(said.filter, recordings) if said.filter else None
     with naming(path, "criteria"):
         criteria = Criteria.with_values(said.criteria)
-    noise = None
-    if said.noise:
-        noise = Noise(
-            _per_joint(said.noise.position_std, robot, f"{path}: noise.position_std"),
-            _per_joint(said.noise.torque_std, robot, f"{path}: noise.torque_std"),
-        )
+    noise = _noise(said, path, robot)
     sets = {
         use: Dataset(tuple(r for r in recordings if r.use == use), settings, noise)
         for use in ("train", "test")
@@ -146,6 +147,8 @@ def load(path: str | Path, *, modules: Permission = "trusted") -> Study:
         drives=drives,
         controller=controller,
         criteria=criteria,
+        digest=digest,
+        modules=modules,
     )
 
 
@@ -175,6 +178,16 @@ def _drives(said: StudyFile, path: Path, problem: GainProblem) -> DriveGains:
             remedy = "state all of it, or train with a recording that carries it"
             raise StudyError(what, str(path), remedy)
     return fit_drive_gains(problem, said.torque_unit)
+
+
+def _noise(said: StudyFile, path: Path, robot: Robot) -> Noise | None:
+    """The noise that a study states."""
+    if not said.noise:
+        return None
+    return Noise(
+        _per_joint(said.noise.position_std, robot, f"{path}: noise.position_std"),
+        _per_joint(said.noise.torque_std, robot, f"{path}: noise.torque_std"),
+    )
 
 
 def _per_joint(value: float | list[float], robot: Robot, where: str) -> np.ndarray:
