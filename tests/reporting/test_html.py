@@ -226,3 +226,21 @@ def test_an_unknown_noise_is_no_tick():
     for noise, mark in ((True, "\u2713"), (False, "?")):
         text = Elements(page(diagnosis(("slide",), noise=noise, samples=200))).text
         assert text.split("What the model of bench arm lacks")[1].strip().startswith(mark)
+
+
+def test_the_first_choice_is_printed_and_contacts_are_said_to_be_left_out(found, html):
+    assert "contacts are left out in every choice" not in html
+    first, *others = found.switches.choices
+    choices = (replace(first, error=0.4321), *others)
+    pushed = effect("contact", found.joints[0].name)
+    robot = found.after.model.robot
+    values = (1.0,) * len(pushed.parameters(robot))
+    shape = (1.0,) * len(pushed.shape_parameters(robot))
+    pushed = replace(pushed, shape=shape)
+    contact = replace(found.steps[0], effect=pushed, values=values)
+    with_contact = replace(
+        found, switches=replace(found.switches, choices=choices), steps=(contact, *found.steps[1:])
+    )
+    text = page(with_contact)
+    assert f'<output id="switched-error">{percent(0.4321)}</output>' in text
+    assert "contacts are left out in every choice" in text
