@@ -26,8 +26,8 @@ RUN = {
     "docs/howto/noisy_encoders.md": "",
 }
 """Pages that are run, first block to last, in a folder with the files of a problem."""
-NOT_HERE = ("design", "corrected", "bayes")
-"""Words of commands that other tests run: they take long, or a study that the page has not."""
+NOT_HERE = ("design", "open", "corrected", "bayes")
+"""Words of commands that other tests run: they take long, wait, or need a study of another kind."""
 
 
 def of_kind(*kinds: str) -> list[tuple[str, CodeBlock]]:
