@@ -66,12 +66,20 @@ def healthy() -> Dataset:
 
 
 @pytest.mark.slow
-def test_a_healthy_robot_is_accused_by_least_squares_and_not_by_simulated_instruments(
+def test_noise_halves_inertias_of_least_squares_and_not_those_of_simulated_instruments(
     healthy: Dataset,
 ) -> None:
-    assert diagnose(model(), healthy, most=1).steps
+    plain = diagnose(model(), healthy, most=1)
     found = diagnose(model(), healthy, controller=CONTROLLER)
-    assert found.verdict == "nothing_missing" and not found.steps
+    for answer in (plain, found):
+        assert answer.verdict == "nothing_missing" and not answer.steps
+    # What passes by its figures is seen to be noise behind lower filters.
+    assert (plain.candidates[0].p_value or 1.0) < 1e-6
+    assert "changes with the filter" in plain.candidates[0].remark
+    at = model().names.index("Izz.fore")
+    true = model().given_values()[at]
+    assert abs(plain.before.values[at] / true - 1.0) > 0.4
+    assert abs(found.before.values[at] / true - 1.0) < 0.05
     assert "simulated" in found.before.method
     assert any("simulated closed loop" in note for note in found.notes)
 

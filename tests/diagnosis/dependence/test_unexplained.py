@@ -66,7 +66,7 @@ def test_the_report_has_it_beside_the_verdict(found: Diagnosis) -> None:
     html = page(found)
     at = html.index("What is left, and what it depends on")
     assert found.residual_dependence[0].sentence in html
-    assert html.index("</header>") < at < html.index("What to do next")
+    assert html.index("</header>") < at < html.index('id="next"')
 
 
 def test_where_nothing_is_missing_nothing_is_asked() -> None:
