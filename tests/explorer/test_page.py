@@ -166,7 +166,7 @@ def test_the_demo_is_solved_by_clicking(demo, tab):
     assert "Explained: stribeck friction at elbow" in verdict
     first = one.page.locator(".effect").first.inner_text()
     assert first.startswith("Stribeck friction at elbow")
-    assert "spikes beside zero velocity" in one.page.locator("#seen").inner_text().lower()
+    one.page.locator("#seen", has_text="spikes beside zero velocity").wait_for()
     assert "Nothing is switched on yet" in one.said
     assert one.page.locator("#write").is_disabled()
     one.switch()

@@ -186,7 +186,7 @@ class _Callbacks:
         robot = opened.study.robot
         if not _is_place(joint, robot.n):
             raise PreventUpdate
-        if ctx.triggered_id == "joint":
+        if "joint" in ctx.triggered_prop_ids.values():  # beside others, where they come at once
             against = None
         names, against, words, figure = map_answer(found.maps, robot.names[joint], against)
         return names, against, [html.Span([one, html.Br()]) for one in words], figure
