@@ -31,8 +31,12 @@ def recordings(seeds) -> Dataset:
     for name in HIDDEN:
         full = full + name
     truth = true_values(full, Fv__shoulder=1.2, Fv__elbow=0.5, **VALUES)
-    noise = {"position_std": 2e-5, "torque_std": 0.1}
-    return Dataset(tuple(synthetic(full, truth, seed, rate_hz=250.0, **noise) for seed in seeds))
+    return Dataset(
+        tuple(
+            synthetic(full, truth, seed, rate_hz=250.0, position_std=2e-5, torque_std=0.1)
+            for seed in seeds
+        )
+    )
 
 
 @pytest.fixture(scope="module")
@@ -97,6 +101,7 @@ def test_torques_are_in_the_unit_of_the_drives(found, given):
     known = dict(zip(arm().names, gains, strict=True))
     drives = replace(fit_drive_gains(GainProblem(given, amperes, known)), unit="A")
     shown = in_recorded_units(found, drives).switches
+    assert shown is not None
     assert shown.measured * gains == pytest.approx(found.switches.measured)
     for before, after in zip(found.switches.choices, shown.choices, strict=True):
         assert after.predicted * gains == pytest.approx(before.predicted)

@@ -218,6 +218,7 @@ def test_switching_an_effect_on_lets_the_error_fall(visit, two_joints):
         percent(found.test_error.before),
         percent(found.test_error.after),
     ]
+    assert found.switches is not None
     assert seen[1][1] == pytest.approx(found.switches.choices[1].predicted[60, 1], rel=1e-4)
     assert float(seen[1][2].rstrip("%")) < float(seen[0][2].rstrip("%"))
     one.assert_quiet()
