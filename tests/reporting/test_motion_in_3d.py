@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import base64
+import gc
 import re
+import threading
 
 import numpy as np
 import pytest
@@ -90,3 +92,15 @@ def test_obstacles_are_drawn() -> None:
     )
     told = messages(motion_page(bar(f"<visual>{BOX}</visual>"), motion(), "", around).html)
     assert b"obstacles/1" in told and b"obstacles/2" in told and b"SphereGeometry" in told
+
+
+def test_nothing_of_the_viewer_is_left_for_another_thread_to_collect() -> None:
+    """Drake's viewer aborts the process where it ends in another thread than it began in."""
+    gc.disable()
+    try:
+        motion_page(bar(f"<visual>{BOX}</visual>"), motion(), "A caption.")
+        thread = threading.Thread(target=gc.collect)
+        thread.start()
+        thread.join()
+    finally:
+        gc.enable()

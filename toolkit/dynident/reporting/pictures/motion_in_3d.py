@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import html
 from dataclasses import dataclass
 from typing import Any
@@ -83,6 +84,16 @@ def motion_page(
     DesignError
         If Drake's viewer cannot be started.
     """
+    try:
+        with quiet():
+            text, shows = _recorded(robot, motion, obstacles)
+    except (RuntimeError, OSError) as error:
+        raise DesignError(f"Drake's viewer does not start: {str(error).splitlines()[0]}") from None
+    return MotionPage(_framed(text, robot.name, f"{caption} Links are drawn as {shows}."), shows)
+
+
+def _recorded(robot: Robot, motion: Fourier, obstacles: tuple[Obstacle, ...]) -> tuple[str, str]:
+    """Return the viewer's page with a period of a motion, and what the links are drawn as."""
     from pydrake.geometry import Meshcat, MeshcatAnimation, MeshcatParams, Rgba
     from pydrake.math import RigidTransform
 
@@ -90,29 +101,31 @@ def motion_page(
     rate = max(min(_RATE, int(_MOST_FRAMES / period)), 1)
     t = np.arange(max(round(rate * period), 1) + 1) / rate
     q = motion.at(t)[0]
+    viewer: Any = Meshcat(MeshcatParams(host="localhost", show_stats_plot=False))
     try:
-        with quiet():
-            viewer = Meshcat(MeshcatParams(host="localhost", show_stats_plot=False))
-            viewer.StartRecording(float(rate))
-            try:
-                shows = _with_shapes(viewer, robot, t, q)
-            except DynidentError:
-                viewer.Delete()
-                shows = ""
-            shows = shows or _with_ellipsoids(viewer, robot, t, q)
-            viewer.StopRecording()
-            for k, one in enumerate(obstacles):
-                centre: Any = one.centre
-                viewer.SetObject(f"obstacles/{k + 1}", one.shape(), Rgba(0.8, 0.2, 0.1, 0.5))
-                viewer.SetTransform(f"obstacles/{k + 1}", RigidTransform(centre))
-            recording = viewer.get_mutable_recording()
-            recording.set_loop_mode(MeshcatAnimation.LoopMode.kLoopRepeat)
-            viewer.PublishRecording()
-            _look_at(viewer, robot, q)
-            text = viewer.StaticHtml()
-    except (RuntimeError, OSError) as error:
-        raise DesignError(f"Drake's viewer does not start: {str(error).splitlines()[0]}") from None
-    return MotionPage(_framed(text, robot.name, f"{caption} Links are drawn as {shows}."), shows)
+        viewer.StartRecording(float(rate))
+        try:
+            shows = _with_shapes(viewer, robot, t, q)
+        except DynidentError:
+            viewer.Delete()
+            shows = ""
+        shows = shows or _with_ellipsoids(viewer, robot, t, q)
+        viewer.StopRecording()
+        for k, one in enumerate(obstacles):
+            centre: Any = one.centre
+            viewer.SetObject(f"obstacles/{k + 1}", one.shape(), Rgba(0.8, 0.2, 0.1, 0.5))
+            viewer.SetTransform(f"obstacles/{k + 1}", RigidTransform(centre))
+        recording = viewer.get_mutable_recording()
+        recording.set_loop_mode(MeshcatAnimation.LoopMode.kLoopRepeat)
+        viewer.PublishRecording()
+        _look_at(viewer, robot, q)
+        return viewer.StaticHtml(), shows
+    finally:
+        # The viewer aborts the process if it ends in another thread than it began in. Diagrams that
+        # hold it are in reference cycles, which any thread may collect: here they go before it.
+        recording = None
+        gc.collect()
+        viewer = None
 
 
 def _with_shapes(viewer: Any, robot: Robot, t: np.ndarray, q: np.ndarray) -> str:
