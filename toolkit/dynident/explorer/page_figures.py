@@ -22,7 +22,8 @@ from dynident.reporting.content import (
     x_title,
     y_title,
 )
-from dynident.reporting.pictures.look import FAINT, dressed, plain, single_precision
+from dynident.reporting.pictures.diagnosis_pictures import noise_band
+from dynident.reporting.pictures.look import dressed, plain, single_precision
 
 NOW = "with what is switched on"
 _POINTS = 3000
@@ -115,7 +116,7 @@ def measured_and_predicted(
     _line(figure, 1, t, measured[kept], name="measured", line={"color": GREY, "width": 3})
     if noise is not None:
         ends, edge = np.array([t[0], t[-1], t[-1], t[0]]), 2 * noise * np.array([1, 1, -1, -1])
-        figure.add_trace(_band(ends, edge, f"{BAND} (2 rms)"), row=2, col=1)
+        figure.add_trace(noise_band(ends, edge, f"{BAND} (2 rms)"), row=2, col=1)
     styles = ((GIVEN, before, BEFORE_COLOUR, "dash"), (NOW, now, AFTER_COLOUR, "solid"))
     for (name, run, colour, dash), left in zip(styles, lefts, strict=True):
         line = {"color": colour, "width": 1.8, "dash": dash}
@@ -154,7 +155,7 @@ def map_picture(one: ResidualMap) -> go.Figure:
         x, edge = one.at[known], one.band[known]
         lower = np.zeros_like(edge) if is_spectrum(one) else -edge
         outline = np.concatenate([x, x[::-1]]), np.concatenate([edge, lower[::-1]])
-        figure.add_trace(_band(*outline, BAND))
+        figure.add_trace(noise_band(*outline, BAND))
     mode = "lines" if is_spectrum(one) else "lines+markers"
     drawn = ((GIVEN, one.before, BEFORE_COLOUR), (NOW, one.after, AFTER_COLOUR))
     for name, values, colour in drawn:
@@ -181,16 +182,3 @@ def _floors(judged: HeldOut) -> np.ndarray | None:
 def _line(figure: go.Figure, row: int, t: np.ndarray, y: np.ndarray, **style) -> None:
     trace = go.Scatter(x=t, y=single_precision(y), mode="lines", **style)
     figure.add_trace(trace, row=row, col=1)
-
-
-def _band(x: np.ndarray, y: np.ndarray, name: str) -> go.Scatter:
-    return go.Scatter(
-        x=x,
-        y=y,
-        fill="toself",
-        fillcolor=FAINT,
-        mode="lines",
-        line={"width": 0},
-        hoverinfo="skip",
-        name=name,
-    )

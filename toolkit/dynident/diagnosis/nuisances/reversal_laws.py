@@ -16,10 +16,10 @@ from itertools import product
 import numpy as np
 from scipy.optimize import minimize
 
-from dynident.diagnosis.nuisances.friction_width import missed_instead
+from dynident.diagnosis.nuisances.friction_width import FrictionWidthColumn, missed_instead
 from dynident.diagnosis.search.ranking import joints_below_noise, rank
 from dynident.diagnosis.search.scoring import Score
-from dynident.effects import Block, JointEffect, Parameter, ShapeParameter
+from dynident.effects import Block, ShapeParameter
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.tables import number
@@ -38,7 +38,7 @@ _AT_ONCE = 5e-5
 """s, below which it reverses with the joint."""
 
 
-class SmoothReversal(JointEffect):
+class SmoothReversal(FrictionWidthColumn):
     """What dry friction has more that reverses over k times the width, at another moment."""
 
     name = "smooth_reversal"
@@ -46,10 +46,6 @@ class SmoothReversal(JointEffect):
     law = "Fc (tanh((v + lead a)/(k w)) - tanh(v/w))"
     sign_of = "opposite spikes on both sides of zero velocity"
     experiment = "reverse {joint} at several accelerations"
-
-    def parameters(self, robot):
-        unit = robot.torque_units[robot.names.index(str(self.joint))]
-        return (Parameter("Fc", unit, 0.0),)
 
     def shape_parameters(self, robot):
         return (

@@ -166,7 +166,7 @@ def law_picture(proposal: Proposal) -> go.Figure:
     figure = go.Figure()
     if np.isfinite(one.band).all():
         edge = np.concatenate([one.law + one.band, (one.law - one.band)[::-1]])
-        figure.add_trace(_band(np.concatenate([one.law, one.law[::-1]]), edge, BAND))
+        figure.add_trace(noise_band(np.concatenate([one.law, one.law[::-1]]), edge, BAND))
     line = {"color": AFTER_COLOUR, "width": 2}
     figure.add_trace(go.Scatter(x=x, y=x, mode="lines", line=line, name=plain("the law")))
     figure.add_trace(
@@ -213,7 +213,7 @@ def measured_and_predicted(diagnosis: Diagnosis, trace: Trace, points: int = 400
     if noise is not None:
         ends = np.array([t[0], t[-1], t[-1], t[0]])
         edge = 2 * noise * np.array([1, 1, -1, -1])
-        figure.add_trace(_band(ends, edge, f"{BAND} (2 rms)"), row=2, col=1)
+        figure.add_trace(noise_band(ends, edge, f"{BAND} (2 rms)"), row=2, col=1)
     for name, predicted, colour, dash in models:
         line = {"color": colour, "width": 1.8, "dash": dash}
         group = {"name": plain(name), "legendgroup": name}
@@ -242,7 +242,7 @@ def _map_traces(diagnosis: Diagnosis, one: ResidualMap) -> list[go.Scatter]:
         edge = np.asarray(one.band, dtype=float)[known]
         lower = np.zeros_like(edge) if is_spectrum(one) else -edge
         x = np.concatenate([at[known], at[known][::-1]])
-        traces.append(_band(x, np.concatenate([edge, lower[::-1]]), BAND))
+        traces.append(noise_band(x, np.concatenate([edge, lower[::-1]]), BAND))
     drawn = [(GIVEN, one.before, BEFORE_COLOUR, "circle-open")]
     if diagnosis.steps:
         drawn.append((after_name(diagnosis), one.after, AFTER_COLOUR, "diamond"))
@@ -265,7 +265,18 @@ def _map_zero(one: ResidualMap) -> dict:
     return {"rangemode": "tozero"} if is_spectrum(one) else {"zeroline": True}
 
 
-def _band(x: np.ndarray, y: np.ndarray, name: str) -> go.Scatter:
+def noise_band(x: np.ndarray, y: np.ndarray, name: str) -> go.Scatter:
+    """Return the band in which noise alone would lie, as a filled outline.
+
+    Parameters
+    ----------
+    x, y : (k,) of the outline.
+    name : in the legend.
+
+    Returns
+    -------
+    A trace without a line.
+    """
     return go.Scatter(
         x=x,
         y=y,
