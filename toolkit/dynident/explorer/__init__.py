@@ -35,7 +35,7 @@ def require_app() -> None:
     DynidentError
         If they are not installed.
     """
-    if importlib.util.find_spec("dash") is None:
+    if not all(map(importlib.util.find_spec, ("dash", "dash_bootstrap_components"))):
         raise DynidentError("the page needs Dash", remedy="pip install 'dynident[app]'")
 
 

@@ -57,6 +57,8 @@ def page(server: Flask, token: str, versions: StudyVersions) -> Dash:
             return html.Main(html.P(f"The study cannot be read: {error}", role="alert"))
         return whole_page(opened, TabState.of(opened.digest))
 
+    # Screen readers choose their voice by the language, which Dash does not say.
+    app.index_string = app.index_string.replace("<html>", '<html lang="en">')
     app.layout = layout
     app.validation_layout = layout()
     _Callbacks(app, versions).register()
@@ -135,7 +137,6 @@ class _Callbacks:
             Input("write", "n_clicks"),
             tab,
             prevent_initial_call=True,
-            running=[(Output("write", "disabled"), True, False)],
         )(self.written)
 
     def searched(self, ticks: int | None, tab: object) -> tuple[Any, ...]:
@@ -169,16 +170,17 @@ class _Callbacks:
         return error_bars(found.before, found.now), found.sentence, words, not many
 
     def drawn(
-        self, tab: object, joint: int, recording: int, _: object, zoom: object
+        self, tab: object, joint: int, recording: str, _: object, zoom: object
     ) -> tuple[Any, str, Any]:
         """A recording at a joint; after a switch it is still zoomed."""
         opened, found = self._contrast(tab)
         named, robot = recordings_of(opened), opened.study.robot
-        if not (_is_place(joint, robot.n) and _is_place(recording, len(named))):
+        if not (_is_place(joint, robot.n) and recording in map(str, range(len(named)))):
             raise PreventUpdate
+        place = int(recording)
         zoom = zoom if ctx.triggered_id == "tab" else None
-        figure = zoomed(found.torque(recording, joint), zoom)
-        return figure, f"{robot.names[joint]}, {named[recording]}", zoom
+        figure = zoomed(found.torque(place, joint), zoom)
+        return figure, f"{robot.names[joint]}, {named[place]}", zoom
 
     def mapped(self, tab: object, joint: int, against: str | None, _: object) -> tuple[Any, ...]:
         """A residual map of a joint; of another joint the one that shows most."""

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
+import dash_bootstrap_components as dbc
 from dash import dcc, html
 
 from dynident.explorer.effect_choices import EffectChoice, Group
@@ -18,7 +19,13 @@ SWITCH = "switch"
 EVERY = 700
 """ms between questions how far the diagnosis is."""
 
-_STILL: Any = {"displaylogo": False, "responsive": True, "displayModeBar": False}
+# What is recorded stays here: no button that uploads a picture.
+_STILL: Any = {
+    "displaylogo": False,
+    "responsive": True,
+    "displayModeBar": False,
+    "showSendToCloud": False,
+}
 _ZOOMED: Any = {
     **_STILL,
     "displayModeBar": True,
@@ -136,7 +143,7 @@ def _choice(name: str, title: str, options: list[tuple[str, Any]]) -> html.Field
     return html.Fieldset(
         [
             html.Legend(title or name, className="" if title else "unseen"),
-            dcc.RadioItems(
+            dbc.RadioItems(
                 id=name,
                 options=[{"label": label, "value": value} for label, value in options],
                 value=options[0][1] if options else None,
@@ -152,12 +159,10 @@ def _recordings(opened: OpenedStudy) -> html.Div:
     return html.Div(
         [
             html.Label("Recording", htmlFor="recording"),
-            dcc.Dropdown(
+            dbc.Select(
                 id="recording",
-                options=[{"label": words, "value": i} for i, words in enumerate(named)],
-                value=0,
-                clearable=False,
-                searchable=False,
+                options=[{"label": words, "value": str(i)} for i, words in enumerate(named)],
+                value="0",
             ),
         ],
         className="recording",
@@ -209,7 +214,7 @@ def _switch(place: int, one: EffectChoice, state: TabState) -> html.Div:
     meaning = type(one.effect).meaning
     return html.Div(
         [
-            dcc.Checklist(
+            dbc.Checklist(
                 id={"type": SWITCH, "place": place},
                 options=[option],
                 value=[one.label] if one.label in state.on else [],
