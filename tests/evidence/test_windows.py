@@ -60,7 +60,9 @@ def test_windows_have_the_columns_that_each_has_alone() -> None:
             found = together.of(effect, run, model, values)[0]
             assert np.allclose(found, expected, rtol=1e-12, atol=1e-12), effect.label
             assert np.any(found) or effect.name == "contact"
-            assert np.allclose(together.rigid(run)[0], alone.rigid(0)[0], rtol=1e-12, atol=1e-12)
+            assert np.allclose(
+                together.rigid(run)[0].dense(), alone.rigid(0)[0].dense(), rtol=1e-12, atol=1e-12
+            )
     contact = _effects(model)[6]
     here = [bool(np.any(together.of(contact, run, model, values)[0])) for run in range(3)]
     assert here == [False, True, False]

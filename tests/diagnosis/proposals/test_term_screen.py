@@ -46,7 +46,7 @@ def test_the_drop_is_that_of_least_squares_with_the_columns(made) -> None:
         for r, run in enumerate(search.evidence.runs):
             columns = [np.stack(of_q_and_v[term](one.q, one.v), axis=1) for one in run.replicates]
             for joint in range(2):
-                rows = fitted.white[r][joint].reshape(-1, len(fitted.values) + 1)
+                rows = fitted.white[r][joint].dense().reshape(-1, len(fitted.values) + 1)
                 x, y = [*x, rows[:, :-1]], [*y, rows[:, -1]]
                 white = run.whitened(columns, joint, fitted.noise[joint])
                 c.append((joint == ELBOW) * white.reshape(len(rows), -1))

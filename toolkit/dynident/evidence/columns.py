@@ -14,6 +14,7 @@ import numpy as np
 from dynident.criteria import DEFAULTS, Criteria
 from dynident.effects import Block, Effect, Needs
 from dynident.evidence.column_cache import ColumnCache, FirstLook, Kept
+from dynident.evidence.joint_columns import RigidColumns
 from dynident.evidence.runs import Run, Signals
 from dynident.evidence.windows import Source, sources
 from dynident.fitting.sampling import Sampled
@@ -61,8 +62,8 @@ class Evidence:
 
     # --- columns --------------------------------------------------------------------------------
 
-    def rigid(self, run: int) -> Signals:
-        """Columns of the base parameters, (T, n, b) for each replicate."""
+    def rigid(self, run: int) -> list[RigidColumns]:
+        """Columns of the base parameters for each replicate."""
         return [self._rigid(sampled, self.model) for sampled in self.runs[run].replicates]
 
     def of(self, effect: Effect, run: int, model: Model, values: np.ndarray | None) -> Signals:
@@ -211,12 +212,12 @@ class Evidence:
         block = replace(block, carries_payload=True)
         return effect.acting_columns(self.model.ready(effect, block, None))
 
-    def _rigid(self, sampled: Sampled, model: Model) -> np.ndarray:
+    def _rigid(self, sampled: Sampled, model: Model) -> RigidColumns:
         source = self._source(sampled)
         known = self._known(source)
         if self.model.robot not in known:
             self._pass_through(source, model, self._evaluated_at_once(source.sampled))
-        return known[self.model.robot][source.rows]
+        return known[self.model.robot].among(source.rows)
 
     def _evaluated_at_once(self, sampled: Sampled) -> dict[Effect, None]:
         """Effects that need nothing but samples, as far as they are asked for along a motion."""
@@ -248,7 +249,7 @@ class Evidence:
 
         found = source.sampled.decimate(model, evaluate)
         if len(found) > len(wanted):
-            known[self.model.robot] = found.pop(0)
+            known[self.model.robot] = RigidColumns.of(self.model.robot, base, found.pop(0))
         known.update(zip([_plain_key(effect, model) for effect in wanted], found, strict=True))
 
     def _together(
@@ -373,7 +374,8 @@ class Evidence:
         """Decimated rows of the torque that the model predicts, but for effects that scale it."""
         kept, key = self._at(model, values), ("torque", self._recorded(sampled))
         if key not in kept:
-            torque = self._rigid(sampled, model) @ values[: len(self.model.base.independent)]
+            rigid = self._rigid(sampled, model)
+            torque = rigid.times(values[: rigid.size])
             for effect in model.effects:
                 if effect.needs_torque or (effect.is_payload and not sampled.recording.payload):
                     continue

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from operator import add
@@ -10,15 +11,19 @@ import numpy as np
 
 from dynident.criteria import Criteria
 from dynident.evidence.columns import Evidence
+from dynident.evidence.joint_columns import JointColumns, WhiteColumns
 from dynident.evidence.joint_residual import JointResidual
 from dynident.evidence.noise_model import NoiseModel, flat_noise
-from dynident.evidence.runs import Signals
+from dynident.evidence.runs import Run, Signals
 from dynident.evidence.time_varying import time_varying_columns, time_varying_mask
 from dynident.fitting.fixed_point import FixedPoint
 from dynident.model import Model
 from dynident.moments.replicates import time_varying_products
 from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import MomentSolution, regress
+
+White = tuple[tuple[WhiteColumns, ...], ...]
+"""Whitened columns of each run, of each joint."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +39,7 @@ class EvidenceFit:
     solution : of the regression behind the values.
     noise : per joint.
     noise_known : whether `noise` was measured or given; otherwise it is the residual.
-    white : per run and joint, whitened columns and torque, (P, S, p + 1).
+    white : per run and joint, whitened columns and torque.
     moments : (B, p + 1, p + 1) of columns and torque, over all joints.
     error_signal : squared systematic residual, whitened: what no noise explains, in this metric.
     squares : (n,) mean systematic square of the residual, (N m)^2 or N^2.
@@ -48,7 +53,7 @@ class EvidenceFit:
     solution: MomentSolution
     noise: tuple[NoiseModel, ...]
     noise_known: bool
-    white: tuple[tuple[np.ndarray, ...], ...]
+    white: White
     moments: SecondMoments
     error_signal: float
     squares: np.ndarray
@@ -120,15 +125,15 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
     noise = tuple(flat_noise(std or 1.0) for std in torque_std) if near is None else near.noise
     known = any(run.kind != "single" for run in evidence.runs)
     reliable = evidence.criteria.noise.reliable
-    columns, values, fixed_point = [], at, FixedPoint()
+    columns, values, fixed_point, white = [], at, FixedPoint(), None
     for round in range(criteria.value_rounds if model.needs_values else criteria.noise_rounds):
         if not columns or model.needs_values:
-            model = model.at(at)
+            model, white = model.at(at), None
             columns = [
-                [model_columns(evidence, model, r, j, at) for j in range(n)]
+                [joint_columns(evidence, model, r, j, at) for j in range(n)]
                 for r in range(len(evidence.runs))
             ]
-        white = _whiten(evidence, columns, noise, values)
+        white = _whiten(evidence, columns, noise, values, white)
         values = regress(_moments(evidence, model, noise, white).pooled(), reliable).values
         if round == 0 and near is None:
             # Along a robot without bodies their columns are rounding errors, and any value fits.
@@ -139,7 +144,7 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
         if round >= criteria.noise_rounds - (near is not None) and small:
             break
         at = _held(model, fixed_point.following(model, at, values))
-    white = _whiten(evidence, columns, noise, values)
+    white = _whiten(evidence, columns, noise, values, white)
     summed = _moments(evidence, model, noise, white)
     solution = regress(summed.pooled(), reliable)
     values = solution.values
@@ -175,7 +180,7 @@ def in_metric_of(evidence: Evidence, fitted: EvidenceFit, wider: EvidenceFit) ->
     """
     model, reliable = fitted.model, evidence.criteria.noise.reliable
     columns = [
-        [model_columns(evidence, model, r, j, fitted.values) for j in range(model.robot.n)]
+        [joint_columns(evidence, model, r, j, fitted.values) for j in range(model.robot.n)]
         for r in range(len(evidence.runs))
     ]
     white = _whiten(evidence, columns, wider.noise, fitted.values)
@@ -243,20 +248,39 @@ def model_columns(
     -------
     (T, p + 1) for each replicate of the run.
     """
+    return [one.dense() for one in joint_columns(evidence, model, run, joint, values)]
+
+
+def joint_columns(
+    evidence: Evidence, model: Model, run: int, joint: int, values: np.ndarray | None
+) -> list[JointColumns]:
+    """As `model_columns`, without columns that are zero throughout.
+
+    Parameters
+    ----------
+    evidence, run, model, joint, values : as for `model_columns`.
+
+    Returns
+    -------
+    One for each replicate of the run.
+    """
     replicates, size = evidence.runs[run].replicates, model.size
     payload = float(bool(evidence.runs[run].recording.payload))
-    found = [np.zeros((len(one.tau), size + 1)) for one in replicates]
-    for one, rigid, replicate in zip(found, evidence.rigid(run), replicates, strict=True):
-        one[:, : rigid.shape[2]] = rigid[:, joint]
-        one[:, size] = replicate.tau[:, joint]
+    rigid = evidence.rigid(run)
+    places, parts = [rigid[0].places[joint]], [[one.rows[joint].T] for one in rigid]
     for effect in model.effects:
         joints = effect.acting_at(model.robot)
-        if joint not in joints:
+        if joint not in joints or (effect.is_payload and not payload):
             continue
         own, at = model.slices[effect.label], joints.index(joint)
-        for one, columns in zip(found, evidence.of(effect, run, model, values), strict=True):
-            one[:, own] = columns[:, at] * payload if effect.is_payload else columns[:, at]
-    return found
+        places.append(np.arange(own.start, own.stop))
+        for some, columns in zip(parts, evidence.of(effect, run, model, values), strict=True):
+            some.append(columns[:, at])
+    everywhere = np.append(np.concatenate(places), size)
+    return [
+        JointColumns(size + 1, everywhere, (*some, one.tau[:, [joint]]))
+        for some, one in zip(parts, replicates, strict=True)
+    ]
 
 
 def residuals(evidence: Evidence, model: Model, values: np.ndarray) -> list[np.ndarray]:
@@ -275,27 +299,57 @@ def residuals(evidence: Evidence, model: Model, values: np.ndarray) -> list[np.n
     found = []
     for r, run in enumerate(evidence.runs):
         joints = [
-            run.fold([c @ combination for c in model_columns(evidence, model, r, j, values)])
+            run.fold([c.times(combination) for c in joint_columns(evidence, model, r, j, values)])
             for j in range(model.robot.n)
         ]
         found.append(np.stack(joints, axis=-1))
     return found
 
 
-def _whiten(evidence: Evidence, columns, noise, values) -> tuple[tuple[np.ndarray, ...], ...]:
-    return tuple(
-        tuple(run.whitened(run.moved(c, values), j, noise[j]) for j, c in enumerate(joints))
-        for run, joints in zip(evidence.runs, columns, strict=True)
-    )
+def _whiten(evidence: Evidence, columns, noise, values, before: White | None = None) -> White:
+    """Whiten the columns; those that were whitened by another noise of no colour are known."""
+    found = []
+    for r, (run, joints) in enumerate(zip(evidence.runs, columns, strict=True)):
+        here = []
+        for j, signals in enumerate(joints):
+            known = None
+            if before is not None and run.columns_from == "recording":
+                known = before[r][j].again(noise[j])
+            here.append(known or WhiteColumns.of(run, j, noise[j], _moved(run, signals, values)))
+        found.append(tuple(here))
+    return tuple(found)
 
 
-def _moments(evidence: Evidence, model: Model, noise, white) -> SecondMoments:
+def _moved(run: Run, signals: Sequence[JointColumns], values: np.ndarray) -> Sequence[JointColumns]:
+    """Move the torque from the measured to the simulated motion, where there is one.
+
+    Instrumental variables V' (y - W x) = 0, with columns W along the measured motion and V along
+    the simulated one, are not symmetric. They are the least squares of y - (W - V) x on V, taken at
+    the x that they find. So the simulated replicate's torque becomes that at the latest x, and
+    everything that follows is plain regression on columns without noise. What another column would
+    bring is then its instrumental moment with the residual y - W x: zero in the mean if nothing is
+    missing, wherever the simulated motion may lie.
+
+    Parameters
+    ----------
+    run : the recording.
+    signals : columns of the model and the torque at a joint, for each replicate.
+    values : (p,) the latest parameters.
+    """
+    if run.columns_from == "recording":
+        return signals
+    measured, simulated = signals[0], signals[-1]
+    torque = measured.times(np.append(-values, 1.0)) + simulated.times(np.append(values, 0.0))
+    return [*signals[:-1], simulated.with_torque(torque)]
+
+
+def _moments(evidence: Evidence, model: Model, noise, white: White) -> SecondMoments:
     found, time_varying = [], time_varying_mask(model)
     for r, (run, joints) in enumerate(zip(evidence.runs, white, strict=True)):
-        here = reduce(add, (run.moments(w, w) for w in joints))
+        here = reduce(add, (w.moments for w in joints))
         if run.kind == "repeated" and time_varying.any():
             own = [
-                time_varying_columns(evidence, model, r, j, noise[j], w)
+                time_varying_columns(evidence, model, r, j, noise[j], w.dense())
                 for j, w in enumerate(joints)
             ]
             other = np.sum([time_varying_products(one, one, run.edges) for one in own], axis=0)
@@ -304,11 +358,11 @@ def _moments(evidence: Evidence, model: Model, noise, white) -> SecondMoments:
     return SecondMoments.stacked(found)
 
 
-def _signal(evidence: Evidence, white, values: np.ndarray) -> float:
+def _signal(evidence: Evidence, white: White, values: np.ndarray) -> float:
     """Squared whitened residual, of what the replicates have in common."""
-    combination = np.append(-values, 1.0)[:, None]
-    return sum(
-        float(run.moments(w @ combination, w @ combination).signal.sum())
-        for run, joints in zip(evidence.runs, white, strict=True)
-        for w in joints
-    )
+    combination, found = np.append(-values, 1.0), 0.0
+    for run, joints in zip(evidence.runs, white, strict=True):
+        for one in joints:
+            left = one.times(combination)
+            found += float(run.moments(left, left).signal.sum())
+    return found

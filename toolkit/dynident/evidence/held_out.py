@@ -9,7 +9,8 @@ from scipy import special
 
 from dynident.criteria import NoiseCriteria
 from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import EvidenceFit, model_columns
+from dynident.evidence.evidence_fit import EvidenceFit, joint_columns
+from dynident.evidence.joint_columns import JointColumns
 from dynident.evidence.noise_model import differences, inflation, systematic_square
 from dynident.fitting.estimate import Estimate
 from dynident.moments.replicates import Kind
@@ -103,8 +104,9 @@ def on_recordings(evidence: Evidence, fitted: EvidenceFit | Estimate) -> HeldOut
     runs, folded, doubt = [], [], []
     for r, run in enumerate(evidence.runs):
         first = run.replicates[0]
-        joints = [model_columns(evidence, fitted.model, r, j, fitted.values) for j in range(n)]
-        residual = np.stack([c[0] @ combination for c in joints], axis=-1)
+        joints = [joint_columns(evidence, fitted.model, r, j, fitted.values) for j in range(n)]
+        left = [[one.times(combination) for one in each] for each in joints]
+        residual = np.stack([one[0] for one in left], axis=-1)
         kept, predicted = run.kept, first.tau - residual
         runs.append(
             HeldOutRun(
@@ -118,7 +120,7 @@ def on_recordings(evidence: Evidence, fitted: EvidenceFit | Estimate) -> HeldOut
                 predicted=predicted[kept],
             )
         )
-        folded.append(np.stack([run.fold([v @ combination for v in c]) for c in joints], axis=-1))
+        folded.append(np.stack([run.fold(one) for one in left], axis=-1))
         doubt.append(np.array([_doubt(c[0], fitted) for c in joints]))
     return _judged(evidence, tuple(runs), folded, doubt)
 
@@ -128,12 +130,13 @@ def on_blocks(evidence: Evidence, fitted: EvidenceFit) -> HeldOut:
     n = fitted.model.robot.n
     runs, folded, doubt, block = [], [], [], 0
     for r, run in enumerate(evidence.runs):
-        joints = [model_columns(evidence, fitted.model, r, j, fitted.values) for j in range(n)]
-        columns = np.stack([run.fold(c) for c in joints], axis=2)  # (P, S, n, p + 1)
-        residual = np.empty(columns.shape[:3])
+        joints = [joint_columns(evidence, fitted.model, r, j, fitted.values) for j in range(n)]
+        columns = [run.fold([one.used for one in each]) for each in joints]
+        residual = np.empty((*columns[0].shape[:2], n))
         for start, stop in zip(run.edges[:-1], run.edges[1:], strict=True):
-            values = fitted.without_each_block[block]
-            residual[:, start:stop] = columns[:, start:stop] @ np.append(-values, 1.0)
+            combination = np.append(-fitted.without_each_block[block], 1.0)
+            for j, used in enumerate(columns):
+                residual[:, start:stop, j] = used[:, start:stop] @ combination[joints[j][0].places]
             block += 1
         measured = 1 if run.kind == "noise_augmented" else len(residual)
         rows = run.index[:measured].ravel()
@@ -194,10 +197,11 @@ def with_noise_of(judged: HeldOut, noise: HeldOut, criteria: NoiseCriteria) -> H
     )
 
 
-def _doubt(columns: np.ndarray, fitted: EvidenceFit | Estimate) -> float:
+def _doubt(columns: JointColumns, fitted: EvidenceFit | Estimate) -> float:
     """Mean square of the torque that the covariance of the parameters makes uncertain."""
-    used = columns[:, :-1]
-    return float(np.mean(np.sum((used @ fitted.covariance) * used, axis=1)))
+    used, places = columns.used[:, :-1], columns.places[:-1]
+    doubt = fitted.covariance[np.ix_(places, places)]
+    return float(np.mean(np.sum((used @ doubt) * used, axis=1)))
 
 
 def _variance(residual: np.ndarray, kind: Kind, criteria: NoiseCriteria) -> float:

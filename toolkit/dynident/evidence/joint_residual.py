@@ -9,6 +9,7 @@ import numpy as np
 
 from dynident.criteria import Criteria
 from dynident.evidence.columns import Evidence
+from dynident.evidence.joint_columns import JointColumns
 from dynident.evidence.noise_model import (
     NoiseModel,
     differences,
@@ -16,7 +17,6 @@ from dynident.evidence.noise_model import (
     measure_noise,
     systematic_square,
 )
-from dynident.evidence.runs import Signals
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +40,7 @@ class JointResidual:
     def of(
         cls,
         evidence: Evidence,
-        columns: Sequence[Sequence[Signals]],
+        columns: Sequence[Sequence[Sequence[JointColumns]]],
         values: np.ndarray,
         joint: int,
     ) -> JointResidual:
@@ -49,7 +49,7 @@ class JointResidual:
         Parameters
         ----------
         evidence : the recordings.
-        columns : of the model and the torque, (T, p + 1) for each run, joint and replicate.
+        columns : of the model and the torque, for each run, joint and replicate.
         values : (p,) of the fit.
         joint : column of the joint.
 
@@ -63,7 +63,7 @@ class JointResidual:
             certain = run.certain(joint)
             if not certain.any():
                 continue
-            residual = run.fold([c @ combination for c in joints[joint]])[:, certain]
+            residual = run.fold([c.times(combination) for c in joints[joint]])[:, certain]
             if run.kind == "single":
                 left.plain.append(residual[0])
                 continue

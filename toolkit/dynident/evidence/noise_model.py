@@ -6,13 +6,18 @@ lacks cancels; never on the residual itself, which would explain the missing eff
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from scipy.linalg import solve_toeplitz
 
 from dynident.criteria import NoiseCriteria
 from dynident.moments.replicates import Kind
+
+_AT_ONCE = 2**15
+"""Samples of several signals that are whitened together."""
 
 
 def differences(residual: np.ndarray, kind: Kind) -> np.ndarray:
@@ -61,6 +66,15 @@ class NoiseModel:
     scales: np.ndarray
     colour: np.ndarray
 
+    @property
+    def is_flat(self) -> bool:
+        """Whether it is white noise of one size: to whiten is then to divide by that."""
+        return len(self.colour) == 1 and len(self.scales) == 1
+
+    def weights(self, speed: np.ndarray) -> np.ndarray:
+        """One over the local standard deviation, (T,), at a joint's velocity (T,)."""
+        return 1.0 / (np.interp(np.abs(speed), self.speeds, self.scales) * self.std)
+
     def whiten(self, signals: np.ndarray, speed: np.ndarray) -> np.ndarray:
         """Give the noise in signals (T, k) of one recording unit variance and no colour.
 
@@ -71,12 +85,39 @@ class NoiseModel:
         speed : (T,)
             Velocity of the joint, rad/s or m/s.
         """
-        local = np.interp(np.abs(speed), self.speeds, self.scales) * self.std
-        scaled = signals / local[:, None]
-        # Few coefficients and many short columns: quicker than a general filter.
-        white, part = self.colour[0] * scaled, np.empty_like(scaled)
-        for lag, coefficient in enumerate(self.colour[1:], start=1):
-            white[lag:] += np.multiply(scaled[:-lag], coefficient, out=part[lag:])
+        return self.whitened([signals], self.weights(speed)).T
+
+    def whitened(self, parts: Sequence[np.ndarray], weights: np.ndarray) -> np.ndarray:
+        """Whiten signals in several parts.
+
+        Parameters
+        ----------
+        parts : (T, k) each, in the order of time.
+        weights : (T,) by which they are multiplied first, see `weights`.
+
+        Returns
+        -------
+        (k of all, T), the samples of a signal side by side.
+        """
+        order, samples = len(self.colour) - 1, len(weights)
+        if order == 0:
+            weights = weights * self.colour[0]
+        # Zeros before each signal: one correlation of many in a row mixes none with the next.
+        scaled = np.empty((sum(part.shape[1] for part in parts), order + samples))
+        scaled[:, :order] = 0.0
+        first = 0
+        for part in parts:
+            last = first + part.shape[1]
+            np.multiply(part.T, weights, out=scaled[first:last, order:])
+            first = last
+        if order == 0:
+            return scaled
+        white, some = np.empty((len(scaled), samples)), max(1, _AT_ONCE // samples)
+        for first in range(0, len(scaled), some):
+            rows = scaled[first : first + some]
+            found = np.correlate(rows.ravel(), self.colour[::-1], "valid")
+            apart = (rows.strides[0], found.itemsize)
+            white[first : first + some] = as_strided(found, (len(rows), samples), apart)
         return white
 
 

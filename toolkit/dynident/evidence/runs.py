@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -69,20 +70,41 @@ class Run:
 
     def certain(self, joint: int) -> np.ndarray:
         """Instants (S,) at which a joint's dry friction is known in every repetition, a mask."""
+        return self._certain[:, joint]
+
+    @cached_property
+    def _certain(self) -> np.ndarray:
+        """The same of every joint, (S, n)."""
         if self.uncertain is None:
-            return np.ones(self.index.shape[1], dtype=bool)
-        return np.asarray(~self.uncertain[:, joint][self.index].any(axis=0))
+            return np.ones((self.index.shape[1], self.replicates[0].tau.shape[1]), dtype=bool)
+        return np.asarray(~self.uncertain[self.index].any(axis=0))
 
-    def known(self, signals: np.ndarray, joint: int) -> np.ndarray:
-        """Signals (T, k) of a joint, zero in rows whose dry friction nothing tells.
+    def told(self, joint: int) -> np.ndarray | None:
+        """Rows (T,) whose dry friction is known at a joint, a mask; None for all of them.
 
-        Whitening looks back: they would be seen in the rows after them. Alike in all repetitions.
+        Whitening looks back: rows that are not would be seen in those after them. Alike in all
+        repetitions.
         """
         if self.uncertain is None:
-            return signals
+            return None
         told = ~self.uncertain[:, joint]
         told[self.index[:, ~self.certain(joint)]] = False
-        return signals * told[:, None]
+        return told
+
+    def known(self, signals: np.ndarray, joint: int) -> np.ndarray:
+        """Signals (T, k) of a joint, zero in rows whose dry friction nothing tells."""
+        told = self.told(joint)
+        return signals if told is None else signals * told[:, None]
+
+    @cached_property
+    def _repetitions(self) -> tuple[np.ndarray | slice, ...]:
+        """The rows of `index`, as slices where nothing is left out of them."""
+        return tuple(
+            slice(int(rows[0]), int(rows[-1]) + 1)
+            if len(rows) and np.all(np.diff(rows) == 1)
+            else rows
+            for rows in self.index
+        )
 
     @property
     def kept(self) -> np.ndarray:
@@ -115,27 +137,6 @@ class Run:
             return signals[0][self.index]
         return np.stack([one[rows] for one, rows in zip(signals, self.index, strict=False)])
 
-    def moved(self, signals: Sequence[np.ndarray], values: np.ndarray) -> list[np.ndarray]:
-        """Move the torque from the measured to the simulated motion, where there is one.
-
-        Instrumental variables V' (y - W x) = 0, with columns W along the measured motion and V
-        along the simulated one, are not symmetric. They are the least squares of y - (W - V) x on
-        V, taken at the x that they find. So the simulated replicate's torque becomes that at the
-        latest x, and everything that follows is plain regression on columns without noise. What
-        another column would bring is then its instrumental moment with the residual y - W x: zero
-        in the mean if nothing is missing, wherever the simulated motion may lie.
-
-        Parameters
-        ----------
-        signals : columns of the model and the torque at a joint, (T, p + 1) for each replicate.
-        values : (p,) the latest parameters.
-        """
-        if self.columns_from == "recording":
-            return list(signals)
-        measured, simulated = signals[0], np.array(signals[-1])
-        simulated[:, -1] = measured @ np.append(-values, 1.0) + simulated[:, :-1] @ values
-        return [*signals[:-1], simulated]
-
     def whitened(self, signals: Sequence[np.ndarray], joint: int, noise: NoiseModel) -> np.ndarray:
         """Whiten columns of a joint, and fold them.
 
@@ -151,13 +152,43 @@ class Run:
         (P, S, k), zero where the joint's dry friction is not known; of a simulated motion P = 1:
         there is one replicate, without noise.
         """
-        if self.columns_from == "simulation":
-            speed = self.replicates[-1].v[:, joint]
-            found = noise.whiten(self.known(signals[-1], joint), speed)[self.index[:1]]
-        else:
-            speed = self.replicates[0].v[:, joint]
-            found = self.fold([noise.whiten(self.known(one, joint), speed) for one in signals])
-        return found if self.uncertain is None else found * self.certain(joint)[:, None]
+        return self.whitened_parts([[one] for one in signals], joint, noise)
+
+    def whitened_parts(
+        self, signals: Sequence[Sequence[np.ndarray]], joint: int, noise: NoiseModel
+    ) -> np.ndarray:
+        """As `whitened`, of columns in several parts.
+
+        Parameters
+        ----------
+        signals : for each replicate, parts (T, k_i) of the columns of one joint.
+        joint, noise : as for `whitened`.
+
+        Returns
+        -------
+        (P, S, k of all).
+        """
+        simulated = self.columns_from == "simulation"
+        speed = self.replicates[-1 if simulated else 0].v[:, joint]
+        weights, told = noise.weights(speed), self.told(joint)
+        if told is not None:
+            weights = weights * told
+        repetitions = self._repetitions[:1] if simulated else self._repetitions
+        if simulated:
+            signals = signals[-1:]
+        elif self.kind == "repeated":
+            signals = signals[:1]
+        each = [
+            noise.whitened(parts, weights) for parts, _ in zip(signals, repetitions, strict=False)
+        ]
+        if len(each) < len(repetitions):
+            each = each * len(repetitions)
+        found = np.empty((len(repetitions), len(each[0]), self.index.shape[1]))
+        for one, white, rows in zip(found, each, repetitions, strict=True):
+            one[:] = white[:, rows]
+        if self.uncertain is not None:
+            found *= self.certain(joint)
+        return found.transpose(0, 2, 1)
 
     def moments(self, left: np.ndarray, right: np.ndarray) -> SecondMoments:
         """Second moments of whitened columns, (P, S, a) and (P, S, b)."""

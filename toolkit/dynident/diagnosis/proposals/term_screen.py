@@ -89,7 +89,7 @@ def _screened(
             np.concatenate([one.columns(term) for term in terms], axis=1) for one in replicates
         ]
         white = run.whitened(signals, joint, fitted.noise[joint])
-        with_model.append(run.moments(fitted.white[r][joint], white))
+        with_model.append(fitted.white[r][joint].moments_with(white))
         with_self.append(run.moments(white, white))
     beside = SecondMoments.stacked(with_model).pooled().signal
     own = SecondMoments.stacked(with_self).pooled().signal

@@ -104,18 +104,19 @@ def candidate_moments(
     columns = (columns_of or evidence.columns)(variants, fitted.model, fitted.values)
     for r, (run, each) in enumerate(zip(evidence.runs, columns, strict=True)):
         width = each[0][0].shape[2]
-        signals = [np.concatenate(shapes, axis=2) for shapes in zip(*each, strict=True)]
         one, two = [], []
         for position, joint in enumerate(joints):
-            white = run.whitened([s[:, position] for s in signals], joint, fitted.noise[joint])
+            parts = [[s[:, position] for s in shapes] for shapes in zip(*each, strict=True)]
+            white = run.whitened_parts(parts, joint, fitted.noise[joint])
             known = fitted.white[r][joint]
-            one.append(run.moments(known, white))
+            one.append(known.moments_with(white))
             two.append(run.moments(white, white))
             if run.kind == "repeated" and mixed:
                 measured = [shape[0][:, position] for shape in each]
                 noise = fitted.noise[joint]
                 new = time_varying_variants(evidence, variants, r, joint, noise, (measured, white))
-                old = time_varying_columns(evidence, fitted.model, r, joint, noise, known)
+                dense = known.dense()
+                old = time_varying_columns(evidence, fitted.model, r, joint, noise, dense)
                 chosen = time_varying[:, None] | np.full(white.shape[2], variants[0].time_varying)
                 one[-1] = one[-1].where(chosen, time_varying_products(old, new, run.edges))
                 if variants[0].time_varying:
