@@ -9,6 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import dynident as di
+from dynident.experiment_design.written_design import read_design
 from loop_studies import write_loop_study
 
 
@@ -23,6 +25,12 @@ def test_the_design_is_written_and_can_be_simulated(run, tmp_path) -> None:
         *(f"{what}.{joint}" for joint in ("shoulder", "elbow") for what in ("q_ref", "v_ref")),
     ]
     assert table.t.iloc[-1] == 8.0
+    told = read_design(tmp_path / "next", ("shoulder", "elbow"))
+    assert told.sentence == json.loads(done.out)["sentence"]
+    assert told.study == di.load(study).digest and told.repeat == 2
+    q, v, _ = told.trajectory.at(table.t.to_numpy())
+    np.testing.assert_allclose(q[:, 1], table["q_ref.elbow"], atol=1e-8)
+    np.testing.assert_allclose(v[:, 0], table["v_ref.shoulder"], atol=1e-8)
     half = len(table) // 2
     np.testing.assert_allclose(
         table["q_ref.elbow"][:half], table["q_ref.elbow"][half:-1], atol=1e-8

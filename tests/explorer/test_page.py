@@ -22,6 +22,7 @@ import dynident as di
 from dynident.diagnosis import Diagnosis
 from dynident.explorer import explore
 from dynident.explorer.local_server import LocalServer
+from explorer.test_next_recording import write_design
 from study_files import STUDY, csv_text, edited, write_study
 from synthetic import ARM
 
@@ -365,6 +366,25 @@ def test_a_notebook_shows_it(small, tab):
     frame.locator(".switch input").first.check()
     frame.locator("#said", has_text="before").wait_for()
     frame.locator("#values table").wait_for()
+
+
+def test_a_designed_motion_is_opened_and_can_ask_for_nothing(small, tab):
+    """Whoever wrote the page that lies beside the study."""
+    path, server = small
+    folder = path.parent / NASTY.replace("/", "|")
+    folder.mkdir()
+    write_design(folder, "")
+    ask = "fetch('../_dash-update-component', {method: 'POST', body: '{}'})"
+    script = f"<script>{ask}.then(() => document.title = 'in', () => document.title = 'out')"
+    (folder / "motion.html").write_text(f"{script}</script>")
+    one = tab(server.url)
+    assert f"{folder.name}/reference.csv is the motion" in one.page.locator("#next").inner_text()
+    one.page.locator("#next .js-plotly-plot .scatterlayer .trace").nth(1).wait_for(state="attached")
+    with one.page.context.expect_page() as other:
+        one.page.locator("#next a").click()
+    other.value.wait_for_function("document.title.length > 0")
+    assert other.value.title() == "out" and other.value.evaluate("origin") == "null"
+    one.assert_quiet()
 
 
 def test_names_stay_names(tmp_path, tab):

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from dynident.study import Study
 
 _PATH = click.Path(path_type=Path)
-_PAGE = "motion.html"
 
 
 @commands.command()
@@ -45,7 +44,9 @@ _PAGE = "motion.html"
 @click.option("--clearance", type=float, help="m, that links keep from each other.")
 @click.option("--limits", type=_PATH, help="A file of limits, [joints.NAME], boxes and obstacles.")
 @click.option(
-    "--out", type=_PATH, help="Write reference.csv, experiment.toml and motion.html here."
+    "--out",
+    type=_PATH,
+    help="Write reference.csv, design.toml, experiment.toml and motion.html here.",
 )
 def design(study: Path, limits: Path | None, out: Path | None, **settings) -> CommandAnswer:
     """Design the recording to make next: all parameters, or which of two effects it is.
@@ -102,22 +103,23 @@ def write_files(
     The files, and what is to be said of them.
     """
     from dynident.experiment_design.design_files import write_design
+    from dynident.experiment_design.written_design import MOTION_PAGE
     from dynident.reporting.pictures.motion_in_3d import design_page
 
     if out is None:
         return (), ()
     rate = study.train.recordings[0].rate_hz
-    written = write_design(designed, out, round(rate, 6), study.controller)
+    written = write_design(designed, out, round(rate, 6), study.controller, study.digest)
     notes = [f"Written: {one}" for one in written]
     try:
         with progress("drawing the motion"):
             page = design_page(designed)
-        place = files.write_text(out / _PAGE, page.html)
+        place = files.write_text(out / MOTION_PAGE, page.html)
         size = len(page.html) / 1e6
         notes.append(f"Written: {place}, {size:.1f} MB, the motion in 3D, drawn with {page.shows}")
         written = (*written, place)
     except DesignError as error:  # what is to be followed is there without it
-        notes.append(f"No {_PAGE}: {error}")
+        notes.append(f"No {MOTION_PAGE}: {error}")
     if study.controller is None:
         notes.append("No experiment.toml: the study has no [controller] to simulate with.")
     return written, tuple(notes)

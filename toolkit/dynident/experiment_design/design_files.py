@@ -14,19 +14,25 @@ from dynident.closed_loop.experiments.virtual_study import controller_table
 from dynident.effects import LawEffect, laws_table
 from dynident.errors import FileError
 from dynident.experiment_design.recording_design import RecordingDesign
+from dynident.experiment_design.written_design import DESIGN, design_file
 from dynident.robot.patching import write
 
 REFERENCE, EXPERIMENT = "reference.csv", "experiment.toml"
 
 
 def write_design(
-    design: RecordingDesign, folder: str | Path, rate_hz: float, controller: Controller | None
+    design: RecordingDesign,
+    folder: str | Path,
+    rate_hz: float,
+    controller: Controller | None,
+    study: str = "",
 ) -> tuple[Path, ...]:
     """Write the reference of a designed recording, and the experiment that simulates it.
 
     `reference.csv` has the time and, for each joint, `q_ref` and `v_ref`, of all repetitions, from
-    rest to rest. `experiment.toml` has the motion by its coefficients, the robot as it is known by
-    now, and its controller; without a controller it is not written.
+    rest to rest. `design.toml` says what it settles. `experiment.toml` has the motion by its
+    coefficients, the robot as it is known by now, and its controller; without a controller it is
+    not written.
 
     Parameters
     ----------
@@ -34,6 +40,7 @@ def write_design(
     folder : made if it is missing.
     rate_hz : of the reference, at least nearly: a period is a whole number of samples.
     controller : of the robot.
+    study : digest of the study that it is for, by which it is known whether that has changed since.
 
     Returns
     -------
@@ -58,7 +65,11 @@ def write_design(
     except OSError as error:
         raise FileError(f"cannot be made ({error.strerror or error})", str(folder)) from None
     text = pd.DataFrame(table).to_csv(index=False, float_format="%.9g", lineterminator="\n")
-    written = [files.write_text(folder / REFERENCE, text)]
+    summary = tomlkit.dumps(design_file(design, study).model_dump())
+    written = [
+        files.write_text(folder / REFERENCE, text),
+        files.write_text(folder / DESIGN, summary),
+    ]
     if controller is not None:
         robot = write(design.estimate.robot, folder / _name(design))
         document = tomlkit.dumps(_experiment(design, robot.name, controller))

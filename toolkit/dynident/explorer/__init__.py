@@ -9,6 +9,7 @@ into that study, and these on a click only. `dynident open STUDY` serves it from
 - `opened_study`: a study as it was read, and written to while it is still that.
 - `tab_state`: what one tab of the browser has chosen.
 - `page`, of `page_parts`, `page_figures` and `page_answers`: what a tab shows.
+- `next_recording`: designed recordings beside the study, with what each settles.
 - `local_access`, `local_server`: who may see it, and from where.
 """
 

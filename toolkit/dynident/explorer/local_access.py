@@ -54,7 +54,8 @@ def guard(server: Flask, token: str, port: Callable[[], int], framing: Framing =
 
     def say_how_to_show(response: Response) -> Response:
         ancestors = "; frame-ancestors 'none'" if framing == "alone" else ""
-        response.headers["Content-Security-Policy"] = _POLICY + ancestors
+        # What is no part of the page brings a narrower one.
+        response.headers.setdefault("Content-Security-Policy", _POLICY + ancestors)
         # The address holds the token: no other page is told of it.
         response.headers["Referrer-Policy"] = "no-referrer"
         response.headers["X-Content-Type-Options"] = "nosniff"

@@ -9,6 +9,7 @@ from flask import Flask
 from werkzeug.serving import WSGIRequestHandler, make_server
 
 from dynident.explorer.local_access import ADDRESS, Framing, guard, new_token
+from dynident.explorer.next_recording import serve_motions
 from dynident.explorer.opened_study import StudyVersions
 from dynident.explorer.page import page
 
@@ -41,6 +42,7 @@ class LocalServer:
         self.flask = Flask("dynident", static_folder=None)
         guard(self.flask, self.token, lambda: self.port, framing)
         self.flask.add_url_rule(f"/{self.token}/alive", "alive", lambda: ("", 204))
+        serve_motions(self.flask, self.token, versions.path)
         page(self.flask, self.token, versions)
         self._server = make_server(ADDRESS, 0, self.flask, threaded=True, request_handler=_Quiet)
         self._thread: Thread | None = None

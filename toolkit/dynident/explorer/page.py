@@ -9,6 +9,7 @@ from dash.exceptions import PreventUpdate
 from flask import Flask
 
 from dynident.errors import DynidentError, StudyError
+from dynident.explorer.next_recording import next_recording
 from dynident.explorer.opened_study import OpenedStudy, StudyVersions
 from dynident.explorer.page_answers import Contrast, map_answer, value_table
 from dynident.explorer.page_figures import error_bars, zoomed
@@ -92,6 +93,7 @@ class _Callbacks:
             Output("tick", "disabled"),
             Output("joint", "value"),
             Output("fitted-by", "children"),
+            Output("next", "children"),
             ticks,
             tab,
         )(self.searched)
@@ -143,9 +145,10 @@ class _Callbacks:
         """How far the diagnosis is; what it offers once it is done."""
         opened, state = self._of(tab)
         if opened.search.is_running:
-            return verdict(opened), no_update, False, no_update, fitted_by(opened)
+            return verdict(opened), no_update, False, no_update, fitted_by(opened), no_update
         worst = Contrast.of(opened, TabState.of(opened.digest)).worst_joint
-        return verdict(opened), switches(opened.choices, state), True, worst, fitted_by(opened)
+        offered, words = switches(opened.choices, state), fitted_by(opened)
+        return verdict(opened), offered, True, worst, words, next_recording(opened)
 
     def switched(self, values: list[list[str] | None], tab: object) -> dict[str, Any]:
         """Which effects are on."""

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from dynident.closed_loop import Fourier
 from dynident.evidence import ResidualMap
 from dynident.evidence.held_out import HeldOut, HeldOutRun
 from dynident.explorer.switched_fit import SwitchedFit
@@ -26,11 +27,11 @@ from dynident.reporting.pictures.diagnosis_pictures import noise_band
 from dynident.reporting.pictures.look import dressed, plain, single_precision
 
 NOW = "with what is switched on"
-_POINTS = 3000
+_POINTS, _MOTION_POINTS = 3000, 401
 
 
-TORQUE_HEIGHT, MAP_HEIGHT = 470, 350
-"""Heights of the pictures of torque and of residuals, pixels."""
+TORQUE_HEIGHT, MAP_HEIGHT, MOTION_HEIGHT = 470, 350, 320
+"""Heights of the pictures of torque, of residuals and of a designed motion, pixels."""
 
 
 def waiting() -> go.Figure:
@@ -166,6 +167,31 @@ def map_picture(one: ResidualMap) -> go.Figure:
     figure.update_layout(dragmode=False)
     figure = dressed(figure, MAP_HEIGHT, top=30)
     return figure.update_layout(legend={"y": -0.2, "yanchor": "top"})
+
+
+def motion_picture(motion: Fourier, joints: Sequence[str], units: Sequence[str]) -> go.Figure:
+    """Positions of all joints over one repetition of a motion.
+
+    Parameters
+    ----------
+    motion : of n joints.
+    joints, units : name and unit, rad or m, of each.
+
+    Returns
+    -------
+    Figure with a line for each joint.
+    """
+    t = np.linspace(0.0, motion.period, _MOTION_POINTS)
+    q = single_precision(motion.at(t)[0])
+    figure = go.Figure()
+    for j, (joint, unit) in enumerate(zip(joints, units, strict=True)):
+        name = plain(f"{joint} ({unit})")
+        figure.add_trace(go.Scatter(x=single_precision(t), y=q[:, j], mode="lines", name=name))
+    figure.update_xaxes(title="time (s)", fixedrange=True)
+    figure.update_yaxes(title=f"position ({', '.join(dict.fromkeys(units))})", fixedrange=True)
+    figure.update_layout(dragmode=False, showlegend=True)
+    figure = dressed(figure, MOTION_HEIGHT, top=30)
+    return figure.update_layout(legend={"y": -0.25, "yanchor": "top"})
 
 
 def _errors(judged: HeldOut) -> np.ndarray:

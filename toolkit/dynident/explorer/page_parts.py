@@ -10,6 +10,7 @@ import dash_bootstrap_components as dbc
 from dash import dcc, html
 
 from dynident.explorer.effect_choices import EffectChoice, Group
+from dynident.explorer.next_recording import next_recording
 from dynident.explorer.opened_study import OpenedStudy
 from dynident.explorer.page_figures import MAP_HEIGHT, TORQUE_HEIGHT, bars_height, waiting
 from dynident.explorer.tab_state import TabState
@@ -63,6 +64,7 @@ def whole_page(opened: OpenedStudy, state: TabState) -> html.Main:
             html.P(id="fault", role="alert"),
             html.Div(id="search", role="status", className="card verdict"),
             html.Div([html.Div([_missing(), _values()]), _errors(opened)], className="pair"),
+            html.Div(next_recording(opened), id="next"),
             _where_it_fails(opened),
         ]
     )
@@ -210,13 +212,14 @@ def _switch(place: int, one: EffectChoice, state: TabState) -> html.Div:
     written = one.label in state.written
     title = one.effect.title[:1].upper() + one.effect.title[1:]
     name = f"{title}, in the study now" if written else title
-    option = {"label": name, "value": one.label, "disabled": written or bool(one.refusal)}
+    disabled = written or bool(one.refusal)
+    options: Any = [{"label": name, "value": one.label, "disabled": disabled}]
     meaning = type(one.effect).meaning
     return html.Div(
         [
             dbc.Checklist(
                 id={"type": SWITCH, "place": place},
-                options=[option],
+                options=options,
                 value=[one.label] if one.label in state.on else [],
                 className="switch",
             ),

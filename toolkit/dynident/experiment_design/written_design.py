@@ -1,0 +1,96 @@
+"""A designed recording read back from its folder: what it settles, and its motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import Field
+
+from dynident.closed_loop import Fourier
+from dynident.errors import DynidentError, StudyError
+from dynident.experiment_design.recording_design import RecordingDesign
+from dynident.settings import Duration, SettingsTable, read_toml
+
+DESIGN, MOTION_PAGE = "design.toml", "motion.html"
+
+
+class DesignFile(SettingsTable):
+    """A file `design.toml`, which stands beside the reference that is to be followed."""
+
+    sentence: str
+    """What the recording is worth, in plain words."""
+    study: str = ""
+    """SHA-256 of the study that it was designed for, as its text was."""
+    repeat: int = Field(ge=1)
+    """How often the motion is to be followed."""
+    duration: Duration
+    """Of one repetition."""
+    joints: list[str]
+    """Their names, in the order of the coefficients."""
+    centre: list[float]
+    """Of each joint, rad or m."""
+    sine: list[list[float]]
+    """Coefficients of each joint, rad or m."""
+    cosine: list[list[float]]
+    """Likewise."""
+
+    @property
+    def trajectory(self) -> Fourier:
+        """One repetition."""
+        return Fourier(self.duration, self.centre, self.sine, self.cosine)  # type: ignore[arg-type]
+
+
+def design_file(design: RecordingDesign, study: str) -> DesignFile:
+    """Return what is written of a design.
+
+    Parameters
+    ----------
+    design : of `dynident.experiment_design.design`.
+    study : digest of the study that it is for; empty where there is none.
+    """
+    series = design.trajectory
+    return DesignFile(
+        sentence=design.sentence,
+        study=study,
+        repeat=design.task.repeat,
+        duration=design.task.duration,
+        joints=list(design.model.robot.names),
+        centre=series.centre.tolist(),
+        sine=series.sine.tolist(),
+        cosine=series.cosine.tolist(),
+    )
+
+
+def folders_with_designs(folder: Path) -> tuple[Path, ...]:
+    """Return the folders in a folder that hold a designed recording, the newest first."""
+    try:
+        found = {one.parent: one.stat().st_mtime for one in folder.glob(f"*/{DESIGN}")}
+    except OSError:  # one that goes meanwhile, or may not be looked at
+        return ()
+    return tuple(sorted(found, key=lambda one: (-found[one], one.name)))
+
+
+def read_design(folder: Path, joints: tuple[str, ...]) -> DesignFile:
+    """Read a designed recording of a robot.
+
+    Parameters
+    ----------
+    folder : that `dynident.experiment_design.design_files.write_design` wrote.
+    joints : names of the robot's joints.
+
+    Raises
+    ------
+    DynidentError
+        If the file cannot be read, is none of a design, or one of another robot.
+    """
+    path = folder / DESIGN
+    found = read_toml(path, DesignFile)
+    if tuple(found.joints) != joints:
+        raise StudyError("is the design of another robot", str(path), "design one for this study")
+    try:
+        of = found.trajectory.n
+    except (DynidentError, ValueError) as error:
+        raise StudyError(f"has no motion: {error}", str(path)) from None
+    if of != len(joints):
+        raise StudyError(f"has a motion of {of} joints, not {len(joints)}", str(path))
+    return found
