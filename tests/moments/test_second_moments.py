@@ -93,9 +93,9 @@ def test_blocks_of_time_add_up_joint_by_joint_and_stand_side_by_side() -> None:
     assert beside.total.shape == (8, 3, 3) and beside.count == 20
     np.testing.assert_allclose(beside.pooled().signal, both.pooled().signal)
     np.testing.assert_allclose(
-        beside.without(5).total, beside.pooled().total - two.total[1], atol=1e-12
+        list(beside.without_each())[5].total, beside.pooled().total - two.total[1], atol=1e-12
     )
-    assert beside.without(5).count == 18
+    assert list(beside.without_each())[5].count == 18
 
 
 def test_what_has_no_known_noise_counts_as_signal_beside_what_has() -> None:

@@ -5,6 +5,8 @@ from the motion alone live as long as the motion. Those that depend on the fit b
 linearisation, the model and the values at which they were taken; the latest one is kept, and with
 another one goes all that belongs to an older. Those of a first look live as long as that look.
 Of shapes that are tried once, a search from other beginnings tries many again: the latest are kept.
+What was worked out of the columns is kept as well, as long as the same fit to the same runs is
+asked about.
 """
 
 from __future__ import annotations
@@ -60,6 +62,8 @@ class ColumnCache:
         self._linearisation: Hashable = None
         self.tried = Tried()
         self._linearised: Kept = {}
+        self._asked: tuple[object, ...] = ()
+        self._answers: Kept = {}
 
     def along(self, motion: Motion) -> Kept:
         """Return what follows from a motion alone."""
@@ -74,3 +78,10 @@ class ColumnCache:
     def seen_in(self, look: FirstLook) -> Kept:
         """Return what a first look has evaluated."""
         return self._of_looks.setdefault(look, {})
+
+    def answers_of(self, *asked: object) -> Kept:
+        """Return what was worked out of these very objects; what was of others is gone."""
+        same = len(asked) == len(self._asked)
+        if not same or any(one is not two for one, two in zip(asked, self._asked, strict=True)):
+            self._asked, self._answers = asked, {}
+        return self._answers

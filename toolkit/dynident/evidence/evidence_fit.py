@@ -20,7 +20,7 @@ from dynident.fitting.fixed_point import FixedPoint
 from dynident.model import Model
 from dynident.moments.replicates import time_varying_products
 from dynident.moments.second_moments import SecondMoments
-from dynident.moments.solution import MomentSolution, regress
+from dynident.moments.solution import MomentSolution, regress, regression_values
 
 White = tuple[tuple[WhiteColumns, ...], ...]
 """Whitened columns of each run, of each joint."""
@@ -81,8 +81,8 @@ class EvidenceFit:
     def without_each_block(self) -> np.ndarray:
         """Values of the fit to all blocks but one, for each, (B, p)."""
         least = self.criteria.noise.reliable
-        blocks = range(len(self.moments.total))
-        return np.array([regress(self.moments.without(b), least).values for b in blocks])
+        each = self.moments.without_each()
+        return np.array([regression_values(others, least) for others in each])
 
     @cached_property
     def error_total(self) -> float:
@@ -134,7 +134,7 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
                 for r in range(len(evidence.runs))
             ]
         white = _whiten(evidence, columns, noise, values, white)
-        values = regress(_moments(evidence, model, noise, white).pooled(), reliable).values
+        values = regression_values(_moments(evidence, model, noise, white).pooled(), reliable)
         if round == 0 and near is None:
             # Along a robot without bodies their columns are rounding errors, and any value fits.
             values = _keeping_dependent(model, at, values)

@@ -27,7 +27,7 @@ def replicate_moments(
 
     Parameters
     ----------
-    left, right : (P, S, a) and (P, S, b)
+    left, right : (P, ..., S, a) and (P, ..., S, b)
         Columns at S instants in P replicates.
     edges : (B + 1,)
         First instant of each block, and S.
@@ -36,7 +36,7 @@ def replicate_moments(
 
     Returns
     -------
-    (B, a, b); noisy copies do not count as rows
+    (B, ..., a, b); noisy copies do not count as rows
     """
     blocks = [slice(start, stop) for start, stop in pairwise(edges.tolist())]
     if kind == "noise_augmented":
@@ -53,9 +53,10 @@ def replicate_moments(
 
 
 def _block_products(left: np.ndarray, right: np.ndarray, blocks: list[slice]) -> np.ndarray:
-    """Products of columns over instants and replicates, block by block, (B, a, b)."""
-    turned = left.transpose(0, 2, 1)
-    return np.array([(turned[:, :, some] @ right[:, some]).sum(axis=0) for some in blocks])
+    """Products of columns over instants and replicates, block by block, (B, ..., a, b)."""
+    turned = np.swapaxes(left, -1, -2)
+    each = ((turned[..., some] @ right[..., some, :]).sum(axis=0) for some in blocks)
+    return np.array(list(each))
 
 
 @dataclass(frozen=True)

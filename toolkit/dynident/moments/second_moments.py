@@ -14,7 +14,7 @@ Where a factor of the rows is worth its cost, see `moments.factors`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
@@ -165,10 +165,13 @@ class SecondMoments:
         """Return the moments of the rows of all blocks together."""
         return self._with(lambda products: products.sum(axis=0), self.count)
 
-    def without(self, block: int) -> SecondMoments:
-        """Return the moments of the rows of all blocks but one."""
-        count = self.count - int(np.asarray(self.counts)[block])
-        return self._with(lambda products: products.sum(axis=0) - products[block], count)
+    def without_each(self) -> Iterator[SecondMoments]:
+        """Yield the moments of the rows of all blocks but one, for each of them."""
+        whole, free = self.pooled(), self.noise_free
+        for block, count in enumerate(np.atleast_1d(self.counts).tolist()):
+            total = whole.total - self.total[block]
+            left = None if free is None else whole.signal - free[block]
+            yield SecondMoments(total, whole.count - int(count), None, left)
 
     def where(self, chosen: np.ndarray, signal: np.ndarray) -> SecondMoments:
         """Take other products for those free of noise (..., a, b) where a mask (a, b) says so."""
@@ -181,6 +184,10 @@ class SecondMoments:
     def columns(self, chosen: slice | np.ndarray) -> SecondMoments:
         """Return the products of all columns with some of the other set."""
         return self._with(lambda products: products[..., chosen], mean=self.mean)
+
+    def at(self, place: int) -> SecondMoments:
+        """Return one of several sets of products (B, ..., a, b) of the same rows."""
+        return self._with(lambda products: products[:, place])
 
     def among(self, chosen: slice | np.ndarray) -> SecondMoments:
         """Return the products of some columns with each other."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import get_lapack_funcs
 
 from dynident.errors import FitError
 from dynident.moments.second_moments import SecondMoments
@@ -12,6 +13,9 @@ from dynident.moments.second_moments import SecondMoments
 EXACT = 1e-9
 """Directions below this share of the largest (of columns scaled to norm 1) are dependent; in terms
 of squares, in which half of the digits are gone."""
+_SOUND = 100.0 * EXACT
+"""Estimated reciprocal condition of squares above which no direction is dependent by `EXACT`."""
+_potrf, _potrs, _pocon = get_lapack_funcs(("potrf", "potrs", "pocon"))
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,50 @@ def regress(moments: SecondMoments, least_reliability: float) -> MomentSolution:
     """
     signal = moments.signal
     return solve_products(signal[:-1, :-1], moments.gram, signal[:-1, -1], least_reliability)
+
+
+def regression_values(moments: SecondMoments, least_reliability: float) -> np.ndarray:
+    """Values of `regress` without its directions, (p,), in less time.
+
+    Where no direction is to be left out they solve one system of equations, of which a Cholesky
+    factor is enough; whether any is, such factors tell as well.
+
+    Parameters
+    ----------
+    moments, least_reliability : as for `regress`.
+
+    Raises
+    ------
+    FitError
+        If a moment is not finite.
+    """
+    total, signal = moments.gram, moments.signal
+    scale = np.sqrt(np.diag(total))
+    if len(scale) and np.all(np.isfinite(signal)) and np.all(scale > 0):
+        units = np.outer(scale, scale)
+        total, known = total / units, signal[:-1, :-1] / units
+        free = moments.noise_free is not None
+        if _sound(total) and (not free or _factor(known - least_reliability * total) is not None):
+            factor = _factor(known)
+            if factor is not None:
+                found, _ = _potrs(factor, signal[:-1, -1] / scale)
+                return found / scale
+    return regress(moments, least_reliability).values
+
+
+def _factor(products: np.ndarray) -> np.ndarray | None:
+    """The upper Cholesky factor; None where the products are not positive definite."""
+    factor, failed = _potrf(products)
+    return None if failed else factor
+
+
+def _sound(products: np.ndarray) -> bool:
+    """Whether columns of norm 1 are independent, to a bound well above that of `regress`."""
+    factor = _factor(products)
+    if factor is None:
+        return False
+    least, _ = _pocon(factor, np.abs(products).sum(axis=0).max())
+    return bool(least > _SOUND)
 
 
 def solve_products(

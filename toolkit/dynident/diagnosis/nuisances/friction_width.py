@@ -27,7 +27,7 @@ from dynident.effects import Block, Effect, JointEffect, Parameter, ShapeParamet
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.moments.second_moments import SecondMoments
-from dynident.moments.solution import regress
+from dynident.moments.solution import regression_values
 from dynident.tables import number
 
 _RIVALS = ("viscous_friction", "quadratic_drag")
@@ -154,7 +154,7 @@ def missed_instead(
             )
         ]
         moments = SecondMoments(products[0], known.counts, None, products[1])
-        combination = np.append(-regress(moments, reliable).values, 1.0)
+        combination = np.append(-regression_values(moments, reliable), 1.0)
         found.append(float(combination @ moments.signal @ combination))
     return np.array(found)
 

@@ -167,7 +167,14 @@ def laws_of_the_rest(evidence: Evidence, fitted: EvidenceFit) -> tuple[ReversalL
 
 
 def _best_law(evidence: Evidence, fitted: EvidenceFit, joint: str) -> ReversalLaw:
-    """Return the law that misses least at a joint."""
+    """Return the law that misses least at a joint; one rival after the other asks for it."""
+    known = evidence.cache.answers_of(evidence.runs, fitted)
+    if joint not in known:
+        known[joint] = _law_that_misses_least(evidence, fitted, joint)
+    return known[joint]
+
+
+def _law_that_misses_least(evidence: Evidence, fitted: EvidenceFit, joint: str) -> ReversalLaw:
     each = [_shaped(evidence, fitted, kind(joint)) for kind in (SmoothReversal, StraightReversal)]
     missed, column = min(each, key=lambda one: one[0])
     k, lead = column.shape

@@ -9,7 +9,7 @@ import numpy as np
 
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.moments.second_moments import SecondMoments
-from dynident.moments.solution import regress
+from dynident.moments.solution import regression_values
 
 _SAME = 1e-9
 
@@ -36,8 +36,7 @@ def cross_validate(
         _joined(fitted.moments.signal, with_model.signal, with_self.signal),
     )
     reliable = fitted.criteria.noise.reliable
-    blocks = range(len(both.total))
-    wider = [regress(both.without(block), reliable).values for block in blocks]
+    wider = [regression_values(others, reliable) for others in both.without_each()]
     return _losses(fitted.moments, fitted.without_each_block), _losses(both, wider)
 
 

@@ -110,7 +110,10 @@ def candidate_moments(
             white = run.whitened_parts(parts, joint, fitted.noise[joint])
             known = fitted.white[r][joint]
             one.append(known.moments_with(white))
-            two.append(run.moments(white, white))
+            # Of each variant with itself: what two of them have in common is not asked for.
+            apart = white.transpose(0, 2, 1).reshape(len(white), len(variants), width, -1)
+            apart = np.swapaxes(apart, 2, 3)
+            two.append(run.moments(apart, apart))
             if run.kind == "repeated" and mixed:
                 measured = [shape[0][:, position] for shape in each]
                 noise = fitted.noise[joint]
@@ -120,14 +123,16 @@ def candidate_moments(
                 chosen = time_varying[:, None] | np.full(white.shape[2], variants[0].time_varying)
                 one[-1] = one[-1].where(chosen, time_varying_products(old, new, run.edges))
                 if variants[0].time_varying:
-                    two[-1] = two[-1].where(
-                        np.array(True), time_varying_products(new, new, run.edges)
-                    )
+                    products = time_varying_products(new, new, run.edges)
+                    apart = products.reshape(-1, len(variants), width, len(variants), width)
+                    of_each = np.einsum("bvivj->bvij", apart)
+                    two[-1] = two[-1].where(np.array(True), of_each)
         with_model.append(reduce(add, one))
         with_self.append(reduce(add, two))
     beside, own = SecondMoments.stacked(with_model), SecondMoments.stacked(with_self)
-    parts = [slice(i, i + width) for i in range(0, width * len(variants), width)]
-    return [(beside.columns(part), own.among(part)) for part in parts]
+    return [
+        (beside.columns(slice(v * width, (v + 1) * width)), own.at(v)) for v in range(len(variants))
+    ]
 
 
 def moments_with_payload(
