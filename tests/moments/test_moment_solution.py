@@ -28,7 +28,7 @@ def moments(noise: float, dependence: float) -> SecondMoments:
     return replicate_moments(rows, rows, np.array([0, 400]), "repeated").pooled()
 
 
-@pytest.mark.parametrize("dependence", [1.0, 1e-2, 1e-4, 1e-6, 0.0])
+@pytest.mark.parametrize("dependence", [1.0, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 0.0])
 @pytest.mark.parametrize("noise", [0.0, 0.3, 30.0])
 def test_values_are_those_of_the_directions(noise: float, dependence: float) -> None:
     """Also where a direction is left out: one that depends on others, or is noise."""

@@ -353,21 +353,23 @@ class Evidence:
         """
         if any(one.needs_bodies for one in model.effects) or len(block.t) > _SHARED:
             return model.torque_without_loads(block, values)
-        base, tip = list(model.base.independent), 10 * (model.robot.tip % model.robot.n)
-        known, key = self.cache.along(sampled.motion), (self.model.robot, "full rate")
+        base, loads = list(model.base.independent), any(one.is_payload for one in model.effects)
+        tip = 10 * (model.robot.tip % model.robot.n)
+        known, key = self.cache.along(sampled.motion), (self.model.robot, "full rate", loads)
         if key not in known:
             whole = model.robot.regressor(block.q, block.v, block.a)
-            wanted = [*base, *range(tip, tip + 10)]
-            # Samples side by side, as products with values are quickest.
-            known[key] = np.ascontiguousarray(whole.transpose(1, 2, 0)[:, wanted])
-        rigid = known[key]
-        torque = (values[: len(base)] @ rigid[:, : len(base)]).T
+            wanted = [*base, *range(tip, tip + 10)] if loads else base
+            known[key] = RigidColumns.of(model.robot, wanted, whole[:, :, wanted])
+        at = np.zeros(known[key].size)
+        at[: len(base)] = values[: len(base)]
         for one in model.effects:
-            own = values[model.slices[one.label]]
-            if one.is_payload:
-                torque = torque + (own @ rigid[:, len(base) :]).T * float(block.carries_payload)
-            elif not one.needs_torque:
-                torque = torque + one.columns(block) @ own
+            if one.is_payload and block.carries_payload:
+                at[len(base) :] = values[model.slices[one.label]]
+        torque = known[key].times(at)
+        for one in model.effects:
+            if not (one.is_payload or one.needs_torque):
+                own = one.acting_columns(block) @ values[model.slices[one.label]]
+                torque[:, list(one.acting_at(model.robot))] += own
         return torque
 
     def _filtered_torque(self, sampled: Sampled, model: Model, values: np.ndarray) -> np.ndarray:

@@ -71,7 +71,7 @@ class RigidColumns:
     def times(self, values: np.ndarray) -> np.ndarray:
         """Torque (T, n) of values (b,) of the base parameters."""
         pairs = zip(self.places, self.rows, strict=True)
-        return np.stack([values[places] @ rows for places, rows in pairs], axis=1)
+        return np.stack([values[places] @ rows for places, rows in pairs]).T
 
     def dense(self) -> np.ndarray:
         """All columns, (T, n, b)."""

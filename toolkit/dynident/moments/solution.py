@@ -15,7 +15,10 @@ EXACT = 1e-9
 of squares, in which half of the digits are gone."""
 _SOUND = 100.0 * EXACT
 """Estimated reciprocal condition of squares above which no direction is dependent by `EXACT`."""
-_potrf, _potrs, _pocon = get_lapack_funcs(("potrf", "potrs", "pocon"))
+_DEPENDENT = 1e-13
+"""Squared part of a column of norm 1, beside others, below which it surely depends on them."""
+
+_potrf, _pstrf, _potrs, _pocon = get_lapack_funcs(("potrf", "pstrf", "potrs", "pocon"))
 
 
 @dataclass(frozen=True)
@@ -70,8 +73,8 @@ def regress(moments: SecondMoments, least_reliability: float) -> MomentSolution:
 def regression_values(moments: SecondMoments, least_reliability: float) -> np.ndarray:
     """Values of `regress` without its directions, (p,), in less time.
 
-    Where no direction is to be left out they solve one system of equations, of which a Cholesky
-    factor is enough; whether any is, such factors tell as well.
+    Where columns are independent, or depend on others beyond doubt, Cholesky factors are enough to
+    see it, and to solve; so they are to see that no direction is noise.
 
     Parameters
     ----------
@@ -82,18 +85,30 @@ def regression_values(moments: SecondMoments, least_reliability: float) -> np.nd
     FitError
         If a moment is not finite.
     """
-    total, signal = moments.gram, moments.signal
-    scale = np.sqrt(np.diag(total))
-    if len(scale) and np.all(np.isfinite(signal)) and np.all(scale > 0):
-        units = np.outer(scale, scale)
-        total, known = total / units, signal[:-1, :-1] / units
-        free = moments.noise_free is not None
-        if _sound(total) and (not free or _factor(known - least_reliability * total) is not None):
-            factor = _factor(known)
-            if factor is not None:
-                found, _ = _potrs(factor, signal[:-1, -1] / scale)
-                return found / scale
-    return regress(moments, least_reliability).values
+    scale, signal = np.sqrt(np.diag(moments.gram)), moments.signal
+    if not (np.all(scale > 0) and np.all(np.isfinite(signal)) and np.all(np.isfinite(scale))):
+        return regress(moments, least_reliability).values
+    units = np.outer(scale, scale)
+    total, free = moments.gram / units, signal[:-1, :-1] / units
+    _, order, rank, _ = _pstrf(total, tol=_DEPENDENT)
+    some, others = order[:rank] - 1, order[rank:] - 1
+    among = np.ix_(some, some)
+    factor = _sound_factor(total[among])
+    own = factor
+    if factor is not None and moments.noise_free is not None:
+        reliable = _factor(free[among] - least_reliability * total[among]) is not None
+        own = _factor(free[among]) if reliable else None
+    if factor is None or own is None:
+        return regress(moments, least_reliability).values
+    found = np.zeros(len(scale))
+    found[some] = _potrs(own, signal[some, -1] / scale[some])[0]
+    if len(others):
+        # What they have in common is shared among them, so that the values are the smallest.
+        same = np.zeros((len(scale), len(others)))
+        same[some] = -_potrs(factor, total[np.ix_(some, others)])[0]
+        same[others, range(len(others))] = 1.0
+        found -= same @ np.linalg.solve(same.T @ same, same.T @ found)
+    return found / scale
 
 
 def _factor(products: np.ndarray) -> np.ndarray | None:
@@ -102,13 +117,13 @@ def _factor(products: np.ndarray) -> np.ndarray | None:
     return None if failed else factor
 
 
-def _sound(products: np.ndarray) -> bool:
-    """Whether columns of norm 1 are independent, to a bound well above that of `regress`."""
+def _sound_factor(products: np.ndarray) -> np.ndarray | None:
+    """The same of columns of norm 1 that are independent, by far beyond the bound of `regress`."""
     factor = _factor(products)
     if factor is None:
-        return False
+        return None
     least, _ = _pocon(factor, np.abs(products).sum(axis=0).max())
-    return bool(least > _SOUND)
+    return factor if least > _SOUND else None
 
 
 def solve_products(
