@@ -37,11 +37,17 @@ def test_the_answer_is_json_and_a_page(run, estimates):
         assert name in text
 
 
-def test_other_effects_are_one_line_with_the_remedy(run, estimates):
-    done = run("changes", str(estimates / "old.json"), str(estimates / "other.json"))
-    assert done.status == 2 and done.out == ""
-    assert done.err.count("\n") == 1
-    assert "coulomb_friction@elbow" in done.err and "fit both with the same effects" in done.err
+def test_effects_that_one_of_them_has_alone_are_listed(run, estimates):
+    page = estimates / "gone.html"
+    files = [str(estimates / name) for name in ("old.json", "other.json")]
+    done = run("changes", *files, "--to", str(page), "--json")
+    assert done.status == 0
+    found = json.loads(done.out)
+    assert {one["parameter"] for one in found["only_before"]} == {"Fc@elbow", "Fc@shoulder"}
+    assert found["only_after"] == []
+    assert not {one["parameter"] for one in found["parameters"]} & {"Fc@elbow", "Fc@shoulder"}
+    text = page.read_text(encoding="utf-8")
+    assert "Effects that one of them has alone" in text and "The models differ by" in text
 
 
 def test_recordings_that_an_estimate_was_fitted_to_do_not_judge_it(run, estimates, tmp_path):

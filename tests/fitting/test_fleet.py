@@ -10,7 +10,7 @@ import pytest
 from dynident import Dataset, Estimate, Model, Recording, fit
 from dynident.errors import FitError
 from dynident.fitting import Fleet, fit_fleet
-from dynident.fitting.uncertainty.between_robots import against_others, holm, usual_value
+from dynident.fitting.comparing.between_robots import against_others, holm, usual_value
 from synthetic import arm, synthetic, true_values
 
 NAMES = ("ada", "bob", "cleo", "dan", "eve", "fay")

@@ -31,14 +31,15 @@ _PATH = click.Path(path_type=Path)
 def changes(before: Path, after: Path, study: Path | None, to: Path | None) -> CommandAnswer:
     """Say what has changed between two estimates of one robot, beyond their joint uncertainty.
 
-    The estimates are files of `dynident fit --out`, of the same effects, from different recordings.
+    The estimates are files of `dynident fit --out`, from different recordings. What both have is
+    compared; effects that one of them has alone are listed, with values and intervals.
 
     Example: dynident changes yesterday.json today.json --to changes.html
     """
     if to is not None:
         files.require_place(to)
+    from dynident.fitting.comparing.between_estimates import estimate_changes
     from dynident.fitting.estimate_file import load_estimate
-    from dynident.fitting.uncertainty.between_estimates import estimate_changes
 
     import_named_effects()
     loaded = None if study is None else load_study(study, to)  # with the effects that it names

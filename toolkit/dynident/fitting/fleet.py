@@ -16,16 +16,16 @@ from scipy.special import stdtrit
 
 from dynident.clusters import Cluster, spread
 from dynident.errors import DynidentError, FitError
-from dynident.fitting.estimate import Estimate
-from dynident.fitting.fit_model import Method, fit
-from dynident.fitting.row_objective import shaped_effects
-from dynident.fitting.uncertainty.between_robots import (
+from dynident.fitting.comparing.between_robots import (
     against_others,
     common_basis,
     holm,
     usual_value,
     values_in_common,
 )
+from dynident.fitting.estimate import Estimate
+from dynident.fitting.fit_model import Method, fit
+from dynident.fitting.row_objective import shaped_effects
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
 from dynident.robot import BaseParameters

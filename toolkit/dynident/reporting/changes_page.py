@@ -9,7 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from dynident import files
-from dynident.fitting.uncertainty.between_estimates import LEVEL, EstimateChanges
+from dynident.fitting.comparing.changed_parameters import LEVEL, EstimateChanges
 from dynident.reporting.content import AFTER_COLOUR, GREY
 from dynident.reporting.diagnosis_tables import versions
 from dynident.reporting.html import rendered

@@ -63,20 +63,47 @@ def common_basis(bases: Sequence[BaseParameters]) -> BaseParameters:
     scale = np.sum([one.scale / np.linalg.norm(one.scale) for one in bases], axis=0)
     scale = np.where(scale > 0, scale, 1.0)
     # What is open in any robot is open in common; in units of torque, where angles mean something.
-    hidden = []
-    for one in bases:
-        null = np.zeros((len(scale), len(one.dependent)))
-        null[list(one.independent)] = -one.K
-        null[list(one.dependent), np.arange(len(one.dependent))] = 1.0
-        hidden.append(np.linalg.qr(scale[:, None] * null)[0])
-    vectors, sizes, _ = np.linalg.svd(np.hstack(hidden), full_matrices=False)
-    hidden = vectors[:, sizes > _SAME]
+    open_ = [np.linalg.qr(_open_directions(one, scale))[0] for one in bases]
+    hidden = _span(np.hstack(open_))
     for one in bases:
         if len(one.dependent) == hidden.shape[1]:
             return one
+    return _orthogonal_to(hidden, scale, bases[0].names)
+
+
+def part_of_basis(basis: BaseParameters, kept: np.ndarray) -> BaseParameters:
+    """Return the combinations of some parameters alone that a basis identifies.
+
+    Parameters
+    ----------
+    basis : of p parameters.
+    kept : their places, in the order of the answer.
+    """
+    if np.array_equal(kept, np.arange(len(basis.names))):
+        return basis
+    scale = np.where(basis.scale > 0, basis.scale, 1.0)
+    # A combination of these is seen if no open direction changes it, whatever else that changes.
+    open_ = np.linalg.qr(_open_directions(basis, scale))[0][kept]
+    return _orthogonal_to(_span(open_), scale[kept], [basis.names[i] for i in kept])
+
+
+def _open_directions(basis: BaseParameters, scale: np.ndarray) -> np.ndarray:
+    """Directions (p, p - r) that a basis leaves open, in units of torque."""
+    null = np.zeros((len(scale), len(basis.dependent)))
+    null[list(basis.independent)] = -basis.K
+    null[list(basis.dependent), np.arange(len(basis.dependent))] = 1.0
+    return scale[:, None] * null
+
+
+def _span(directions: np.ndarray) -> np.ndarray:
+    vectors, sizes, _ = np.linalg.svd(directions, full_matrices=False)
+    return vectors[:, sizes > _SAME]
+
+
+def _orthogonal_to(hidden: np.ndarray, scale: np.ndarray, names: Sequence[str]) -> BaseParameters:
     shown = np.eye(len(scale)) - hidden @ hidden.T
     shown[:, np.linalg.norm(shown, axis=0) < _SAME] = 0.0
-    return base_parameters(shown * scale, bases[0].names, _SAME)
+    return base_parameters(shown * scale, names, _SAME)
 
 
 def values_in_common(

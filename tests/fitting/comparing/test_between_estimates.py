@@ -10,8 +10,9 @@ from scipy.stats import kstest
 
 from dynident import fit
 from dynident.errors import FitError
+from dynident.fitting.comparing.between_estimates import estimate_changes
+from dynident.fitting.comparing.changed_parameters import LEVEL
 from dynident.fitting.estimate import DataSource, Estimate
-from dynident.fitting.uncertainty.between_estimates import LEVEL, estimate_changes
 from dynident.model import Model
 from dynident.recording import Dataset
 from synthetic import arm, synthetic, true_values
@@ -140,11 +141,9 @@ def test_another_tree_of_the_same_names_is_refused(before):
 def test_what_cannot_be_compared_is_refused_in_a_line(before):
     other = replace(before, sources=(DataSource("today.csv", "ab" * 32, ""),))
     same = replace(before, sources=(DataSource("again.csv", "ab" * 32, ""),))
-    wider = estimated(4, of=model() + "stribeck_friction@elbow")
     bare = replace(before, covariance=0 * before.covariance)
     cases = (
         (other, same, "both estimates rest on again.csv"),
-        (before, wider, "stribeck_friction@elbow"),
         (before, bare, "no covariance"),
     )
     for old, new, words in cases:

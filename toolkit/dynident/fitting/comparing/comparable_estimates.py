@@ -1,4 +1,4 @@
-"""Whether two estimates can be compared: of one robot, in the same quantities, and independent."""
+"""Whether two estimates can be compared: of one robot, in common quantities, and independent."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from dynident.effects.soundness import sample_block
 from dynident.errors import FitError
+from dynident.fitting.comparing.unlike_effects import shared_effects
 from dynident.fitting.estimate import Estimate
 from dynident.model import Model
 from dynident.robot import Robot
@@ -17,7 +18,7 @@ _SAME = 1e-6
 
 
 def require_comparable(before: Estimate, after: Estimate) -> None:
-    """Refuse two estimates whose values are not those of the same quantities, or not independent.
+    """Refuse two estimates without quantities in common, or that are not independent.
 
     Parameters
     ----------
@@ -26,24 +27,20 @@ def require_comparable(before: Estimate, after: Estimate) -> None:
     Raises
     ------
     FitError
-        If they are of other robots, effects or friction widths, rest on a recording in common, or
-        have no covariance.
+        If they are of other robots, an effect that both have is another one or reverses over
+        another width, they rest on a recording in common, or have no covariance.
     """
     old, new = before.model, after.model
     if old.robot.names != new.robot.names or old.base.names != new.base.names:
         remedy = "compare two estimates from one description"
         raise FitError("the two estimates are of different robots", remedy=remedy)
     _require_same_tree(old.robot, new.robot)
-    effects = [{one.label for one in model.effects} for model in (old, new)]
-    if effects[0] != effects[1]:
-        only = sorted(effects[0] ^ effects[1])
-        named = ", ".join(only[:3]) + (f" and {len(only) - 3} more" if len(only) > 3 else "")
-        what = f"only one of the two estimates has {named}: beside other effects, values differ"
-        raise FitError(what, remedy="fit both with the same effects")
-    _require_same_widths(old, new)
-    if before.names != after.names:
-        what = "the two estimates have other base parameters: the descriptions differ"
-        raise FitError(what, remedy="compare two estimates from one description")
+    labels = shared_effects(old, new)
+    _require_same_widths(old, new, labels)
+    for label in labels:
+        if _parameters(old, label) != _parameters(new, label):
+            what = f"{label} has other parameters in the two estimates"
+            raise FitError(what, remedy="fit both with one version of it")
     if not (np.any(before.covariance) and np.any(after.covariance)):
         raise FitError("an estimate has no covariance", remedy="take a method that has one")
     shared = {one.sha256 for one in before.sources} & {one.sha256 for one in after.sources} - {""}
@@ -68,11 +65,17 @@ def _require_same_tree(old: Robot, new: Robot) -> None:
             raise FitError(what, remedy=remedy)
 
 
-def _require_same_widths(old: Model, new: Model) -> None:
+def _parameters(model: Model, label: str) -> list[tuple[str, str]]:
+    own = model.slices[label]
+    return list(zip(model.names[own], model.units[own], strict=True))
+
+
+def _require_same_widths(old: Model, new: Model, labels: tuple[str, ...]) -> None:
     """Dry friction that reverses over another speed has another value for the same robot."""
+    both = replace(old, effects=tuple(one for one in old.effects if one.label in labels))
     for joint, name in enumerate(old.robot.names):
         widths = old.friction_widths[joint], new.friction_widths[joint]
-        if np.isclose(*widths, rtol=_SAME, atol=0) or not _has_dry_friction(old, joint):
+        if np.isclose(*widths, rtol=_SAME, atol=0) or not _has_dry_friction(both, joint):
             continue
         what = f"friction_width at {name} is {widths[0]:.3g} in one estimate, {widths[1]:.3g} in "
         raise FitError(f"{what}the other", remedy="fit both with the same friction_width")
