@@ -7,7 +7,9 @@ motion and noise of its own; the encoders' noise is fed back. Records begin and 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
+import casadi
 import numpy as np
 
 from dynident.closed_loop import Controller
@@ -92,40 +94,55 @@ class Lab:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Measured positions and commanded torques, (S, T, 2) each."""
         S, T, _ = q_ref.shape
-        x = np.concatenate([q_ref[:, 0], v_ref[:, 0]], axis=1)
-        measured, commands = np.empty((S, T, 2)), np.empty((S, T, 2))
-        before = q_ref[:, 0] - v_ref[:, 0] / RATE
-        h = 1.0 / RATE
-        for k in range(T):
-            y = x[:, :2] + noise[:, k]
-            tau = KP * (q_ref[:, k] - y) + KD * (v_ref[:, k] - (y - before) * RATE)
-            before = y
-            measured[:, k], commands[:, k] = y, tau
-            k1 = self._rate(x, tau)
-            k2 = self._rate(x + h / 2 * k1, tau)
-            k3 = self._rate(x + h / 2 * k2, tau)
-            k4 = self._rate(x + h * k3, tau)
-            x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-        return measured, commands
+        loop, found = _loop(T), np.empty((S, T, 4))
+        share = np.full((T, 1), self.stribeck)
+        for i in range(S):
+            start = [*q_ref[i, 0], *v_ref[i, 0], *(q_ref[i, 0] - v_ref[i, 0] / RATE)]
+            _, out = loop(start, np.hstack([q_ref[i], v_ref[i], noise[i], share]).T)
+            found[i] = np.asarray(out).T
+        return found[..., :2], found[..., 2:]
 
-    def _rate(self, x: np.ndarray, tau: np.ndarray) -> np.ndarray:
-        """Derivative of positions and velocities, (S, 4)."""
-        q1, q2, v1, v2 = x.T
-        s2, c2 = np.sin(q2), np.cos(q2)
-        across = _LENGTH * (_X2 * c2 - _Y2 * s2)
-        slope = -_LENGTH * (_X2 * s2 + _Y2 * c2)
-        m11 = _J1 + _M2 * _LENGTH**2 + _J2 + 2 * across
-        m12, m22 = _J2 + across, _J2
-        fore = _G * (_X2 * np.cos(q1 + q2) - _Y2 * np.sin(q1 + q2))
-        upper = _G * ((_X1 + _M2 * _LENGTH) * np.cos(q1) - _Y1 * np.sin(q1))
-        dry = np.tanh(x[:, 2:] / WIDTH) * (
-            1.0 + self.stribeck * np.exp(-((x[:, 2:] / (4 * WIDTH)) ** 2))
-        )
-        left = tau - VISCOUS * x[:, 2:] - COULOMB * dry
-        b1 = left[:, 0] - slope * (2 * v1 * v2 + v2**2) - upper - fore
-        b2 = left[:, 1] + slope * v1**2 - fore
-        det = m11 * m22 - m12**2
-        return np.stack([v1, v2, (m22 * b1 - m12 * b2) / det, (m11 * b2 - m12 * b1) / det], axis=1)
+
+@cache
+def _loop(samples: int) -> casadi.Function:
+    """The sampled loop, replayed without Python between its samples.
+
+    From positions, velocities and the positions measured before, and, a column a sample,
+    references, noise and the Stribeck share; to what is measured and commanded. A command is held
+    for a step of the classical Runge-Kutta method.
+    """
+    x, before = casadi.SX.sym("x", 4), casadi.SX.sym("before", 2)
+    q_ref, v_ref, noise = (casadi.SX.sym(name, 2) for name in ("q_ref", "v_ref", "noise"))
+    share, h = casadi.SX.sym("share"), 1.0 / RATE
+    y = x[:2] + noise
+    tau = casadi.DM(KP) * (q_ref - y) + casadi.DM(KD) * (v_ref - (y - before) * RATE)
+    k1 = _rate(x, tau, share)
+    k2 = _rate(x + h / 2 * k1, tau, share)
+    k3 = _rate(x + h / 2 * k2, tau, share)
+    k4 = _rate(x + h * k3, tau, share)
+    after = casadi.vertcat(x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4), y)
+    given = casadi.vertcat(q_ref, v_ref, noise, share)
+    states, told = casadi.vertcat(x, before), casadi.vertcat(y, tau)
+    return casadi.Function("sample", [states, given], [after, told]).mapaccum(samples)
+
+
+def _rate(x: casadi.SX, tau: casadi.SX, share: casadi.SX) -> casadi.SX:
+    """Derivative of positions and velocities, (4,)."""
+    q1, q2, v1, v2 = casadi.vertsplit(x)
+    s2, c2 = casadi.sin(q2), casadi.cos(q2)
+    across = _LENGTH * (_X2 * c2 - _Y2 * s2)
+    slope = -_LENGTH * (_X2 * s2 + _Y2 * c2)
+    m11 = _J1 + _M2 * _LENGTH**2 + _J2 + 2 * across
+    m12, m22 = _J2 + across, _J2
+    fore = _G * (_X2 * casadi.cos(q1 + q2) - _Y2 * casadi.sin(q1 + q2))
+    upper = _G * ((_X1 + _M2 * _LENGTH) * casadi.cos(q1) - _Y1 * casadi.sin(q1))
+    v = x[2:]
+    dry = casadi.tanh(v / WIDTH) * (1.0 + share * casadi.exp(-((v / (4 * WIDTH)) ** 2)))
+    left = tau - casadi.DM(VISCOUS) * v - casadi.DM(COULOMB) * dry
+    b1 = left[0] - slope * (2 * v1 * v2 + v2**2) - upper - fore
+    b2 = left[1] + slope * v1**2 - fore
+    det = m11 * m22 - m12**2
+    return casadi.vertcat(v1, v2, (m22 * b1 - m12 * b2) / det, (m11 * b2 - m12 * b1) / det)
 
 
 def controller() -> Controller:
