@@ -11,6 +11,7 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -22,39 +23,51 @@ TESTS = Path(__file__).parents[1]
 NAMES = [(kind, name) for kind in KINDS for name in corpus(kind)]
 
 
-@pytest.fixture(scope="session")
-def outcomes(request, tmp_path_factory) -> dict[tuple[str, str], list[dict]]:
-    """What became of the cases that are asked for; one that ended the process has no outcomes."""
-    # Tests elsewhere have cases of their own.
-    own = (item for item in request.session.items if item.path == Path(__file__))
-    asked = (getattr(item, "callspec", None) for item in own)
-    left = [one.params["case"] for one in asked if one is not None and "case" in one.params]
-    results = tmp_path_factory.mktemp("hostile") / "outcomes"
-    around = {key: value for key, value in os.environ.items() if key != "DYNIDENT_DATA"}
-    found: dict[tuple[str, str], list[dict]] = {}
-    while left:
-        results.write_text("")
-        subprocess.run(
-            [sys.executable, "-m", "hostile.worker", str(results)],
-            input="\n".join("\t".join(case) for case in left),
-            text=True,
+class Tried:
+    """Cases that are tried in a process of their own, begun again after one that ends it."""
+
+    def __init__(self) -> None:
+        self.around = {key: value for key, value in os.environ.items() if key != "DYNIDENT_DATA"}
+        self.process = self.begun()
+
+    def begun(self) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            [sys.executable, "-m", "hostile.worker"],
             cwd=TESTS,
-            env=around,
-            timeout=3600,
+            env=self.around,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
         )
-        done = [json.loads(line) for line in results.read_text().splitlines()]
-        found |= dict(zip(left, done, strict=False))
-        left = left[len(done) :]
-        if left:  # it ended with this one: go on after it
-            found[left.pop(0)] = []
-    return found
+
+    def outcomes(self, kind: str, name: str) -> list[dict]:
+        """What became of the commands of a case; nothing, where it ended the process."""
+        assert self.process.stdin is not None and self.process.stdout is not None
+        self.process.stdin.write(f"{kind}\t{name}\n")
+        self.process.stdin.flush()
+        if answer := self.process.stdout.readline():
+            return json.loads(answer)
+        self.end()
+        self.process = self.begun()
+        return []
+
+    def end(self) -> None:
+        """Let the process end, as it does when nothing more is asked."""
+        self.process.communicate()
+
+
+@pytest.fixture(scope="module")
+def tried() -> Iterator[Tried]:
+    one = Tried()
+    yield one
+    one.end()
 
 
 @pytest.mark.parametrize("case", NAMES, ids=[f"{kind}: {name}" for kind, name in NAMES])
-def test_one_line_or_a_right_answer(outcomes, case):
+def test_one_line_or_a_right_answer(tried: Tried, case: tuple[str, str]) -> None:
     kind, name = case
     expected = corpus(kind)[name]
-    done = outcomes[case]
+    done = tried.outcomes(kind, name)
     assert len(done) == len(expected.commands), "it took too long, or ended the process"
     for one in done:
         said = one["err"].splitlines()

@@ -1,8 +1,8 @@
 """Runs hostile cases one after the other, each within its share of memory and processor time.
 
-`python -m hostile.worker FILE` reads kinds and names of cases from standard input, one a line with
-a tab between them, and appends a JSON line for each to FILE. A case beyond its share of time ends
-the process: whoever started it sees where it stopped, and starts another with the rest.
+`python -m hostile.worker` reads the kind and the name of a case from standard input, one case a
+line with a tab between them, and answers each with a line of JSON. A case beyond its share of time
+ends the process: whoever asks gets no answer, and starts another for the next case.
 """
 
 from __future__ import annotations
@@ -39,18 +39,19 @@ class Outcome:
 
 def main() -> None:
     """Run what standard input names."""
-    from hostile.corpus import corpus
+    from hostile.corpus import KINDS, corpus
 
-    asked = [line.split("\t") for line in sys.stdin.read().splitlines()]
-    cases = [corpus(kind)[name] for kind, name in asked]
+    tables = {kind: corpus(kind) for kind in KINDS}
+    asked = os.fdopen(os.dup(0))
+    # Commands find an end where they read, not the next case.
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     load_libraries()
     gc.collect()
     gc.freeze()  # so that looking for garbage costs nothing from here on
     limit_memory()
-    with open(sys.argv[1], "a") as stream:
-        for case in cases:
-            stream.write(json.dumps([asdict(one) for one in _tried(case)]) + "\n")
-            stream.flush()
+    for line in asked:
+        kind, name = line.rstrip("\n").split("\t")
+        print(json.dumps([asdict(one) for one in _tried(tables[kind][name])]), flush=True)
 
 
 def load_libraries() -> None:
