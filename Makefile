@@ -21,13 +21,15 @@ demo: install
 	$(BIN)/dynident demo
 
 # One worker a processor: threads of the linear algebra beside them would wait for each other.
+# Work is stolen by the half, so that a file mostly stays with one worker and what its tests share is
+# made once. Where a worker dies its test has failed and the rest goes on; `loadfile` would hang.
 test test-fast: export OMP_NUM_THREADS = 1
 
 test: install
-	$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal
 
 test-fast: install
-	$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder -m "not slow"
+	$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal -m "not slow"
 
 lint: install
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[lint]'
