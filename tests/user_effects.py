@@ -33,6 +33,17 @@ class CableSag(JointEffect):
 '''
 """A class of twenty lines, as a user writes it."""
 
+SAGGING = """
+[[effects]]
+effect = "viscous_friction"
+values = { Fv = 1.0 }
+
+[[effects]]
+effect = "cable_sag@elbow"
+values = { c = 0.5 }
+"""
+"""The effects of an arm with that cable, in an experiment."""
+
 
 def with_columns(line: str) -> str:
     """The same class with another last line."""

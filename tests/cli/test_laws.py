@@ -10,60 +10,33 @@ import pytest
 import dynident as di
 from dynident.closed_loop import load_experiment, write_experiment
 from dynident.effects import LawEffect
-from synthetic import ARM
+from experiment_files import write_search
 
-EXPERIMENT = """\
-robot = "arm.urdf"
-seed = 3
-
-[[effects]]
-effect = "viscous_friction"
-values = { Fv = 0.4 }
-
-[[effects]]
-effect = "law:wave@elbow"
-values = { c = 0.3 }
-shape = { k = 3.3, p = 1.1 }
-hidden = true
-
-[laws.wave]
-torque = "c*v*sin(k*q + p)"
-shape = { k = [1, 6], p = [-3.2, 3.2] }
-
-[controller]
-kind = "pd"
-kp = [200.0, 60.0]
-kd = [25.0, 4.0]
-rate_hz = 250.0
-
-[sensors]
-position_std = 1e-5
-torque_std = [0.1, 0.05]
-"""
-RECORDING = """
-[[recordings]]
-file = "{use}{number}.csv"
-use = "{use}"
-duration = 12.0
-period = 6.0
-trajectory = {{ harmonics = 5, speed = 2.0, seed = {number} }}
-"""
 WAVE = """
 [laws.wave]
 torque = "c*v*sin(k*q + p)"
 shape = { k = [1, 6], p = [-3.2, 3.2] }
 """
+EFFECTS = f"""
+[[effects]]
+effect = "viscous_friction"
+values = {{ Fv = 0.4 }}
+
+[[effects]]
+effect = "law:wave@elbow"
+values = {{ c = 0.3 }}
+shape = {{ k = 3.3, p = 1.1 }}
+hidden = true
+{WAVE}"""
 
 
 @pytest.fixture(scope="module")
 def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with recordings of an arm with the law, and a study that does not know of it."""
     folder = tmp_path_factory.mktemp("laws")
-    (folder / "arm.urdf").write_text(ARM)
     runs = [("train", 1), ("train", 2), ("test", 3)]
-    text = EXPERIMENT + "".join(RECORDING.format(use=use, number=k) for use, k in runs)
-    (folder / "experiment.toml").write_text(text)
-    write_experiment(load_experiment(folder / "experiment.toml"), folder / "data")
+    path = write_search(folder, EFFECTS, runs, period=6.0, harmonics=5)
+    write_experiment(load_experiment(path), folder / "data")
     return folder / "data"
 
 

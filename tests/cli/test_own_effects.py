@@ -1,4 +1,4 @@
-"""A class of one's own by commands alone, each a process that knows nothing of the one before."""
+"""A class of one's own by commands alone, each of which knows nothing of the one before."""
 
 from __future__ import annotations
 
@@ -9,71 +9,39 @@ from pathlib import Path
 
 import pytest
 
+from experiment_files import write_search
 from synthetic import ARM
-from user_effects import SAG, own_settings
+from user_effects import SAG, SAGGING, own_settings, put
 
 __all__ = ["own_settings"]
 pytestmark = pytest.mark.usefixtures("own_settings")
 
-EXPERIMENT = """\
-robot = "arm.urdf"
-seed = 3
-effect_modules = ["mine.py"]
 
-[[effects]]
-effect = "viscous_friction"
-values = { Fv = 1.0 }
+def forget() -> None:
+    """As another process is, that knows nothing of the file."""
+    from dynident.effects import catalogue, known_effects
 
-[[effects]]
-effect = "cable_sag@elbow"
-values = { c = 0.5 }
-hidden = true
-
-[controller]
-kind = "pd"
-kp = [200.0, 60.0]
-kd = [25.0, 4.0]
-rate_hz = 250.0
-
-[sensors]
-position_std = 1e-5
-torque_std = [0.1, 0.05]
-"""
-RECORDING = """
-[[recordings]]
-file = "{use}.csv"
-use = "{use}"
-duration = 8.0
-period = 4.0
-trajectory = {{ harmonics = 4, speed = 2.0, seed = {seed} }}
-"""
-
-
-def dynident(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run the command as a process of its own."""
-    command = [sys.executable, "-m", "dynident.cli", *arguments]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-
-
-def answer(folder: Path, *arguments: str) -> dict:
-    done = dynident(folder, *arguments, "--json")
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    known_effects.forget_module(catalogue()["cable_sag"].__module__)
 
 
 @pytest.mark.slow
-def test_it_is_simulated_considered_ranked_added_saved_loaded_and_reported(tmp_path: Path) -> None:
-    (tmp_path / "arm.urdf").write_text(ARM)
-    (tmp_path / "mine.py").write_text(SAG)
-    runs = "".join(RECORDING.format(use=use, seed=k) for k, use in enumerate(("train", "test")))
-    (tmp_path / "experiment.toml").write_text(EXPERIMENT + runs)
-    answer(tmp_path, "simulate", "experiment.toml", "--out", "data", "--trust")
+def test_it_is_simulated_considered_ranked_added_saved_loaded_and_reported(tmp_path, run) -> None:
+    def answer(*arguments: str) -> dict:
+        done = run(*arguments, "--trust", "--json")
+        assert done.status == 0, done.err
+        forget()
+        return done.json
+
+    put(tmp_path / "mine.py", SAG)
+    hidden = f'effect_modules = ["mine.py"]\n{SAGGING}hidden = true\n'
+    write_search(tmp_path, hidden, (("train", 0), ("test", 1)), period=4.0, harmonics=4)
+    answer("simulate", "experiment.toml", "--out", "data")
     study = "data/study.toml"
     text = (tmp_path / study).read_text()
     assert "cable_sag" not in text and "effect_modules" not in text  # it is hidden
     (tmp_path / study).write_text('effect_modules = ["../mine.py"]\n' + text)
 
-    found = answer(tmp_path, "explain", study, "--trust", "--report", "report.html")
+    found = answer("explain", study, "--report", "report.html")
     assert found["verdict"] == "explained"
     assert [(s["effect"], s["joint"]) for s in found["steps"]] == [("cable_sag", "elbow")]
     ranked = [(c["effect"], c["joint"]) for c in found["candidates"]]
@@ -81,16 +49,14 @@ def test_it_is_simulated_considered_ranked_added_saved_loaded_and_reported(tmp_p
     page = (tmp_path / "report.html").read_text()
     assert "a cable drags more in some positions than in others" in page
 
-    added = answer(tmp_path, "add", study, "cable_sag@elbow", "--trust")
+    added = answer("add", study, "cable_sag@elbow")
     assert added["added"] == ["cable_sag@elbow"]
     assert '"cable_sag@elbow"' in (tmp_path / study).read_text()
-    answer(tmp_path, "fit", study, "--out", "fit.json", "--trust")
+    answer("fit", study, "--out", "fit.json")
     effects = json.loads((tmp_path / "fit.json").read_text())["model"]["effects"]
     assert effects[-1]["effect"] == "cable_sag"
-    loop = answer(tmp_path, "simulate", study, "--estimate", "fit.json", "--trust")
-    assert loop["verdict"] == "follows"
-    checked = answer(tmp_path, "check", "fit.json", "--effects", "mine.py", "--trust")
-    assert checked["consistent"]
+    assert answer("simulate", study, "--estimate", "fit.json")["verdict"] == "follows"
+    assert answer("check", "fit.json", "--effects", "mine.py")["consistent"]
 
 
 @pytest.fixture(scope="module")
@@ -134,13 +100,6 @@ def test_a_command_that_takes_an_estimate_can_be_told_of_its_effects(run, saved,
     done = run(name, *arguments, "--effects", mine, "--trust", "--json")
     assert done.status == 0, done.err
     forget()
-
-
-def forget() -> None:
-    """As another process is, that knows nothing of the file."""
-    from dynident.effects import catalogue, known_effects
-
-    known_effects.forget_module(catalogue()["cable_sag"].__module__)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,17 @@ import pytest
 
 from dynident.effect_modules import remember
 from study_files import CONTROLLER, STUDY, listing
-from user_effects import HOSTILE, PLACES, SAG, UNSOUND, own_settings, put, put_place, with_columns
+from user_effects import (
+    HOSTILE,
+    PLACES,
+    SAG,
+    SAGGING,
+    UNSOUND,
+    own_settings,
+    put,
+    put_place,
+    with_columns,
+)
 
 WITH_MODULE = STUDY.replace(
     'effects = ["viscous_friction"]',
@@ -31,20 +41,13 @@ COMMANDS = {
     "show": ("--to", "picture.png"),
     "simulate": (),
 }
-EXPERIMENT = """robot = "arm.urdf"
-effect_modules = ["mine.py"]
-[[effects]]
-effect = "viscous_friction"
-values = { Fv = 1.0 }
-[[effects]]
-effect = "cable_sag@elbow"
-values = { c = 0.5 }
-hidden = HIDDEN
+LOOP = """
 [controller]
 kind = "pd"
 kp = [400.0, 120.0]
 kd = [50.0, 8.0]
 rate_hz = 250.0
+
 [[recordings]]
 file = "run.csv"
 duration = 8.0
@@ -176,7 +179,9 @@ def test_effects_that_fail_in_the_work_are_one_line(run, study, tmp_path, kind, 
 def test_experiments_name_modules_too(run, study, tmp_path, hidden):
     study()
     put(tmp_path / "mine.py", SAG)
-    (tmp_path / "experiment.toml").write_text(EXPERIMENT.replace("HIDDEN", hidden))
+    head = 'robot = "arm.urdf"\neffect_modules = ["mine.py"]\n'
+    text = f"{head}{SAGGING}hidden = {hidden}\n{LOOP}"
+    (tmp_path / "experiment.toml").write_text(text)
     done = run("simulate", "experiment.toml", "--out", "made")
     assert done.status == 2 and "not trusted" in done.err and not (tmp_path / "made").exists()
     done = run("simulate", "experiment.toml", "--out", "made", "--trust")

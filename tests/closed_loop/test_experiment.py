@@ -24,43 +24,23 @@ from dynident.closed_loop import (
 from dynident.errors import DynidentError, EffectError, SimulationError, StudyError
 from dynident.recording import read
 from dynident.study import load
+from experiment_files import HEAD, HIDDEN_STRIBECK, SHORT_RUN, STIFF
 
 RATE = 250.0
 LOAD = {"mass": 0.8, "mx": 0.2, "Ixx": 0.01, "Iyy": 0.1, "Izz": 0.1}
-FILE = """
-robot = "arm.urdf"
-joints = ["shoulder", "elbow"]
-seed = 3
-lead_in = 0.5
-
+FRICTION = """
 [[effects]]
 effect = "viscous_friction"
 values = {Fv = 0.5}
-
-[[effects]]
-effect = "stribeck_friction@elbow"
-values = {Fs = 0.3}
-shape = {vs = 0.1}
-hidden = true
-
-[controller]
-kind = "pd"
-kp = [300.0, 100.0]
-kd = [40.0, 5.0]
-rate_hz = 250.0
-
+"""
+SENSORS = """
 [sensors]
 position_std = 2e-5
 position_resolution = 1e-5
 torque_std = [0.05, 0.02]
 torque_resolution = 0.001
-
-[[recordings]]
-file = "run1.csv"
-duration = 1.0
-period = 0.5
-trajectory = {harmonics = 2, speed = 2.0, seed = 1}
-
+"""
+RESTING_RUN = """
 [[recordings]]
 file = "run2.csv"
 use = "test"
@@ -68,6 +48,7 @@ duration = 0.5
 period = 0.5
 start = 10.0
 """
+FILE = HEAD + FRICTION + HIDDEN_STRIBECK + STIFF + SENSORS + SHORT_RUN + RESTING_RUN
 
 
 @pytest.fixture

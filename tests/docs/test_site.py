@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
-from axe_playwright_python.sync_playwright import Axe
 from bs4 import BeautifulSoup
-from playwright.sync_api import sync_playwright
 
+from browsers import DESK, PHONE, Tab, needs_browser, opened, serious_faults
 from code_blocks import ROOT
 from dynident.effects import catalogue
 
-BROWSER = next(
-    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
-)
 WIDE = ("effects", "symbols", "reference/study", "accuracy", "api")
 TRIED = ("index", "first_robot", "reference/experiment")
 """Pages with all that pages have, and short: axe-core takes its time by their length."""
@@ -66,26 +60,13 @@ def test_every_effect_has_its_picture(site: Path, pages) -> None:
     assert own <= drawn
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator:
-    if BROWSER is None:
-        pytest.skip("no chromium, chromium-browser or google-chrome on the path")
-    with sync_playwright() as driver:
-        found = driver.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
-        yield found
-        found.close()
-
-
-@pytest.mark.parametrize("width", [390, 1280])
+@needs_browser
+@pytest.mark.parametrize("width", [PHONE, DESK])
 def test_pages_fit_the_screen_and_have_no_serious_fault(site: Path, browser, width: int) -> None:
     """No page is wider than the screen; axe-core finds nothing critical or serious."""
-    context = browser.new_context(viewport={"width": width, "height": 900}, offline=True)
-    page = context.new_page()
     for name in (*WIDE, *TRIED):
-        page.goto((site / f"{name}.html").as_uri())
-        assert page.evaluate("document.documentElement.scrollWidth") <= width, name
-        if name not in TRIED:
-            continue
-        found = Axe().run(page).response["violations"]
-        assert [v["id"] for v in found if v["impact"] in ("critical", "serious")] == [], name
-    context.close()
+        one = opened(browser, (site / f"{name}.html").as_uri(), width, Tab)
+        one.assert_fits()
+        if name in TRIED:
+            assert serious_faults(one.page) == [], name
+        one.page.context.close()

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import pytest
-from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import sync_playwright
 
 import dynident as di
+from browsers import DESK, PHONE, Tab, needs_browser, opened, serious_faults
 from dynident.diagnosis import Diagnosis
 from dynident.explorer import explore
 from dynident.explorer.local_server import LocalServer
@@ -26,45 +23,16 @@ from explorer.test_next_recording import write_design
 from study_files import STUDY, csv_text, edited, write_study
 from synthetic import ARM
 
-BROWSER = next(
-    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
-)
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(
-        BROWSER is None, reason="no chromium, chromium-browser or google-chrome on the path"
-    ),
-]
+pytestmark = [pytest.mark.slow, needs_browser]
 
 DEMO = Path(__file__).parents[2] / "problems" / "hidden_effect"
 HIDDEN = "coulomb_friction@elbow"
-PHONE, DESK = 390, 1280
 NASTY = "<script>alert(1)</script>"
 _NOW = re.compile(r"All joints: ([0-9.]+) % before, ([0-9.]+) % now")
 
 
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory) -> Iterator:
-    home = tmp_path_factory.mktemp("home")
-    with sync_playwright() as driver:
-        found = driver.chromium.launch(
-            executable_path=BROWSER,
-            timeout=120_000,
-            args=["--no-sandbox", "--disable-gpu"],
-            env={**os.environ, "HOME": str(home)},
-        )
-        yield found
-        found.close()
-
-
-@dataclass
-class Tab:
-    """A tab of the browser, with what it has complained of and asked for."""
-
-    page: Any
-    home: str
-    complaints: list[str] = field(default_factory=list)
-    requests: list[str] = field(default_factory=list)
+class Explorer(Tab):
+    """The page of the explorer."""
 
     def switch(self, place: int = 0) -> None:
         """Flip a switch by the keyboard, and wait until the error has been seen to change."""
@@ -95,36 +63,24 @@ class Tab:
         ends = self.page.locator("#errors .bartext").all_text_contents()
         assert [ends[len(ends) // 2 - 1], ends[-1]] == want
 
-    def assert_quiet(self) -> None:
-        """Nothing was complained of, and nothing left the machine."""
-        assert self.complaints == []
-        assert [one for one in self.requests if not one.startswith((self.home, "data:"))] == []
 
-
-Opened = Callable[..., Tab]
+Opened = Callable[..., Explorer]
 
 
 @pytest.fixture
 def tab(browser) -> Iterator[Opened]:
-    contexts = []
+    tabs: list[Explorer] = []
 
-    def opened(url: str, width: int = DESK) -> Tab:
-        context = browser.new_context(viewport={"width": width, "height": 844})
-        contexts.append(context)
-        found = Tab(context.new_page(), url)
-        found.page.on("console", lambda message: found.complaints.append(message.text))
-        found.page.on("pageerror", lambda error: found.complaints.append(str(error)))
-        found.page.on("dialog", lambda one: found.complaints.append(one.message))
-        found.page.on("request", lambda request: found.requests.append(request.url))
-        found.page.set_default_timeout(120_000)
-        found.page.goto(url)
+    def at(url: str, width: int = DESK) -> Explorer:
+        found = opened(browser, url, width, Explorer)
+        tabs.append(found)
         found.page.locator(".effect").first.wait_for(state="attached")
         found.page.wait_for_function("document.querySelector('#said').innerText.length > 0")
         return found
 
-    yield opened
-    for context in contexts:
-        context.close()
+    yield at
+    for one in tabs:
+        one.page.context.close()
 
 
 @pytest.fixture(scope="module")
@@ -198,7 +154,7 @@ def test_it_is_readable_and_reached_by_keys(small, tab, width):
     one = tab(small[1].url, width)
     one.switch()
     one.page.locator("#values table").wait_for()
-    assert one.page.evaluate("document.documentElement.scrollWidth") <= width
+    one.assert_fits()
     # Every control has a name, and the keyboard reaches all that is open.
     unnamed = """() => [...document.querySelectorAll("main input, main button, main summary")]
       .filter((n) => !n.ariaHidden && n.getBoundingClientRect().height && !(n.labels?.length
@@ -215,21 +171,15 @@ def test_it_is_readable_and_reached_by_keys(small, tab, width):
 
 
 @pytest.mark.parametrize("width", [PHONE, DESK])
-def test_axe_finds_nothing_serious(small, tab, width):
+def test_axe_finds_nothingserious_faults(small, tab, width):
     """As it is opened, with all that is folded open, and with an effect switched on."""
     page = tab(small[1].url, width).page
-    faults = [_serious(page)]
+    faults = [serious_faults(page)]
     page.evaluate("document.querySelectorAll('details').forEach((part) => part.open = true)")
     page.locator(".switch input").first.check()
     page.locator("#values table").wait_for()
-    faults.append(_serious(page))
+    faults.append(serious_faults(page))
     assert faults == [[], []]
-
-
-def _serious(page) -> list[tuple[str, list[str]]]:
-    found = Axe().run(page, options={"resultTypes": ["violations"]}).response["violations"]
-    serious = [one for one in found if one["impact"] in ("serious", "critical")]
-    return [(one["id"], [node["html"][:90] for node in one["nodes"][:3]]) for one in serious]
 
 
 def test_a_recording_is_zoomed_and_what_is_held_out_is_said(small, tab):

@@ -2,6 +2,10 @@ from collections.abc import Iterator
 
 import pytest
 
+from chains import chain_text, estimated, recorded
+from dynident.fitting import Estimate
+from dynident.robot import Robot
+
 
 @pytest.fixture(scope="session")
 def client() -> Iterator:
@@ -14,3 +18,12 @@ def client() -> Iterator:
         distributed.Client(cluster) as client,
     ):
         yield client
+
+
+@pytest.fixture(scope="session")
+def chain_estimate() -> Estimate:
+    """Three links, an impossible estimate."""
+    robot = Robot.from_text(chain_text(3))
+    estimate = estimated(robot, recorded(robot))
+    assert estimate.inconsistent_links()
+    return estimate

@@ -9,8 +9,6 @@ import pytest
 
 from chains import (
     QUIET,
-    chain_text,
-    estimated,
     noisy_estimate,
     recorded,
 )
@@ -18,17 +16,6 @@ from dynident.constraints import ParameterSpace
 from dynident.errors import FitError
 from dynident.fitting import Estimate, Metric, Prior, given_estimate, project
 from dynident.recording import Dataset
-from dynident.robot import Robot
-
-
-@pytest.fixture(scope="module")
-def chain_estimate() -> Estimate:
-    """Three links, an impossible estimate."""
-    robot = Robot.from_text(chain_text(3))
-    estimate = estimated(robot, recorded(robot))
-    assert estimate.inconsistent_links()
-    return estimate
-
 
 # --- the metric ----------------------------------------------------------------------------------
 

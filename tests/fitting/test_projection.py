@@ -26,16 +26,6 @@ from dynident.inertia import margins
 from dynident.nlp.certificate import OPTIMAL
 from dynident.robot import Robot
 
-
-@pytest.fixture(scope="module")
-def chain_estimate() -> Estimate:
-    """Three links, an impossible estimate."""
-    robot = Robot.from_text(chain_text(3))
-    estimate = estimated(robot, recorded(robot))
-    assert estimate.inconsistent_links()
-    return estimate
-
-
 # --- what comes out is possible, and says in which sense -----------------------------------------
 
 

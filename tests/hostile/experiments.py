@@ -2,38 +2,16 @@
 
 from __future__ import annotations
 
+from experiment_files import HEAD, HIDDEN_STRIBECK, SHORT_RUN, STIFF
 from hostile.case import ANSWER, Content, HostileCase, folder, link_to
 from study_files import edited
 
-EXPERIMENT = """\
-robot = "arm.urdf"
-joints = ["shoulder", "elbow"]
-seed = 3
-lead_in = 0.5
-
-[[effects]]
-effect = "stribeck_friction@elbow"
-values = {Fs = 0.3}
-shape = {vs = 0.1}
-hidden = true
-
-[controller]
-kind = "pd"
-kp = [300.0, 100.0]
-kd = [40.0, 5.0]
-rate_hz = 250.0
-
+SENSORS = """
 [sensors]
 position_std = 2e-5
 torque_std = [0.05, 0.02]
-
-[[recordings]]
-file = "run1.csv"
-duration = 1.0
-period = 0.5
-trajectory = {harmonics = 2, speed = 2.0, seed = 1}
 """
-CONTROLLER = EXPERIMENT[EXPERIMENT.index("[controller]") : EXPERIMENT.index("[sensors]")]
+EXPERIMENT = HEAD + HIDDEN_STRIBECK + STIFF + SENSORS + SHORT_RUN
 
 
 def but(old: str, new: str) -> str:
@@ -70,7 +48,7 @@ FOUND: dict[str, tuple[Content, str]] = {
         but("lead_in = 0.5", "lead_in = 1e7"),
         r"lead_in = 1e\+07 s at 250 Hz are more than 1e\+07 samples",
     ),
-    "no controller": (but(CONTROLLER, ""), r"experiment\.toml: key 'controller' is missing"),
+    "no controller": (but(STIFF, ""), r"experiment\.toml: key 'controller' is missing"),
     "a controller of 1e7 Hz": (
         edited(("250.0", "1e7"), ("duration = 1.0", "duration = 9.0"), text=EXPERIMENT),
         r"duration = 9 s at 1e\+07 Hz are more than 1e\+07 samples",

@@ -2,32 +2,22 @@
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import pytest
-from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import sync_playwright
 
+from browsers import DESK, HEIGHT, PHONE, Tab, needs_browser, opened, serious_faults
 from dynident.reporting import report
 from dynident.tables import percent
 from reporting.fabricated import diagnosis
 from reporting.fabricated_loop import validation
 
-BROWSER = next(
-    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
-)
-pytestmark = pytest.mark.skipif(
-    BROWSER is None, reason="no chromium, chromium-browser or google-chrome on the path"
-)
+pytestmark = needs_browser
 
-PHONE, DESK = 390, 1280
 SMALLEST_TEXT = 12.0  # pixels
 
 _DRAWN = """() => [...document.querySelectorAll(".plot")]
@@ -52,20 +42,6 @@ _RANGE = 'document.getElementById("torque")._fullLayout.xaxis.range'
 
 
 @pytest.fixture(scope="module")
-def browser(tmp_path_factory) -> Iterator:
-    home = tmp_path_factory.mktemp("home")
-    with sync_playwright() as driver:
-        found = driver.chromium.launch(
-            executable_path=BROWSER,
-            timeout=120_000,
-            args=["--no-sandbox", "--disable-gpu"],
-            env={**os.environ, "HOME": str(home)},
-        )
-        yield found
-        found.close()
-
-
-@pytest.fixture(scope="module")
 def two_joints(tmp_path_factory) -> Path:
     to = tmp_path_factory.mktemp("two") / "report.html"
     return report(diagnosis(samples=300), to, loop=validation())
@@ -81,20 +57,12 @@ def seven_joints(tmp_path_factory) -> Path:
     return report(found, tmp_path_factory.mktemp("seven") / "report.html")
 
 
-@dataclass
-class Visit:
-    """A page that was opened once, with what it has complained of and asked for."""
-
-    page: Any
-    width: int
-    address: str
-    complaints: list[str] = field(default_factory=list)
-    requests: list[str] = field(default_factory=list)
+class Visit(Tab):
+    """The report: one file, and nothing beside it."""
 
     def assert_quiet(self) -> None:
-        """Nothing was complained of, and nothing left the machine."""
-        assert self.complaints == []
-        assert set(self.requests) == {self.address}
+        super().assert_quiet()
+        assert set(self.requests) == {self.home}
 
 
 @pytest.fixture(scope="module")
@@ -110,16 +78,7 @@ def visit(browser) -> Callable[[Path, int], Visit]:
 
 
 def _visited(browser, path: Path, width: int) -> Visit:
-    phone = width == PHONE
-    context = browser.new_context(
-        viewport={"width": width, "height": 844}, has_touch=phone, is_mobile=phone
-    )
-    found = Visit(context.new_page(), width, path.as_uri())
-    found.page.on("console", lambda message: found.complaints.append(message.text))
-    found.page.on("pageerror", lambda error: found.complaints.append(str(error)))
-    found.page.on("request", lambda request: found.requests.append(request.url))
-    found.page.set_default_timeout(120_000)
-    found.page.goto(found.address)
+    found = opened(browser, path.as_uri(), width, Visit)
     # Drawn in the order of the page, and all at once.
     found.page.locator(".js-plotly-plot").nth(2).wait_for()
     return found
@@ -130,7 +89,7 @@ def assert_readable(one: Visit) -> None:
     pictures = one.page.evaluate(_DRAWN)
     assert pictures and all(picture["height"] > 60 for picture in pictures)
     assert [picture["name"] for picture in pictures if not picture["shapes"]] == []
-    assert one.page.evaluate("document.documentElement.scrollWidth") <= one.width
+    one.assert_fits()
     assert one.page.evaluate(_SMALL_TEXT, SMALLEST_TEXT) == []
     one.assert_quiet()
 
@@ -141,9 +100,9 @@ def test_it_is_readable(which, width, visit, request):
     one = visit(request.getfixturevalue(which), width)
     assert_readable(one)
     sentence = one.page.locator(".sentence").bounding_box()
-    assert sentence["y"] + sentence["height"] < 844  # the verdict is seen without scrolling
+    assert sentence["y"] + sentence["height"] < HEIGHT  # the verdict is seen without scrolling
     first = one.page.locator(".plot").first.bounding_box()
-    assert first["y"] + 150 < 844  # and so is the first picture
+    assert first["y"] + 150 < HEIGHT  # and so is the first picture
 
 
 def test_zoom(visit, two_joints):
@@ -235,9 +194,7 @@ def test_it_prints_on_less_than_ten_pages(visit, seven_joints):
 def test_who_cannot_see_or_point_can_read_it(which, browser, request):
     one = _visited(browser, request.getfixturevalue(which), DESK)
     one.page.evaluate("document.querySelectorAll('details').forEach((part) => part.open = true)")
-    found = Axe().run(one.page, options={"resultTypes": ["violations"]})
-    serious = [v for v in found.response["violations"] if v["impact"] in ("serious", "critical")]
-    assert [(v["id"], [n["html"][:90] for n in v["nodes"][:3]]) for v in serious] == []
+    assert serious_faults(one.page) == []
     levels = one.page.evaluate(
         "[...document.querySelectorAll('h1,h2,h3,h4')].map((n) => Number(n.tagName[1]))"
     )
