@@ -13,6 +13,7 @@ another order or unit, whose rounding differs, would get another answer.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 
@@ -122,7 +123,7 @@ def analyse(
         # Gains that grow are those of a saddle that is being left.
         growing = gain - (bounds[-2] - bounds[-3]) > here.rounding
         with np.errstate(all="ignore"):  # it may go anywhere: its bound decides
-            there = _leap(here, prior, known, degree)
+            (there,) = _leaps(here, prior, known, (degree,))
             won = there.bound(prior) - bounds[-1]
         nothing = max(_NOTHING * tolerance, here.rounding)
         if not -nothing <= won < np.inf:
@@ -155,8 +156,7 @@ def _ahead(here: Posterior, prior: Gamma | None, known: np.ndarray) -> Posterior
     """Where the best leap of any degree ends; here where none gains."""
     best, highest = here, here.bound(prior)
     with np.errstate(all="ignore"):
-        for degree in _FAR:
-            there = _leap(here, prior, known, degree)
+        for there in _leaps(here, prior, known, _FAR):
             bound = there.bound(prior)
             if highest < bound < np.inf:
                 best, highest = there, bound
@@ -171,10 +171,13 @@ def _drift(here: Posterior, there: Posterior) -> float:
     return float(np.max(change, where=matters, initial=0.0))
 
 
-def _leap(here: Posterior, prior: Gamma | None, known: np.ndarray, degree: int) -> Posterior:
-    """Apply T_n(2 M - 1) for the linear map M that a round is near its end; n is the degree.
+def _leaps(
+    here: Posterior, prior: Gamma | None, known: np.ndarray, degrees: tuple[int, ...]
+) -> Iterator[Posterior]:
+    """Apply T_n(2 M - 1) for the linear map M that a round is near its end; n are the degrees.
 
-    Far from there it may end anywhere, out of the numbers as well: then its bound is no number.
+    They rise, and the way to each leads through those before it. Far from there a leap may end
+    anywhere, out of the numbers as well: then its bound is no number.
     """
     # The weights have no variance in plain joint factor analysis.
     positive = _VARIANCES if prior is None else _POSITIVE
@@ -183,11 +186,13 @@ def _leap(here: Posterior, prior: Gamma | None, known: np.ndarray, degree: int) 
         return Posterior(_factors(coordinates, positive, here.factors, known), here.statistics)
 
     last = _coordinates(here.factors, positive)
-    now = 2 * _coordinates(here.updated(prior, known), positive) - last
-    for _ in range(degree - 1):
-        after = _coordinates(place(now).updated(prior, known), positive)
-        last, now = now, 2 * (2 * after - now) - last
-    return place(now)
+    now, reached = 2 * _coordinates(here.updated(prior, known), positive) - last, 1
+    for degree in degrees:
+        for _ in range(degree - reached):
+            after = _coordinates(place(now).updated(prior, known), positive)
+            last, now = now, 2 * (2 * after - now) - last
+        reached = degree
+        yield place(now)
 
 
 _VARIANCES = ("pz", "px")
