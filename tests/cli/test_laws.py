@@ -44,12 +44,14 @@ def test_what_is_hidden_is_not_told(simulated: Path) -> None:
     assert "law" not in (simulated / "study.toml").read_text()
 
 
+@pytest.mark.slow
 def test_without_the_law_nothing_explains_it(simulated: Path, run) -> None:
     done = run("explain", simulated / "study.toml", "--json")
     assert done.status == 0
     assert done.json["verdict"] == "unexplained"
 
 
+@pytest.mark.slow
 def test_a_law_is_proposed_and_written(simulated: Path, tmp_path: Path, run) -> None:
     """The hidden c v sin(k q + p), as its expansion; the verdict stays."""
     study, shared = simulated / "proposed.toml", tmp_path / "lab.toml"
@@ -84,6 +86,7 @@ def test_a_law_is_proposed_and_written(simulated: Path, tmp_path: Path, run) -> 
     assert [s["effect"] for s in done.json["steps"]] == ["law:proposal1"]
 
 
+@pytest.mark.slow
 def test_nothing_is_proposed_for_a_complete_model(simulated: Path, run) -> None:
     study = simulated / "complete.toml"
     text = (simulated / "study.toml").read_text()
@@ -96,6 +99,7 @@ def test_nothing_is_proposed_for_a_complete_model(simulated: Path, run) -> None:
     assert "none was made" in done.err
 
 
+@pytest.mark.slow
 def test_the_law_is_found_added_fitted_saved_and_loaded(simulated: Path, tmp_path: Path, run):
     study = simulated / "with_law.toml"
     study.write_text((simulated / "study.toml").read_text() + WAVE)

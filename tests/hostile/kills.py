@@ -18,6 +18,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import pytest
+
 import dynident as di
 from dynident.cli import main as command
 from dynident.robot import Robot
@@ -95,6 +97,13 @@ WRITERS = {
     ),
     "demo": Writer(words=("demo", "--to", "demo.html"), results={"demo.html": _page}),
 }
+
+LONG = ("show", "explain", "report", "simulate", "experiment", "demo")
+"""Commands that take seconds: `make test-fast` leaves them out."""
+each_writer = pytest.mark.parametrize(
+    "name",
+    [pytest.param(one, marks=pytest.mark.slow if one in LONG else ()) for one in WRITERS],
+)
 
 
 def prepare(folder: Path) -> None:

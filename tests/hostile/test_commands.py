@@ -20,6 +20,8 @@ from dynident.tables import printable
 from hostile.corpus import KINDS, corpus
 
 TESTS = Path(__file__).parents[1]
+SHARE = 6
+"""Of so many cases `make test-fast` tries one."""
 NAMES = [(kind, name) for kind in KINDS for name in corpus(kind)]
 
 
@@ -63,7 +65,13 @@ def tried() -> Iterator[Tried]:
     one.end()
 
 
-@pytest.mark.parametrize("case", NAMES, ids=[f"{kind}: {name}" for kind, name in NAMES])
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(case, id=": ".join(case), marks=pytest.mark.slow if k % SHARE else ())
+        for k, case in enumerate(NAMES)
+    ],
+)
 def test_one_line_or_a_right_answer(tried: Tried, case: tuple[str, str]) -> None:
     kind, name = case
     expected = corpus(kind)[name]

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import dynident as di
-from hostile.kills import WRITERS, Writer, content, finished, prepare, started
+from hostile.kills import WRITERS, Writer, content, each_writer, finished, prepare, started
 from hostile.worker import load_libraries
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks here")
@@ -48,7 +48,7 @@ def no_room() -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (300, 300))
 
 
-@pytest.mark.parametrize("name", WRITERS)
+@each_writer
 def test_no_room_leaves_the_old_files_and_one_line(name: str, tmp_path: Path) -> None:
     folder = tmp_path / "study"
     folder.mkdir()
@@ -62,7 +62,7 @@ def test_no_room_leaves_the_old_files_and_one_line(name: str, tmp_path: Path) ->
     assert {k: v for k, v in content(folder).items() if not k.startswith("virtual/")} == before
 
 
-@pytest.mark.parametrize("name", WRITERS)
+@each_writer
 def test_a_folder_that_may_not_be_written_stays_as_it_is(name: str, tmp_path: Path) -> None:
     folder = tmp_path / "study"
     folder.mkdir()
@@ -103,6 +103,27 @@ def test_two_that_add_at_once_leave_one_answer_or_both(tmp_path: Path) -> None:
         assert 0 in statuses and not [k for k in content(folder) if Path(k).name.startswith(".")]
 
 
+def added_and_fitted(folder: Path, around: dict[str, str]) -> tuple[bytes, bytes]:
+    """The study and the robot that two commands write."""
+    folder.mkdir()
+    prepare(folder)
+    for words in (WRITERS["add"].words, WRITERS["fit"].words):
+        done = subprocess.run(
+            [sys.executable, "-m", "dynident.cli", *words],
+            cwd=folder,
+            env={**os.environ, **around},
+            capture_output=True,
+            timeout=120,
+        )
+        assert done.returncode in (0, 1) and b"Traceback" not in done.stderr, done.stderr
+    return (folder / "study.toml").read_bytes(), (folder / "fit.urdf").read_bytes()
+
+
+@pytest.fixture(scope="module")
+def usual(tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, bytes]:
+    return added_and_fitted(tmp_path_factory.mktemp("surroundings") / "usual", {})
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "around",
@@ -114,24 +135,8 @@ def test_two_that_add_at_once_leave_one_answer_or_both(tmp_path: Path) -> None:
     ],
     ids=["Turkish", "ASCII", "no HOME", "an empty HOME"],
 )
-def test_odd_surroundings_change_no_file(around: dict[str, str], tmp_path: Path) -> None:
-    written = []
-    for place, more in (("usual", {}), ("odd", around)):
-        folder = tmp_path / place
-        folder.mkdir()
-        prepare(folder)
-        for words in (WRITERS["add"].words, WRITERS["fit"].words):
-            done = subprocess.run(
-                [sys.executable, "-m", "dynident.cli", *words],
-                cwd=folder,
-                env={**os.environ, **more},
-                capture_output=True,
-                timeout=120,
-            )
-            assert done.returncode in (0, 1) and b"Traceback" not in done.stderr, done.stderr
-        study, robot = (folder / name for name in ("study.toml", "fit.urdf"))
-        written.append((study.read_bytes(), robot.read_bytes()))
-    assert written[0] == written[1]
+def test_odd_surroundings_change_no_file(usual, around: dict[str, str], tmp_path: Path) -> None:
+    assert added_and_fitted(tmp_path / "odd", around) == usual
 
 
 def test_a_reader_that_has_gone_loses_no_file(tmp_path: Path) -> None:

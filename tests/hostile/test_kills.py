@@ -6,13 +6,13 @@ import os
 
 import pytest
 
-from hostile.kills import WRITERS, at_line, at_moment, damage, uninterrupted
+from hostile.kills import WRITERS, at_line, at_moment, damage, each_writer, uninterrupted
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks here")
 LINES = (2, 9, 17)
 
 
-@pytest.mark.parametrize("name", WRITERS)
+@each_writer
 def test_a_kill_leaves_the_old_or_the_new(name):
     writer = WRITERS[name]
     for line in LINES:
@@ -22,7 +22,7 @@ def test_a_kill_leaves_the_old_or_the_new(name):
     assert lost == []
 
 
-@pytest.mark.parametrize("name", WRITERS)
+@each_writer
 def test_what_nobody_kills_is_written(name):
     files = uninterrupted(WRITERS[name]).files
     assert set(WRITERS[name].results) <= set(files)
