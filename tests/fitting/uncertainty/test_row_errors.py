@@ -100,17 +100,20 @@ def test_scaling_torques_scales_sigma(model: Model) -> None:
     np.testing.assert_allclose(fit(model, loud).sigma, 1e3 * fit(model, data).sigma, rtol=1e-6)
 
 
+@pytest.fixture(scope="module")
+def hundred() -> list[Recording]:
+    return lab.Lab(torque_std=STD).recordings(range(7000, 7100))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("settings", [None, Filter()], ids=["default filter", "no filter"])
-def test_intervals_cover_what_they_say(settings: Filter | None) -> None:
+def test_intervals_cover_what_they_say(hundred, settings: Filter | None) -> None:
     """Of 100 recordings of a foreign simulator; rows taken as independent: 0.88 and 0.84."""
     model = lab.model()
-    recordings = lab.Lab(torque_std=STD).recordings(range(7000, 7100))
-    found = [fit(model, Dataset((one,), settings)) for one in recordings]
+    found = [fit(model, Dataset((one,), settings)) for one in hundred]
     assert 0.93 <= covered(found, lab.truth(model)) <= 0.97
     independent = [
-        fit(model, Dataset((one,), settings), LeastSquares(errors="independent"))
-        for one in recordings
+        fit(model, Dataset((one,), settings), LeastSquares(errors="independent")) for one in hundred
     ]
     assert covered(independent, lab.truth(model)) < 0.91
 
