@@ -27,7 +27,7 @@ from hostile.case import place
 from hostile.experiments import EXPERIMENT
 from hostile.worker import load_libraries
 from loop_studies import LOOP_STUDY, write_loop_study
-from study_files import CONTROLLER, STUDY, write_study
+from study_files import CONTROLLER, STUDY, edited, write_study
 
 WRITING = "dynident/files.py"
 
@@ -80,11 +80,11 @@ WRITERS = {
     ),
     "show": Writer(words=("show", "study.toml", "--to", "old.png"), results={"old.png": _picture}),
     "explain": Writer(
-        words=("explain", "study.toml", "--most", "0", "--report", "old.html"),
+        words=("explain", "whole.toml", "--most", "0", "--report", "old.html"),
         results={"old.html": _page},
     ),
     "report": Writer(
-        words=("report", "study.toml", "--most", "0", "--to", "new.html"),
+        words=("report", "whole.toml", "--most", "0", "--to", "new.html"),
         results={"new.html": _page},
     ),
     "simulate": Writer(
@@ -109,6 +109,9 @@ each_writer = pytest.mark.parametrize(
 def prepare(folder: Path) -> None:
     """Write what the commands read, and some of what they replace."""
     write_study(folder, STUDY + CONTROLLER)
+    # Where nothing is missing, nothing is asked of what is left.
+    complete = edited(('"viscous_friction"', '"viscous_friction", "coulomb_friction@elbow"'))
+    place(folder / "whole.toml", complete + CONTROLLER)
     (folder / "loop").mkdir()
     write_loop_study(folder / "loop", LOOP_STUDY)
     robot = (folder / "arm.urdf").read_text()

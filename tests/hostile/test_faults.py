@@ -14,16 +14,11 @@ import pytest
 
 import dynident as di
 from hostile.kills import WRITERS, Writer, content, each_writer, finished, prepare, started
-from hostile.worker import load_libraries
 
-pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks here")
-
-
-@pytest.fixture(scope="module", autouse=True)
-def libraries() -> None:
-    """Have them before a limit that would stop what they write for themselves."""
-    load_libraries()
-    b"".decode("utf-8-sig")
+pytestmark = [
+    pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks here"),
+    pytest.mark.usefixtures("libraries"),
+]
 
 
 def run_with(fault: Callable[[], object], writer: Writer, folder: Path) -> tuple[int, str]:

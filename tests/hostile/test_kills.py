@@ -8,7 +8,10 @@ import pytest
 
 from hostile.kills import WRITERS, at_line, at_moment, damage, each_writer, uninterrupted
 
-pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks here")
+pytestmark = [
+    pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks here"),
+    pytest.mark.usefixtures("libraries"),
+]
 LINES = (2, 9, 17)
 
 

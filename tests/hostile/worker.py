@@ -56,6 +56,9 @@ def main() -> None:
 
 def load_libraries() -> None:
     """Import what commands import when they need it: it is no memory of theirs."""
+    import matplotlib.backends.backend_agg
+    import plotly.graph_objects  # noqa: F401
+
     import dynident.diagnosis  # noqa: F401
     import dynident.reporting  # noqa: F401
     import dynident.study  # noqa: F401
@@ -64,7 +67,7 @@ def load_libraries() -> None:
     from dynident.robot import Robot
     from synthetic import ARM
 
-    assert dynident.study_draft and Robot.from_text(ARM).n == 2
+    assert dynident.study_draft and matplotlib and Robot.from_text(ARM).n == 2
 
 
 def limit_memory() -> None:

@@ -75,6 +75,7 @@ def test_without_a_noise_floor_shares_are_of_everything_and_it_says_so() -> None
     assert "noise included" in " ".join(str(dependence_table((first, second))).split())
 
 
+@pytest.mark.slow
 def test_no_unit_and_no_order_of_recordings_matters() -> None:
     """In degrees and N mm, and with the second recording first."""
     two = (record(12, {rough_friction: 0.6}, duration=30.0), record(13, {}, duration=30.0))

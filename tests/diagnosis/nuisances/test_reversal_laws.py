@@ -115,6 +115,7 @@ def test_friction_that_lags_is_never_nothing() -> None:
     assert not said.reversals_left_out
 
 
+@pytest.mark.slow
 def test_a_study_that_asks_for_every_row_keeps_it() -> None:
     every = di.Filter(position_cutoff_hz=40.0, ends="keep")
     train = replace(dataset(0, 1, lead=6e-3), filter=every)
