@@ -148,10 +148,13 @@ def follows_the_filter(
 ) -> str:
     """Say by how much an effect's torque changes with the filter, if it does.
 
+    What noise makes of an effect rises and falls with the cut-off. So any two filters are compared,
+    not only each with the first, whose value may lie between those of two others.
+
     Parameters
     ----------
     evidence : the training recordings, marked with those that carry a payload.
-    narrow : as from `narrower`.
+    narrow : as from `narrower`, from the highest cut-off to the lowest.
     wider : the model with the effect, as it fits the recordings behind their own filter.
     effect : that was added.
 
@@ -160,30 +163,62 @@ def follows_the_filter(
     In words; empty where it makes the same torque, or that does not matter.
     """
     payloads = [run.recording.payload for run in evidence.runs]
-    every = (_changed(marked(one, payloads), wider, effect) for one in narrow)
-    return next((why for why in every if why), "")
+    own = wider.model.slices[effect.label]
+    every = [wider.values[own]]
+    for one in narrow:
+        lower = marked(one, payloads)
+        again = fit_evidence(lower, wider.model)
+        gram, second = _gram(lower, wider, effect), again.values[own]
+        doubt = np.trace(gram @ again.covariance[own, own])
+        for first in every:
+            if _changed(gram, doubt, first, second, evidence.criteria.gates):
+                return _how_it_changes(gram, every[0], first, second)
+        every.append(second)
+    return ""
 
 
-def _changed(narrow: Evidence, wider: EvidenceFit, effect: Effect) -> str:
-    """Say by how much an effect's torque changes with one filter, if it does."""
-    gates, own = narrow.criteria.gates, wider.model.slices[effect.label]
-    again = fit_evidence(narrow, wider.model)
-    first, second = wider.values[own], again.values[own]
-    apart = first - second
-    doubt = again.covariance[own, own]
+def _gram(lower: Evidence, wider: EvidenceFit, effect: Effect) -> np.ndarray:
+    """Return the products of an effect's columns behind a lower filter, (k, k)."""
+    own = wider.model.slices[effect.label]
     whole = next(e for e in wider.model.effects if e.label == effect.label)
-    squares = np.zeros(4)
-    for run in range(len(narrow.runs)):
-        for columns in narrow.of(whole, run, wider.model, wider.values):
+    gram = np.zeros((own.stop - own.start,) * 2)
+    for run in range(len(lower.runs)):
+        for columns in lower.of(whole, run, wider.model, wider.values):
             rows = columns.reshape(-1, columns.shape[-1])
-            sizes = [rows @ first, rows @ second, rows @ apart]
-            squares[:3] += [float(x @ x) for x in sizes]
-            squares[3] += float(np.sum((rows @ doubt) * rows))
-    once, again_, change, uncertain = np.sqrt(squares)
-    if change <= gates.same_value * max(once, again_) or change <= gates.beyond_bounds * uncertain:
-        return ""
-    share = percent(again_ / once if once > 0 else np.inf, 0)
+            gram += rows.T @ rows
+    return gram
+
+
+def _changed(
+    gram: np.ndarray, doubt: float, first: np.ndarray, second: np.ndarray, gates: GateCriteria
+) -> bool:
+    """Whether two values of an effect make torques that differ, beyond what is uncertain.
+
+    Parameters
+    ----------
+    gram : products of its columns, (k, k).
+    doubt : sum of squares of the torque's standard deviation.
+    first, second : the values, (k,) each.
+    gates : what is the same, and from how many standard deviations it is not.
+    """
+    change = _size(gram, first - second)
+    most = max(_size(gram, first), _size(gram, second))
+    return change > gates.same_value * most and change > gates.beyond_bounds * np.sqrt(doubt)
+
+
+def _how_it_changes(
+    gram: np.ndarray, here: np.ndarray, first: np.ndarray, second: np.ndarray
+) -> str:
+    """Say how large an effect's torque is with two values, against that with those found here."""
+    own = _size(gram, here)
+    others = [one for one in (first, second) if one is not here]
+    told = [percent(_size(gram, one) / own if own > 0 else np.inf, 0) for one in others]
     return (
-        f"changes with the filter: behind lower cut-offs its torque is {share} of what it is here, "
-        "so noise in the columns makes it"
+        f"changes with the filter: behind lower cut-offs its torque is {' and '.join(told)} of what "
+        "it is here, so noise in the columns makes it"
     )
+
+
+def _size(gram: np.ndarray, values: np.ndarray) -> float:
+    """Root of the sum of squares of an effect's torque."""
+    return float(np.sqrt(max(values @ gram @ values, 0.0)))
