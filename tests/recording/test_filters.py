@@ -174,6 +174,27 @@ def test_filters_that_cannot_be(arguments, message):
         Filter(**arguments)
 
 
+@pytest.mark.parametrize(
+    "recipe",
+    [
+        default_filter(1000.0),
+        Filter(position_cutoff_hz=80.0, cutoff_hz=40.0, rate_hz=200.0),
+        Filter(cutoff_hz=18.0),
+        Filter(position_cutoff_hz=30.0),
+        Filter(),
+    ],
+    ids=["default", "both", "torque and columns", "positions alone", "none"],
+)
+def test_a_narrowed_filter_takes_noise_from_columns_and_torque_alike(recipe):
+    lower, lowest = (recipe.narrowed(share, 1000.0) for share in (0.5, 0.25))
+    assert lower.cutoff_hz == pytest.approx(2.0 * lowest.cutoff_hz)
+    assert recipe.cutoff_hz is None or lower.cutoff_hz == 0.5 * recipe.cutoff_hz
+    for one in (lower, lowest):
+        # The positions' low-pass leaves what the other one passes, and the rows show it.
+        assert one.position_cutoff_hz >= one.cutoff_hz
+        assert one.rate_hz is None or one.rate_hz > 2.0 * one.cutoff_hz
+
+
 def test_filters_that_do_not_suit_the_recording(arm):
     with pytest.raises(RecordingError, match=r"arm: a cut-off of 125 Hz .* below 125 Hz"):
         differentiate(arm, Filter(position_cutoff_hz=125))

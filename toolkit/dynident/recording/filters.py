@@ -86,14 +86,23 @@ class Filter:
     def narrowed(self, share: float, rate_hz: float) -> Filter:
         """Return the filter with its cut-offs at a share of what they are, for samples at a rate.
 
-        Where positions pass no low-pass, they then pass that of columns and torque, or the default.
+        What is narrowed is the band of columns and torque alike. A recipe that lets torque through
+        whole gets a low-pass of both, at a share of the band that it leaves the positions: behind a
+        lower cut-off of the positions alone, noise around that cut-off would still be judged.
         """
         default = default_filter(rate_hz)
         position = self.position_cutoff_hz or self.cutoff_hz or default.position_cutoff_hz
+        assert position is not None and default.cutoff_hz and default.rate_hz
+        if self.cutoff_hz:
+            lower = replace(self, cutoff_hz=share * self.cutoff_hz)
+            return replace(lower, position_cutoff_hz=share * position)
+        cutoff = share * position
+        enough = default.rate_hz / default.cutoff_hz * cutoff
         return replace(
             self,
-            position_cutoff_hz=share * position if position else None,
-            cutoff_hz=share * self.cutoff_hz if self.cutoff_hz else None,
+            position_cutoff_hz=position,
+            cutoff_hz=cutoff,
+            rate_hz=min(enough, self.rate_hz or rate_hz),
         )
 
     def margins(self, rate_hz: float) -> tuple[int, int]:
