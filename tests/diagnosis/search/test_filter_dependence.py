@@ -38,9 +38,7 @@ def evidence(viscosity: float) -> Evidence:
         ((0.75, 1.3), ("75 %", "130 %")),
     ],
 )
-def test_any_two_filters_are_compared(
-    behind: tuple[float, float], shares: tuple[str, ...]
-) -> None:
+def test_any_two_filters_are_compared(behind: tuple[float, float], shares: tuple[str, ...]) -> None:
     here = evidence(HERE)
     fitted = fit_evidence(here, MODEL)
     lower = tuple(evidence(HERE * share) for share in behind)

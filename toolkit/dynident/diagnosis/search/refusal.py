@@ -214,8 +214,8 @@ def _how_it_changes(
     others = [one for one in (first, second) if one is not here]
     told = [percent(_size(gram, one) / own if own > 0 else np.inf, 0) for one in others]
     return (
-        f"changes with the filter: behind lower cut-offs its torque is {' and '.join(told)} of what "
-        "it is here, so noise in the columns makes it"
+        "changes with the filter: behind lower cut-offs its torque is "
+        f"{' and '.join(told)} of what it is here, so noise in the columns makes it"
     )
 
 
