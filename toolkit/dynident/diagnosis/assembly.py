@@ -25,7 +25,7 @@ from dynident.diagnosis.search.withdrawal import Path
 from dynident.diagnosis.verdict import noise_source, notes_on, verdict_of
 from dynident.errors import FitError
 from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import EvidenceFit
+from dynident.evidence.evidence_fit import EvidenceFit, rows_of_run
 from dynident.evidence.held_out import HeldOut, on_recordings
 from dynident.evidence.maps import residual_maps
 from dynident.fitting.estimate import Estimate
@@ -235,6 +235,7 @@ def _estimate(evidence: Evidence, fitted: EvidenceFit, train: Dataset) -> Estima
                 replace(train, recordings=recordings),
                 fitted.values,
                 [run.certain_rows for run in evidence.runs],
+                lambda run: rows_of_run(evidence, model, run, fitted.values),
             )
             words = errors.words
     covariance[np.ix_(kept, kept)] = combination @ whole @ combination.T

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from operator import add
@@ -21,6 +21,9 @@ from dynident.model import Model
 from dynident.moments.replicates import time_varying_products
 from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import MomentSolution, regress, regression_values
+
+_PART = 8192
+"""Rows of all joints that are written out at a time."""
 
 White = tuple[tuple[WhiteColumns, ...], ...]
 """Whitened columns of each run, of each joint."""
@@ -281,6 +284,27 @@ def joint_columns(
         JointColumns(size + 1, everywhere, (*some, one.tau[:, [joint]]))
         for some, one in zip(parts, replicates, strict=True)
     ]
+
+
+def rows_of_run(
+    evidence: Evidence, model: Model, run: int, values: np.ndarray
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Rows of the regression of one recording as measured, a part of it at a time.
+
+    Parameters
+    ----------
+    evidence, run, model, values : as for `model_columns`.
+
+    Yields
+    ------
+    columns (T, n, p) and torque (T, n)
+    """
+    joints = range(model.robot.n)
+    measured = [joint_columns(evidence, model, run, j, values)[0] for j in joints]
+    for start in range(0, len(evidence.runs[run].replicates[0].t), _PART):
+        part = slice(start, start + _PART)
+        whole = np.stack([one.among(part).dense() for one in measured], axis=1)
+        yield whole[:, :, :-1], whole[:, :, -1]
 
 
 def residuals(evidence: Evidence, model: Model, values: np.ndarray) -> list[np.ndarray]:

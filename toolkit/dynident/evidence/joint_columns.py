@@ -96,6 +96,10 @@ class JointColumns:
     places: np.ndarray
     parts: tuple[np.ndarray, ...]
 
+    def among(self, rows: slice) -> JointColumns:
+        """Return some rows of the motion."""
+        return replace(self, parts=tuple(part[rows] for part in self.parts))
+
     @property
     def used(self) -> np.ndarray:
         """All of them in one piece, (T, u)."""

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import reduce
+from operator import mul
 from typing import Any
 
 import numpy as np
 
-from dynident.diagnosis.proposals.term_library import LibraryTerm
+from dynident.diagnosis.proposals.term_library import Factor, LibraryTerm
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, model_columns
 from dynident.evidence.runs import Run
@@ -85,10 +87,8 @@ def _screened(
 ) -> list[tuple[LibraryTerm, float]]:
     with_model, with_self = [], []
     for r, (run, replicates) in enumerate(zip(evidence.runs, rows, strict=True)):
-        signals = [
-            np.concatenate([one.columns(term) for term in terms], axis=1) for one in replicates
-        ]
-        white = run.whitened(signals, joint, fitted.noise[joint])
+        signals = [[one.columns(term) for term in terms] for one in replicates]
+        white = run.whitened_parts(signals, joint, fitted.noise[joint])
         with_model.append(fitted.white[r][joint].moments_with(white))
         with_self.append(run.moments(white, white))
     beside = SecondMoments.stacked(with_model).pooled().signal
@@ -136,6 +136,7 @@ class _TermRows:
     widths: np.ndarray
     load: np.ndarray
     known: dict[str, np.ndarray] = field(default_factory=dict)
+    factors: dict[Factor, np.ndarray] = field(default_factory=dict)
 
     @classmethod
     def of(cls, evidence: Evidence, fitted: EvidenceFit, run: int, joint: int) -> list[_TermRows]:
@@ -155,10 +156,15 @@ class _TermRows:
 
     def columns(self, term: LibraryTerm) -> np.ndarray:
         """Columns of a term, (T, k)."""
-        found = np.ones((1, 1))
-        for factor in term.factors:
-            found = found * np.stack([self._value(text) for text in factor.columns()], axis=1)
-        return found
+        return reduce(mul, (self._columns_of(factor) for factor in term.factors))
+
+    def _columns_of(self, factor: Factor) -> np.ndarray:
+        """Columns of a factor, (T, k), which many terms have in common."""
+        if factor not in self.factors:
+            values = [self._value(text) for text in factor.columns()]
+            size = len(self.load)
+            self.factors[factor] = np.stack([np.broadcast_to(v, size) for v in values], axis=1)
+        return self.factors[factor]
 
     def _value(self, text: str) -> np.ndarray:
         if text not in self.known:

@@ -11,8 +11,9 @@ errors. That a fit takes freedom from its residual is accounted for exactly (`_s
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 from scipy.optimize import nnls
@@ -38,6 +39,9 @@ from dynident.moments.lagged import (
 )
 from dynident.recording import Dataset, Filter, Recording
 from dynident.tables import number
+
+RowsOf = Callable[[int], Iterator[tuple[np.ndarray, np.ndarray]]]
+"""Columns (T, n, p) and torque (T, n) of a dataset's recording of a number, in blocks."""
 
 _EXACT = 1e-10
 """Residual relative to the torque below which it is rounding, of no colour."""
@@ -137,6 +141,7 @@ def masked_row_errors(
     values: np.ndarray,
     solution: LinearSolution,
     counting: Sequence[np.ndarray],
+    rows_of: RowsOf | None = None,
 ) -> RowErrors:
     """As `row_errors`, of rows of which not all were fitted.
 
@@ -145,6 +150,7 @@ def masked_row_errors(
     model, dataset, values, solution : as there.
     counting : mask (T, n) for each recording of the decimated rows that were fitted, joint by
         joint.
+    rows_of : the rows of each recording, where they are known; else they are evaluated here.
 
     Returns
     -------
@@ -153,11 +159,12 @@ def masked_row_errors(
     samples = [sample(recording, dataset.filter) for recording in dataset.recordings]
     lags = min(LAGS, *(one.count // 10 for one in samples))
     kept, squares = list(solution.basis.independent), np.zeros(model.robot.n)
+    rows_of = rows_of or (lambda k: samples[k].rows(model, values))
 
     def blocks() -> Iterator[RowBlock]:
-        for sampled, counts in zip(samples, counting, strict=True):
+        for k, counts in enumerate(counting):
             start = 0
-            for columns, torque in sampled.rows(model, values):
+            for columns, torque in rows_of(k):
                 mask = counts[start : start + len(torque)]
                 squares[:] += np.sum((torque * mask) ** 2, axis=0)
                 yield start == 0, columns[:, :, kept], torque - columns @ values, mask
@@ -172,6 +179,7 @@ def row_covariance(
     dataset: Dataset,
     values: np.ndarray,
     counting: Sequence[np.ndarray] | None = None,
+    rows_of: RowsOf | None = None,
 ) -> tuple[np.ndarray, RowErrors]:
     """Return the covariance (p, p) of least squares at values (p,), and the errors behind it.
 
@@ -180,6 +188,7 @@ def row_covariance(
     model, dataset : what was fitted to what.
     values : (p,) what came out, by whichever way.
     counting : as of `masked_row_errors`; None for all rows.
+    rows_of : as of `masked_row_errors`; only where not all rows count.
 
     Returns
     -------
@@ -190,11 +199,11 @@ def row_covariance(
     FitError
         As `solve_factors`.
     """
-    solution = solve_factors(model, _factors(model, dataset, values, counting))
+    solution = solve_factors(model, _factors(model, dataset, values, counting, rows_of))
     if counting is None:
         found = row_errors(model, dataset, values, solution)
     else:
-        found = masked_row_errors(model, dataset, values, solution, counting)
+        found = masked_row_errors(model, dataset, values, solution, counting, rows_of)
     kept = list(solution.basis.independent)
     covariance = np.zeros_like(solution.covariance)
     covariance[np.ix_(kept, kept)] = found.covariance
@@ -283,16 +292,23 @@ def _seen(white: np.ndarray, both: np.ndarray, pairs: np.ndarray) -> np.ndarray:
 
 
 def _factors(
-    model: Model, dataset: Dataset, values: np.ndarray, counting: Sequence[np.ndarray] | None
+    model: Model,
+    dataset: Dataset,
+    values: np.ndarray,
+    counting: Sequence[np.ndarray] | None,
+    rows_of: RowsOf | None,
 ) -> TriangularFactors:
     """Factors of the rows that count."""
     if counting is None:
         return factorise(rows(model, dataset, values))
     counts = np.concatenate(counting)
+    whole = rows(model, dataset, values)
+    if rows_of is not None:
+        whole = chain.from_iterable(map(rows_of, range(len(counting))))
 
     def weighted() -> Iterator[tuple[np.ndarray, np.ndarray]]:
         start = 0
-        for columns, torque in rows(model, dataset, values):
+        for columns, torque in whole:
             mask = counts[start : start + len(torque)]
             yield columns * mask[:, :, None], torque * mask
             start += len(torque)
