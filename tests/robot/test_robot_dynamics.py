@@ -1,5 +1,8 @@
 """Regressor and inverse dynamics against Pinocchio's and Drake's own, on random trees."""
 
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
 from typing import Any
 
 import numpy as np
@@ -117,6 +120,28 @@ def test_nan_parameters_give_nan_torques_and_leave_the_evaluator_sound():
     before = robot.inverse_dynamics(*motion)
     assert np.all(np.isnan(robot.inverse_dynamics(*motion, np.full(10 * robot.n, np.nan))))
     np.testing.assert_array_equal(robot.inverse_dynamics(*motion), before)
+
+
+def test_threads_may_share_a_robot():
+    robot = Robot.from_text(urdf(random_tree(0)))
+    motion = robot.random_motion(0, 200)
+    thetas = [scale * robot.theta for scale in (1.0, 2.0)]
+    alone = [robot.inverse_dynamics(*motion, theta) for theta in thetas]
+    together = Barrier(2)
+
+    def often(theta):
+        together.wait()
+        return [robot.inverse_dynamics(*motion, theta) for _ in range(100)]
+
+    held = sys.getswitchinterval()
+    sys.setswitchinterval(1e-5)  # they meet within a call
+    try:
+        with ThreadPoolExecutor(2) as threads:
+            found = list(threads.map(often, thetas))
+    finally:
+        sys.setswitchinterval(held)
+    for each, torque in zip(found, alone, strict=True):
+        assert all(np.array_equal(one, torque) for one in each)
 
 
 def test_columns_follow_the_order_asked_for():

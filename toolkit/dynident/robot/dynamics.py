@@ -5,9 +5,11 @@ Pinocchio is given joints and inertias by us, never a file: its parsers change b
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -97,8 +99,41 @@ class TorqueDerivatives:
     by_a: Array
 
 
+class _Workspace:
+    """A model whose inertias change, and what Pinocchio writes to: of one robot in one thread."""
+
+    def __init__(self, model: Any, sequence: Sequence[int]) -> None:
+        self.model, self.data, self._sequence = model, model.createData(), sequence
+        # A simulation asks for one sample at a time, of parameters that stay the same.
+        self._held: Array | None = None
+        self.keeps_digits = True
+
+    def hold(self, phi: Array) -> None:
+        """Give the model these inertias, and note whether it holds them with all their digits."""
+        if self._held is not None and np.array_equal(phi, self._held):
+            return
+        self._held = None
+        for pin_id, index in enumerate(self._sequence, start=1):
+            body = np.array(phi[index])
+            self.model.inertias[pin_id] = (
+                pin.Inertia.FromDynamicParameters(body) if np.any(body) else pin.Inertia.Zero()
+            )
+        self.keeps_digits = all(_keeps_digits(body) for body in phi)
+        self._held = phi.copy()
+
+
+class _OfThread(threading.local):
+    """Work spaces of the thread that asks, by their robot: threads may share a robot."""
+
+    def __init__(self) -> None:
+        self.known: WeakKeyDictionary[Dynamics, _Workspace] = WeakKeyDictionary()
+
+
+_of_thread = _OfThread()
+
+
 class Dynamics:
-    """The evaluator of one robot: its model, work space and the order of its joints.
+    """The evaluator of one robot: its model and the order of its joints.
 
     Parameters
     ----------
@@ -109,7 +144,6 @@ class Dynamics:
 
     def __init__(self, joints: Sequence[Joint], gravity: Array) -> None:
         self.model, self.sequence = _kinematics(joints, gravity)
-        self.data = self.model.createData()
         self.n = len(joints)
         self.tree = JointTree(
             parents=tuple(joint.parent for joint in joints),
@@ -122,18 +156,25 @@ class Dynamics:
         ordered = self.sequence == list(range(self.n))
         self.order: Any = slice(None) if ordered else np.array(self.sequence)
         self.back: Any = slice(None) if ordered else np.argsort(self.sequence)
-        # A simulation asks for one sample at a time, of parameters that stay the same.
-        self._held: Array | None = None
-        self._keeps_digits = True
+
+    def _workspace(self) -> _Workspace:
+        found = _of_thread.known.get(self)
+        if found is None:
+            found = _of_thread.known[self] = _Workspace(pin.Model(self.model), self.sequence)
+        return found
 
     def _evaluate(
-        self, function: Callable[..., Any], motion: tuple[Array, ...], shape: tuple[int, ...]
+        self,
+        space: _Workspace,
+        function: Callable[..., Any],
+        motion: tuple[Array, ...],
+        shape: tuple[int, ...],
     ) -> Array:
         """Return the function's values (T, *shape) at all samples, in the order of the model."""
         q, v, a = (np.ascontiguousarray(x[:, self.order]) for x in motion)
         out = np.empty((len(q), *shape))
         for k in range(len(q)):
-            out[k] = function(self.model, self.data, q[k], v[k], a[k])
+            out[k] = function(space.model, space.data, q[k], v[k], a[k])
         return out
 
     def regressor(
@@ -156,7 +197,9 @@ class Dynamics:
         wanted = tuple(range(10 * self.n) if columns is None else columns)
         if self._is_many(q):
             return regressor_kernel(self.tree, wanted)(q, v, a, out=out)
-        Y = self._evaluate(pin.computeJointTorqueRegressor, (q, v, a), (self.n, 10 * self.n))
+        Y = self._evaluate(
+            self._workspace(), pin.computeJointTorqueRegressor, (q, v, a), (self.n, 10 * self.n)
+        )
         blocks = Y.reshape(len(Y), self.n, self.n, 10)
         Y = blocks[:, self.back][:, :, self.back].reshape(Y.shape)
         if out is None:
@@ -178,9 +221,10 @@ class Dynamics:
             return np.full(q.shape, np.nan)
         if self._is_many(q):
             return torque_kernel(self.tree)(q, v, a, parameters=theta.tolist())
-        self._hold(phi)
+        space = self._workspace()
+        space.hold(phi)
         function = pin.rnea
-        if not self._keeps_digits:
+        if not space.keeps_digits:
             # Pinocchio holds mass, centre of mass and central inertia, which a massless body with
             # a first moment does not have. Its regressor needs none of them.
             ours = phi[self.sequence].ravel()
@@ -188,7 +232,7 @@ class Dynamics:
             def function(*sample: Any) -> Array:
                 return pin.computeJointTorqueRegressor(*sample) @ ours
 
-        return self._evaluate(function, (q, v, a), (self.n,))[:, self.back]
+        return self._evaluate(space, function, (q, v, a), (self.n,))[:, self.back]
 
     def derivatives(self, q: Array, v: Array, a: Array, theta: Array) -> TorqueDerivatives:
         """Return the derivatives of tau, in the robot's order.
@@ -199,8 +243,9 @@ class Dynamics:
         theta : (10 n,) ndarray
             As in `Robot.torque_derivatives`.
         """
-        self._hold(theta.reshape(self.n, 10))
-        found = self._evaluate(pin.computeRNEADerivatives, (q, v, a), (3, self.n, self.n))
+        space = self._workspace()
+        space.hold(theta.reshape(self.n, 10))
+        found = self._evaluate(space, pin.computeRNEADerivatives, (q, v, a), (3, self.n, self.n))
         by_q, by_v, by_a = np.ascontiguousarray(found.swapaxes(0, 1))
         # Pinocchio fills the upper triangle of the inertia matrix only.
         by_a = np.triu(by_a) + np.triu(by_a, 1).transpose(0, 2, 1)
@@ -210,19 +255,6 @@ class Dynamics:
     def _is_many(self, q: Array) -> bool:
         """Whether a function of many samples pays."""
         return len(q) >= _MANY
-
-    def _hold(self, phi: Array) -> None:
-        """Give the model these inertias, and note whether it holds them with all their digits."""
-        if self._held is not None and np.array_equal(phi, self._held):
-            return
-        self._held = None
-        for pin_id, index in enumerate(self.sequence, start=1):
-            body = np.array(phi[index])
-            self.model.inertias[pin_id] = (
-                pin.Inertia.FromDynamicParameters(body) if np.any(body) else pin.Inertia.Zero()
-            )
-        self._keeps_digits = all(_keeps_digits(body) for body in phi)
-        self._held = phi.copy()
 
 
 def _keeps_digits(phi: Array) -> bool:
