@@ -19,6 +19,7 @@ from dynident.diagnosis.details import (
     place,
 )
 from dynident.diagnosis.detection_limits import DetectionLimit, limit_table
+from dynident.diagnosis.effect_groups import hidden_effects
 from dynident.diagnosis.proposals.proposal import Proposal
 from dynident.diagnosis.switches import Switches
 from dynident.diagnosis.track_record import JOINTS, TrackRecord, track_record
@@ -332,11 +333,8 @@ class Diagnosis(Shown):
             )
             for c in shown
         )
-        notes = tuple(
-            f"Not identifiable: {c.effect.title}. {c.remark}"
-            for c in self.candidates
-            if c.status == "absorbed"
-        )
+        hidden = hidden_effects(self.candidates, len(self.joints))
+        notes = tuple(f"Not identifiable: {one.title}. {one.remark}" for one in hidden)
         columns = ("effect", "p", "gain, points", "finding")
         return Table("Candidates, tried on the model as given", columns, rows, notes)
 

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from dynident.diagnosis.details import Candidate, Step, Trace
+from dynident.diagnosis.effect_groups import grouped_title
 from dynident.diagnosis.result import Diagnosis
 from dynident.effects import Effect
 from dynident.errors import DynidentError
@@ -82,31 +83,6 @@ def step_groups(diagnosis: Diagnosis) -> tuple[StepGroup, ...]:
         )
         for group in found
     )
-
-
-def grouped_title(effects: Sequence[Effect], joints: int) -> str:
-    """What effects are called together.
-
-    Parameters
-    ----------
-    effects : at least one; of one kind, where they are told as one.
-    joints : of the robot.
-    """
-    first = effects[0]
-    if len(effects) == 1:
-        return first.title
-    if len({one.name for one in effects}) > 1 or any(one.source for one in effects):
-        return f"{first.title}, and {in_words(len(effects) - 1)} more"
-    name, at = first.name.replace("_", " "), [str(one.joint) for one in effects]
-    if len(at) == joints:
-        return f"{name} at {'both' if joints == 2 else f'all {in_words(joints)}'} joints"
-    return f"{name} at {', '.join(at[:-1])} and {at[-1]}"
-
-
-def in_words(count: int) -> str:
-    """A small number in words."""
-    words = ["no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine"]
-    return words[count] if count < len(words) else str(count)
 
 
 def bars(diagnosis: Diagnosis) -> tuple[Bar, ...]:

@@ -15,6 +15,7 @@ from dynident import files
 from dynident.batch import evaluations
 from dynident.closed_loop import loop_evaluations
 from dynident.diagnosis.details import Candidate, Step
+from dynident.diagnosis.effect_groups import hidden_effects
 from dynident.diagnosis.proposals.proposal import Proposal
 from dynident.diagnosis.result import Diagnosis
 from dynident.reporting.content import first_set
@@ -126,11 +127,8 @@ def remaining_table(diagnosis: Diagnosis) -> Table:
 
 def not_identifiable_table(diagnosis: Diagnosis) -> Table:
     """Effects that this data cannot show, and what would."""
-    rows = tuple(
-        (c.effect.title, c.remark or c.effect.advice)
-        for c in diagnosis.candidates
-        if c.status == "absorbed"
-    )
+    found = hidden_effects(diagnosis.candidates, len(diagnosis.joints))
+    rows = tuple((one.title, one.remark) for one in found)
     return Table("Effects that are not identifiable", ("effect", "what would show it"), rows)
 
 

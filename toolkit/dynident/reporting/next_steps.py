@@ -6,9 +6,10 @@ import shlex
 from dataclasses import dataclass
 
 from dynident.diagnosis.details import Step
+from dynident.diagnosis.effect_groups import in_words
 from dynident.diagnosis.result import Diagnosis
 from dynident.effects import Effect
-from dynident.reporting.content import in_words, step_groups
+from dynident.reporting.content import step_groups
 from dynident.reporting.joint_states import states
 from dynident.tables import percent
 from dynident.wiring import Fault

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
+from dynident.diagnosis.effect_groups import grouped_title
 from dynident.diagnosis.result import Diagnosis
-from dynident.reporting.content import AFTER_COLOUR, BEFORE_COLOUR, GREY, grouped_title
+from dynident.reporting.content import AFTER_COLOUR, BEFORE_COLOUR, GREY
 from dynident.reporting.pictures.look import dressed, plain
 
 _DIGITS = 5
