@@ -35,6 +35,7 @@ def rows(text: str) -> list[list[str]]:
     return [line[2:-2].split(" | ") for line in text.splitlines() if line.startswith("| ")]
 
 
+@pytest.mark.slow
 def test_a_run_of_the_least_size_becomes_a_page_with_a_picture(tmp_path: Path) -> None:
     run.main(["csv_reading", "effect_count", "--size", "tiny", "--out", str(tmp_path)])
     text = (tmp_path / "benchmarks.md").read_text()

@@ -57,6 +57,7 @@ def test_a_lag_follows_what_it_lags() -> None:
     np.testing.assert_allclose(state, size * np.sin(np.pi * t - late), atol=0.02)
 
 
+@pytest.mark.slow
 def test_the_true_formula_is_marked_as_the_law_and_others_are_not(tmp_path: Path) -> None:
     case = next(c for c in draw_laws(0, 300) if c.kind == "law" and _is_plain(c))
     make(case, tmp_path, TINY)

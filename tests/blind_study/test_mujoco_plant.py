@@ -195,6 +195,7 @@ SIDE_OF_THE_RECORD = ("torque_delay",)
 
 @pytest.mark.parametrize("circumstances", [SMOOTH, TIGHT], ids=["tanh", "constraint"])
 @pytest.mark.parametrize("name", sorted((*KNOWN, *EFFECTS)))
+@pytest.mark.slow
 def test_every_effect_is_felt(name: str, circumstances: Circumstances) -> None:
     made = specimen(4, 500.0, np.random.default_rng(6))
     robot = made.robot

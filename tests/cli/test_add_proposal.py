@@ -51,6 +51,7 @@ def test_the_law_is_written_and_not_what_it_is_proposed_instead_of(misleading, r
     }
 
 
+@pytest.mark.slow
 def test_it_is_sought_as_explain_was_told_to(misleading, run) -> None:
     """With --most 0 nothing is added, and nothing proposed."""
     text = misleading.read_text()

@@ -14,6 +14,7 @@ from dynident.experiment_design.written_design import read_design
 from loop_studies import write_loop_study
 
 
+@pytest.mark.slow
 def test_the_design_is_written_and_can_be_simulated(run, tmp_path) -> None:
     study = write_loop_study(tmp_path)
     wanted = ("--duration", "4", "--repeat", "2", "--harmonics", "3", "--starts", "1")
@@ -142,6 +143,7 @@ def test_the_loop_is_closed_without_a_hand_in_between(run, tmp_path) -> None:
     assert len(pd.read_csv(tmp_path / "next" / "reference.csv")) > 1000
 
 
+@pytest.mark.slow
 def test_where_no_recording_can_settle_anything_the_answer_says_so(run, tmp_path) -> None:
     study = write_loop_study(tmp_path)
     done = run("explain", study, "--propose", "never", "--design", "next")

@@ -10,6 +10,7 @@ from study_files import edited
 PERIODS = edited(('use = "train"\n', 'use = "train"\nperiod = 2.0\n'), text=LOOP_STUDY)
 
 
+@pytest.mark.slow
 def test_iterations_and_picture(run, tmp_path):
     path = write_loop_study(tmp_path)
     words = ("--method", "iv", "--start", "description", "--plot", "iv.png")

@@ -25,6 +25,7 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_loads_are_said_on_the_command_line(run, logs: Path) -> None:
     log = logs / "run_load_1.csv"
     for said, message in (

@@ -187,6 +187,7 @@ def test_compare_where_the_noise_is_unknown(run, study):
     assert [joint["noise_rms"] for joint in said["joints"]] == [None, None]
 
 
+@pytest.mark.slow
 def test_report(run, study, tmp_path):
     path = study()
     done = run("report", path, "--json", "--to", "page.html")

@@ -88,6 +88,7 @@ COMMANDS = {
 
 
 @pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.slow
 def test_a_command_that_takes_an_estimate_can_be_told_of_its_effects(run, saved, name) -> None:
     arguments = [str(saved / a) if a.endswith("json") else a for a in COMMANDS[name]]
     done = run(name, *arguments)
@@ -110,6 +111,7 @@ def test_a_command_that_takes_an_estimate_can_be_told_of_its_effects(run, saved,
         ("", "came from mine.py"),
     ],
 )
+@pytest.mark.slow
 def test_files_that_do_not_bring_it_are_one_line(run, saved, tmp_path, content, says) -> None:
     if content is not None:
         (tmp_path / "mine.py").write_text(content)

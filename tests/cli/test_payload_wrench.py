@@ -55,6 +55,7 @@ def test_the_sensor_weighs_without_any_torque(run, folder: Path) -> None:
     assert f"The wrench sensor at '{FRAME}'" in shown
 
 
+@pytest.mark.slow
 def test_columns_of_a_sensor_go_by_other_names(run, folder: Path) -> None:
     before = run("payload", folder / "study.toml", "--json").json
     names = [f"ft_{one}" for one in COMPONENTS]

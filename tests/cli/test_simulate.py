@@ -43,6 +43,7 @@ def test_the_loop_is_judged_by_the_criteria_of_the_study(run, tmp_path):
     assert said == [False, True]
 
 
+@pytest.mark.slow
 def test_report_and_picture(run, tmp_path):
     path = write_loop_study(tmp_path)
     done = run("simulate", path, "--report", "loop.html", "--plot", "loop.png")
@@ -141,6 +142,7 @@ def test_options_that_do_not_fit(run, tmp_path):
     assert done.status == 2 and "--plot is for a study" in done.err
 
 
+@pytest.mark.slow
 def test_compare_and_report_have_the_loop(run, tmp_path):
     path = write_loop_study(tmp_path)
     model = run("compare", path, "--json").json["models"][0]

@@ -101,6 +101,7 @@ def test_what_was_trusted_before_runs_in_a_pipe(run, study, tmp_path):
 
 
 @pytest.mark.parametrize("answer", ["y", "n", ""])
+@pytest.mark.slow
 def test_on_a_terminal_it_asks_and_remembers_a_yes(study, tmp_path, own_settings, answer):
     path = study(WITH_MODULE)
     put(tmp_path / "mine.py", SAG)

@@ -145,6 +145,7 @@ OF_THE_INSTANT = [
 
 
 @pytest.mark.parametrize("name", OF_THE_INSTANT)
+@pytest.mark.slow
 def test_commands_are_the_torque_of_the_recorded_motion(name: str) -> None:
     """(u[k-1] + u[k])/2 is the model's torque at central differences, within 0.2 % of its rms."""
     robot = arm()

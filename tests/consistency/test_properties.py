@@ -63,6 +63,7 @@ def test_masses_inside_a_box_are_never_flagged(seed):
 
 @settings(max_examples=60)
 @given(SEEDS)
+@pytest.mark.slow
 def test_masses_out_of_the_box_are_seen(seed):
     """All of the mass beyond one face: its centre is outside."""
     rng = np.random.default_rng(seed)

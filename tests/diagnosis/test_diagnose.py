@@ -26,7 +26,7 @@ STATED = Noise(np.array([2e-5, 2e-5]), np.array([0.3, 0.3]))
 
 
 def in_full(*case: object):
-    """A case that `make test-fast` leaves out: three of their kind remain."""
+    """A case that `make test-fast` leaves out: two of their kind remain."""
     return pytest.param(*case, marks=pytest.mark.slow)
 
 
@@ -62,7 +62,7 @@ def diagnosed(model: Model, hidden: str | None, values: dict[str, float]) -> Dia
 @pytest.mark.parametrize(
     ("hidden", "values"),
     [
-        ("torque_offset@elbow", {"offset__elbow": 0.3}),
+        in_full("torque_offset@elbow", {"offset__elbow": 0.3}),
         in_full("asymmetric_friction@elbow", {"dFv__elbow": 0.3, "dFc__elbow": 0.2}),
         ("stribeck_friction@elbow", {"Fs__elbow": 0.6}),
         in_full("quadratic_drag@shoulder", {"Fq__shoulder": 0.3}),
@@ -178,6 +178,7 @@ def test_test_recordings_that_do_not_repeat_take_the_floor_of_the_others(model: 
     assert any("do not repeat" in note for note in found.notes)
 
 
+@pytest.mark.slow
 def test_without_test_recordings_blocks_are_held_out(model: Model) -> None:
     train, test = recordings(model, "torque_offset@elbow", {"offset__elbow": 0.3}, **NOISE)
     found = find(model, Dataset(train + test))
@@ -236,6 +237,7 @@ def test_compare_needs_recordings_and_a_period_must_repeat(model: Model) -> None
 
 
 @pytest.mark.parametrize("width", [0.04, 0.002])
+@pytest.mark.slow
 def test_the_friction_width_of_a_joint_is_found_and_is_no_missing_effect(
     model: Model, width: float
 ) -> None:

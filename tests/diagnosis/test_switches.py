@@ -49,6 +49,7 @@ def found(given) -> Diagnosis:
     return diagnose(given, recordings(range(3)), recordings([3]), switches="all")
 
 
+@pytest.mark.slow
 def test_the_ends_are_the_model_as_given_and_the_final_one(found):
     assert {step.effect.label for step in found.steps} == set(HIDDEN)
     assert found.switches is not None
@@ -89,6 +90,7 @@ def test_either_effect_alone_leaves_the_other_one_at_its_joint(found):
         assert alone[other] > 2.0 * both[other]
 
 
+@pytest.mark.slow
 def test_nothing_is_fitted_unasked(given):
     assert diagnose(given, recordings([0]), most=0).switches is None
     assert diagnose(given, recordings([0]), most=0, switches="all").switches is None

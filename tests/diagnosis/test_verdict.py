@@ -59,6 +59,7 @@ def test_the_shape_of_an_effect_in_the_given_model_is_sought_too(model: Model) -
     assert found.test_error.after < 1.1 * (found.test_error.noise_floor or 0.0)
 
 
+@pytest.mark.slow
 def test_what_the_data_do_not_tell_keeps_its_given_value_and_has_no_sigma(model: Model) -> None:
     """The elbow is at rest: its speed is noise, and so is every friction found from it."""
     truth = true_values(model, **FRICTION)
@@ -99,6 +100,7 @@ def test_the_estimate_names_the_method_that_was_used(model: Model) -> None:
     assert len(rows) == 1  # noisy copies are no new equations
 
 
+@pytest.mark.slow
 def test_a_joint_without_torque_has_no_error_and_no_nan_in_json(model: Model) -> None:
     runs = []
     for one in recordings(model)[:3]:
@@ -114,6 +116,7 @@ def test_a_joint_without_torque_has_no_error_and_no_nan_in_json(model: Model) ->
     assert both.tables()
 
 
+@pytest.mark.slow
 def test_test_recordings_that_do_not_repeat_are_judged_all_the_same(model: Model) -> None:
     """Healthy training runs, and a drag in the test run only: something is missing there."""
     healthy = recordings(model)[:3]

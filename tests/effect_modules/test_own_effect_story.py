@@ -43,6 +43,7 @@ def study(folder: Path, module: str, text: str, label: str, value: float = 0.6) 
     return path
 
 
+@pytest.mark.slow
 def test_the_page_tells_what_happens(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     study(tmp_path, "my_effects.py", CLASS, "cable_drag@elbow")
@@ -127,6 +128,7 @@ def test_the_packages_own_need_no_origin(saved):
         ({"file": "x" * 500}, "came from x{80}: import"),
     ],
 )
+@pytest.mark.slow
 def test_other_places_are_named_too(saved, origin, words):
     content = json.loads(saved.read_text())
     effect = content["model"]["effects"][-1]
@@ -139,6 +141,7 @@ def test_other_places_are_named_too(saved, origin, words):
 
 
 @pytest.mark.parametrize("origin", [None, 7, {}, {"module": 1, "file": "", "package": ""}, []])
+@pytest.mark.slow
 def test_an_origin_that_is_none_is_refused(saved, origin):
     content = json.loads(saved.read_text())
     content["model"]["effects"][-1] |= {"effect": "no_such_effect", "origin": origin}

@@ -235,6 +235,7 @@ def installed(folder: Path, name: str, text: str) -> None:
     ],
     ids=["error", "exit", "syntax", "import", "clash"],
 )
+@pytest.mark.slow
 def test_packages_bring_effects_and_a_broken_one_is_a_warning(tmp_path, monkeypatch, text, reason):
     installed(tmp_path, "good_cables", sag())
     installed(tmp_path, "the_broken_one", text)

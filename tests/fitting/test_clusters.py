@@ -95,6 +95,7 @@ def same(there: Estimate, here: Estimate) -> None:
 
 @pytest.mark.filterwarnings("default")
 @pytest.mark.parametrize("kind", MODELS)
+@pytest.mark.slow
 def test_a_cluster_of_two_processes_says_the_same(client, runs, kind) -> None:
     model, data = model_of(MODELS[kind]), Dataset(runs)
     here = fit(model, data)
@@ -158,6 +159,7 @@ def test_a_cluster_that_fails_is_one_line(runs, monkeypatch, method) -> None:
 
 
 @pytest.mark.filterwarnings("default")
+@pytest.mark.slow
 def test_a_worker_that_dies_is_one_line(client) -> None:
     with pytest.raises(FitError, match=r"the cluster failed \(\w+: ") as caught:
         list(spread(client, os._exit, [1]))

@@ -84,6 +84,7 @@ def test_noise_free_truth_is_recovered(model, truth, solver) -> None:
 
 @pytest.mark.parametrize("distance", ["quadratic", "entropic"])
 @pytest.mark.parametrize("consistency", ["full", "semi"])
+@pytest.mark.slow
 def test_it_is_fitting_first_and_projecting_under_the_metric(
     model, truth, consistency, distance
 ) -> None:
@@ -133,6 +134,7 @@ def test_links_are_possible_and_the_answer_the_optimum(model, truth, solver) -> 
         assert np.all(found.values[rigid:] >= -1e-9), "friction opposes motion"
 
 
+@pytest.mark.slow
 def test_held_out_motion_is_predicted_better_than_by_least_squares(model, truth) -> None:
     """Of poorly exciting noisy data, with a description that is off by a tenth."""
     better = 0

@@ -56,6 +56,7 @@ def keys(content, path=""):
 ANYTHING = (None, "x", 1e308, float("nan"), HUGE, [], {}, -1, True, [1, 2], "\ud800", 10**6)
 
 
+@pytest.mark.slow
 def test_whatever_is_read_can_be_worked_with(good, tmp_path):
     """Every key takes every wrong value: refused in one line, or read and computed with."""
     path = tmp_path / "odd.json"

@@ -95,6 +95,7 @@ def test_an_estimate_says_how_it_came_about(name: str) -> None:
 
 
 @every_method
+@pytest.mark.slow
 def test_units_of_torque_do_not_matter(name: str) -> None:
     plain = fitted(name)
     noise = dataset().noise
@@ -123,6 +124,7 @@ def in_units(text: str) -> str:
 
 
 @every_method
+@pytest.mark.slow
 def test_order_of_joints_does_not_matter(name: str) -> None:
     plain = fitted(name)
     turned, method = ["elbow", "shoulder"], METHODS[name]

@@ -73,6 +73,7 @@ def test_the_odd_robot_is_found_and_no_other(parameter: str, factor: float) -> N
 
 @pytest.mark.parametrize("own", [0.02, 1.0])
 @pytest.mark.parametrize("many", [4, 6])
+@pytest.mark.slow
 def test_false_alarms_in_a_fleet_are_few(many: int, own: float) -> None:
     """In 400 fleets 5 % are 20, and 30 with three standard deviations of that number."""
     rng = np.random.default_rng([many, round(100 * own)])

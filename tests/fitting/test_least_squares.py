@@ -49,6 +49,7 @@ def test_factors_of_any_blocks_give_the_same_answer_as_one_dense_solve() -> None
         assert np.allclose(R[:6, :6].T @ R[:6, :6], stacked.T @ stacked)
 
 
+@pytest.mark.slow
 def test_blocks_of_a_long_chain_take_no_more_memory_than_those_of_an_arm() -> None:
     long = Model(chain(24))
     samples = 3 * sampling.BLOCK

@@ -27,6 +27,7 @@ def recordings(model: Model, gain: float, torque_std: float = 0.0) -> tuple[Reco
 
 
 @pytest.mark.parametrize("gain", [-0.5, 0.15, 1.5])
+@pytest.mark.slow
 def test_a_gain_is_found_whatever_its_size(model: Model, gain: float) -> None:
     estimate = fit(model, Dataset(recordings(model, gain)))
     assert estimate.value("e@shoulder") == pytest.approx(gain, abs=1e-4)

@@ -70,6 +70,7 @@ def test_mapped_files_are_fitted_as_they_lie(model, long, tmp_path: Path) -> Non
     np.testing.assert_array_equal(one.covariance, other.covariance)
 
 
+@pytest.mark.slow
 def test_a_longer_recording_takes_no_more_memory(model: Model, long: Recording) -> None:
     double = Recording(
         np.arange(2 * long.samples) / 1000.0,

@@ -98,7 +98,7 @@ WRITERS = {
     "demo": Writer(words=("demo", "--to", "demo.html"), results={"demo.html": _page}),
 }
 
-LONG = ("show", "explain", "report", "simulate", "experiment", "demo")
+LONG = ("refit in place", "show", "explain", "report", "simulate", "experiment", "demo")
 """Commands that take seconds: `make test-fast` leaves them out."""
 each_writer = pytest.mark.parametrize(
     "name",

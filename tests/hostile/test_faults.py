@@ -83,6 +83,7 @@ def test_a_folder_that_may_not_be_written_stays_as_it_is(name: str, tmp_path: Pa
     assert content(folder) == before
 
 
+@pytest.mark.slow
 def test_two_that_add_at_once_leave_one_answer_or_both(tmp_path: Path) -> None:
     for round_ in range(5):
         folder = tmp_path / str(round_)
@@ -134,6 +135,7 @@ def test_odd_surroundings_change_no_file(usual, around: dict[str, str], tmp_path
     assert added_and_fitted(tmp_path / "odd", around) == usual
 
 
+@pytest.mark.slow
 def test_a_reader_that_has_gone_loses_no_file(tmp_path: Path) -> None:
     prepare(tmp_path)
     end, start = os.pipe()

@@ -58,6 +58,7 @@ def semi_body(eta: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.slow
 def test_no_other_program_finds_a_better_semi_consistent_body(seed) -> None:
     phi = impossible(seed)
     assert least(phi, "semi") < -1e-3
@@ -76,6 +77,7 @@ def test_no_other_program_finds_a_better_semi_consistent_body(seed) -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.slow
 def test_no_other_program_finds_a_better_entropic_body(seed) -> None:
     """Over log-Cholesky parameters, from several starts."""
     rng = np.random.default_rng(seed)

@@ -69,6 +69,7 @@ def test_instruments_give_the_same_inertias_at_every_cutoff() -> None:
 
 
 @pytest.mark.parametrize("name", ["J1", "J2", "m2r2", "g1"])
+@pytest.mark.slow
 def test_they_are_near_to_the_authors_fits(name: str) -> None:
     low, high = sorted(AUTHORS[name])
     assert 0.96 * low < instruments()[name][0] < 1.04 * high

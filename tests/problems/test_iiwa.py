@@ -30,6 +30,7 @@ def estimates(position_std: float) -> dict[str, di.Estimate]:
 
 
 @pytest.mark.parametrize("position_std", LEVELS)
+@pytest.mark.slow
 def test_instruments_beat_unfiltered_least_squares_and_cost_nothing_filtered(
     position_std: float,
 ) -> None:

@@ -35,6 +35,7 @@ def test_redundant_inputs_are_convex_combinations_of_the_noisy_ones() -> None:
 
 
 @pytest.mark.parametrize("snr", table.PUBLISHED["input_snr"])
+@pytest.mark.slow
 def test_signals_and_noise_have_the_stated_ratios(snr: float) -> None:
     rows = 200_000
     one = cell(snr, 30, 60)

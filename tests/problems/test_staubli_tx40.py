@@ -68,6 +68,7 @@ def test_the_error_falls_to_the_published_one_and_never_rises(found: Diagnosis) 
     assert found.wiring == () and not any("payload" in s.effect.label for s in found.steps)
 
 
+@pytest.mark.slow
 def test_six_joints_are_refitted_on_the_page_as_by_fit(study: Study) -> None:
     """Nothing repeats; the coupled wrist switched on, as `dynident open` does it."""
     couplings = ("joint_coupling@joint5:joint6", "joint_coupling@joint6:joint5")

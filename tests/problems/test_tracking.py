@@ -62,6 +62,7 @@ def test_motions_stay_within_the_joints(head: Any) -> None:
         assert np.all(np.abs(v) <= [joint.velocity for joint in robot.joints])
 
 
+@pytest.mark.slow
 def test_a_true_model_follows_best_and_a_wrong_one_is_lost(head: Any) -> None:
     truth = head.experiment.mechanism()
     metric = Metric.of_data(head.model, head.dataset)

@@ -127,6 +127,7 @@ def test_a_long_row_of_signs_is_read(log):
 
 
 @given(st.text(max_size=40) | st.text("x+-*/()[]`.1pi ", max_size=40))
+@pytest.mark.slow
 def test_any_text_is_an_expression_or_is_refused(text):
     try:
         found = parse(text)

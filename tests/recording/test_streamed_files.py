@@ -241,6 +241,7 @@ def test_letters_are_counted_from_the_start(run, tmp_path, in_small_parts):
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @pytest.mark.parametrize("share", [0.3, 0.9, 0.999])
+@pytest.mark.slow
 def test_a_truncated_file_is_one_line_and_leaves_nothing(
     run, tmp_path, suffix, share, in_small_parts
 ):
@@ -321,6 +322,7 @@ def test_nothing_is_left_once_the_recording_is_gone(run, tmp_path, in_small_part
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.slow
 def test_memory_is_that_of_a_part(tmp_path, suffix, monkeypatch):
     """A file of 12 MB takes a few of them, and its samples are on the disk."""
     rng = np.random.default_rng(0)

@@ -94,6 +94,7 @@ def test_equivariance(regression: StatisticsRegressor) -> None:
 
 
 @pytest.mark.parametrize("seed", range(12))
+@pytest.mark.slow
 def test_equivariance_after_hundreds_of_rounds_along_a_ridge(seed: int) -> None:
     """Correlated inputs of unknown noise: neither steps nor the end may hang on rounding."""
     rng = np.random.default_rng([9, seed])

@@ -180,6 +180,7 @@ def test_noise_that_is_known_stays_and_other_noise_moves() -> None:
 
 
 @pytest.mark.parametrize("prior", [None, Gamma()])
+@pytest.mark.slow
 def test_leaps_end_where_plain_rounds_end(prior: Gamma | None) -> None:
     rng = np.random.default_rng(18)
     T = rng.standard_normal((500, 6)) @ rng.standard_normal((6, 6))

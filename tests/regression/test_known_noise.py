@@ -131,6 +131,7 @@ def test_correlated_inputs_are_told_and_corrected_least_squares_stands_beside() 
     assert "not independent" not in independent.summary()
 
 
+@pytest.mark.slow
 def test_what_the_data_do_not_tell_is_said() -> None:
     rng = np.random.default_rng(2)
     T = rng.standard_normal((3000, 3))
@@ -146,6 +147,7 @@ def test_what_the_data_do_not_tell_is_said() -> None:
     assert "differs by" in str(starts.table())
 
 
+@pytest.mark.slow
 def test_what_the_data_do_tell_is_said_too() -> None:
     """Hardly any noise in the output: there is no room for much in the inputs."""
     rng = np.random.default_rng(2)

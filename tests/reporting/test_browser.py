@@ -205,6 +205,7 @@ def test_the_page_of_a_validation(visit, tmp_path):
     assert_readable(visit(report(validation(), tmp_path / "loop.html"), PHONE))
 
 
+@pytest.mark.slow
 def test_hostile_names_stay_names(visit, tmp_path):
     names = ("a", "$x$ </script><img src=x onerror=alert(2)>")
     one = visit(report(diagnosis(names, samples=300), tmp_path / "report.html"), DESK)

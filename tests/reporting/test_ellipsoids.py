@@ -96,6 +96,7 @@ def test_a_broken_triangle_is_a_disc_with_a_spike() -> None:
 
 
 @pytest.mark.parametrize("case", IMPOSSIBLE)
+@pytest.mark.slow
 def test_anything_can_be_drawn_and_is_named(case: str) -> None:
     phi, said = IMPOSSIBLE[case]
     robots = {"before": with_body(phi), "after": arm()}

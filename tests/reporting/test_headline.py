@@ -30,6 +30,7 @@ def of_kind(verdict, steps, noise):
 
 
 @pytest.mark.parametrize(("verdict", "steps", "noise"), KINDS)
+@pytest.mark.slow
 def test_verdict_icon_title_and_colour_agree(verdict, steps, noise):
     if (verdict == "explained" and not steps) or (verdict == "nothing_missing" and steps):
         pytest.skip("is no verdict that a diagnosis can have")

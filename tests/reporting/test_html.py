@@ -172,6 +172,7 @@ def test_hostile_names_are_text():
 @pytest.mark.parametrize("noise", [True, False], ids=["noise known", "noise unknown"])
 @pytest.mark.parametrize("steps", [True, False], ids=["something added", "nothing added"])
 @pytest.mark.parametrize("joints", [("slide",), ("shoulder", "elbow")], ids=["one", "two"])
+@pytest.mark.slow
 def test_every_kind_of_diagnosis(joints, steps, noise):
     found = diagnosis(joints, steps=steps, noise=noise, samples=200)
     bare = replace(found, candidates=(), remaining=(), maps=(), traces=(), notes=())

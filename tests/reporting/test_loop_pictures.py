@@ -93,6 +93,7 @@ def test_the_report_has_the_section_where_there_is_a_loop(found):
     assert loop_section(None) is None
 
 
+@pytest.mark.slow
 def test_a_page_of_its_own(found):
     html = page(found, command="dynident simulate study.toml")
     assert html.count(escape(found.sentence)) == 1

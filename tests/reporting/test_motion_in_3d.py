@@ -54,6 +54,7 @@ def messages(html: str) -> bytes:
         ),
     ],
 )
+@pytest.mark.slow
 def test_links_are_drawn_as_the_description_has_them(inside: str, shows: str, shape: bytes) -> None:
     page = motion_page(bar(inside), motion(), "A caption.")
     assert shows in page.shows and shows in page.html
@@ -61,6 +62,7 @@ def test_links_are_drawn_as_the_description_has_them(inside: str, shows: str, sh
     assert shape in told and b"set_animation" in told
 
 
+@pytest.mark.slow
 def test_every_frame_of_a_period_is_there_and_long_ones_have_fewer() -> None:
     sizes = [len(messages(motion_page(bar(), motion(x), "").html)) for x in (1.0, 4.0, 1800.0)]
     per_second = (sizes[1] - sizes[0]) / 3.0

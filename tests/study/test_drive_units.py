@@ -227,6 +227,7 @@ def test_links_are_trusted_by_their_names(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("unit", ["A", "%"])
+@pytest.mark.slow
 def test_torques_and_noise_are_said_in_the_unit_of_the_drives(tmp_path: Path, unit: str) -> None:
     path = written(tmp_path, STUDY.replace('"A"', f'"{unit}"'))
     current, _ = recorded(4, "tool")

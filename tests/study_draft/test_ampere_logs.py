@@ -44,6 +44,7 @@ def test_the_draft_tells_what_the_study_by_hand_does(logs: Path) -> None:
     np.testing.assert_allclose(drafted.drives.gains, by_hand.drives.gains, rtol=2e-3)
 
 
+@pytest.mark.slow
 def test_files_carry_the_loads_that_are_said(logs: Path) -> None:
     files = [logs / f"{log.name}.csv" for log in ampere_logs.LOGS]
     facts = LogFacts(loads=(CarriedLoad(pattern="run_test*"), CarriedLoad(pattern="*load_1.csv")))

@@ -48,6 +48,7 @@ def test_missing_physics_is_no_fault() -> None:
         assert check_wiring(true_model(), broken(data(), change)) == ()
 
 
+@pytest.mark.slow
 def test_joints_in_another_order_have_the_same_fault() -> None:
     swapped = Dataset(tuple(one.select(("elbow", "shoulder")) for one in data().recordings))
     robot = di.Robot.from_text(true_model().robot.description.text, joints=["elbow", "shoulder"])  # type: ignore[union-attr]
@@ -114,6 +115,7 @@ def _mended(path: Path, fault: di.wiring.Fault) -> None:
 @pytest.mark.filterwarnings("ignore::dynident.errors.DynidentWarning")
 @pytest.mark.parametrize("mapped", ["", '\n[columns]\n"tau.elbow" = "current"\n'])
 @pytest.mark.parametrize("fault", list(column_faults(2)), ids=NAMES[: -len([*data_faults(2)])])
+@pytest.mark.slow
 def test_the_line_mends_it_when_typed(fault: Injected, mapped: str, tmp_path: Path) -> None:
     path = _study_with(fault, tmp_path, mapped)
     study = di.load(path)

@@ -65,6 +65,7 @@ def test_joints_where_only_noise_is_left_are_not_asked() -> None:
     )
 
 
+@pytest.mark.slow
 def test_without_a_noise_floor_shares_are_of_everything_and_it_says_so() -> None:
     first, second = asked(ONE)
     shares = first.shares
@@ -102,6 +103,7 @@ def test_no_unit_and_no_order_of_recordings_matters() -> None:
         assert one["share"] == pytest.approx(two_["share"], abs=0.02)
 
 
+@pytest.mark.slow
 def test_rows_that_do_not_count_are_not_asked() -> None:
     """Half of the rows are spoilt, and masked."""
     residual, certain = ONE.residual.copy(), ONE.certain.copy()
@@ -122,6 +124,7 @@ def test_too_little_data_is_a_reason_and_no_number() -> None:
     assert "-" in str(dependence_table((first,)))
 
 
+@pytest.mark.slow
 def test_one_motion_over_and_over_is_no_way_to_look_it_up() -> None:
     """Ten cycles of one motion, and nobody has said so; what is left is no function of anything."""
     one = record(15, {}, duration=30.0, period=3.0)

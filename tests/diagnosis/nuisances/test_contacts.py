@@ -132,6 +132,7 @@ def test_bursts_come_in_the_order_of_their_significance() -> None:
 
 
 @pytest.mark.parametrize("kind", ["", "coloured", "slow", "coloured slow", "heavy"])
+@pytest.mark.slow
 def test_noise_is_no_contact(kind: str) -> None:
     assert [seed for seed in range(6) if pulses_in(data(100 + seed, kind), DEFAULTS)] == []
 

@@ -23,6 +23,7 @@ def test_a_hidden_law_is_proposed_with_its_coefficient() -> None:
     assert found.test_error_after < 1.05 * found.noise_floor
 
 
+@pytest.mark.slow
 def test_a_product_of_three_is_found_by_way_of_products_of_two() -> None:
     found = proposals({"c*v*q*abs(v[shoulder])": 0.4})[0]
     factors = set(found.torque.replace("[shoulder]", ".far").split("*"))
@@ -30,6 +31,7 @@ def test_a_product_of_three_is_found_by_way_of_products_of_two() -> None:
     assert found.values[0] == pytest.approx(0.4, abs=4 * found.sigma[0])
 
 
+@pytest.mark.slow
 def test_shapes_of_a_law_of_another_joint_have_a_sigma() -> None:
     found = proposals({"c*v*sin(2.4*q[shoulder])": 0.4})[0]
     assert found.torque == "v*(c1*sin(k*q[shoulder]) + c2*cos(k*q[shoulder]))"
@@ -39,12 +41,14 @@ def test_shapes_of_a_law_of_another_joint_have_a_sigma() -> None:
     assert found.named_values["k"] == pytest.approx(2.4, abs=4 * sigma)
 
 
+@pytest.mark.slow
 def test_of_several_laws_none_is_called_an_explanation() -> None:
     found = proposals({"c*v*q": 0.5, "c*v^2*q[shoulder]": 0.2})
     assert found[-1].torque == "c*v^2*q[shoulder]"
     assert [one.is_explanation for one in found] == [False, False]
 
 
+@pytest.mark.slow
 def test_what_cannot_be_told_apart_are_rivals_and_the_truth_is_among_them() -> None:
     found = proposals({"c*v*q": 0.5}, motion=together)[0]
     named = {one.made_of.torque for one in (found.effect, *found.rivals)}
@@ -82,6 +86,7 @@ def test_only_the_wrong_one_of_two_effects_is_replaced() -> None:
 
 
 @pytest.mark.parametrize("spring", [8.0, 1.0])
+@pytest.mark.slow
 def test_a_right_effect_stays_beside_a_law(spring: float) -> None:
     found = proposals({"c*v*q": 0.5}, "joint_spring@elbow", spring=spring)[0]
     assert (found.torque, found.instead_of) == ("c*v*q", ())

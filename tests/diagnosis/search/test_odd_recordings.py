@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from dynident import diagnose as find
 from dynident import fit
@@ -32,6 +33,7 @@ def loaded(seed: int, payload: bool | None) -> Recording:
     return made
 
 
+@pytest.mark.slow
 def test_what_a_plane_arm_cannot_tell_of_a_load_is_no_reason_to_refuse_it() -> None:
     """Out of the plane a load has moments that no torque shows: they are rounding errors."""
     train = Dataset(tuple(loaded(s, bool(s % 2)) for s in range(4)))

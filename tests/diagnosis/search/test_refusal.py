@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from dynident import diagnose as find
 from dynident.diagnosis import Diagnosis, procedure
@@ -73,6 +74,7 @@ def test_what_was_impossible_already_is_no_fault_of_the_effect_that_makes_it_cer
         assert "inertia at elbow" in newly_impossible(evidence, possible, certain)
 
 
+@pytest.mark.slow
 def test_after_an_effect_that_breaks_its_promise_the_next_best_is_tried(monkeypatch) -> None:
     def broken(fitted, wider, one) -> str:
         return "keeps no promise" if one.effect.name == "quadratic_drag" else ""

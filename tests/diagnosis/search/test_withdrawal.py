@@ -35,6 +35,7 @@ def trained_on_what_the_test_lacks() -> Diagnosis:
     return find(FULL, train, data(FULL, {}, 2))
 
 
+@pytest.mark.slow
 def test_what_raises_the_held_out_error_is_withdrawn_and_said_to_be() -> None:
     found = trained_on_what_the_test_lacks()
     assert not [one for one in found.steps if one.effect.name == "joint_spring"]
@@ -52,6 +53,7 @@ def test_what_raises_the_held_out_error_is_withdrawn_and_said_to_be() -> None:
     assert found.verdict != "explained"
 
 
+@pytest.mark.slow
 def test_no_twin_of_what_was_withdrawn_takes_its_place() -> None:
     found = trained_on_what_the_test_lacks()
     refused = {label for one in found.withdrawn for label in one.refusals}
@@ -67,6 +69,7 @@ def from_the_rigid_body(most: int) -> Diagnosis:
     return find(Model(arm()), data(FULL, {}, 0, 1), data(FULL, {}, 2), most=most)
 
 
+@pytest.mark.slow
 def test_what_every_joint_has_is_one_proposal() -> None:
     found = from_the_rigid_body(2)
     assert {one.effect.label for one in found.steps} == {e.label for e in FULL.effects}
@@ -96,6 +99,7 @@ def test_a_warm_motor_in_some_recordings_is_no_payload() -> None:
     assert not any(one.effect.is_payload for one in found.steps)
 
 
+@pytest.mark.slow
 def test_an_effect_that_noise_in_the_columns_makes_changes_with_the_filter() -> None:
     """Nothing repeats and no noise is stated: least squares shrinks inertias, and others grow."""
     truth = true_values(FULL, **FRICTION)
@@ -111,6 +115,7 @@ def test_an_effect_that_noise_in_the_columns_makes_changes_with_the_filter() -> 
     assert any("changes with the filter" in remark for remark in remarks)
 
 
+@pytest.mark.slow
 def test_a_shape_is_sought_beside_an_effect_of_the_session() -> None:
     model = FULL + "thermal_friction@elbow"
     truth = {"Fvt__elbow": 0.2, "Fct__elbow": 0.1, "Fs__shoulder": 1.0}

@@ -49,6 +49,7 @@ def test_where_nothing_has_changed_nothing_is_said_to(before):
     assert found.sentence.startswith("None of 10")
 
 
+@pytest.mark.slow
 def test_p_values_are_uniform_and_false_alarms_as_rare_as_promised(before):
     # What two fits to recordings of their own would give, of a robot that has not changed.
     rng = np.random.default_rng(0)

@@ -74,6 +74,7 @@ def test_without_noise_nothing_is_left() -> None:
     np.testing.assert_allclose(found.constants, CONSTANTS, atol=2e-3)
 
 
+@pytest.mark.slow
 def test_intervals_cover_the_truth() -> None:
     """95 % intervals of ten quantities and six constants, over twelve sensors."""
     scores = []
@@ -133,6 +134,7 @@ def test_a_sensor_that_records_what_the_load_does_is_told_by_the_mass() -> None:
 
 
 @pytest.mark.parametrize("position_std", [0.0, 2e-5, 3e-4])
+@pytest.mark.slow
 def test_poses_at_rest_tell_no_inertia(position_std: float) -> None:
     """Neither exact encoders nor noisy ones, whose noise looks like accelerations."""
     found = weighed(*poses(12, 11, position_std))
