@@ -11,7 +11,7 @@ from scipy import stats
 
 from dynident.moments import SecondMoments
 from dynident.regression.factor_analysis import Gamma, Loadings, Posterior, begun, start_of
-from dynident.regression.iterations import Analysis, AnalysisEnding, _leap, analyse
+from dynident.regression.iterations import Analysis, AnalysisEnding, _leaps, analyse
 
 
 def standardised(X: np.ndarray, y: np.ndarray) -> SecondMoments:
@@ -204,7 +204,7 @@ def test_leaps_out_of_the_numbers_have_no_bound() -> None:
     known = np.zeros(statistics.inputs, dtype=bool)
     lost = replace(factors, wz_var=np.where(np.arange(len(known)) == 0, 0.0, factors.wz_var))
     with np.errstate(all="ignore"):
-        there = _leap(Posterior(lost, statistics), Gamma(), known, 4)
+        (there,) = _leaps(Posterior(lost, statistics), Gamma(), known, (4,))
         assert np.isnan(there.bound(Gamma()))
 
 
