@@ -96,3 +96,13 @@ class Block:
         """
         widths = np.broadcast_to(self.friction_width, len(self.names))
         return np.tanh(speed / max(float(widths[self.index(joint)]) for joint in joints))
+
+    def direction(self, joint: str | None) -> np.ndarray:
+        """Smoothed sign of a joint's own speed, (T, 1); made once, for all that ask."""
+        if joint not in self._directions:
+            self._directions[joint] = self.sign(self.v[:, [self.index(joint)]], joint)
+        return self._directions[joint]
+
+    @cached_property
+    def _directions(self) -> dict[str | None, np.ndarray]:
+        return {}

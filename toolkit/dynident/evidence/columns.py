@@ -5,9 +5,10 @@ Low-passed and decimated like the torque, for every replicate of every run.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
+from itertools import islice
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from dynident.evidence.column_cache import ColumnCache, FirstLook, Kept
 from dynident.evidence.joint_columns import RigidColumns
 from dynident.evidence.runs import Run, Signals
 from dynident.evidence.windows import Source, sources
-from dynident.fitting.sampling import Sampled
+from dynident.fitting.sampling import Sampled, decimate_each
 from dynident.model import Model
 
 _SHARED = 50_000
@@ -102,12 +103,17 @@ class Evidence:
         if len(variants) > 1 and first.is_dynamic_response and first not in model:
             found = self._together(variants, model, values)
             return [[found[variant, run] for variant in variants] for run in runs]
-        found = []
-        for run in runs:
-            along = self._along(first, run, model)
-            each = [self._of_each(variants, one, model, values) for one in along]
-            found.append([[of_one[v] for of_one in each] for v in range(len(variants))])
-        return found
+        along = [self._along(first, run, model) for run in runs]
+        every = [one for some in along for one in some]
+        if first.depends_on_fit:
+            found = [[self._of(one, each, model, values) for one in variants] for each in every]
+        else:
+            found = self._plain(variants, every, model)
+        of_replicates = iter(found)
+        return [
+            [list(signals) for signals in zip(*islice(of_replicates, len(some)), strict=True)]
+            for some in along
+        ]
 
     def first_look(
         self, variants: Sequence[Effect], model: Model, values: np.ndarray
@@ -148,17 +154,9 @@ class Evidence:
 
     # --- of one replicate, by all that they depend on -------------------------------------------
 
-    def _of_each(
-        self, variants: Sequence[Effect], sampled: Sampled, model: Model, values: np.ndarray
-    ) -> list[np.ndarray]:
-        """Columns of one effect with several shapes."""
-        if variants[0].depends_on_fit:
-            return [self._of(variant, sampled, model, values) for variant in variants]
-        return self._plain(variants, sampled, model)
-
     def _of(self, effect: Effect, sampled: Sampled, model: Model, values: np.ndarray) -> np.ndarray:
         if not effect.depends_on_fit:
-            return self._plain([effect], sampled, model)[0]
+            return self._plain([effect], [sampled], model)[0][0]
         kept, key = self._at(model, values), (effect, self._recorded(sampled))
         if key in kept:
             return kept[key]
@@ -173,44 +171,61 @@ class Evidence:
             kept[place] = effect, source.sampled.filtered(effect.acting_columns(block))
         return kept[place][1][source.rows]
 
-    def _plain(self, effects: Sequence[Effect], sampled: Sampled, model: Model) -> list[np.ndarray]:
-        """Columns that follow from the motion alone, of one effect with any number of shapes."""
-        source = self._source(sampled, effects[0])
-        known, tried = self._known(source), self.cache.tried
+    def _plain(
+        self, effects: Sequence[Effect], every: Sequence[Sampled], model: Model
+    ) -> list[list[np.ndarray]]:
+        """Columns that follow from the motion alone, of one effect with any number of shapes.
+
+        For each recording: those of each shape.
+        """
+        sources = [self._source(one, effects[0]) for one in every]
         keys = {_plain_key(effect, model): effect for effect in effects}
+        places = {source.key: source for source in sources}
+        found = {place: self._looked_up(source, keys, model) for place, source in places.items()}
+        missing = {place: tuple(key for key in keys if key not in found[place]) for place in places}
+        for new in dict.fromkeys(missing.values()):
+            some = [place for place in places if missing[place] == new]
+            if not new:
+                continue
+            tried = [keys[key] for key in new]
+            evaluated = self._evaluated(tried, [places[place].sampled for place in some], model)
+            for place, columns in zip(some, evaluated, strict=True):
+                known = self._known(places[place])
+                for key, effect, one in zip(new, tried, columns, strict=True):
+                    found[place][key] = one
+                    if effect in self._kept or effect in model.effects:
+                        known[key] = one
+                    else:
+                        self.cache.tried.put((place, key), one)
+        wanted = [_plain_key(effect, model) for effect in effects]
+        return [[found[source.key][key][source.rows] for key in wanted] for source in sources]
+
+    def _looked_up(self, source: Source, keys: Mapping[Hashable, Effect], model: Model) -> Kept:
+        """What is known already of some effects along a motion."""
+        known, tried = self._known(source), self.cache.tried
         at_once = self._evaluated_at_once(source.sampled)
         if any(key not in known and effect in at_once for key, effect in keys.items()):
             # Many a friction width is tried without a look at the candidates.
-            own = all(effect in model.effects for effect in effects)
+            own = all(effect in model.effects for effect in keys.values())
             self._pass_through(source, model, model.effects if own else at_once)
         found = {key: known[key] for key in keys if key in known}
         for key in keys:
             if key not in found and (latest := tried.get((source.key, key))) is not None:
                 found[key] = latest
-        new = {key: effect for key, effect in keys.items() if key not in found}
-        if new:
-            evaluated = self._evaluated(list(new.values()), source.sampled, model)
-            found |= zip(new, evaluated, strict=True)
-        for key, effect in new.items():
-            if effect in self._kept or effect in model.effects:
-                known[key] = found[key]
-            else:
-                tried.put((source.key, key), found[key])
-        return [found[_plain_key(effect, model)][source.rows] for effect in effects]
+        return found
 
     def _evaluated(
-        self, effects: Sequence[Effect], sampled: Sampled, model: Model
-    ) -> list[np.ndarray]:
-        """Columns that follow from the motion alone, all in one pass through it."""
+        self, effects: Sequence[Effect], every: Sequence[Sampled], model: Model
+    ) -> list[list[np.ndarray]]:
+        """Columns that follow from the motion alone, all in one pass through each recording."""
         if effects[0].is_instantaneous:
-            return sampled.decimate(model, lambda block: [self._loaded(e, block) for e in effects])
-        block = sampled.block(model)
-        return sampled.filtered_each([self._loaded(effect, block) for effect in effects])
+            return decimate_each(every, model, lambda block: self._loaded(effects, block))
+        return [one.filtered_each(self._loaded(effects, one.block(model))) for one in every]
 
-    def _loaded(self, effect: Effect, block: Block) -> np.ndarray:
+    def _loaded(self, effects: Sequence[Effect], block: Block) -> list[np.ndarray]:
         """Columns that follow from the motion alone, with the payload on board."""
         block = replace(block, carries_payload=True)
-        return effect.acting_columns(self.model.ready(effect, block, None))
+        return [one.acting_columns(self.model.ready(one, block, None)) for one in effects]
 
     def _rigid(self, sampled: Sampled, model: Model) -> RigidColumns:
         source = self._source(sampled)

@@ -183,10 +183,13 @@ class Run:
         ]
         if len(each) < len(repetitions):
             each = each * len(repetitions)
-        found = np.empty((len(repetitions), len(each[0]), self.index.shape[1]))
-        for one, white, rows in zip(found, each, repetitions, strict=True):
-            one[:] = white[:, rows]
-        if self.uncertain is not None:
+        if len(repetitions) == 1:
+            found = each[0][None, :, repetitions[0]]
+        else:
+            found = np.empty((len(repetitions), len(each[0]), self.index.shape[1]))
+            for one, white, rows in zip(found, each, repetitions, strict=True):
+                one[:] = white[:, rows]
+        if told is not None and not noise.is_flat:  # flat noise is whitened without looking back
             found *= self.certain(joint)
         return found.transpose(0, 2, 1)
 

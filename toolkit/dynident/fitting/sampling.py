@@ -6,7 +6,7 @@ low-pass as the torque; in blocks, so that a regressor at the full rate never ex
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -164,7 +164,7 @@ class Sampled:
     ) -> Iterator[tuple[FilterBlock, Block, dict[str, np.ndarray], np.ndarray]]:
         """Yield plans with what they evaluate: samples, columns that are known, and the torque."""
         known = self.whole_columns(model, values)
-        for plan in self._plans(model):
+        for plan in self.plans(model):
             here = {label: own[plan.raw] for label, own in known.items()}
             motion = self.source.part(plan.raw)
             yield plan, self._block(model, motion, plan.raw), here, motion.tau
@@ -189,9 +189,16 @@ class Sampled:
         """Evaluate columns block by block; all of their decimated rows."""
         parts = [
             self.parallel.apply_each(evaluate(self.block(model, plan.raw)), plan)
-            for plan in self._plans(model)
+            for plan in self.plans(model)
         ]
         return [np.concatenate(pieces) for pieces in zip(*parts, strict=True)]
+
+    @property
+    def layout(self) -> Hashable:
+        """What the blocks of its rows depend on: recordings of one layout are filtered at once."""
+        filter = self.parallel
+        rows = (self.source.samples, self.kept.start, self.kept.stop, self.at_once)
+        return filter.filter, filter.rate_hz, filter.period, *rows
 
     def block(self, model: Model, raw: slice = slice(None)) -> Block:
         """Samples at the full rate as effects see them; all of them by default.
@@ -224,11 +231,38 @@ class Sampled:
             temperature=temperature,
         )
 
-    def _plans(self, model: Model) -> Iterator[FilterBlock]:
+    def plans(self, model: Model) -> Iterator[FilterBlock]:
         """Blocks whose rows are used."""
         fitting = _MEMORY // (8 * model.robot.n * model.size)
         size = min(self.at_once, max(_LEAST_BLOCK, fitting))
         return self.parallel.blocks(self.source.samples, size, self.kept)
+
+
+def decimate_each(
+    every: Sequence[Sampled], model: Model, evaluate: Evaluate
+) -> list[list[np.ndarray]]:
+    """As `Sampled.decimate`, of several recordings: those of one layout are filtered at once.
+
+    Parameters
+    ----------
+    every : the recordings.
+    model, evaluate : as for `Sampled.decimate`.
+
+    Returns
+    -------
+    For each recording its columns.
+    """
+    found: dict[Sampled, list[np.ndarray]] = {}
+    for layout in dict.fromkeys(one.layout for one in every):
+        some = [one for one in every if one.layout == layout]
+        first, parts = some[0], []
+        for plan in first.plans(model):
+            columns = [evaluate(one.block(model, plan.raw)) for one in some]
+            parts.append(first.parallel.apply_each([x for each in columns for x in each], plan))
+        whole = [np.concatenate(pieces) for pieces in zip(*parts, strict=True)]
+        count = len(whole) // len(some)
+        found |= {one: whole[k * count : (k + 1) * count] for k, one in enumerate(some)}
+    return [found[one] for one in every]
 
 
 def sample(recording: Recording, settings: Filter | None) -> Sampled:

@@ -55,7 +55,7 @@ class FrictionWidthColumn(JointEffect):
 
     def at_joint(self, block: Block) -> np.ndarray:
         v = block.v[:, [block.index(self.joint)]]
-        return block.sign(v / self.shape[0], self.joint) - block.sign(v, self.joint)
+        return block.sign(v / self.shape[0], self.joint) - block.direction(self.joint)
 
 
 @dataclass(frozen=True, eq=False)

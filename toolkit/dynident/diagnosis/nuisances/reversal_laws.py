@@ -57,7 +57,7 @@ class SmoothReversal(FrictionWidthColumn):
         j, (k, lead) = block.index(self.joint), self.shape
         v, a = block.v[:, [j]], block.a[:, [j]]
         width = float(np.broadcast_to(block.friction_width, len(block.names))[j])
-        return self.reversal((v + lead * a) / (k * width)) - block.sign(v, self.joint)
+        return self.reversal((v + lead * a) / (k * width)) - block.direction(self.joint)
 
     @staticmethod
     def reversal(x: np.ndarray) -> np.ndarray:
