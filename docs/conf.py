@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 import re
 import sys
 from pathlib import Path
@@ -9,11 +11,12 @@ from typing import Any
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
+NOTEBOOKS = HERE / "_made" / "notebooks"
 sys.path[:0] = [str(HERE), str(ROOT / "toolkit")]
 
 project = "dynident"
 copyright = "the authors of dynident, BSD-3-Clause"
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 exclude_patterns = ["_build"]
 html_theme = "furo"
 html_title = "dynident"
@@ -24,6 +27,7 @@ html_copy_source = False
 suppress_warnings = ["ref.python"]  # `n` of several classes, in shapes
 myst_heading_anchors = 3
 smartquotes = False
+nb_execution_mode = "off"  # as they were run, and are tested to run
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 napoleon_google_docstring = False
@@ -33,10 +37,24 @@ napoleon_use_rtype = False
 
 def setup(app: Any) -> None:
     """Join the steps of this site to a build."""
+    app.connect("builder-inited", _bring_notebooks)
     app.connect("builder-inited", _draw)
     app.connect("source-read", _for_the_site)
     app.connect("html-page-context", _for_everybody, priority=900)  # after the theme
     app.connect("autodoc-process-docstring", _as_numpydoc, priority=400)  # before napoleon
+
+
+def _bring_notebooks(app: Any) -> None:
+    """Copy the notebooks into the site, with their links as they are from there."""
+    NOTEBOOKS.mkdir(parents=True, exist_ok=True)
+    for path in sorted((ROOT / "notebooks").glob("*.ipynb")):
+        notebook = json.loads(path.read_text(encoding="utf-8"))
+        for cell in notebook["cells"]:
+            if cell["cell_type"] == "markdown":
+                cell["source"] = _with_links("".join(cell["source"]), path.parent, NOTEBOOKS)
+        text, made = json.dumps(notebook), NOTEBOOKS / path.name
+        if not made.exists() or made.read_text(encoding="utf-8") != text:  # or all is read anew
+            made.write_text(text, encoding="utf-8")
 
 
 def _draw(app: Any) -> None:
@@ -51,20 +69,32 @@ def _for_the_site(app: Any, docname: str, source: list[str]) -> None:
 
     What only the site has is put in: pictures that are made with it.
     """
+    folder = Path(app.env.doc2path(docname)).parent
+    if folder == NOTEBOOKS:
+        return
     text = re.sub(r"```mermaid\n.*?```\n", "", source[0], flags=re.DOTALL)
     text = re.sub(
         r"<!-- picture of (\w+) -->", r"![\1 in the residual](_made/effects/\1.png)", text
     )
     if not (HERE / "benchmarks.md").exists():  # `make bench` writes it
         text = text.replace("\nbenchmarks\n", "\n")
-    folder = Path(app.env.doc2path(docname)).parent
+    source[0] = _with_links(text, folder, folder)
+
+
+def _with_links(text: str, folder: Path, made: Path) -> str:
+    """Return Markdown of a folder with its links as they are on the site, in another folder."""
 
     def link(found: re.Match[str]) -> str:
-        target = (folder / found[2].partition("#")[0]).resolve()
-        stays = target.is_relative_to(HERE) or target.is_file()  # which goes along as a download
-        return found[0] if stays else found[1]
+        name, mark, anchor = found[2].partition("#")
+        target = (folder / name).resolve()
+        goes_along = target.is_file() and target.suffix != ".md"  # as a download
+        if not (target.is_relative_to(HERE) or goes_along):
+            return found[1]
+        if target.parent == ROOT / "notebooks":
+            target = NOTEBOOKS / target.name  # a page here
+        return f"[{found[1]}]({os.path.relpath(target, made)}{mark}{anchor})"
 
-    source[0] = re.sub(r"(?<!!)\[([^\]]+)\]\(((?!\w+:|#)[^)\s]+)\)", link, text)
+    return re.sub(r"(?<!!)\[([^\]]+)\]\(((?!\w+:|#)[^)\s]+)\)", link, text)
 
 
 def _for_everybody(app: Any, page: str, template: str, context: dict[str, Any], tree: Any) -> None:

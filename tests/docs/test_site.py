@@ -15,8 +15,12 @@ from browsers import DESK, PHONE, Tab, needs_browser, opened, serious_faults
 from code_blocks import ROOT
 from dynident.effects import catalogue
 
-WIDE = ("effects", "symbols", "reference/study", "accuracy", "api")
-TRIED = ("index", "first_robot", "reference/experiment")
+STORIES = sorted((ROOT / "notebooks").glob("*.ipynb"))
+WIDE = (
+    *("effects", "symbols", "reference/study", "accuracy", "api"),
+    *(f"_made/notebooks/{path.stem}" for path in STORIES),
+)
+TRIED = ("index", "first_robot", "reference/experiment", "notebooks", WIDE[-2])
 """Pages with all that pages have, and short: axe-core takes its time by their length."""
 pytestmark = pytest.mark.slow
 
