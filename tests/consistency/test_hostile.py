@@ -48,6 +48,7 @@ def mutated(name: str, seed: int) -> str:
 
 
 @pytest.mark.parametrize("name", WRITERS)
+@pytest.mark.slow
 def test_mutations_end_in_findings_or_in_one_error(name, tmp_path, capfd):
     path = tmp_path / f"robot.{name}"
     done = 0
@@ -64,6 +65,7 @@ def test_mutations_end_in_findings_or_in_one_error(name, tmp_path, capfd):
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_no_mutation_ends_the_process(tmp_path):
     """Native code below us ends processes where Python raises: try it in one of its own."""
     for name in WRITERS:

@@ -125,6 +125,7 @@ def test_predicted_sigma_is_that_of_the_regression() -> None:
     np.testing.assert_allclose(alone.sigma(found.motion.variables), expected, rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_it_tells_more_than_many_random_motions_within_the_limits() -> None:
     task = DesignTask(duration=10.0, repeat=1, harmonics=5, starts=2)
     found = design(MODEL, recorded(), task)
@@ -148,6 +149,7 @@ def test_it_tells_more_than_many_random_motions_within_the_limits() -> None:
         ),
     ],
 )
+@pytest.mark.slow
 def test_pairs_are_told_apart_better_than_by_any_of_many_motions(pair, times: float) -> None:
     base = Model(ROBOT) + "coulomb_friction"
     (first,), (second,) = (effects_of(label, ROBOT) for label in pair)
@@ -204,6 +206,7 @@ def test_of_several_pairs_the_one_told_least_counts() -> None:
     assert both.sentence.count("standard deviations") >= 2
 
 
+@pytest.mark.slow
 def test_a_pair_that_nothing_tells_hides_no_other() -> None:
     law = law_effect(Law(name="again", torque="c*v"))("elbow").on(ROBOT)
     (viscous,), (drag,), (spring,) = (
@@ -217,6 +220,7 @@ def test_a_pair_that_nothing_tells_hides_no_other() -> None:
     assert "No motion within the limits" in found.sentence
 
 
+@pytest.mark.slow
 def test_several_effects_are_shown_together() -> None:
     effects = tuple(effects_of(one, ROBOT)[0] for one in ("torque_offset@shoulder", "base_tilt"))
     found = design(MODEL, recorded(), DesignTask(show=effects, starts=1, harmonics=4))
@@ -226,7 +230,9 @@ def test_several_effects_are_shown_together() -> None:
     assert np.all(together < before)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize(
+    "seed", [pytest.param(k, marks=pytest.mark.slow if k > 1 else ()) for k in range(12)]
+)
 def test_no_limit_is_exceeded_on_a_fine_grid(seed: int) -> None:
     robot = chain(1 + seed % 4, seed)
     rng = np.random.default_rng(seed)
@@ -293,6 +299,7 @@ def test_effects_of_the_past_are_refused_by_name() -> None:
         design(MODEL, recorded(), DesignTask(show=(first,)))
 
 
+@pytest.mark.slow
 def test_limits_without_a_motion_are_refused() -> None:
     limits = replace(MotionLimits.of(ROBOT), torque=np.array([1e-3, 1e-3]))
     with pytest.raises(DesignError, match="within the limits"):
@@ -312,6 +319,7 @@ def test_limits_by_file(tmp_path) -> None:
         MotionLimits.from_file(path, ROBOT)
 
 
+@pytest.mark.slow
 def test_what_no_motion_tells_is_infinite_and_named() -> None:
     """Beside viscous friction the law c v has no sigma; rivals that are the same are not told."""
     law = law_effect(Law(name="again", torque="c*v"))("elbow").on(ROBOT)

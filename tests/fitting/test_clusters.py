@@ -133,6 +133,7 @@ def _refuse(recording: Recording, what: str) -> None:
 
 
 @pytest.mark.filterwarnings("default")
+@pytest.mark.slow
 def test_what_a_recording_lacks_comes_through(client, runs) -> None:
     short = runs[0].part(slice(0, 30))
     with pytest.raises(RecordingError) as here:
@@ -168,6 +169,7 @@ def test_a_worker_that_dies_is_one_line(client) -> None:
 
 
 @pytest.mark.filterwarnings("default")
+@pytest.mark.slow
 def test_a_closed_client_is_one_line(client, runs) -> None:
     closed = type(client)(client.cluster)
     closed.close()

@@ -153,6 +153,7 @@ def test_bad_fleets_are_one_line() -> None:
 
 
 @pytest.mark.filterwarnings("default")
+@pytest.mark.slow
 def test_a_cluster_of_two_processes_says_the_same(client, even: Fleet) -> None:
     there = fit_fleet(model(), robots(), client=client)
     for name, one in even.estimates.items():

@@ -75,6 +75,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.slow
 def test_units_signs_order_and_zeros_are_found_and_said(arm: Path, fault: str) -> None:
     one = recording(1)
     study, decisions = read_back(

@@ -19,6 +19,7 @@ from synthetic import ARM
 
 
 @pytest.mark.parametrize("kind", ["bag", "mcap", "db3"])
+@pytest.mark.slow
 def test_what_is_drafted_is_read(tmp_path: Path, kind: str) -> None:
     (tmp_path / "arm.urdf").write_text(ARM)
     bags = []
