@@ -18,7 +18,7 @@ NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 LARGEST = 1 << 20  # bytes
 CELL_TIMEOUT = 300  # s; a slow machine gets there, a hanging cell does not
 MACHINE_PATH = re.compile(r"/(?:work|tmp|root|home|Users)\b|[A-Za-z]:\\\\")
-PROGRESS = re.compile(r"diagnosing: .* \(\d+ s\)")
+PROGRESS = re.compile(r"(diagnosing|designing): .* \(\d+ s\)")
 """A line of the log, every ten seconds: on a slow machine."""
 
 each_notebook = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
