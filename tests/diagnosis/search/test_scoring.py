@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dynident import diagnose
 from dynident.criteria import Criteria
 from dynident.diagnosis.search.cross_validation import cross_validate
 from dynident.diagnosis.search.scoring import (
@@ -28,7 +29,8 @@ from dynident.model import Model
 from dynident.moments.replicates import replicate_moments
 from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import regress
-from synthetic import arm
+from dynident.recording import Dataset
+from synthetic import arm, synthetic, true_values
 
 RELIABLE = Criteria().noise.reliable
 MODEL = Model(arm()) + "viscous_friction"
@@ -271,3 +273,26 @@ def test_values_beyond_their_bounds_are_impossible() -> None:
     negative = replace(found, values=(-0.3,))
     assert "Fc" in impossible(negative, rows.fitted)
     assert impossible(replace(negative, not_identifiable=True), rows.fitted) == ""
+
+
+@pytest.mark.parametrize("gain", [-0.4, -0.48])
+def test_the_gain_of_one_drive_is_named_with_the_other_that_it_cannot_be_told_from(
+    gain: float,
+) -> None:
+    """Two joints whose bodies' scale nothing fixes: e and -e / (1 + e) make the same torques.
+
+    As a share of the torque that is predicted without it, the true gain is beyond what a drive has.
+    """
+    given = Model(arm()) + "viscous_friction" + "coulomb_friction"
+    with_gain = given + "drive_gain@elbow"
+    friction = {"Fv__shoulder": 1.2, "Fv__elbow": 0.5, "Fc__shoulder": 1.5, "Fc__elbow": 0.6}
+    truth = true_values(with_gain, **friction, e__elbow=gain)
+    recordings = (
+        synthetic(with_gain, truth, seed, rate_hz=250.0, torque_std=0.1) for seed in (0, 1)
+    )
+    found = diagnose(given, Dataset(tuple(recordings)))
+    (step,) = found.steps
+    named = {step.effect.label, *(one.label for one in step.indistinguishable)}
+    assert named == {"drive_gain@shoulder", "drive_gain@elbow"}
+    values = {one.effect.label: one.values for one in found.candidates}
+    assert values["drive_gain@elbow"] == pytest.approx((gain,), abs=0.02)

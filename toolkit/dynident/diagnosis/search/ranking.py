@@ -19,7 +19,7 @@ from dynident.diagnosis.search.scoring import (
 )
 from dynident.effects import Block, Effect, catalogue, law_effect
 from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import EvidenceFit, residuals
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, residuals
 from dynident.evidence.noise_model import differences, systematic_square
 from dynident.model import Model
 from dynident.moments.replicates import Kind
@@ -152,7 +152,7 @@ def joints_below_noise(evidence: Evidence, fitted: EvidenceFit) -> frozenset[str
 def _score_variants(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> Iterator[Score]:
     if effect.is_payload:
         for one in payload_scores(evidence, fitted, effect):
-            yield _possible(one, fitted)
+            yield _possible(one, evidence, fitted)
         return
     seen = _seen(fitted, effect)
     shapes = [variant.suited(seen) for variant in effect.variants(fitted.model.robot)]
@@ -161,12 +161,31 @@ def _score_variants(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> 
         shapes = list(dict.fromkeys([*shapes, effect]))
     found = candidate_moments(evidence, fitted, shapes, evidence.first_look)
     for shaped, parts in zip(shapes, found, strict=True):
-        yield _possible(score(fitted, shaped, *parts, grid=len(shapes)), fitted)
+        yield _possible(score(fitted, shaped, *parts, grid=len(shapes)), evidence, fitted)
 
 
-def _possible(one: Score, fitted: EvidenceFit) -> Score:
+def _possible(one: Score, evidence: Evidence, fitted: EvidenceFit) -> Score:
     """Return a score that counts for nothing where its values are impossible."""
-    return replace(one, penalised=-np.inf) if impossible(one, fitted) else one
+    if not impossible(one, fitted):
+        return one
+    anew = _beside_the_new_torque(one, evidence, fitted)
+    return replace(anew, penalised=-np.inf) if impossible(anew, fitted) else anew
+
+
+def _beside_the_new_torque(one: Score, evidence: Evidence, fitted: EvidenceFit) -> Score:
+    """Return a score with the share of the torque that a model predicts once the effect is in it.
+
+    A score's value is a share of what the model predicts without the effect. The gain of one drive
+    is, but for the bodies' scale, the gain of every other: with that scale a value that seems to be
+    impossible is the only one that is not.
+    """
+    if not (one.effect.linear_in_torque and one.penalised > 0):
+        return one
+    wider = fit_evidence(evidence, fitted.model + one.effect, fitted)
+    if not wider.misfit(fitted) < fitted.misfit(fitted):
+        return one
+    found = wider.values[wider.model.slices[one.effect.label]]
+    return replace(one, values=tuple(found.tolist()))
 
 
 def _seen(fitted: EvidenceFit, effect: Effect) -> Block:

@@ -44,7 +44,8 @@ class Score:
     share : drop over the squared residual with its noise.
     p_value : before correction for the number of tests; blocks of time are the sampling units.
     penalised : drop less the price of its parameters and of its grid.
-    values, sigma : (k,) its parameters and their standard deviations.
+    values, sigma : (k,) its parameters and their standard deviations; of a share of the predicted
+        torque, of that which the model predicts without it, where that is possible.
     covariance : (k, k) of the values; None where nothing of them can be told.
     fall : of the squared residual with its noise, at the value at which the column is taken. A
         column that noise drives is other in every repetition: that counts against it.
