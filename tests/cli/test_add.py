@@ -34,6 +34,7 @@ def test_words(run, study):
     done = run("add", path, "coulomb_friction@elbow")
     assert done.status == 0 and done.err == ""
     assert "study" in done.out and "+ coulomb_friction@elbow" in done.out
+    assert "explain may print other figures" in done.out
     assert done.out.rstrip().endswith(f"Written into {path}.") or "Written into" in done.out
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -62,6 +63,16 @@ def test_every_effect_has_its_picture(site: Path, pages) -> None:
     drawn = {Path(str(img["src"])).stem for img in pages[site / "effects.html"].find_all("img")}
     own = {n for n, kind in catalogue().items() if kind.__module__.startswith("dynident.")}
     assert own <= drawn
+
+
+@pytest.mark.parametrize("path", STORIES, ids=lambda path: path.stem[:2])
+def test_notebooks_are_pages_with_their_pictures(site: Path, pages, path: Path) -> None:
+    page = pages[site / "_made" / "notebooks" / f"{path.stem}.html"]
+    cells = [one for one in json.loads(path.read_text())["cells"] if one["cell_type"] == "code"]
+    data = [output.get("data", {}) for cell in cells for output in cell["outputs"]]
+    assert len(page.select("div.cell_input")) == len(cells)
+    drawn = page.select("div.cell_output img")
+    assert len(drawn) == sum("image/png" in one and "text/html" not in one for one in data)
 
 
 @needs_browser

@@ -201,6 +201,12 @@ def payload(study: Path) -> CommandAnswer:
     return CommandAnswer(content=drives.to_dict, parts=drives.tables, status=int(broken))
 
 
+_OTHER_FIGURES = (
+    "explain may print other figures: beside the effects it adapts friction widths and shapes, and "
+    "leaves out rows of contacts and of doubtful reversals."
+)
+
+
 @commands.command()
 @STUDY
 @click.argument("labels", metavar="EFFECT[@JOINT[:SOURCE]]...", nargs=-1)
@@ -250,7 +256,7 @@ def add(
     add_effects(study, fresh, laws)
     return CommandAnswer(
         content=lambda: {"added": [one.label for one in fresh], **comparison.to_dict()},
-        parts=lambda: (*comparison.tables()[:1], f"Written into {study}."),
+        parts=lambda: (*comparison.tables()[:1], _OTHER_FIGURES, f"Written into {study}."),
     )
 
 
