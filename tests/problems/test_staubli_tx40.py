@@ -13,6 +13,7 @@ from dynident.diagnosis import Diagnosis
 from dynident.errors import FileError
 from dynident.explorer.switched_fit import Refitter
 from dynident.study import Study, load
+from dynident.study_draft import LogFacts, StudyDraft, draft_study
 
 STUDY = Path(__file__).parents[2] / "problems" / "staubli_tx40" / "study.toml"
 
@@ -38,6 +39,40 @@ def test_columns_are_those_of_the_joints(study: Study) -> None:
     expected = np.linalg.solve(gears, motors.T).T + zeros
     np.testing.assert_allclose(recording.q, expected, atol=1e-12)
     np.testing.assert_allclose(recording.tau, currents @ gears, atol=1e-9)
+
+
+@pytest.fixture(scope="module")
+def drafted(study: Study, tmp_path_factory: pytest.TempPathFactory) -> tuple[StudyDraft, Study]:
+    """What `dynident init` makes of the raw columns and the ratios."""
+    data = find_data("staubli_tx40/recording.npz", STUDY.parent)
+    facts = LogFacts(gears=[32, 32, 45, -48, 45, 32])
+    draft = draft_study(STUDY.with_name("tx40.urdf"), [data], facts=facts)
+    return draft, load(draft.write(tmp_path_factory.mktemp("tx40") / "study.toml"))
+
+
+def test_a_draft_of_the_raw_columns_has_those_of_the_study_by_hand(
+    study: Study, drafted: tuple[StudyDraft, Study]
+) -> None:
+    draft, loaded = drafted
+    by_hand, found = study.train.recordings[0], loaded.train.recordings[0]
+    np.testing.assert_allclose(found.q, by_hand.q, atol=1e-12)
+    np.testing.assert_allclose(found.tau, by_hand.tau, atol=1e-9)
+    said = {one.subject: one for one in draft.decisions}
+    assert said["zeros"].words == "moved: joint2 by -90 deg, joint3 by +90 deg"
+    # The torques do not tell of the coupling, the limits of speed do; it is an open question.
+    assert said["coupling"].is_open and "limit" in said["coupling"].reason
+    assert draft.otherwise is not None
+    alone = {ours: one.name for ours, one in draft.otherwise.columns.items()}
+    assert alone == {"q.joint6": "motor_position[5]/32", "tau.joint5": "45*motor_torque[4]"}
+
+
+@pytest.mark.slow
+def test_the_draft_is_explained_as_the_study_by_hand(drafted: tuple[StudyDraft, Study]) -> None:
+    _, study = drafted
+    found = diagnose(study.model, study.train, most=2, propose="never")
+    first = {step.effect.label for step in found.steps}
+    assert first == {"joint_coupling@joint5:joint6", "joint_coupling@joint6:joint5"}
+    assert found.test_error.after <= 0.06
 
 
 def test_every_fourth_half_second_is_to_judge_by(study: Study) -> None:

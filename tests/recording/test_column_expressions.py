@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from dynident.errors import RecordingError
 from dynident.recording import Column, read
-from dynident.recording.formats.column_expressions import parse
+from dynident.recording.formats.column_expressions import ColumnExpression, parse
 
 
 @pytest.fixture(scope="module")
@@ -163,3 +163,32 @@ def test_columns_of_different_lengths_are_refused(tmp_path):
     np.savez(tmp_path / "a.npz", t=np.arange(5.0), x=np.ones(5), y=np.ones(4))
     with pytest.raises(RecordingError, match=r"different lengths.*'x' 5, 'y' 4"):
         read(tmp_path / "a.npz", ["j"], {"q.j": "x - y", "tau.j": "x"})
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "motor[5]/32 - motor[4]/45 + pi/2",
+        "-48*x",
+        "-x/48.06 - y - pi",
+        "pi/180*`a b`/32 + 3*pi/2",
+        "0.3*x + 0.1",
+    ],
+)
+def test_an_expression_is_written_as_people_write_it(text):
+    assert parse(text).text == text
+
+
+@given(
+    st.dictionaries(
+        st.sampled_from(["x", "a b", "m[3]", "pi", "q.x"]),
+        st.floats(1e-9, 1e9) | st.floats(-1e9, -1e-9),
+        min_size=1,
+    ),
+    st.floats(-1e6, 1e6),
+)
+def test_what_is_written_is_read_again(terms, offset):
+    one = ColumnExpression(terms, offset)
+    again = parse(one.text)
+    assert again.terms == pytest.approx(terms, rel=1e-13)
+    assert again.offset == pytest.approx(offset, rel=1e-13, abs=1e-300)

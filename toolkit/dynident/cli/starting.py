@@ -27,6 +27,7 @@ class _Told:
 
     joints: str | None
     gears: str | None
+    columns: tuple[str, ...]
     rate_hz: float | None
     topic: str
     loads: tuple[str, ...]
@@ -38,6 +39,7 @@ class _Told:
         return LogFacts(
             joints=[name.strip() for name in self.joints.split(",")] if self.joints else None,
             gears=_numbers(self.gears) if self.gears else None,
+            columns=dict(_stated(one) for one in self.columns),
             rate_hz=self.rate_hz,
             topic=self.topic,
             loads=tuple(_load(one) for one in self.loads),
@@ -51,6 +53,14 @@ class _Told:
 @click.option("--joints", help="Joints that were recorded, in order, with commas between them.")
 @click.option("--rate", "rate_hz", type=float, help="Hz, of files without a column of time.")
 @click.option("--gears", help="Ratios, where columns are of the motors' side: 32,32,45,-48,45,32.")
+@click.option(
+    "--column",
+    "columns",
+    multiple=True,
+    metavar="NAME=EXPRESSION",
+    help="What one of our columns is made of, as a motor that turns two joints makes it: "
+    "'q.joint6 = motor[5]/32 - motor[4]/45'; torques follow. May be repeated.",
+)
 @click.option("--topic", default="", help="Of bags that hold joint states on several.")
 @click.option(
     "--load",
@@ -99,6 +109,16 @@ def _numbers(text: str) -> list[float]:
         raise click.BadParameter(
             f"'{text}' holds what is no number", param_hint="--gears"
         ) from None
+
+
+def _stated(text: str) -> tuple[str, str]:
+    """One of our columns and what it is made of."""
+    ours, _, theirs = text.partition("=")
+    if not ours.strip() or not theirs.strip():
+        raise click.BadParameter(
+            f"'{text}' is not as in 'q.joint6 = motor[5]/32'", param_hint="--column"
+        )
+    return ours.strip(), theirs.strip()
 
 
 def _load(text: str) -> CarriedLoad:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,9 +13,14 @@ from dynident.effects import FRICTION_WIDTH
 from dynident.recording import Column, FileLayout, default_filter
 from dynident.study import load, load_wrenches
 from dynident.study_draft.decision import Decision
+from dynident.study_draft.drafted_columns import (
+    OtherReading,
+    as_comment,
+    as_lines,
+    columns_text,
+    quoted,
+)
 from dynident.tables import Table
-
-_SIGNALS = ("t", "q", "v", "a", "tau", "q_ref", "temperature", "wrench")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +54,7 @@ class StudyDraft:
     robot : path of the description.
     joints : that were recorded; None for all that move.
     columns : ours -> theirs, also where both are called the same.
+    otherwise : columns that another reading has in their place; None where there is none.
     recordings : entries of the study.
     loads : name -> mass, kg, or None.
     torque : "measured" or "held_command".
@@ -67,6 +72,7 @@ class StudyDraft:
     robot: Path
     joints: tuple[str, ...] | None
     columns: dict[str, Column]
+    otherwise: OtherReading | None
     recordings: tuple[DraftedRecording, ...]
     loads: dict[str, float | None]
     torque: Literal["measured", "held_command"]
@@ -90,7 +96,7 @@ class StudyDraft:
         parts = [
             self._head(folder),
             self._model() if self.has_torques else "",
-            self._columns(),
+            columns_text(self.columns, self.decisions, self.otherwise),
             self._filter(),
             self._loads(),
             *(self._recording(one, folder) for one in self.recordings),
@@ -137,17 +143,17 @@ class StudyDraft:
         lines = [
             "# A study of dynident, drafted from the files that it names. Read what was decided,",
             f"# correct what is wrong, then: {self.next_command} <this file>",
-            f"robot = {_quoted(_relative(self.robot, folder))}",
+            f"robot = {quoted(_relative(self.robot, folder))}",
         ]
         if self.joints is not None:
             lines.append(f"joints = {json.dumps(self.joints, ensure_ascii=False)}")
-        return _lines(lines)
+        return as_lines(lines)
 
     def _model(self) -> str:
         held = self.torque == "held_command"
         why = "a command is held to the next sample" if held else "as a sensor or drive reports it"
         rotor = [] if "rotor_inertia" in self.effects else ['# Behind gears add "rotor_inertia".']
-        return _lines(
+        return as_lines(
             [
                 "",
                 "# Effects that any geared joint has, at every joint; `explain` looks for others.",
@@ -166,37 +172,16 @@ class StudyDraft:
         if self.torque_unit == "N m":
             return []
         first = next(name for name in self.columns if name.startswith("tau."))
-        gains = f"{{ {_quoted(first.partition('.')[2])} = 10.0 }}"
+        gains = f"{{ {quoted(first.partition('.')[2])} = 10.0 }}"
         return [
             'torque_unit = "A"  # motor currents: each joint has a gain, which is identified',
             "# A known load (see the end) or a known gain fixes the common scale of the gains:",
             f"# drive_gains = {gains}  # N m/A",
         ]
 
-    def _columns(self) -> str:
-        lines = ["", "# Ours = the file's name of it, or a linear expression of its columns."]
-        if all(one == Column(name) for name, one in self.columns.items()):
-            return _lines(["", "# The files have the names that a study asks for: no [columns]."])
-        lines.append("[columns]")
-        reasons = {one.subject: one for one in self.decisions}
-        if (units := reasons.get("units and signs")) is not None:
-            lines += _comment(f"Units and signs: {units.words}, because {units.reason}.")
-        for signal in _SIGNALS:
-            own = [name for name in self.columns if name.partition(".")[0] == signal]
-            if not own:
-                continue
-            if (one := reasons.get(signal)) is not None:
-                others = [choice for k, choice in enumerate(one.choices) if k != one.chosen]
-                said = f"{signal}: {one.words}, {one.reason}."
-                if others:
-                    said += f" There are also {'; '.join(others)}."
-                lines += _comment(said)
-            lines += [f"{_quoted(name)} = {_theirs(self.columns[name])}" for name in own]
-        return _lines(lines)
-
     def _filter(self) -> str:
         usual = default_filter(self.rate_hz)
-        return _lines(
+        return as_lines(
             [
                 "",
                 f"# The usual filter at {self.rate_hz:.5g} Hz; with this table, what it says.",
@@ -214,26 +199,26 @@ class StudyDraft:
             lines += ["", "# What is left out is identified: centre = [x, y, z] (m), inertia.",
                       f"[loads.{name}]"]  # fmt: skip
             lines += [] if mass is None else [f"mass = {float(mass)!r}  # kg"]
-        return _lines(lines)
+        return as_lines(lines)
 
     def _recording(self, one: DraftedRecording, folder: Path) -> str:
-        lines = ["", *_comment(f"{one.remark}."), "[[recordings]]"]
-        lines.append(f"file = {_quoted(_relative(one.file, folder))}")
+        lines = ["", *as_comment(f"{one.remark}."), "[[recordings]]"]
+        lines.append(f"file = {quoted(_relative(one.file, folder))}")
         if one.record:
-            lines.append(f"record = {_quoted(one.record)}")
+            lines.append(f"record = {quoted(one.record)}")
         if one.layout.names and one.layout.names != "numbered":
-            names = ", ".join(_quoted(name) for name in one.layout.names)
+            names = ", ".join(quoted(name) for name in one.layout.names)
             lines.append(f"columns = [{names}]")
         if one.layout.rate_hz is not None:
             lines.append(f"rate_hz = {one.layout.rate_hz!r}")
         lines.append(f'use = "{one.use}"')
         if one.layout.topic:
-            lines.append(f"topic = {_quoted(one.layout.topic)}")
+            lines.append(f"topic = {quoted(one.layout.topic)}")
         if one.load:
-            lines.append(f"payload = {_quoted(one.load)}")
+            lines.append(f"payload = {quoted(one.load)}")
         if one.period is not None:
             lines.append(f"period = {one.period!r}")
-        return _lines(lines)
+        return as_lines(lines)
 
     def _optional(self) -> str:
         lines = [
@@ -265,23 +250,7 @@ class StudyDraft:
                 '# kind = "pd"',
                 f"# rate_hz = {self.rate_hz:.5g}",
             ]
-        return _lines(lines)
-
-
-def _lines(lines: list[str]) -> str:
-    return "".join(f"{line}\n" for line in lines)
-
-
-def _comment(text: str, width: int = 98) -> list[str]:
-    """A remark as lines of comment; control characters of hostile names have no place in it."""
-    words = "".join(c if c.isprintable() else " " for c in text).split()
-    lines, line = [], "#"
-    for word in words:
-        if len(line) + 1 + len(word) > width and line != "#":
-            lines.append(line)
-            line = "#"
-        line += f" {word}"
-    return [*lines, line]
+        return as_lines(lines)
 
 
 def _relative(path: Path, folder: Path) -> str:
@@ -293,20 +262,3 @@ def _relative(path: Path, folder: Path) -> str:
         return path.absolute().as_posix()
     steps = Path(found).parts.count("..")
     return Path(found).as_posix() if steps <= 4 else path.absolute().as_posix()
-
-
-def _theirs(column: Column) -> str:
-    if column.scale == 1.0:
-        return _quoted(column.name)
-    scale = repr(column.scale) if _is_exact(column.scale) else f"{column.scale:.6g}"
-    scale = scale if any(c in scale for c in ".e") else f"{scale}.0"
-    return f"{{ name = {_quoted(column.name)}, scale = {scale} }}"
-
-
-def _is_exact(scale: float) -> bool:
-    """Whether a factor is that of a unit, of which every digit counts."""
-    return any(math.isclose(abs(scale), x, rel_tol=1e-12) for x in (math.pi / 180, 1e-6, 1e-9))
-
-
-def _quoted(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)

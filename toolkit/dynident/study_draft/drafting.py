@@ -27,13 +27,16 @@ from dynident.study_draft.by_numbers import named_by_numbers
 from dynident.study_draft.decision import Ask, Decision, decided
 from dynident.study_draft.draft import StudyDraft
 from dynident.study_draft.entries import drafted_recordings
-from dynident.study_draft.guesses.amendments import Reading, amended
+from dynident.study_draft.guesses.amendments import amended
 from dynident.study_draft.guesses.drive_unit import drive_sizes
 from dynident.study_draft.guesses.motor_side import joint_side, require_ratios
+from dynident.study_draft.guesses.reading import Reading
+from dynident.study_draft.guesses.stated_columns import with_stated
 from dynident.study_draft.guesses.torque_timing import samples_late
 from dynident.study_draft.log import Log, logs_of, same_columns
 from dynident.study_draft.log_facts import LogFacts
 from dynident.study_draft.matching import Group, Matched, match
+from dynident.study_draft.shared_motors import with_shared_motors
 from dynident.study_draft.timing import clock_from_speeds, clock_scale
 from dynident.study_draft.wrench_groups import in_radians, wrench_columns, wrench_groups
 from dynident.threads import single_threaded
@@ -66,7 +69,7 @@ def draft_study(
     robot : description (URDF, SDF or MJCF).
     data : files of measurements with the same columns, or patterns of their names, in the order of
         the study.
-    facts : what somebody knows: joints, gears, rate, topic of bags, loads that files carry.
+    facts : what somebody knows: joints, gears, columns, rate, topic of bags, loads in files.
     ask : called with each decision that the files leave open; by default the likeliest is taken.
 
     Returns
@@ -95,24 +98,29 @@ def draft_study(
     files = _Sources(robot, facts, logs)
     if "tau" not in matched.groups:
         return _of_sensor(files, described, columns | wrench, notes)
-    ratios = require_ratios(facts.gears, described)
-    if ratios is not None:
-        columns = joint_side(columns, described, ratios)
-        notes.take("gears", ["on the motors' side"], "the ratios were given")
+    columns, motors = _of_joints(columns, described, facts, logs, notes)
     torque = matched.groups["tau"][chosen["tau"]]
-    reading = Reading(robot=described, columns=columns)
+    reading = Reading(
+        robot=described,
+        columns=columns,
+        geared=facts.gears is not None,
+        stated=facts.states_positions,
+        motors=motors,
+    )
     unit = _unit(torque, logs, reading, notes)
     reading = replace(reading, torque_unit=unit)
     reading = replace(reading, columns=_without_strangers(reading, logs, notes))
     reading = amended(reading, lambda one: _read(logs, one), notes.take)
+    reading, otherwise = with_shared_motors(reading, _read(logs, reading), notes.take)
     recordings = _read(logs, reading)
-    held = _is_held(reading.robot, recordings, torque.origin == "command", notes)
-    behind_gears = reading.geared or ratios is not None or unit == "A"
+    held = _is_held(reading, recordings, torque.origin == "command", notes)
+    behind_gears = reading.geared or motors is not None or unit == "A"
     mounted = not np.array_equal(reading.robot.gravity, described.gravity)
     return StudyDraft(
         robot=files.robot,
         joints=files.joints,
         columns=reading.columns | wrench,
+        otherwise=otherwise,
         recordings=drafted_recordings(logs, recordings, facts, notes.take),
         loads=files.loads,
         torque="held_command" if held else "measured",
@@ -164,6 +172,7 @@ def _of_sensor(
         robot=files.robot,
         joints=files.joints,
         columns={ours: one for ours, one in columns.items() if not ours.startswith("v.")},
+        otherwise=None,
         recordings=drafted_recordings(files.logs, recordings, files.facts, notes.take),
         loads=files.loads,
         torque="measured",
@@ -273,6 +282,25 @@ def _with_clock(
     return {**columns, "t": Column(column.name, scale)}
 
 
+def _of_joints(
+    matched: dict[str, Column], robot: Robot, facts: LogFacts, logs: Sequence[Log], notes: _Notes
+) -> tuple[dict[str, Column], np.ndarray | None]:
+    """The columns of the joints' side, by what was given, and what motors turn if not one joint."""
+    columns = matched
+    if (ratios := require_ratios(facts.gears, robot)) is not None:
+        columns = joint_side(columns, robot, ratios)
+        notes.take("gears", ["on the motors' side"], "the ratios were given")
+    if not facts.columns:
+        return columns, None
+    found = with_stated(facts.columns, matched, columns, robot, logs[0].columns)
+    reason = "so it was said"
+    if found.followed:
+        joints = ", ".join(f"tau.{joint}" for joint in found.followed)
+        reason += f"; {joints} follow, for power is the same on either side of gears"
+    notes.take("stated", [", ".join(facts.columns)], reason)
+    return found.columns, found.motors
+
+
 def _read(logs: Sequence[Log], reading: Reading) -> tuple[Recording, ...]:
     robot = reading.robot
     with warnings.catch_warnings():
@@ -326,12 +354,14 @@ def _unit(
     return "A" if taken == 0 else "N m"
 
 
-def _is_held(robot: Robot, recordings: tuple[Recording, ...], named: bool, notes: _Notes) -> bool:
+def _is_held(
+    reading: Reading, recordings: tuple[Recording, ...], named: bool, notes: _Notes
+) -> bool:
     """Whether torques are commands that are held from sample to sample."""
     choices = ["measured", "held_command"]
     if named:
         return notes.take("torque", choices[::-1], "the columns are called commands") == 0
-    late = samples_late(robot, recordings)
+    late = samples_late(reading, recordings)
     if late > 0.5:
         reason = f"torques fit far better {late:g} samples later: a delay, for `explain` to find"
         notes.take("torque", ["measured"], reason)

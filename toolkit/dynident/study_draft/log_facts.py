@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -47,6 +47,8 @@ class LogFacts:
     joints : of the robot that were recorded, in order; None for all that move.
     gears : ratio of each joint's gear, where the files are of the motors' side; negative where the
         joint turns the other way.
+    columns : ours -> a column of the files, or a linear expression of them, where matching would
+        take another: `{"q.j6": "m6/32 - m5/45"}` of a joint that two motors turn.
     rate_hz : of the samples, where the files have no clock.
     topic : of bags that hold joint states on several.
     loads : that some files carry.
@@ -54,9 +56,15 @@ class LogFacts:
 
     joints: Sequence[str] | None = None
     gears: Sequence[float] | None = None
+    columns: Mapping[str, str] = field(default_factory=dict)
     rate_hz: float | None = None
     topic: str = ""
     loads: tuple[CarriedLoad, ...] = ()
+
+    @property
+    def states_positions(self) -> bool:
+        """Whether somebody has said what positions are made of."""
+        return any(ours.startswith("q.") for ours in self.columns)
 
     def carried(self, names: Sequence[tuple[Path, str]]) -> dict[str, CarriedLoad]:
         """Return the loads by their names in the study, each one that is there.

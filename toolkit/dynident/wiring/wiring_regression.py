@@ -141,17 +141,31 @@ class WiringRegression:
 
 
 def _columns(model: Model, rows: WiringRows) -> np.ndarray:
-    """Columns of base parameters, then five of each joint's own, (T, n, p)."""
+    """Columns of base parameters, of shared motors, and five of each joint's own, (T, n, p)."""
     robot, kept = model.robot, list(model.base.independent)
     samples, n = rows.q.shape
-    columns = np.zeros((samples, n, len(kept) + OF_A_JOINT * n))
+    shared = _of_shared_motors(rows, model.friction_widths)
+    first = len(kept) + len(shared)
+    columns = np.zeros((samples, n, first + OF_A_JOINT * n))
     columns[:, :, : len(kept)] = robot.regressor(rows.q, rows.v, rows.a)[:, :, kept]
+    for k, one in enumerate(shared, start=len(kept)):
+        columns[:, :, k] = one
     dry = np.tanh(rows.v / model.friction_widths)
     for j in range(n):
         own = [rows.v[:, j], dry[:, j], rows.a[:, j], rows.q[:, j], np.ones(samples)]
-        at = len(kept) + OF_A_JOINT * j
+        at = first + OF_A_JOINT * j
         columns[:, j, at : at + OF_A_JOINT] = np.stack(own, axis=1)
     return columns
+
+
+def _of_shared_motors(rows: WiringRows, widths: np.ndarray) -> list[np.ndarray]:
+    """Friction and rotors of motors that turn several joints, (T, n) each: they act at all."""
+    found = []
+    for turns, width in zip([] if rows.motors is None else rows.motors, widths, strict=False):
+        if np.count_nonzero(turns) > 1:
+            v, a = rows.v @ turns, rows.a @ turns
+            found += [np.outer(one, turns) for one in (v, np.tanh(v / width), a)]
+    return found
 
 
 def _inertia_of(model: Model, rows: WiringRows, size: int) -> np.ndarray:
@@ -168,5 +182,5 @@ def _inertia_of(model: Model, rows: WiringRows, size: int) -> np.ndarray:
         pushed[:, j] = 1.0
         column = (robot.regressor(q, rest, pushed) - still)[:, j, kept]
         found[j, : len(kept)] = column.mean(axis=0)
-        found[j, len(kept) + OF_A_JOINT * j + 2] = 1.0
+        found[j, size - OF_A_JOINT * (n - j) + 2] = 1.0
     return found

@@ -21,6 +21,8 @@ class WiringRows:
     q, v, a : (T, n) rad or m, and their derivatives.
     tau : (T, n) N m or N.
     independent : about how many of the rows are worth counting: neighbours err alike.
+    motors : (n, n) speeds of the motors, behind their gears, from those of the joints, where a
+        motor turns two of them: it then rubs at both; None where each turns one.
     """
 
     q: np.ndarray
@@ -28,11 +30,13 @@ class WiringRows:
     a: np.ndarray
     tau: np.ndarray
     independent: float
+    motors: np.ndarray | None = None
 
     def moved(self, change: np.ndarray) -> WiringRows:
         """Return the rows with positions `change @ q`, (n, n): joints exchanged, or rescaled."""
         q, v, a = (x @ change.T for x in (self.q, self.v, self.a))
-        return replace(self, q=q, v=v, a=a)
+        motors = None if self.motors is None else self.motors @ np.linalg.inv(change)
+        return replace(self, q=q, v=v, a=a, motors=motors)
 
     def thinned(self, most: int) -> WiringRows:
         """Return at most so many of the rows, evenly."""

@@ -52,6 +52,43 @@ class ColumnExpression:
         terms = {name: value / divisor for name, value in self.terms.items()}
         return ColumnExpression(terms, self.offset / divisor)
 
+    @property
+    def text(self) -> str:
+        """The expression as `parse` reads it, gears and turns written as people write them."""
+        parts = [_signed(factor, _term(abs(factor), name)) for name, factor in self.terms.items()]
+        if self.offset:
+            parts.append(_signed(self.offset, _turn(abs(self.offset))))
+        joined = " ".join(parts)
+        return joined[2:] if joined[0] == "+" else f"-{joined[2:]}"
+
+
+def _signed(value: float, text: str) -> str:
+    return f"{'-' if value < 0 else '+'} {text}"
+
+
+def _term(size: float, name: str) -> str:
+    """A column times a positive number: of what says the number exactly, the shortest."""
+    name, found = quoted(name), []
+    for unit, prefix in ((1.0, ""), (math.pi / 180, "pi/180*")):
+        for number, before, after in ((size / unit, "*", ""), (unit / size, "", "/")):
+            shown = f"{number:.15g}"
+            if not math.isclose(float(shown), number, rel_tol=1e-14):
+                shown = repr(number)
+            text = f"{shown}{before}{name}" if before else f"{name}{after}{shown}"
+            found.append(prefix + (name if number == 1.0 else text))
+    return min(found, key=len)
+
+
+def _turn(size: float) -> str:
+    """A positive offset, in quarter turns where it is a whole number of them."""
+    quarters = size / (math.pi / 2)
+    count = round(quarters)
+    if not count or not math.isclose(quarters, count, rel_tol=1e-14):
+        return repr(size)
+    shown = "pi" if count % 2 == 0 else "pi/2"
+    times = count // 2 if count % 2 == 0 else count
+    return shown if times == 1 else f"{times}*{shown}"
+
 
 def may_be_expression(text: str) -> bool:
     """Whether a text that names no column could have been meant as an expression."""

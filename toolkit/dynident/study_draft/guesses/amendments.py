@@ -8,42 +8,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from dynident.criteria import DEFAULTS
-from dynident.errors import DynidentError, RecordingError
+from dynident.errors import RecordingError
 from dynident.model import Model
-from dynident.recording import Column, Dataset, Recording
+from dynident.recording import Recording
 from dynident.robot import Robot
-from dynident.study_draft.guesses.motor_side import turned
+from dynident.study_draft.guesses.coupled_motors import Coupling, coupling_by_torques
+from dynident.study_draft.guesses.motor_side import coupled, turned
+from dynident.study_draft.guesses.reading import Reading
 from dynident.study_draft.guesses.wiring_guess import guess_wiring
 from dynident.study_draft.guesses.zeros import guess_zeros
 from dynident.tables import percent
 from dynident.wiring.wiring_regression import TorqueFit, WiringRegression
-from dynident.wiring.wiring_rows import WiringRows, rows_of
+from dynident.wiring.wiring_rows import WiringRows
 
 _ROUNDS = 4
 _ALIKE = 1.02  # times the least misfit, within which amendments are not told apart
-
-
-@dataclass(frozen=True, kw_only=True)
-class Reading:
-    """How files are read, and of which robot.
-
-    Attributes
-    ----------
-    robot : with the direction of gravity.
-    columns : ours -> theirs.
-    torque_unit : "A" where what stands for torques are currents: their size tells nothing.
-    geared : whether the motors' side of a gear was found.
-    """
-
-    robot: Robot
-    columns: dict[str, Column]
-    torque_unit: Literal["N m", "A"] = "N m"
-    geared: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +73,7 @@ def amended(
     refused: set[str] = set()
     for _ in range(_ROUNDS):
         recordings = read(reading)
-        guesses = [guess(reading, recordings) for guess in (_zeros, _mounting, _wiring)]
+        guesses = [guess(reading, recordings) for guess in (_zeros, _mounting, _wiring, _coupling)]
         found = [one for one in guesses if one is not None and one.subject not in refused]
         if not found:
             break
@@ -113,7 +96,7 @@ def amended(
 def _mounting(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | None:
     """A base on the ceiling or on a wall."""
     size = float(np.linalg.norm(reading.robot.gravity))
-    rows = _rows(recordings)
+    rows = reading.rows(recordings)
     if rows is None or not size:
         return None
     start = _fit(reading.robot, rows)
@@ -137,27 +120,30 @@ def _mounting(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment 
 
 def _zeros(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | None:
     """Joints that count from a quarter turn elsewhere."""
-    rows = _rows(recordings)
+    rows = reading.rows(recordings)
     if rows is None:
         return None
     robot = reading.robot
-    quarters, start, best = guess_zeros(robot, rows, _fit)
-    if not any(quarters):
+    guess = guess_zeros(robot, rows, _fit, reading.torque_unit)
+    if not any(guess.quarters):
         return None
-    turns = zip(robot.names, quarters, strict=True)
+    turns = zip(robot.names, guess.quarters, strict=True)
     moved = [f"{joint} by {90 * count:+d} deg" for joint, count in turns if count]
     return Amendment(
         subject="zeros",
         what=f"moved: {', '.join(moved)}",
-        why=evidence(start, best),
-        left=misfit(best),
-        reading=replace(reading, columns=turned(reading.columns, robot, quarters)),
+        why=evidence(guess.start, guess.best) + guess.evidence,
+        left=misfit(guess.best),
+        reading=replace(reading, columns=turned(reading.columns, robot, guess.quarters)),
     )
 
 
 def _wiring(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | None:
     """Units, gears, signs and order of columns."""
-    guess = guess_wiring(reading.robot, recordings, reading.columns, reading.torque_unit)
+    rows = reading.rows(recordings)
+    if rows is None:
+        return None
+    guess = guess_wiring(reading, rows, recordings[0])
     if guess is None:
         return None
     if guess.unknown_gears:
@@ -165,7 +151,10 @@ def _wiring(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | 
             f"positions of {', '.join(guess.unknown_gears)} are on the motor side of gears, whose "
             "ratios the data do not tell"
         )
-        remedy = "give them: --gears 32,-48,1 for three joints, say"
+        remedy = (
+            "give them: --gears 32,-48,1 for three joints, say; of a motor that turns two joints "
+            "also --column 'q.j6 = m6/32 - m5/45'"
+        )
         raise RecordingError(what, recordings[0].where, remedy)
     return Amendment(
         subject="units and signs",
@@ -176,13 +165,41 @@ def _wiring(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | 
     )
 
 
-def _rows(recordings: tuple[Recording, ...]) -> WiringRows | None:
-    """A few hundred rows; None where recordings are too short for the usual filter."""
-    criteria = DEFAULTS.wiring
-    try:
-        return rows_of(Dataset(recordings), criteria.rows, criteria.independent_hz)
-    except DynidentError:
+def _coupling(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | None:
+    """A motor that turns two joints, where the torques tell."""
+    rows = reading.rows(recordings) if reading.may_share_motors else None
+    guess = None if rows is None else coupling_by_torques(reading.robot, rows)
+    if rows is None or guess is None:
         return None
+    (one,) = guess.found
+    after = shared(reading, one)
+    n = reading.robot.n
+    change, back = np.eye(n), np.eye(n)
+    i, k = reading.robot.names.index(one.joint), reading.robot.names.index(one.by)
+    change[i, k], back[k, i] = one.turns, -one.turns
+    moved = replace(rows.moved(change), tau=rows.tau @ back.T, motors=after.motors)
+    return Amendment(
+        subject="coupling",
+        what=one.words,
+        why=guess.reason,
+        left=misfit(_fit(reading.robot, moved)),
+        reading=after,
+    )
+
+
+def shared(reading: Reading, one: Coupling) -> Reading:
+    """Return a reading with a motor that turns two joints.
+
+    Parameters
+    ----------
+    reading : of motors that turn one each.
+    one : which, and how far.
+    """
+    names = reading.robot.names
+    motors = np.eye(len(names))
+    motors[names.index(one.joint), names.index(one.by)] = -one.turns
+    columns = coupled(reading.columns, one.joint, one.by, one.turns)
+    return replace(reading, columns=columns, motors=motors)
 
 
 def _fit(robot: Robot, rows: WiringRows) -> TorqueFit:

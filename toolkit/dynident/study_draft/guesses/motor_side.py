@@ -1,4 +1,9 @@
-"""Columns on the motor side of gears whose ratios are known."""
+"""Columns on the motor side of gears, and what joints make of them: ratios, zeros, shared motors.
+
+Positions of joints are linear in those of motors, q = B m + b, with ratios on the diagonal of B and
+what one motor does to another's joint beside it. Power is the same on either side, so that torques
+follow: tau = B^-T c.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +12,29 @@ from collections.abc import Sequence
 
 from dynident.errors import RecordingError
 from dynident.recording import Column
-from dynident.recording.formats.column_expressions import quoted
+from dynident.recording.formats.column_expressions import ColumnExpression, parse
 from dynident.robot import Robot
 
-_TURNS = {1: "pi/2", -1: "pi/2", 2: "pi", -2: "pi"}
+MOVED = ("q", "v", "a", "q_ref")
+"""Signals that turn as positions do."""
+_ROUNDING = 1e-12
+
+
+class MadeColumn(Column):
+    """A column that is an expression of the file's, whatever names the file has."""
+
+    @classmethod
+    def of(cls, expression: ColumnExpression) -> MadeColumn:
+        """Write an expression."""
+        return cls(expression.text)
+
+
+def expression_of(column: Column) -> ColumnExpression:
+    """Return what a column is worth, its scale in it."""
+    if isinstance(column, MadeColumn):
+        return parse(column.name).times(column.scale)
+    # Any other is a name, whatever signs are in it.
+    return ColumnExpression({column.name: column.scale})
 
 
 def require_ratios(gears: Sequence[float] | None, robot: Robot) -> tuple[float, ...] | None:
@@ -44,14 +68,13 @@ def joint_side(
     """
     found = dict(columns)
     for joint, ratio in zip(robot.names, ratios, strict=True):
-        for signal in ("q", "v", "a", "q_ref", "tau"):
+        for signal in (*MOVED, "tau"):
             theirs = columns.get(f"{signal}.{joint}")
             if theirs is None:
                 continue
-            name, sign = quoted(theirs.name), "-" if ratio < 0 else ""
-            size = f"{abs(ratio):.12g}"
-            text = f"{sign}{size}*{name}" if signal == "tau" else f"{sign}{name}/{size}"
-            found[f"{signal}.{joint}"] = _Made(text, theirs.scale)
+            one = expression_of(theirs)
+            made = one.times(ratio) if signal == "tau" else one.divided(ratio)
+            found[f"{signal}.{joint}"] = MadeColumn.of(made)
     return found
 
 
@@ -68,17 +91,38 @@ def turned(columns: dict[str, Column], robot: Robot, quarters: Sequence[int]) ->
     for joint, count in zip(robot.names, quarters, strict=True):
         for signal in ("q", "q_ref"):
             theirs = columns.get(f"{signal}.{joint}")
-            if theirs is None or not count:
-                continue
-            # What was made here is an expression; any other is a name, whatever signs are in it.
-            text = theirs.name if isinstance(theirs, _Made) else quoted(theirs.name)
-            if theirs.scale != 1.0:
-                text = f"{theirs.scale!r}*({text})"
-            found[f"{signal}.{joint}"] = _Made(
-                f"{text} {'+' if count > 0 else '-'} {_TURNS[count]}"
-            )
+            if theirs is not None and count:
+                moved = expression_of(theirs) + ColumnExpression(offset=count * math.pi / 2)
+                found[f"{signal}.{joint}"] = MadeColumn.of(moved)
     return found
 
 
-class _Made(Column):
-    """A column that is an expression of the file's."""
+def coupled(columns: dict[str, Column], joint: str, by: str, turns: float) -> dict[str, Column]:
+    """Return columns with a joint that another one's motor turns too.
+
+    Parameters
+    ----------
+    columns : ours -> theirs, of joints that each one motor turns.
+    joint, by : names of the joint, and of the one whose motor turns it.
+    turns : of `joint` for each turn of `by`, with its own motor at rest.
+    """
+    found = dict(columns)
+    for signal in MOVED:
+        own, other = (columns.get(f"{signal}.{name}") for name in (joint, by))
+        if own is not None and other is not None:
+            shared = ColumnExpression(expression_of(other).terms).times(turns)  # not its zero
+            found[f"{signal}.{joint}"] = MadeColumn.of(_added(expression_of(own), shared))
+    tau, other = (expression_of(columns[f"tau.{name}"]) for name in (joint, by))
+    found[f"tau.{by}"] = MadeColumn.of(_added(other, tau.times(-turns)))
+    return found
+
+
+def _added(one: ColumnExpression, other: ColumnExpression) -> ColumnExpression:
+    """The sum without what cancels but for rounding."""
+    total = one + other
+    terms = {
+        name: factor
+        for name, factor in total.terms.items()
+        if abs(factor) > _ROUNDING * abs(one.terms.get(name, 0.0))
+    }
+    return ColumnExpression(terms, total.offset)

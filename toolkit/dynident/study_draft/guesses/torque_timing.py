@@ -5,23 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.criteria import DEFAULTS
-from dynident.errors import DynidentError
 from dynident.model import Model
-from dynident.recording import Dataset, Recording
-from dynident.robot import Robot
+from dynident.recording import Recording
+from dynident.study_draft.guesses.reading import Reading
 from dynident.wiring.wiring_regression import WiringRegression
-from dynident.wiring.wiring_rows import rows_of
 
 _DELAYS = (1, 2, 4)  # samples
 
 
-def samples_late(robot: Robot, recordings: tuple[Recording, ...]) -> float:
+def samples_late(reading: Reading, recordings: tuple[Recording, ...]) -> float:
     """Samples by which torques act later than they are recorded: 0, 0.5 of a held command, or more.
 
     Parameters
     ----------
-    robot : as it is described.
-    recordings : in the units of the robot; their torques count as measured.
+    reading : with the robot as it is described.
+    recordings : read so, in the units of the robot; their torques count as measured.
 
     Returns
     -------
@@ -29,11 +27,16 @@ def samples_late(robot: Robot, recordings: tuple[Recording, ...]) -> float:
     """
     late = {0.5: tuple(one.replace(torque="held_command") for one in recordings)}
     late |= {float(k): tuple(_delayed(one, k) for one in recordings) for k in _DELAYS}
-    try:
-        now, rows = _score(robot, recordings)
-        scores = {samples: _score(robot, some)[0] for samples, some in late.items()}
-    except DynidentError:
+    start = _score(reading, recordings)
+    if start is None:
         return 0.0
+    now, rows = start
+    scores = {}
+    for samples, some in late.items():
+        one = _score(reading, some)
+        if one is None:
+            return 0.0
+        scores[samples] = one[0]
     enough = DEFAULTS.wiring.evidence / rows
     if scores[0.5] - now < enough:
         return 0.0
@@ -46,10 +49,11 @@ def _delayed(one: Recording, samples: int) -> Recording:
     return one.replace(tau=tau)
 
 
-def _score(robot: Robot, recordings: tuple[Recording, ...]) -> tuple[float, float]:
+def _score(reading: Reading, recordings: tuple[Recording, ...]) -> tuple[float, float] | None:
     """Logarithmic likelihood per row of a fit, and how many rows count."""
-    criteria = DEFAULTS.wiring
-    rows = rows_of(Dataset(recordings), criteria.rows, criteria.independent_hz)
-    n = robot.n
-    found = WiringRegression.of(Model(robot), rows).fit(np.arange(n), np.ones(n))
+    rows = reading.rows(recordings)
+    if rows is None:
+        return None
+    n = reading.robot.n
+    found = WiringRegression.of(Model(reading.robot), rows).fit(np.arange(n), np.ones(n))
     return found.fit_score, rows.independent

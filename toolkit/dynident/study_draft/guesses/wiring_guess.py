@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from dynident.criteria import DEFAULTS
 from dynident.errors import DynidentError
 from dynident.model import Model
-from dynident.recording import Column, Dataset, Recording
+from dynident.recording import Column, Recording
 from dynident.robot import Robot
+from dynident.study_draft.guesses.reading import Reading
 from dynident.wiring.assignment import Assignment
 from dynident.wiring.fault_words import faults_of
 from dynident.wiring.hypothesis_search import search
-from dynident.wiring.wiring_rows import rows_of
+from dynident.wiring.wiring_rows import WiringRows
 
 _OF_GAINS = ("torque_sign", "torque_signs", "torque_unit", "torque_scale", "motor_side_torque")
 """Faults that a gain of the drive makes up for."""
@@ -43,35 +43,30 @@ class WiringGuess:
     unknown_gears: tuple[str, ...]
 
 
-def guess_wiring(
-    robot: Robot,
-    recordings: tuple[Recording, ...],
-    columns: dict[str, Column],
-    torque_unit: Literal["N m", "A"],
-) -> WiringGuess | None:
+def guess_wiring(reading: Reading, rows: WiringRows, recording: Recording) -> WiringGuess | None:
     """Compare recordings with the equations of motion of the robot as it is described.
 
     Parameters
     ----------
-    robot : with its limits and described inertias.
-    recordings : read with `columns`.
-    columns : ours -> theirs, every `q` and `tau` among them.
-    torque_unit : "A" where they are currents: sizes and signs of them are gains to be identified,
-        and no fault.
+    reading : with the robot's limits and described inertias, and every `q` and `tau` among its
+        columns. Where these are in amperes, sizes and signs of them are gains to be identified, and
+        no fault.
+    rows : of the recordings.
+    recording : the first of them.
 
     Returns
     -------
-    None where nothing is found, or the recordings are too short for the usual filter.
+    None where nothing is found.
     """
+    robot, columns = reading.robot, reading.columns
     model, criteria = Model(robot), DEFAULTS.wiring
     try:
-        rows = rows_of(Dataset(recordings), criteria.rows, criteria.independent_hz)
         result = search(model, rows, criteria)
     except DynidentError:
         return None
-    faults = faults_of(model, result, recordings[0])
+    faults = faults_of(model, result, recording)
     now = result.assignment
-    if torque_unit == "A":
+    if reading.torque_unit == "A":
         faults = tuple(one for one in faults if one.kind not in _OF_GAINS)
         now = replace(now, torque_scale=np.ones(robot.n))
     if not faults:

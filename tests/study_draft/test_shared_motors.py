@@ -1,0 +1,164 @@
+"""Drafts of arms of which a motor turns two joints: said, seen in torques, or seen in speeds."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dynident as di
+from chains import chain_text
+from dynident.errors import RecordingError
+from dynident.recording import Recording
+from dynident.study_draft import LogFacts, StudyDraft, draft_study
+from synthetic import smooth_motion
+
+N = 4
+RATIOS = np.array([50.0, 40.0, -45.0, 32.0])
+STATED = {"q.j3": "m_pos[3]/32 + m_pos[2]/45 - 0.25"}
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """A chain, what its joints did, and the file that its drives wrote."""
+
+    folder: Path
+    recording: Recording
+
+    @property
+    def robot(self) -> Path:
+        return self.folder / "arm.urdf"
+
+    def draft(self, **facts) -> StudyDraft:
+        told = LogFacts(gears=RATIOS.tolist(), **facts)
+        return draft_study(self.robot, [self.folder / "run.npz"], facts=told)
+
+    def study(self, draft: StudyDraft) -> di.Study:
+        path = self.folder / "study.toml"
+        path.unlink(missing_ok=True)
+        return di.load(draft.write(path))
+
+
+def written(folder: Path, text: str, turns: float, zero: float = 0.0) -> Arm:
+    """Motors that rub by their own speeds; the third turns the last joint `turns` times, too."""
+    (folder / "arm.urdf").write_text(text)
+    robot = di.Robot.from_file(folder / "arm.urdf")
+    t, q, v, a = smooth_motion(N, 3, 100.0, 16.0, 8.0)
+    motors = np.eye(N)  # turns of motors behind their gears, from those of joints
+    motors[3, 2] = -turns
+    speed = v @ motors.T
+    rubs = 0.6 * speed + 0.8 * np.tanh(speed / 0.01) + 0.05 * (a @ motors.T)
+    tau = robot.inverse_dynamics(q, v, a) + rubs @ motors
+    position = (q - np.array([0, 0, 0, zero])) @ motors.T * RATIOS
+    effort = tau @ np.linalg.inv(motors) / RATIOS
+    rng = np.random.default_rng(5)
+    noise = 0.01 * effort.std(axis=0) * rng.standard_normal(effort.shape)
+    np.savez(folder / "run.npz", t=t, m_pos=position, m_vel=speed * RATIOS, m_tau=effort + noise)
+    exact = (effort + noise) * RATIOS @ motors
+    return Arm(folder, Recording(t, q, exact, robot.names, v=v))
+
+
+def assert_same(study: di.Study, arm: Arm) -> None:
+    found = study.train.recordings[0]
+    np.testing.assert_allclose(found.q, arm.recording.q, atol=1e-9)
+    np.testing.assert_allclose(found.tau, arm.recording.tau, atol=1e-9)
+    assert found.v is not None and arm.recording.v is not None
+    np.testing.assert_allclose(found.v, arm.recording.v, atol=1e-9)
+
+
+def test_what_is_said_of_a_position_holds_for_speed_and_torque(tmp_path: Path) -> None:
+    """Power is the same on either side of the gears, and the friction of motors is no fault."""
+    arm = written(tmp_path, chain_text(N, 1), -1.0, zero=-0.25)
+    draft = arm.draft(columns=STATED)
+    study = arm.study(draft)
+    assert_same(study, arm)
+    read = study.train.recordings[0]
+    assert read.v is not None
+    with np.load(tmp_path / "run.npz") as file:
+        power = np.sum(file["m_vel"] * file["m_tau"], axis=1)
+    np.testing.assert_allclose(np.sum(read.v * read.tau, axis=1), power, atol=1e-9)
+    said = {one.subject: one for one in draft.decisions}
+    assert "tau.j2" in said["stated"].reason
+    assert not {"zeros", "coupling", "units and signs"} & set(said)
+    given = arm.draft(columns={**STATED, "tau.j2": "m_tau[2]"})
+    assert given.columns["tau.j2"].name == "m_tau[2]"
+
+
+@pytest.mark.parametrize(
+    ("columns", "message"),
+    [
+        ({"q.j9": "m_pos[0]"}, "'q.j9' is no column of this robot"),
+        ({"t": "m_pos[0]"}, "'t' is no column of this robot"),
+        ({"q.j3": "m_pos[3]/32 - motor[2]"}, "'motor[2]' is no column of the files"),
+        ({"q.j3": "m_pos[3]*m_pos[2]"}, "not linear"),
+        ({"q.j3": "m_pos[2]/32"}, "do not tell the motors apart"),
+    ],
+)
+def test_what_is_said_wrongly_is_refused(tmp_path: Path, columns, message: str) -> None:
+    arm = written(tmp_path, chain_text(N, 1), 0.0)
+    with pytest.raises(RecordingError, match=re.escape(message)):
+        arm.draft(columns=columns)
+
+
+def test_a_heavy_wrist_shows_that_its_motor_turns_two_joints(tmp_path: Path) -> None:
+    for turns, sign in ((-1.0, "less"), (1.0, "plus")):
+        arm = written(tmp_path, chain_text(N, 1), turns)
+        draft = arm.draft()
+        (one,) = (one for one in draft.decisions if one.subject == "coupling")
+        assert one.words == f"j3 is its motor's turn {sign} that of j2"
+        assert "has not seen" in one.reason
+        assert_same(arm.study(draft), arm)
+        assert draft.otherwise is not None
+        alone = {ours: column.name for ours, column in draft.otherwise.columns.items()}
+        assert alone == {"q.j3": "m_pos[3]/32", "v.j3": "m_vel[3]/32", "tau.j2": "-45*m_tau[2]"}
+
+
+def test_motors_that_turn_one_joint_each_are_left_alone(tmp_path: Path) -> None:
+    """The draft says how the other reading is written."""
+    for seed in (1, 2):
+        arm = written(tmp_path, chain_text(N, seed), 0.0)
+        draft = arm.draft()
+        assert "coupling" not in {one.subject for one in draft.decisions}
+        assert_same(arm.study(draft), arm)
+    text = (tmp_path / "study.toml").read_text()
+    assert '\n# "q.j3" = "m_pos[3]/32 + m_pos[2]/45"\n' in text
+    assert '\n# "tau.j2" = "-45*m_tau[2] + 32*m_tau[3]"\n' in text
+
+
+def light_wrist(arm: Arm, share: float) -> str:
+    """A description whose last link weighs nothing, and whose limits are the speeds reached."""
+    v = arm.recording.v
+    assert v is not None
+    reached = np.abs(v).max(axis=0) * np.array([1.0, 1.0, 1.0, share])
+    text = chain_text(N, 1)
+    head, link, tail = text.partition('<link name="l3">')
+    body, end, rest = tail.partition("</link>")
+    text = head + link + re.sub(r'="([-\d.e]+)"', lambda x: f'="{1e-6 * float(x[1])}"', body)
+    parts = (text + end + rest).split('velocity="3"')
+    limits = [f'velocity="{limit}"' for limit in reached]
+    return "".join(a + b for a, b in zip(parts, [*limits, ""], strict=True))
+
+
+def test_limits_of_speed_tell_where_a_wrist_is_light(tmp_path: Path) -> None:
+    arm = written(tmp_path, light_wrist(written(tmp_path, chain_text(N, 1), -1.0), 1.0), -1.0)
+    draft = arm.draft()
+    (one,) = (one for one in draft.decisions if one.subject == "coupling")
+    assert one.words == "j3 is its motor's turn less that of j2"
+    assert "over its limit in the description" in one.reason and one.is_open
+    assert_same(arm.study(draft), arm)
+
+
+def test_limits_that_no_joint_comes_near_tell_nothing(tmp_path: Path) -> None:
+    text = light_wrist(written(tmp_path, chain_text(N, 1), -1.0), 1.0)
+    for kept, joints in (("1000", (0, 1, 2)), ("0.5", (0,))):  # not reached; not kept
+        parts = re.split(r'velocity="[^"]+"', text)
+        limits = re.findall(r'velocity="[^"]+"', text)
+        for joint in joints:
+            limits[joint] = f'velocity="{kept}"'
+        other = "".join(a + b for a, b in zip(parts, [*limits, ""], strict=True))
+        draft = written(tmp_path, other, -1.0).draft()
+        assert "coupling" not in {one.subject for one in draft.decisions}
+        assert "If the motor of j2 turns j3 too" in draft.text(tmp_path)
