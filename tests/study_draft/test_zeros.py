@@ -10,7 +10,7 @@ import pytest
 from dynident.model import Model
 from dynident.recording import Recording
 from dynident.robot import Robot
-from dynident.study_draft.guesses.reading import Reading
+from dynident.study_draft.guesses.file_reading import Reading
 from dynident.study_draft.guesses.zeros import ZerosGuess, guess_zeros
 from dynident.wiring.wiring_regression import TorqueFit, WiringRegression
 from dynident.wiring.wiring_rows import WiringRows

@@ -29,8 +29,8 @@ from dynident.study_draft.draft import StudyDraft
 from dynident.study_draft.entries import drafted_recordings
 from dynident.study_draft.guesses.amendments import amended
 from dynident.study_draft.guesses.drive_unit import drive_sizes
+from dynident.study_draft.guesses.file_reading import Reading
 from dynident.study_draft.guesses.motor_side import joint_side, require_ratios
-from dynident.study_draft.guesses.reading import Reading
 from dynident.study_draft.guesses.stated_columns import with_stated
 from dynident.study_draft.guesses.torque_timing import samples_late
 from dynident.study_draft.log import Log, logs_of, same_columns
@@ -98,15 +98,8 @@ def draft_study(
     files = _Sources(robot, facts, logs)
     if "tau" not in matched.groups:
         return _of_sensor(files, described, columns | wrench, notes)
-    columns, motors = _of_joints(columns, described, facts, logs, notes)
+    reading = _of_joints(columns, described, facts, logs, notes)
     torque = matched.groups["tau"][chosen["tau"]]
-    reading = Reading(
-        robot=described,
-        columns=columns,
-        geared=facts.gears is not None,
-        stated=facts.states_positions,
-        motors=motors,
-    )
     unit = _unit(torque, logs, reading, notes)
     reading = replace(reading, torque_unit=unit)
     reading = replace(reading, columns=_without_strangers(reading, logs, notes))
@@ -114,7 +107,7 @@ def draft_study(
     reading, otherwise = with_shared_motors(reading, _read(logs, reading), notes.take)
     recordings = _read(logs, reading)
     held = _is_held(reading, recordings, torque.origin == "command", notes)
-    behind_gears = reading.geared or motors is not None or unit == "A"
+    behind_gears = reading.geared or reading.motors is not None or unit == "A"
     mounted = not np.array_equal(reading.robot.gravity, described.gravity)
     return StudyDraft(
         robot=files.robot,
@@ -284,21 +277,27 @@ def _with_clock(
 
 def _of_joints(
     matched: dict[str, Column], robot: Robot, facts: LogFacts, logs: Sequence[Log], notes: _Notes
-) -> tuple[dict[str, Column], np.ndarray | None]:
+) -> Reading:
     """The columns of the joints' side, by what was given, and what motors turn if not one joint."""
-    columns = matched
+    columns, motors = matched, None
     if (ratios := require_ratios(facts.gears, robot)) is not None:
         columns = joint_side(columns, robot, ratios)
         notes.take("gears", ["on the motors' side"], "the ratios were given")
-    if not facts.columns:
-        return columns, None
-    found = with_stated(facts.columns, matched, columns, robot, logs[0].columns)
-    reason = "so it was said"
-    if found.followed:
-        joints = ", ".join(f"tau.{joint}" for joint in found.followed)
-        reason += f"; {joints} follow, for power is the same on either side of gears"
-    notes.take("stated", [", ".join(facts.columns)], reason)
-    return found.columns, found.motors
+    if facts.columns:
+        found = with_stated(facts.columns, matched, columns, robot, logs[0].columns)
+        columns, motors = found.columns, found.motors
+        reason = "so it was said"
+        if found.followed:
+            joints = ", ".join(f"tau.{joint}" for joint in found.followed)
+            reason += f"; {joints} follow, for power is the same on either side of gears"
+        notes.take("stated", [", ".join(facts.columns)], reason)
+    return Reading(
+        robot=robot,
+        columns=columns,
+        geared=facts.gears is not None,
+        stated=facts.states_positions,
+        motors=motors,
+    )
 
 
 def _read(logs: Sequence[Log], reading: Reading) -> tuple[Recording, ...]:

@@ -11,7 +11,7 @@ from dynident.recording import Recording
 from dynident.study_draft.drafted_columns import OtherReading
 from dynident.study_draft.guesses.amendments import shared
 from dynident.study_draft.guesses.coupled_motors import Coupling, coupling_by_speeds
-from dynident.study_draft.guesses.reading import Reading
+from dynident.study_draft.guesses.file_reading import Reading
 
 _ALONE = "each motor turns one joint"
 

@@ -17,8 +17,8 @@ from dynident.model import Model
 from dynident.recording import Recording
 from dynident.robot import Robot
 from dynident.study_draft.guesses.coupled_motors import Coupling, coupling_by_torques
+from dynident.study_draft.guesses.file_reading import Reading
 from dynident.study_draft.guesses.motor_side import coupled, turned
-from dynident.study_draft.guesses.reading import Reading
 from dynident.study_draft.guesses.wiring_guess import guess_wiring
 from dynident.study_draft.guesses.zeros import guess_zeros
 from dynident.tables import percent

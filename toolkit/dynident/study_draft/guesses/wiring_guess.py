@@ -11,7 +11,7 @@ from dynident.errors import DynidentError
 from dynident.model import Model
 from dynident.recording import Column, Recording
 from dynident.robot import Robot
-from dynident.study_draft.guesses.reading import Reading
+from dynident.study_draft.guesses.file_reading import Reading
 from dynident.wiring.assignment import Assignment
 from dynident.wiring.fault_words import faults_of
 from dynident.wiring.hypothesis_search import search
