@@ -47,6 +47,18 @@ def test_verdict_icon_title_and_colour_agree(verdict, steps, noise):
     assert len(head.sentence.split()) <= 32
 
 
+@pytest.mark.parametrize("steps", [True, False])
+def test_a_part_below_the_noise_is_told_with_every_verdict(steps):
+    found = of_kind("explained" if steps else "nothing_missing", steps, noise=True)
+    for left, told in ((0.4, False), (0.7, True)):
+        joints = tuple(replace(joint, ratio_after=left) for joint in found.joints)
+        one = replace(found, joints=joints)
+        assert ("though not nothing" in headline(one).sentence) == told
+        assert ("(0.7 of it), though not nothing" in one.sentence) == told
+        assert ("Nothing is missing" in one.sentence) == (not steps and not told)
+        assert (headline(one).title == "nothing is missing") == (not steps and not told)
+
+
 def opening(html):
     parsed = Elements(html)
     (kind,) = (a["class"] for tag, a in parsed.elements if tag == "body")

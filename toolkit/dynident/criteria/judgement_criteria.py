@@ -224,7 +224,7 @@ class VerdictCriteria(CriteriaGroup):
         1.0, "1", "systematic residual over noise at any joint that may then be left"
     )
     not_nothing: float = criterion(
-        0.5, "1", "systematic residual over noise from which an explained model says what is left"
+        0.5, "1", "systematic residual over noise from which a verdict says that something is left"
     )
 
 

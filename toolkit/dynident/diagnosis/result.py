@@ -157,10 +157,11 @@ class Diagnosis(Shown):
         if self.noise_source == "unknown":
             return _VERDICTS_WITHOUT_NOISE[self.verdict].format(effects=effects)
         left = max((j.ratio_after or 0.0 for j in self.joints), default=0.0)
-        if self.verdict == "explained" and left > self.criteria.verdict.not_nothing:
+        if self.verdict != "unexplained" and left > self.criteria.verdict.not_nothing:
+            found = f"Explained: {effects} added, and" if effects else "No missing effect is found:"
             return (
-                f"Explained: {effects} added, and what remains is smaller than the noise "
-                f"({left:.2g} of it), though not nothing."
+                f"{found} what remains is smaller than the noise ({left:.2g} of it), though not "
+                "nothing."
             )
         if self.verdict == "unexplained" and effects:
             before, after = percent(self.test_error.before), percent(self.test_error.after)

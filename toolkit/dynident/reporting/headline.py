@@ -13,6 +13,7 @@ Mark = Literal["\u2713", "!", "?"]
 """Nothing is left but noise; something is to be mended or remains; it cannot be said."""
 
 _COLOURS: dict[Mark, str] = {"\u2713": "nothing_missing", "!": "unexplained", "?": "unknown"}
+_WITHIN, _SMALLER = "within the noise", "smaller than the noise, though not nothing"
 _NOT_KNOWN = "The noise is unknown, so more may be missing."
 
 
@@ -72,10 +73,12 @@ def _of_verdict(diagnosis: Diagnosis) -> Headline:
     if diagnosis.verdict == "unexplained":
         said = f"{added} {fall}, and a residual beyond the noise remains unexplained."
         return Headline("!", f"{title}, a residual remains", said)
+    return Headline("\u2713", title, f"{added} {fall}; what remains is {_rest(diagnosis)}.")
+
+
+def _rest(diagnosis: Diagnosis) -> str:
     left = max((joint.ratio_after or 0.0 for joint in diagnosis.joints), default=0.0)
-    nothing = left <= diagnosis.criteria.verdict.not_nothing
-    rest = "within the noise" if nothing else "smaller than the noise, though not nothing"
-    return Headline("\u2713", title, f"{added} {fall}; what remains is {rest}.")
+    return _WITHIN if left <= diagnosis.criteria.verdict.not_nothing else _SMALLER
 
 
 def _nothing_added(diagnosis: Diagnosis, known: bool) -> Headline:
@@ -88,7 +91,10 @@ def _nothing_added(diagnosis: Diagnosis, known: bool) -> Headline:
         said = f"Effects are significant, and none was added. {_NOT_KNOWN}"
         return Headline("?", "nothing added, noise unknown", said)
     if known:
-        said = "Nothing is missing: what remains is within the noise."
+        rest = _rest(diagnosis)
+        if rest == _SMALLER:
+            return Headline("?", "no missing effect is found", f"What remains is {rest}.")
+        said = f"Nothing is missing: what remains is {rest}."
         return Headline("\u2713", "nothing is missing", said)
     said = f"No effect of the catalogue would be of use. {_NOT_KNOWN}"
     return Headline("?", "nothing found, noise unknown", said)
