@@ -184,8 +184,15 @@ def _beside_the_new_torque(one: Score, evidence: Evidence, fitted: EvidenceFit) 
     wider = fit_evidence(evidence, fitted.model + one.effect, fitted)
     if not wider.misfit(fitted) < fitted.misfit(fitted):
         return one
-    found = wider.values[wider.model.slices[one.effect.label]]
-    return replace(one, values=tuple(found.tolist()))
+    own = wider.model.slices[one.effect.label]
+    covariance = wider.covariance[own, own]
+    sigma = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
+    return replace(
+        one,
+        values=tuple(wider.values[own].tolist()),
+        sigma=tuple(sigma.tolist()),
+        covariance=covariance,
+    )
 
 
 def _seen(fitted: EvidenceFit, effect: Effect) -> Block:

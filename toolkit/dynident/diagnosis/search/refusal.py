@@ -164,16 +164,18 @@ def follows_the_filter(
     """
     payloads = [run.recording.payload for run in evidence.runs]
     own = wider.model.slices[effect.label]
-    every = [wider.values[own]]
+    every = [(wider.values[own], wider.covariance[own, own])]
     for one in narrow:
         lower = marked(one, payloads)
         again = fit_evidence(lower, wider.model)
-        gram, second = _gram(lower, wider, effect), again.values[own]
-        doubt = np.trace(gram @ again.covariance[own, own])
-        for first in every:
+        gram = _gram(lower, wider, effect)
+        second, covariance = again.values[own], again.covariance[own, own]
+        for first, before in every:
+            # What two fits to the same recordings have in common makes this too much.
+            doubt = np.trace(gram @ (before + covariance))
             if _changed(gram, doubt, first, second, evidence.criteria.gates):
-                return _how_it_changes(gram, every[0], first, second)
-        every.append(second)
+                return _how_it_changes(gram, every[0][0], first, second)
+        every.append((second, covariance))
     return ""
 
 
