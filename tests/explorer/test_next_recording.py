@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import base64
 import json
+import os
+import re
 from collections.abc import Iterator
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -37,11 +40,12 @@ def server(tmp_path, diagnosis) -> Iterator[LocalServer]:
     found.stop()
 
 
-def write_design(folder: Path, study: str, **changed: object) -> None:
+def write_design(folder: Path, study: str, motion: str = "<p>moves</p>", **changed: object) -> None:
     """A motion of the arm of the tests, beside the study."""
     told = DesignFile(
         sentence=SENTENCE,
         study=study,
+        motion=sha256(motion.encode()).hexdigest(),
         repeat=2,
         duration=8.0,
         joints=["shoulder", "elbow"],
@@ -51,7 +55,7 @@ def write_design(folder: Path, study: str, **changed: object) -> None:
     )
     folder.mkdir(exist_ok=True)
     (folder / DESIGN).write_text(tomlkit.dumps({**told.model_dump(), **changed}))
-    (folder / "motion.html").write_text("<p>moves</p>")
+    (folder / "motion.html").write_text(motion)
 
 
 def asked(server: LocalServer, path: str, **headers: str):
@@ -72,7 +76,7 @@ def test_a_design_is_shown_with_its_motion_and_what_it_settles(server, tmp_path)
     write_design(tmp_path / "next", server.versions.latest().digest)
     text = shown(server)
     assert SENTENCE in text and "8 s from rest to rest, 2 times" in text
-    assert "has changed since" not in text and '"motion/next"' in text
+    assert "has changed since" not in text and f'"/{server.motions}/next"' in text
     # q(t) = 0.5 + sin(2 * 2 pi t / 8) at the shoulder, -0.25 at the elbow, over one repetition.
     curves = json.loads(text)["props"]["children"][0]["props"]["children"][-1]["props"]["figure"]
     shoulder, elbow = ({k: np.array(_numbers(d[k])) for k in "xy"} for d in curves["data"])
@@ -118,19 +122,55 @@ def test_only_motions_of_designs_are_served_and_in_a_sandbox(server, tmp_path):
     (tmp_path / "other" / "motion.html").write_text("no design")
     (tmp_path / "motion.html").write_text("beside the study")
     before = listing(tmp_path)
-    home = f"/{server.token}/motion"
+    home = f"/{server.motions}"
     answer = asked(server, f"{home}/next%20one")
     assert (answer.status_code, answer.get_data()) == (200, b"<p>moves</p>")
     policy = answer.headers["Content-Security-Policy"]
     assert policy.startswith("sandbox allow-scripts; default-src 'none';")
     assert "same-origin" not in policy and "'self'" not in policy and "http" not in policy
     for name in ("other", "..", "%2e%2e", ".", "next%20one%2fdesign.toml", "next one/../other"):
-        told = asked(server, f"{home}/{name}")  # Dash answers other paths with its empty page
-        assert told.status_code == 404 or b"react-entry-point" in told.get_data(), name
-        assert not [one for one in (b"no design", b"moves", b"beside") if one in told.get_data()]
+        told = asked(server, f"{home}/{name}")
+        assert told.status_code in (403, 404), name
     assert asked(server, "/motion/next%20one").status_code == 403
     assert asked(server, f"{home}/next%20one", Host="evil.example").status_code == 403
     assert listing(tmp_path) == before
+
+
+def test_a_motion_does_not_know_the_token_of_the_page(server, tmp_path):
+    """Its scripts read their own address, and may go elsewhere with it."""
+    write_design(tmp_path / "next", "")
+    (address,) = re.findall(r'"href": "([^"]*)"', shown(server))
+    assert asked(server, address).get_data() == b"<p>moves</p>"
+    assert server.token not in address and server.motions != server.token
+    for rest in ("", "/", "/alive", "/_dash-layout", "/_dash-dependencies", "/assets/page.css"):
+        told = asked(server, f"/{server.motions}{rest}")
+        assert told.status_code == 404 and server.token not in told.get_data(as_text=True), rest
+    home = {"Host": f"{ADDRESS}:{server.port}"}
+    path = f"/{server.motions}/_dash-update-component"
+    assert server.flask.test_client().post(path, headers=home, json={}).status_code in (404, 405)
+
+
+def test_a_motion_of_another_design_is_neither_linked_nor_served(server, tmp_path):
+    write_design(tmp_path / "next", "")
+    (tmp_path / "next" / "motion.html").write_text("<p>moves otherwise</p>")
+    text = shown(server)
+    assert "is not the one that was written with this design" in text and "href" not in text
+    assert asked(server, f"/{server.motions}/next").status_code == 404
+    (tmp_path / "next" / "motion.html").unlink()
+    text = shown(server)
+    assert SENTENCE in text and "motion.html" not in text and "href" not in text
+
+
+def test_a_folder_whose_name_is_no_text_hides_no_other(server, tmp_path):
+    write_design(tmp_path / "next", "")
+    odd = Path(os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9"))
+    try:
+        write_design(odd, "")
+    except OSError:
+        pytest.skip("the file system has names of UTF-8 alone")
+    text = shown(server)
+    assert "next/reference.csv" in text and "caf" not in text
+    assert asked(server, f"/{server.motions}/caf%e9").status_code == 404
 
 
 def test_what_is_left_open_comes_with_the_command_that_designs(tmp_path, diagnosis):

@@ -323,10 +323,10 @@ def test_a_designed_motion_is_opened_and_can_ask_for_nothing(small, tab):
     path, server = small
     folder = path.parent / NASTY.replace("/", "|")
     folder.mkdir()
-    write_design(folder, "")
-    ask = "fetch('../_dash-update-component', {method: 'POST', body: '{}'})"
+    # It cannot know the token of the page; here it is told, and still may not ask.
+    ask = f"fetch('/{server.token}/_dash-update-component', {{method: 'POST', body: '{{}}'}})"
     script = f"<script>{ask}.then(() => document.title = 'in', () => document.title = 'out')"
-    (folder / "motion.html").write_text(f"{script}</script>")
+    write_design(folder, "", f"{script}</script>")
     one = tab(server.url)
     assert f"{folder.name}/reference.csv is the motion" in one.page.locator("#next").inner_text()
     one.page.locator("#next .js-plotly-plot .scatterlayer .trace").nth(1).wait_for(state="attached")
@@ -334,6 +334,7 @@ def test_a_designed_motion_is_opened_and_can_ask_for_nothing(small, tab):
         one.page.locator("#next a").click()
     other.value.wait_for_function("document.title.length > 0")
     assert other.value.title() == "out" and other.value.evaluate("origin") == "null"
+    assert server.motions in other.value.url and server.token not in other.value.url
     one.assert_quiet()
 
 

@@ -286,6 +286,20 @@ def write_text(path: str | Path, text: str) -> Path:
     return write_bytes(path, text.encode("utf-8"))
 
 
+def remove(path: str | Path) -> None:
+    """Remove a file, or a link to one; where there is none nothing happens.
+
+    Raises
+    ------
+    FileError
+        If something is there that cannot be removed, such as a folder.
+    """
+    try:
+        Path(path).unlink(missing_ok=True)
+    except OSError as error:
+        raise FileError(f"cannot be removed ({error.strerror or error})", str(path)) from None
+
+
 def write_private(path: str | Path, data: bytes) -> Path:
     """Write a file in one step that is its owner's alone to read and write; see `write_bytes`."""
     path = Path(path)

@@ -108,21 +108,20 @@ def write_files(
 
     if out is None:
         return (), ()
-    rate = study.train.recordings[0].rate_hz
-    written = write_design(designed, out, round(rate, 6), study.controller, study.digest)
-    notes = [f"Written: {one}" for one in written]
+    rate = round(study.train.recordings[0].rate_hz, 6)
+    motion, shown, missing = "", "", ()
     try:
         with progress("drawing the motion"):
             page = design_page(designed)
-        place = files.write_text(out / MOTION_PAGE, page.html)
-        size = len(page.html) / 1e6
-        notes.append(f"Written: {place}, {size:.1f} MB, the motion in 3D, drawn with {page.shows}")
-        written = (*written, place)
+        motion = page.html
+        shown = f", {len(motion) / 1e6:.1f} MB, the motion in 3D, drawn with {page.shows}"
     except DesignError as error:  # what is to be followed is there without it
-        notes.append(f"No {MOTION_PAGE}: {error}")
+        missing = (f"No {MOTION_PAGE}: {error}",)
+    written = write_design(designed, out, rate, study.controller, study.digest, motion)
+    notes = [f"Written: {one}{shown * (one.name == MOTION_PAGE)}" for one in written]
     if study.controller is None:
-        notes.append("No experiment.toml: the study has no [controller] to simulate with.")
-    return written, tuple(notes)
+        missing = (*missing, "No experiment.toml: the study has no [controller] to simulate with.")
+    return written, (*notes, *missing)
 
 
 @dataclass(frozen=True, kw_only=True)

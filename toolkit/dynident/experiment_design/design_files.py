@@ -14,7 +14,7 @@ from dynident.closed_loop.experiments.virtual_study import controller_table
 from dynident.effects import LawEffect, laws_table
 from dynident.errors import FileError
 from dynident.experiment_design.recording_design import RecordingDesign
-from dynident.experiment_design.written_design import DESIGN, design_file
+from dynident.experiment_design.written_design import DESIGN, MOTION_PAGE, design_file
 from dynident.robot.patching import write
 
 REFERENCE, EXPERIMENT = "reference.csv", "experiment.toml"
@@ -26,13 +26,17 @@ def write_design(
     rate_hz: float,
     controller: Controller | None,
     study: str = "",
+    motion: str = "",
 ) -> tuple[Path, ...]:
-    """Write the reference of a designed recording, and the experiment that simulates it.
+    """Write the reference of a designed recording, its motion, and what simulates it.
+
+    What an earlier design left in the folder goes first, and `design.toml` comes last: whenever it
+    is there, what lies beside it is of the same design.
 
     `reference.csv` has the time and, for each joint, `q_ref` and `v_ref`, of all repetitions, from
     rest to rest. `design.toml` says what it settles. `experiment.toml` has the motion by its
     coefficients, the robot as it is known by now, and its controller; without a controller it is
-    not written.
+    not written. `motion.html` shows the motion.
 
     Parameters
     ----------
@@ -41,15 +45,16 @@ def write_design(
     rate_hz : of the reference, at least nearly: a period is a whole number of samples.
     controller : of the robot.
     study : digest of the study that it is for, by which it is known whether that has changed since.
+    motion : page of HTML; none where there is none.
 
     Returns
     -------
-    The files written.
+    The files written, `design.toml` last.
 
     Raises
     ------
     FileError
-        If a file cannot be written.
+        If a file cannot be written, or an old one not be removed.
     """
     folder = Path(folder)
     task, series, names = design.task, design.trajectory, design.model.robot.names
@@ -65,15 +70,17 @@ def write_design(
     except OSError as error:
         raise FileError(f"cannot be made ({error.strerror or error})", str(folder)) from None
     text = pd.DataFrame(table).to_csv(index=False, float_format="%.9g", lineterminator="\n")
-    summary = tomlkit.dumps(design_file(design, study).model_dump())
-    written = [
-        files.write_text(folder / REFERENCE, text),
-        files.write_text(folder / DESIGN, summary),
-    ]
+    for old in (DESIGN, MOTION_PAGE, EXPERIMENT):
+        files.remove(folder / old)
+    written = [files.write_text(folder / REFERENCE, text)]
     if controller is not None:
         robot = write(design.estimate.robot, folder / _name(design))
         document = tomlkit.dumps(_experiment(design, robot.name, controller))
         written += [robot, files.write_text(folder / EXPERIMENT, document)]
+    if motion:
+        written.append(files.write_text(folder / MOTION_PAGE, motion))
+    summary = tomlkit.dumps(design_file(design, study, motion).model_dump())
+    written.append(files.write_text(folder / DESIGN, summary))
     return tuple(written)
 
 

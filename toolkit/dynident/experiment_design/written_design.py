@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 
 from pydantic import Field
 
+from dynident import files
 from dynident.closed_loop import Fourier
 from dynident.errors import DynidentError, StudyError
 from dynident.experiment_design.recording_design import RecordingDesign
@@ -21,6 +23,8 @@ class DesignFile(SettingsTable):
     """What the recording is worth, in plain words."""
     study: str = ""
     """SHA-256 of the study that it was designed for, as its text was."""
+    motion: str = ""
+    """SHA-256 of `motion.html`; empty where there is none."""
     repeat: int = Field(ge=1)
     """How often the motion is to be followed."""
     duration: Duration
@@ -40,18 +44,20 @@ class DesignFile(SettingsTable):
         return Fourier(self.duration, self.centre, self.sine, self.cosine)  # type: ignore[arg-type]
 
 
-def design_file(design: RecordingDesign, study: str) -> DesignFile:
+def design_file(design: RecordingDesign, study: str, motion: str = "") -> DesignFile:
     """Return what is written of a design.
 
     Parameters
     ----------
     design : of `dynident.experiment_design.design`.
     study : digest of the study that it is for; empty where there is none.
+    motion : page that shows it; likewise.
     """
     series = design.trajectory
     return DesignFile(
         sentence=design.sentence,
         study=study,
+        motion=_digest(motion.encode()) if motion else "",
         repeat=design.task.repeat,
         duration=design.task.duration,
         joints=list(design.model.robot.names),
@@ -59,6 +65,24 @@ def design_file(design: RecordingDesign, study: str) -> DesignFile:
         sine=series.sine.tolist(),
         cosine=series.cosine.tolist(),
     )
+
+
+def _digest(page: bytes) -> str:
+    return hashlib.sha256(page).hexdigest()
+
+
+def motion_page(folder: Path) -> bytes | None:
+    """Return the page that shows the motion of a design; none where it is of another motion.
+
+    Parameters
+    ----------
+    folder : that `dynident.experiment_design.design_files.write_design` wrote.
+    """
+    try:
+        page, told = files.read_bytes(folder / MOTION_PAGE), read_toml(folder / DESIGN, DesignFile)
+    except DynidentError:
+        return None
+    return page if _digest(page) == told.motion else None
 
 
 def folders_with_designs(folder: Path) -> tuple[Path, ...]:

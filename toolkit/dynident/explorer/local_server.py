@@ -34,16 +34,17 @@ class LocalServer:
     Attributes
     ----------
     flask : the application behind it.
-    token : without which nothing is told.
+    token : without which nothing is told of the study.
+    motions : token of the motions of its designed recordings.
     """
 
     def __init__(self, versions: StudyVersions, framing: Framing = "alone") -> None:
-        self.versions, self.token = versions, new_token()
+        self.versions, self.token, self.motions = versions, new_token(), new_token()
         self.flask = Flask("dynident", static_folder=None)
-        guard(self.flask, self.token, lambda: self.port, framing)
+        guard(self.flask, (self.token, self.motions), lambda: self.port, framing)
         self.flask.add_url_rule(f"/{self.token}/alive", "alive", lambda: ("", 204))
-        serve_motions(self.flask, self.token, versions.path)
-        page(self.flask, self.token, versions)
+        serve_motions(self.flask, self.motions, versions.path)
+        page(self.flask, self.token, versions, self.motions)
         self._server = make_server(ADDRESS, 0, self.flask, threaded=True, request_handler=_Quiet)
         self._thread: Thread | None = None
 

@@ -9,7 +9,6 @@ from urllib.parse import quote
 from dash import dcc, html
 from flask import Flask, Response, abort
 
-from dynident import files
 from dynident.errors import DynidentError
 from dynident.experiment_design import DesignTask
 from dynident.experiment_design.open_questions import open_task
@@ -17,6 +16,7 @@ from dynident.experiment_design.written_design import (
     MOTION_PAGE,
     DesignFile,
     folders_with_designs,
+    motion_page,
     read_design,
 )
 from dynident.explorer.opened_study import OpenedStudy
@@ -27,8 +27,12 @@ _CHANGED = (
     "The study has changed since this was designed: what it says of the recordings so far may hold "
     "no more."
 )
+_OTHER_MOTION = (
+    f"{MOTION_PAGE} is not the one that was written with this design, and is not shown: design "
+    "the recording anew."
+)
 # A page that lies beside the study may be anybody's: it runs in an origin of its own, in which it
-# can ask nothing of this server.
+# can ask nothing of this server, and its address holds a token that opens motions alone.
 _SANDBOX = (
     "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; "
     "style-src 'unsafe-inline'; img-src data: blob:; connect-src data: blob:; font-src data:; "
@@ -36,25 +40,39 @@ _SANDBOX = (
 )
 
 
-def next_recording(opened: OpenedStudy) -> list[Any]:
+def next_recording(opened: OpenedStudy, motions: str) -> list[Any]:
     """Return the recordings to make next, each with what it settles and its motion.
 
     Parameters
     ----------
     opened : the study; designs are in folders beside its file.
+    motions : token under which they are shown in 3D.
 
     Returns
     -------
     A section, or nothing where no recording is designed and the diagnosis leaves nothing open.
     """
     folder = opened.study.path.parent
-    shown = folders_with_designs(folder)[:_MOST]
-    parts = [part for one in shown for part in _designed(one, opened)] or _advice(opened)
+    shown = _folders(folder)[:_MOST]
+    parts = [part for one in shown for part in _designed(one, opened, motions)] or _advice(opened)
     head = html.H2("What to record next")
     return [html.Section([head, *parts], className="card")] if parts else []
 
 
-def _designed(folder: Path, opened: OpenedStudy) -> list[Any]:
+def _folders(beside: Path) -> tuple[Path, ...]:
+    """The folders with designs whose names can be written on a page and in an address."""
+    return tuple(one for one in folders_with_designs(beside) if _is_text(one.name))
+
+
+def _is_text(name: str) -> bool:
+    try:
+        name.encode()
+    except UnicodeEncodeError:  # bytes that are no UTF-8
+        return False
+    return True
+
+
+def _designed(folder: Path, opened: OpenedStudy, motions: str) -> list[Any]:
     robot = opened.study.robot
     try:
         design = read_design(folder, robot.names)
@@ -68,8 +86,14 @@ def _designed(folder: Path, opened: OpenedStudy) -> list[Any]:
     ]
     if design.study != opened.digest:
         found.append(html.P(_CHANGED, className="quiet"))
-    if (folder / MOTION_PAGE).is_file():
-        address, words = f"motion/{quote(folder.name)}", f"See the motion of {folder.name} in 3D"
+    if motion_page(folder) is None:
+        if (folder / MOTION_PAGE).exists():
+            found.append(html.P(_OTHER_MOTION, className="quiet"))
+    else:
+        address, words = (
+            f"/{motions}/{quote(folder.name)}",
+            f"See the motion of {folder.name} in 3D",
+        )
         found.append(html.P(html.A(words, href=address, target="_blank", rel="noopener")))
     picture = motion_picture(design.trajectory, robot.names, robot.units)
     still: Any = {"displayModeBar": False, "responsive": True}
@@ -104,18 +128,15 @@ def serve_motions(server: Flask, token: str, study: Path) -> None:
     Parameters
     ----------
     server : that asks for the token.
-    token : under which every path of the page lies.
+    token : under which motions lie, and nothing else.
     study : the study file; only folders beside it with a designed recording are looked into.
     """
 
     def motion(name: str) -> Response:
-        known = {one.name: one for one in folders_with_designs(study.parent)}
-        if name not in known:
-            abort(404)
-        try:
-            page = files.read_bytes(known[name] / MOTION_PAGE)
-        except DynidentError:
+        known = {one.name: one for one in _folders(study.parent)}
+        page = motion_page(known[name]) if name in known else None
+        if page is None:
             abort(404)
         return Response(page, headers={"Content-Security-Policy": _SANDBOX}, mimetype="text/html")
 
-    server.add_url_rule(f"/{token}/motion/<name>", "motion", motion)
+    server.add_url_rule(f"/{token}/<name>", "motion", motion)

@@ -25,7 +25,7 @@ from dynident.explorer.page_parts import (
 from dynident.explorer.tab_state import TabState
 
 
-def page(server: Flask, token: str, versions: StudyVersions) -> Dash:
+def page(server: Flask, token: str, versions: StudyVersions, motions: str) -> Dash:
     """Put the page of a study on a server.
 
     Parameters
@@ -33,6 +33,7 @@ def page(server: Flask, token: str, versions: StudyVersions) -> Dash:
     server : that asks for the token.
     token : under which every path of the page lies.
     versions : the study.
+    motions : token under which the motions of its designed recordings lie.
 
     Returns
     -------
@@ -56,13 +57,13 @@ def page(server: Flask, token: str, versions: StudyVersions) -> Dash:
             opened = versions.latest()
         except DynidentError as error:
             return html.Main(html.P(f"The study cannot be read: {error}", role="alert"))
-        return whole_page(opened, TabState.of(opened.digest))
+        return whole_page(opened, TabState.of(opened.digest), motions)
 
     # Screen readers choose their voice by the language, which Dash does not say.
     app.index_string = app.index_string.replace("<html>", '<html lang="en">')
     app.layout = layout
     app.validation_layout = layout()
-    _Callbacks(app, versions).register()
+    _Callbacks(app, versions, motions).register()
     return app
 
 
@@ -77,8 +78,8 @@ def _told(error: Exception) -> None:
 class _Callbacks:
     """What happens on the page; each method is one callback."""
 
-    def __init__(self, app: Dash, versions: StudyVersions) -> None:
-        self._app, self._versions = app, versions
+    def __init__(self, app: Dash, versions: StudyVersions, motions: str) -> None:
+        self._app, self._versions, self._motions = app, versions, motions
 
     def register(self) -> None:
         on, tab = self._app.callback, State("tab", "data")
@@ -148,7 +149,8 @@ class _Callbacks:
             return verdict(opened), no_update, False, no_update, fitted_by(opened), no_update
         worst = Contrast.of(opened, TabState.of(opened.digest)).worst_joint
         offered, words = switches(opened.choices, state), fitted_by(opened)
-        return verdict(opened), offered, True, worst, words, next_recording(opened)
+        following = next_recording(opened, self._motions)
+        return verdict(opened), offered, True, worst, words, following
 
     def switched(self, values: list[list[str] | None], tab: object) -> dict[str, Any]:
         """Which effects are on."""

@@ -44,13 +44,14 @@ _HEADS: dict[Group, str] = {
 }
 
 
-def whole_page(opened: OpenedStudy, state: TabState) -> html.Main:
+def whole_page(opened: OpenedStudy, state: TabState, motions: str) -> html.Main:
     """Return the page of a study as it is when a tab is opened.
 
     Parameters
     ----------
     opened : the study.
     state : of the new tab.
+    motions : token under which the motions of designed recordings lie.
     """
     what_to_do = (
         "Switch on what is missing, watch the error on held-out data fall, and write it into the "
@@ -64,7 +65,7 @@ def whole_page(opened: OpenedStudy, state: TabState) -> html.Main:
             html.P(id="fault", role="alert"),
             html.Div(id="search", role="status", className="card verdict"),
             html.Div([html.Div([_missing(), _values()]), _errors(opened)], className="pair"),
-            html.Div(next_recording(opened), id="next"),
+            html.Div(next_recording(opened, motions), id="next"),
             _where_it_fails(opened),
         ]
     )
