@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +14,7 @@ import dynident as di
 from chains import chain_text
 from dynident.errors import RecordingError
 from dynident.recording import Recording
-from dynident.study_draft import LogFacts, StudyDraft, draft_study
+from dynident.study_draft import Decision, LogFacts, StudyDraft, draft_study
 from synthetic import smooth_motion
 
 N = 4
@@ -42,11 +43,11 @@ class Arm:
         return di.load(draft.write(path))
 
 
-def written(folder: Path, text: str, turns: float, zero: float = 0.0) -> Arm:
+def written(folder: Path, text: str, turns: float, *, zero: float = 0.0, seed: int = 3) -> Arm:
     """Motors that rub by their own speeds; the third turns the last joint `turns` times, too."""
     (folder / "arm.urdf").write_text(text)
     robot = di.Robot.from_file(folder / "arm.urdf")
-    t, q, v, a = smooth_motion(N, 3, 100.0, 16.0, 8.0)
+    t, q, v, a = smooth_motion(N, seed, 100.0, 16.0, 8.0)
     motors = np.eye(N)  # turns of motors behind their gears, from those of joints
     motors[3, 2] = -turns
     speed = v @ motors.T
@@ -142,12 +143,39 @@ def light_wrist(arm: Arm, share: float) -> str:
     return "".join(a + b for a, b in zip(parts, [*limits, ""], strict=True))
 
 
-def test_limits_of_speed_tell_where_a_wrist_is_light(tmp_path: Path) -> None:
+def test_limits_of_speed_raise_a_question_where_a_wrist_is_light(tmp_path: Path) -> None:
+    """They are no evidence by themselves: nothing changes until somebody answers."""
     arm = written(tmp_path, light_wrist(written(tmp_path, chain_text(N, 1), -1.0), 1.0), -1.0)
     draft = arm.draft()
     (one,) = (one for one in draft.decisions if one.subject == "coupling")
-    assert one.words == "j3 is its motor's turn less that of j2"
-    assert "over its limit in the description" in one.reason and one.is_open
+    assert one.words == "each motor turns one joint" and one.is_open
+    assert "over its limit in the description" in one.reason
+    assert draft.columns["q.j3"].name == "m_pos[3]/32"
+    option = "--column 'q.j3 = m_pos[3]/32 + m_pos[2]/45'"
+    assert draft.open_question.endswith(option)
+    text = draft.text(tmp_path)
+    assert f"\n# {option}\n" in text
+    assert '\n# "tau.j2" = "-45*m_tau[2] + 32*m_tau[3]"\n' in text
+    _, stated = shlex.split(option)
+    ours, _, theirs = stated.partition(" = ")
+    assert_same(arm.study(arm.draft(columns={ours: theirs})), arm)
+
+    def yes(decision: Decision) -> int:
+        return 1 if decision.subject == "coupling" else 0
+
+    told = LogFacts(gears=RATIOS.tolist())
+    asked = draft_study(arm.robot, [tmp_path / "run.npz"], facts=told, ask=yes)
+    assert_same(arm.study(asked), arm)
+
+
+@pytest.mark.parametrize("seed", [3, 6])
+def test_a_limit_that_is_too_low_makes_no_coupling(tmp_path: Path, seed: int) -> None:
+    """The same light wrist whose motors turn one joint each, and a description 7 % too low."""
+    first = written(tmp_path, chain_text(N, 1), 0.0, seed=seed)
+    arm = written(tmp_path, light_wrist(first, 1 / 1.07), 0.0, seed=seed)
+    draft = arm.draft()
+    (one,) = (one for one in draft.decisions if one.subject == "coupling")
+    assert one.words == "each motor turns one joint"
     assert_same(arm.study(draft), arm)
 
 

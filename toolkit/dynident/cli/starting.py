@@ -96,6 +96,7 @@ def init(robot: Path, data: tuple[str, ...], out: Path, told: _Told) -> CommandA
         content=lambda: {"out": str(out), **draft.to_dict()},
         parts=lambda: (
             draft.decision_table(),
+            *([draft.open_question] if ask is None and draft.open_question else []),
             f"Written: {out}. Read it, then: {draft.next_command} {out}",
         ),
     )

@@ -126,6 +126,11 @@ class StudyDraft:
             tuple((one.subject, one.words, one.reason) for one in self.decisions),
         )
 
+    @property
+    def open_question(self) -> str:
+        """What the files suggest and only whoever knows the robot can say; empty for nothing."""
+        return "" if self.otherwise is None else self.otherwise.open_question
+
     def to_dict(self) -> dict[str, Any]:
         """The draft as JSON has it."""
         return {

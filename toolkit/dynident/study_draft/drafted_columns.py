@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -28,10 +29,19 @@ class OtherReading:
     ----------
     words : when.
     columns : ours -> theirs, those that differ.
+    question : what only whoever knows the robot can say; empty where nothing suggests the reading.
+    answers : options of `dynident init` that say it, one for each way in which it may be.
     """
 
     words: str
     columns: dict[str, Column]
+    question: str = ""
+    answers: tuple[str, ...] = ()
+
+    @property
+    def open_question(self) -> str:
+        """The question with its answers, as they are typed; empty where there is none."""
+        return "\n".join([self.question, *self.answers]) if self.question else ""
 
 
 def columns_text(
@@ -68,6 +78,9 @@ def columns_text(
             lines += as_comment(said)
         lines += [f"{quoted(name)} = {_theirs(columns[name])}" for name in own]
     if otherwise is not None:
+        if otherwise.question:
+            lines += as_comment(otherwise.question)
+            lines += [line for one in otherwise.answers for line in as_comment(one, sys.maxsize)]
         lines += as_comment(f"{otherwise.words}:")
         shown = otherwise.columns.items()
         lines += [f"# {quoted(name)} = {_theirs(one)}" for name, one in shown]

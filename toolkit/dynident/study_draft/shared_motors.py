@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -10,8 +11,13 @@ import numpy as np
 from dynident.recording import Recording
 from dynident.study_draft.drafted_columns import OtherReading
 from dynident.study_draft.guesses.amendments import shared
-from dynident.study_draft.guesses.coupled_motors import Coupling, coupling_by_speeds
+from dynident.study_draft.guesses.coupled_motors import (
+    Coupling,
+    CouplingGuess,
+    coupling_by_speeds,
+)
 from dynident.study_draft.guesses.file_reading import Reading
+from dynident.study_draft.guesses.motor_side import expression_of
 
 _ALONE = "each motor turns one joint"
 
@@ -21,7 +27,9 @@ def with_shared_motors(
     recordings: Sequence[Recording],
     take: Callable[[str, list[str], str], int],
 ) -> tuple[Reading, OtherReading | None]:
-    """Let a motor turn two joints where limits of speed want it, and say how else columns may be.
+    """Ask whether a motor turns two joints where limits of speed suggest it, and say how else.
+
+    Limits alone change nothing: a limit that the description has too low looks the same.
 
     Parameters
     ----------
@@ -32,25 +40,21 @@ def with_shared_motors(
     Returns
     -------
     The reading as it was decided, and the columns as they would be otherwise; None where columns
-    are of joints, where somebody has said what they are made of, or where no joint carries another.
+    are of joints, where somebody has said what they are made of, where no joint carries another, or
+    where torques are currents, of which no sum is a torque.
     """
     robot = reading.robot
-    if not reading.geared or reading.stated:
+    if not reading.geared or reading.stated or reading.torque_unit == "A":
         return reading, None
     if reading.motors is not None:
         return reading, _alone(reading)
     guess = coupling_by_speeds(robot, recordings)
     if guess is not None:
-        words = [one.words for one in guess.found]
-        # Which way it turns has to be known: of two ways none is likelier.
-        choices = [*words, _ALONE] if len(words) == 1 else [_ALONE, *words]
-        reason = guess.reason + ("" if len(words) == 1 else "; which way it turns nothing says")
-        chosen = choices[take("coupling", choices, reason)]
-        for one in guess.found:
-            if one.words == chosen:
-                after = shared(reading, one)
-                return after, _alone(after)
-        return reading, _as_coupled(reading, guess.found[0])
+        taken = take("coupling", [_ALONE, *(one.words for one in guess.found)], guess.reason)
+        if taken:
+            after = shared(reading, guess.found[taken - 1])
+            return after, _alone(after)
+        return reading, _suggested(reading, guess)
     last = robot.joints[-1]
     if last.parent < 0 or {last.kind, robot.kinds[last.parent]} != {"revolute"}:
         return reading, None
@@ -70,6 +74,22 @@ def _alone(reading: Reading) -> OtherReading:
 def _as_coupled(reading: Reading, one: Coupling) -> OtherReading:
     words = f"If the motor of {one.by} turns {one.joint} too (or with the other sign)"
     return _otherwise(reading, shared(reading, one), words)
+
+
+def _suggested(reading: Reading, guess: CouplingGuess) -> OtherReading:
+    """What limits of speed suggest, with what to type if it is so."""
+    stated = []
+    for one in guess.found:
+        ours = f"q.{one.joint}"
+        theirs = expression_of(shared(reading, one).columns[ours]).text
+        stated.append(f"--column {shlex.quote(f'{ours} = {theirs}')}")
+    found = _as_coupled(reading, guess.found[0])
+    one = guess.found[0]
+    question = (
+        f"Does the motor of {one.by} turn {one.joint} too, as its limit of speed suggests? "
+        f"If so, draft again with{' one of' if len(stated) > 1 else ''}:"
+    )
+    return replace(found, words=f"If {one.words}", question=question, answers=tuple(stated))
 
 
 def _otherwise(taken: Reading, other: Reading, words: str) -> OtherReading:

@@ -4,7 +4,7 @@ Where the motor of joint k also turns joint k + 1, whose own motor sits before j
 are q_(k+1) = m_(k+1) - m_k, say, each m behind its own gear. Friction and rotors are the motors'
 own and fit either way, so that the torques tell only where the links behind the joint are heavy
 enough; both readings are given every friction that either of them needs, and are compared on blocks
-of time that the fit has not seen. What a light wrist leaves open the limits of speed may tell.
+of time that the fit has not seen. What a light wrist leaves open, limits of speed may suggest.
 """
 
 from __future__ import annotations
@@ -143,12 +143,12 @@ def coupling_by_speeds(robot: Robot, recordings: Sequence[Recording]) -> Couplin
     if not found:
         return None
     at_limit = [name for k, name in enumerate(robot.names) if _REACHED <= share[k] <= _WITHIN]
+    words = " or ".join(one.words for one in found)
     reason = (
-        f"by its own motor alone {robot.names[i]} would reach {share[i] * limits[i]:.3g} rad/s, "
-        f"{100 * (share[i] - 1):.0f} % over its limit in the description, while "
-        f"{', '.join(at_limit)} reach theirs and keep them; so it reaches {' or '.join(speeds)}. "
-        "A wrong ratio or limit would look alike, and the torques do not tell: friction and rotors "
-        "are the motors' own in any case"
+        f"nobody has said otherwise and the torques do not tell; but {robot.names[i]} so reaches "
+        f"{share[i] * limits[i]:.3g} rad/s, {100 * (share[i] - 1):.0f} % over its limit in the "
+        f"description, while {', '.join(at_limit)} reach theirs and keep them. If {words} it "
+        f"reaches {' or '.join(speeds)}; a wrong ratio or limit would look alike"
     )
     return CouplingGuess(found=tuple(found), reason=reason)
 

@@ -38,8 +38,12 @@ class Reading:
 
     @property
     def may_share_motors(self) -> bool:
-        """Whether a motor may turn two joints, and nobody has said that one does."""
-        return self.geared and not self.stated and self.motors is None
+        """Whether a motor may turn two joints, and nobody has said that one does.
+
+        Currents of two motors add only with their gains, which nobody knows yet.
+        """
+        free = self.geared and not self.stated and self.motors is None
+        return free and self.torque_unit == "N m"
 
     def rows(self, recordings: tuple[Recording, ...]) -> WiringRows | None:
         """Return a few hundred rows; None where recordings are too short for the usual filter.
