@@ -110,6 +110,14 @@ def test_whitening_is_linear_and_column_by_column() -> None:
     assert model.whiten(one[:, 1:], v)[:, 0] == pytest.approx(model.whiten(one, v)[:, 1])
 
 
+@pytest.mark.parametrize("coloured_noise", [True, False])
+def test_signals_without_samples_stay_without(coloured_noise: bool) -> None:
+    model = measure_noise([coloured(0.7, 8)], [speed()], CRITERIA)
+    assert len(model.colour) > 1
+    found = (model if coloured_noise else flat_noise(2.0)).whiten(np.zeros((0, 3)), np.zeros(0))
+    assert found.shape == (0, 3)
+
+
 def test_few_samples_make_a_model_without_colour() -> None:
     model = measure_noise([coloured(0.9, 10, 12)], [speed(12)], CRITERIA)
     assert len(model.colour) == 1

@@ -6,7 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
+from dynident import fit
+from dynident.errors import FitError
 from dynident.fitting import LeastSquares
 from dynident.fitting.comparing.between_estimates import estimate_changes
 from dynident.fitting.comparing.changed_parameters import LEVEL, EstimateChanges
@@ -82,6 +85,41 @@ def test_a_robot_that_is_the_same_is_rarely_said_to_have_changed(wide, narrow, d
     # The plain difference would accuse the robot of what the model left out.
     beyond = np.mean([max(abs(one.z) for one in each.parameters) > 5 for each in found])
     assert beyond > 0.5 if drag else beyond == 0.0
+
+
+def coloured(of: Model, seed: int) -> Estimate:
+    """A fit as `di.fit` does it, to errors that neighbouring rows share."""
+    made = synthetic(WIDE, true_values(WIDE, **TRUE, Fq__elbow=DRAG), 1, rate_hz=100.0)
+    white = np.random.default_rng([seed, 9]).normal(size=(len(made.tau) + 200, 2))
+    noise = lfilter([0.06], [1.0, -0.8], white, axis=0)[200:]
+    return fit(of, Dataset((replace(made, tau=made.tau + noise, name=f"run {seed}"),)))
+
+
+@pytest.mark.slow
+def test_where_taking_out_is_approximate_false_alarms_are_rare_all_the_same():
+    """Weights from the residual, a covariance of coloured errors: every old fit with every new."""
+    many = 20
+    old = [coloured(NARROW, 100 + k) for k in range(many)]
+    new = [coloured(WIDE, 500 + k) for k in range(many)]
+    found = [estimate_changes(one, other) for one in old for other in new]
+    claims = np.mean([not one.sentence.startswith("None of") for one in found])
+    # The mean over all pairs varies no more than that over `many` pairs that share nothing.
+    assert claims < LEVEL + 3 * np.sqrt(LEVEL / many)
+    (caveat,) = [one for one in found[0].caveats if "taken out" in one]
+    assert "approximate" in caveat
+
+
+def test_nothing_in_common_with_a_variance_is_one_line():
+    """What is known of either is what the other has not."""
+    both = [NARROW + f"{label}@elbow" for label in ("quadratic_drag", "torque_offset")]
+    found = []
+    for one in (estimated(model, 1 + k, DRAG) for k, model in enumerate(both)):
+        alone = np.zeros_like(one.covariance)
+        alone[-1, -1] = 1.0
+        found.append(replace(one, covariance=alone))
+    with pytest.raises(FitError, match="in common has a variance") as refusal:
+        estimate_changes(*found)
+    assert "\n" not in str(refusal.value)
 
 
 def test_what_has_changed_beside_a_new_effect_is_found_and_nothing_else():

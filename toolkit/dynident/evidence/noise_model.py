@@ -112,7 +112,7 @@ class NoiseModel:
             first = last
         if order == 0:
             return scaled
-        white, some = np.empty((len(scaled), samples)), max(1, _AT_ONCE // samples)
+        white, some = np.empty((len(scaled), samples)), max(1, _AT_ONCE // max(1, samples))
         for first in range(0, len(scaled), some):
             rows = scaled[first : first + some]
             found = np.correlate(rows.ravel(), self.colour[::-1], "valid")

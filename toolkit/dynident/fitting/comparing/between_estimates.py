@@ -131,6 +131,9 @@ class _Contrast:
         S = np.sum([B @ C[np.ix_(k, k)] @ B.T for (_, C), k in zip(pair, places, strict=True)], 0)
         sigma = np.sqrt(np.clip(np.diag(S), 0.0, None))
         known = sigma > 0
+        if not known.any():
+            what = "nothing that the two estimates have in common has a variance"
+            raise FitError(what, None, "fit both anew, with the errors of the data")
         z, adjusted = np.zeros(len(sigma)), np.ones(len(sigma))
         z[known] = (values[1] - values[0])[known] / sigma[known]
         adjusted[known] = holm(2.0 * ndtr(-np.abs(z[known])))
@@ -163,8 +166,9 @@ def _of_other_effects(alone: Sequence[Sequence[LoneParameter]]) -> tuple[str, ..
         f"The models differ by {', '.join(effects)}, beside which other parameters may have other "
         "values though the robot is the same. What both have is said to have changed only where it "
         "has both as estimated (the effect is new, or gone) and with the effect taken out of the "
-        "fit that has it, by its covariance (it was there all along). The second holds if the two "
-        "motions are alike; where they are not, fit both with the same effects.",
+        "fit that has it, by its covariance (it was there all along). The second is approximate "
+        "where weights are measured or errors coloured, and holds if the two motions are alike; in "
+        "doubt fit both with the same effects.",
         "That one model alone has an effect says what was fitted, not that the robot has it since "
         "then or has lost it: its value and interval are in the table.",
     )

@@ -9,7 +9,9 @@ neither: an intersection-union test (Berger, Technometrics 24, 1982), which keep
 parts without a correction.
 
 The fit without an effect follows from the one with it: b1 - C12 C22^-1 b2, with the covariance
-C11 - C12 C22^-1 C21. For weighted least squares in linear parameters that is exact.
+C11 - C12 C22^-1 C21. That is exact where both fits would have the same weights, and a covariance
+that is the inverse of the same information. Where weights come from the residual, or the covariance
+counts errors that rows share, it is approximate: a fit anew has other weights.
 """
 
 from __future__ import annotations

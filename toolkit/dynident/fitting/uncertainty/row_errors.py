@@ -301,12 +301,12 @@ def _factors(
     """Factors of the rows that count."""
     if counting is None:
         return factorise(rows(model, dataset, values))
-    counts = np.concatenate(counting)
-    whole = rows(model, dataset, values)
-    if rows_of is not None:
-        whole = chain.from_iterable(map(rows_of, range(len(counting))))
+    counts, many = np.concatenate(counting), len(counting)
 
     def weighted() -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        whole = rows(model, dataset, values)
+        if rows_of is not None:
+            whole = chain.from_iterable(map(rows_of, range(many)))
         start = 0
         for columns, torque in whole:
             mask = counts[start : start + len(torque)]
