@@ -1,7 +1,8 @@
 """Hostile input by the hundred: one line that says what and where, status 2, and nothing is left.
 
 Each kind has a module with its table. All are run in a process of their own, each command within
-ten seconds of processor time and a gigabyte (`worker`).
+ten seconds of processor time and a gigabyte (`worker`), and a case within two minutes by the clock:
+who waits uses no processor.
 """
 
 from __future__ import annotations
@@ -11,8 +12,9 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from threading import Timer
 
 import pytest
 
@@ -22,19 +24,23 @@ from hostile.corpus import KINDS, corpus
 TESTS = Path(__file__).parents[1]
 SHARE = 6
 """Of so many cases `make test-fast` tries one."""
+MOST_SECONDS = 120.0
+"""By the clock, that a case may take."""
+WORKER = (sys.executable, "-m", "hostile.worker")
 NAMES = [(kind, name) for kind in KINDS for name in corpus(kind)]
 
 
 class Tried:
     """Cases that are tried in a process of their own, begun again after one that ends it."""
 
-    def __init__(self) -> None:
+    def __init__(self, command: Sequence[str] = WORKER, most_seconds: float = MOST_SECONDS) -> None:
+        self.command, self.most_seconds = command, most_seconds
         self.around = {key: value for key, value in os.environ.items() if key != "DYNIDENT_DATA"}
         self.process = self.begun()
 
     def begun(self) -> subprocess.Popen[str]:
         return subprocess.Popen(
-            [sys.executable, "-m", "hostile.worker"],
+            self.command,
             cwd=TESTS,
             env=self.around,
             stdin=subprocess.PIPE,
@@ -47,7 +53,11 @@ class Tried:
         assert self.process.stdin is not None and self.process.stdout is not None
         self.process.stdin.write(f"{kind}\t{name}\n")
         self.process.stdin.flush()
-        if answer := self.process.stdout.readline():
+        late = Timer(self.most_seconds, self.process.kill)
+        late.start()
+        answer = self.process.stdout.readline()
+        late.cancel()
+        if answer.endswith("\n"):
             return json.loads(answer)
         self.end()
         self.process = self.begun()
@@ -55,7 +65,11 @@ class Tried:
 
     def end(self) -> None:
         """Let the process end, as it does when nothing more is asked."""
-        self.process.communicate()
+        try:
+            self.process.communicate(timeout=self.most_seconds)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.communicate()
 
 
 @pytest.fixture(scope="module")
@@ -90,6 +104,17 @@ def test_one_line_or_a_right_answer(tried: Tried, case: tuple[str, str]) -> None
         assert len(lines) == 1 and lines[0].startswith("error: ") and said[-1] == lines[0]
         assert not re.search(r"error: (unexpected \w+:|out of memory)", lines[0])
         assert re.search(expected.message, lines[0]) and len(lines[0]) < 700
+
+
+def test_a_case_that_waits_for_ever_fails_alone() -> None:
+    """Sleep uses no processor time, of which alone the worker itself has a limit."""
+    waits = "import time; print(end='[', flush=True); time.sleep(3600)"
+    one = Tried((sys.executable, "-c", waits), most_seconds=1.0)
+    first = one.process
+    assert one.outcomes("any", "case") == []
+    assert first.returncode and one.process is not first and one.process.poll() is None
+    one.end()
+    assert one.process.returncode
 
 
 def test_there_are_many() -> None:
