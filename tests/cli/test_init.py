@@ -46,6 +46,10 @@ def test_it_says_what_it_decided_and_what_to_type_next(run, study, tmp_path):
         (("train.csv", "train.csv"), "not well-formed XML"),
         (("arm.urdf", "train.csv", "--gears", "a,b"), "no number"),
         (("arm.urdf", "train.csv", "--gears", "1,2,3"), "one number for each"),
+        (
+            ("arm.urdf", "train.csv", "--column", "q.j1=q1", "--column", "q.j1 = q2"),
+            "q.j1 is stated twice",
+        ),
         (("arm.urdf", "train.csv", "--column", "q.elbow"), "is not as in"),
         (("arm.urdf", "train.csv", "--column", "q.wrist = t"), "is no column of this robot"),
         (("arm.urdf", "train.csv", "--column", "q.elbow = m6/32"), "is no column of the files"),

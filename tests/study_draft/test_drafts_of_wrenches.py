@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import dynident as di
+from dynident.errors import RecordingError
 from dynident.fitting.wrench_sensor import fit_wrench
 from dynident.recording import Column, Recording
 from dynident.study import load_wrenches
-from dynident.study_draft import draft_study
+from dynident.study_draft import LogFacts, draft_study
 from dynident.study_draft.wrench_groups import wrench_groups
 from study_files import recording
 from synthetic import ARM
@@ -86,3 +87,11 @@ def test_torques_and_a_sensor_go_into_one_study(tmp_path: Path) -> None:
     assert draft.columns[f"wrench.{frame}.tx"] == Column("mx")
     study = di.load(draft.write(tmp_path / "study.toml"))
     np.testing.assert_allclose(study.train.recordings[0].tau, one.tau, atol=1e-9)
+
+
+@pytest.mark.parametrize("facts", [LogFacts(gears=[1.0] * N), LogFacts(columns={"q.x": "time"})])
+def test_what_is_said_of_motors_is_refused_of_a_sensor_alone(tmp_path: Path, facts) -> None:
+    run = written(tmp_path / "run.csv", log(recorded(CRATE, motion(1), 1)))
+    (tmp_path / "arm.urdf").write_text(text())
+    with pytest.raises(RecordingError, match="leave out --gears and --column"):
+        draft_study(tmp_path / "arm.urdf", [run], facts=facts)

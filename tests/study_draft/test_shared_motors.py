@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 import shlex
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -96,6 +98,8 @@ def test_what_is_said_of_a_position_holds_for_speed_and_torque(tmp_path: Path) -
         ({"q.j3": "m_pos[3]/32 - motor[2]"}, "'motor[2]' is no column of the files"),
         ({"q.j3": "m_pos[3]*m_pos[2]"}, "not linear"),
         ({"q.j3": "m_pos[2]/32"}, "do not tell the motors apart"),
+        ({"q.j3": "m_pos[3]/32 + m_vel[2]/45"}, "'m_vel[2]' stands beside motors' positions"),
+        ({"q.j3": "m_pos[3]/64"}, "has 1/64 of its motor, where the gears have 1/32"),
     ],
 )
 def test_what_is_said_wrongly_is_refused(tmp_path: Path, columns, message: str) -> None:
@@ -190,3 +194,61 @@ def test_limits_that_no_joint_comes_near_tell_nothing(tmp_path: Path) -> None:
         draft = written(tmp_path, other, -1.0).draft()
         assert "coupling" not in {one.subject for one in draft.decisions}
         assert "If the motor of j2 turns j3 too" in draft.text(tmp_path)
+
+
+def rewritten(arm: Arm, change: Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]) -> None:
+    """Write the arm's file anew."""
+    with np.load(arm.folder / "run.npz") as file:
+        columns = {name: file[name] for name in file.files}
+    changed: dict[str, Any] = change(columns)
+    np.savez(arm.folder / "run.npz", **changed)
+
+
+def test_currents_of_two_motors_are_not_added_unasked(tmp_path: Path) -> None:
+    """Each has a gain of its own: whoever knows these writes the sum."""
+    arm = written(tmp_path, chain_text(N, 1), -1.0)
+    rewritten(arm, lambda x: {"m_current" if k == "m_tau" else k: y for k, y in x.items()})
+    told = {"q.j3": "m_pos[3]/32 + m_pos[2]/45"}
+    with pytest.raises(RecordingError, match=r"give --column tau\.j2 \(currents of two motors add"):
+        arm.draft(columns=told)
+    sum_ = "-45*m_current[2] + 20*m_current[3]"
+    draft = arm.draft(columns={**told, "tau.j2": sum_})
+    assert draft.torque_unit == "A" and draft.columns["tau.j2"].name == sum_
+    silent = arm.draft()
+    assert silent.otherwise is None and "coupling" not in {x.subject for x in silent.decisions}
+
+
+def test_degrees_in_a_stated_position_are_no_gear(tmp_path: Path) -> None:
+    """Torques keep their size: the power of a motor is not counted in degrees."""
+    arm = written(tmp_path, chain_text(N, 1), -1.0)
+
+    def in_degrees(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        turned = {name: columns[name].copy() for name in ("m_pos", "m_vel")}
+        for column in turned.values():
+            column[:, 2:] = np.rad2deg(column[:, 2:])
+        return {**columns, **turned}
+
+    rewritten(arm, in_degrees)
+    told = {
+        "q.j2": "-m_pos[2]*pi/180/45",
+        "q.j3": "m_pos[3]*pi/180/32 + m_pos[2]*pi/180/45",
+    }
+    assert_same(arm.study(arm.draft(columns=told)), arm)
+
+
+def test_what_is_said_of_a_position_turns_speed_and_reference(tmp_path: Path) -> None:
+    """Without gears too: sign and factor for both, the offset for the reference alone."""
+    arm = written(tmp_path, chain_text(N, 1), 0.0)
+    q, v, tau = arm.recording.q, arm.recording.v, arm.recording.tau
+    assert v is not None
+    back = np.array([1.0, -2.0, 1.0, 1.0])
+    raw = (q - [0.0, 0.25, 0.0, 0.0]) / back
+    t = arm.recording.t
+    np.savez(tmp_path / "run.npz", t=t, pos=raw, vel=v / back, tau=tau, pos_ref=raw)
+    told = LogFacts(columns={"q.j1": "-2*pos[1] + 0.25"})
+    draft = draft_study(arm.robot, [tmp_path / "run.npz"], facts=told)
+    study = arm.study(draft)
+    assert_same(study, arm)
+    asked = study.train.recordings[0].q_ref
+    assert asked is not None
+    np.testing.assert_allclose(asked, q, atol=1e-9)

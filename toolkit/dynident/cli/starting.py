@@ -39,7 +39,7 @@ class _Told:
         return LogFacts(
             joints=[name.strip() for name in self.joints.split(",")] if self.joints else None,
             gears=_numbers(self.gears) if self.gears else None,
-            columns=dict(_stated(one) for one in self.columns),
+            columns=_all_stated(self.columns),
             rate_hz=self.rate_hz,
             topic=self.topic,
             loads=tuple(_load(one) for one in self.loads),
@@ -110,6 +110,16 @@ def _numbers(text: str) -> list[float]:
         raise click.BadParameter(
             f"'{text}' holds what is no number", param_hint="--gears"
         ) from None
+
+
+def _all_stated(options: tuple[str, ...]) -> dict[str, str]:
+    """Our columns and what they are made of."""
+    found: dict[str, str] = {}
+    for ours, theirs in map(_stated, options):
+        if ours in found:
+            raise click.BadParameter(f"{ours} is stated twice", param_hint="--column")
+        found[ours] = theirs
+    return found
 
 
 def _stated(text: str) -> tuple[str, str]:

@@ -31,7 +31,7 @@ from dynident.study_draft.guesses.amendments import amended
 from dynident.study_draft.guesses.drive_unit import drive_sizes
 from dynident.study_draft.guesses.file_reading import Reading
 from dynident.study_draft.guesses.motor_side import joint_side, require_ratios
-from dynident.study_draft.guesses.stated_columns import with_stated
+from dynident.study_draft.guesses.stated_columns import require_no_sums, with_stated
 from dynident.study_draft.guesses.torque_timing import samples_late
 from dynident.study_draft.log import Log, logs_of, same_columns
 from dynident.study_draft.log_facts import LogFacts
@@ -97,10 +97,13 @@ def draft_study(
     columns = _with_clock(columns, logs[0], matched, notes)
     files = _Sources(robot, facts, logs)
     if "tau" not in matched.groups:
+        _require_no_motors(facts, logs[0].where)
         return _of_sensor(files, described, columns | wrench, notes)
     reading = _of_joints(columns, described, facts, logs, notes)
     torque = matched.groups["tau"][chosen["tau"]]
     unit = _unit(torque, logs, reading, notes)
+    if unit == "A":
+        require_no_sums(reading.columns, facts.columns)
     reading = replace(reading, torque_unit=unit)
     reading = replace(reading, columns=_without_strangers(reading, logs, notes))
     reading = amended(reading, lambda one: _read(logs, one), notes.take)
@@ -178,6 +181,13 @@ def _of_sensor(
         has_reference=False,
         decisions=tuple(notes.decisions),
     )
+
+
+def _require_no_motors(facts: LogFacts, where: str) -> None:
+    """Refuse what was said of motors, where the files hold a wrench sensor and no torques."""
+    if facts.columns or facts.gears is not None:
+        what = "gears and columns are stated of drives, and the files hold no torques of any"
+        raise RecordingError(what, where, "leave out --gears and --column")
 
 
 @dataclass

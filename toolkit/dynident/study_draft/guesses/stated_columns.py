@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
@@ -15,6 +16,7 @@ from dynident.study_draft.guesses.motor_side import MOVED, MadeColumn, expressio
 
 _SIGNALS = (*MOVED, "tau", "temperature")
 _SINGULAR = 1e-9  # least over largest singular value
+_ROUGH = 0.01  # relative, to which ratios are written out
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -43,9 +45,9 @@ def with_stated(
 ) -> StatedColumns:
     """Put columns that were stated in place of those that were matched.
 
-    Where a position is made of several motors', or of one whose gear was given, speeds and
-    references turn with it, and torques are those that take the same power: tau = B^-T c for
-    positions q = B m + b.
+    Speeds and references turn with a position that is made of motors'. Where it is made of several,
+    or gears were given, torques are those that take the same power: tau = B^-T c for positions
+    q = B m + b; degrees in it are a unit and no gear.
 
     Parameters
     ----------
@@ -62,8 +64,9 @@ def with_stated(
     Raises
     ------
     RecordingError
-        If what is stated is no column of a joint, cannot be read, names no column of the files, or
-        if the positions do not tell the motors apart.
+        If what is stated is no column of a joint, cannot be read, names no column of the files, has
+        motors' positions beside other columns, has another ratio than was given, or if the
+        positions do not tell the motors apart.
     """
     given = {ours: _read(ours, text, robot, names) for ours, text in told.items()}
     found = {**columns, **given}
@@ -74,8 +77,12 @@ def with_stated(
     stated = []
     for i, joint in enumerate(robot.names):
         one = expression_of(found[f"q.{joint}"])
-        if not set(one.terms) <= set(places):  # a sensor of the joint itself, say: no gear's doing
+        if places.keys().isdisjoint(one.terms):  # a sensor of the joint itself: no gear's doing
             one = expression_of(columns[f"q.{joint}"])
+        elif odd := [name for name in one.terms if name not in places]:
+            what = f"'{odd[0]}' stands beside motors' positions and is none"
+            remedy = f"the columns of motors' positions are {', '.join(places)}"
+            raise RecordingError(what, f"q.{joint}", remedy)
         elif f"q.{joint}" in given:
             stated.append(i)
         for name, factor in one.terms.items():
@@ -83,26 +90,40 @@ def with_stated(
         offsets[i] = one.offset
     beside = np.any(turns - np.diag(np.diag(turns)), axis=1)
     geared = any(columns[f"q.{joint}"] != motors[f"q.{joint}"] for joint in robot.names)
-    stated = [i for i in stated if geared or beside[i]]
-    if not stated:
-        return StatedColumns(columns=found, followed=(), motors=None)
-    values = np.linalg.svd(
-        turns / np.maximum(np.linalg.norm(turns, axis=0), 1e-300), compute_uv=False
-    )
-    if not values[-1] > _SINGULAR * values[0]:
-        what = f"positions of {', '.join(told)} do not tell the motors apart"
-        raise RecordingError(
-            what, "column", "state one position for each motor, none of them twice"
-        )
+    units = np.ones(robot.n)
+    for i in stated:
+        ratio = _ratio(robot.names[i], motors, columns)
+        units[i] = _unit(float(turns[i, i] * ratio))
+        if geared and turns[i, i]:
+            _require_same(robot.names[i], float(turns[i, i] / units[i]), ratio)
     for i in stated:
         joint = robot.names[i]
         for signal in MOVED[1:]:
-            if f"{signal}.{joint}" in motors and f"{signal}.{joint}" not in given:
+            theirs = motors.get(f"{signal}.{joint}")
+            if theirs is not None and f"{signal}.{joint}" not in given:
+                # Degrees of a position are those of its speed, but where its name says the unit.
+                known = 1.0 if theirs.scale == size[i] else units[i]
                 offset = float(offsets[i]) if signal == "q_ref" else 0.0
-                made = _sum(turns[i], signal, motors, robot, offset)
+                made = _sum(turns[i] / known, signal, motors, robot, offset)
                 found[f"{signal}.{joint}"] = made
+    if not (geared or any(beside[i] for i in stated)):
+        return StatedColumns(columns=found, followed=(), motors=None)
+    turns = turns / units[:, None]
+    _require_apart(turns, told)
+    return _with_torques(found, given, motors, turns, robot)
+
+
+def _with_torques(
+    found: dict[str, Column],
+    given: Collection[str],
+    motors: Mapping[str, Column],
+    turns: np.ndarray,
+    robot: Robot,
+) -> StatedColumns:
+    """The columns with the torques that take the motors' power."""
     inverse = _rounded(np.linalg.inv(turns))
-    followed = []
+    beside = turns - np.diag(np.diag(turns))
+    found, followed = dict(found), []
     for k, joint in enumerate(robot.names):
         made = _sum(inverse[:, k], "tau", motors, robot)
         if f"tau.{joint}" not in given and made != found[f"tau.{joint}"]:
@@ -130,6 +151,54 @@ def _read(ours: str, text: str, robot: Robot, names: Collection[str]) -> Column:
         shown = ", ".join(list(names)[:20]) + (", ..." if len(names) > 20 else "")
         raise RecordingError(f"'{odd[0]}' is no column of the files", ours, f"they hold {shown}")
     return MadeColumn(text)
+
+
+def _ratio(joint: str, motors: Mapping[str, Column], columns: Mapping[str, Column]) -> float:
+    """The ratio that was given of a joint's gear."""
+    theirs = motors[f"q.{joint}"]
+    return theirs.scale / expression_of(columns[f"q.{joint}"]).terms[theirs.name]
+
+
+def _unit(factor: float) -> float:
+    """What of a factor is a unit: degrees, or none."""
+    degree = math.pi / 180
+    return degree if math.isclose(abs(factor), degree, rel_tol=_ROUGH) else 1.0
+
+
+def _require_same(joint: str, turn: float, ratio: float) -> None:
+    if not math.isclose(turn * ratio, 1.0, rel_tol=_ROUGH):
+        what = f"has 1/{1 / turn:g} of its motor, where the gears have 1/{ratio:g}"
+        remedy = f"say the same in both; for degrees write pi/180/{ratio:g}"
+        raise RecordingError(what, f"q.{joint}", remedy)
+
+
+def _require_apart(turns: np.ndarray, told: Collection[str]) -> None:
+    sizes = np.maximum(np.linalg.norm(turns, axis=0), 1e-300)
+    values = np.linalg.svd(turns / sizes, compute_uv=False)
+    if not values[-1] > _SINGULAR * values[0]:
+        what = f"positions of {', '.join(told)} do not tell the motors apart"
+        remedy = "state one position for each motor, none of them twice"
+        raise RecordingError(what, "column", remedy)
+
+
+def require_no_sums(columns: Mapping[str, Column], told: Collection[str]) -> None:
+    """Refuse currents that were added without anybody saying so.
+
+    Parameters
+    ----------
+    columns : ours -> theirs, with currents for torques.
+    told : ours that were stated.
+
+    Raises
+    ------
+    RecordingError
+        If a torque is made of several currents: these add only with the gain of each drive.
+    """
+    for ours, theirs in columns.items():
+        summed = ours.startswith("tau.") and len(expression_of(theirs).terms) > 1
+        if summed and ours not in told:
+            remedy = f"give --column {ours} (currents of two motors add only with their gains)"
+            raise RecordingError("is no sum of two motors' currents", ours, remedy)
 
 
 def _rounded(x: np.ndarray) -> np.ndarray:
