@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from dynident.diagnosis.nuisances.friction_width import WidthProfile, with_friction_width
 from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import fit_evidence
+from dynident.evidence.evidence_fit import fit_evidence, in_metric_of
 from dynident.evidence.runs import gather
 from dynident.recording import Dataset
 from study_files import recording, true_model
+from synthetic import synthetic, true_values
 
 STATED = 0.01
 """rad/s, in the recordings and in the model alike."""
@@ -32,3 +34,31 @@ def test_a_width_that_the_data_call_for_stays_and_its_interval_holds_it() -> Non
     low, high = WidthProfile(evidence, kept, "elbow").interval()
     assert low <= kept.model.friction_widths[1] <= high
     assert low <= STATED <= high
+
+
+@pytest.mark.parametrize(("stated", "is_found"), [(0.006, False), (0.04, True)])
+def test_where_nothing_repeats_a_width_is_taken_if_it_is_worth_its_price(
+    stated: float, is_found: bool
+) -> None:
+    """Each fit whitened by its own residual misses the same, whatever its width."""
+    truth = true_model() + "stribeck_friction@elbow"
+    friction = {"Fv__shoulder": 2.0, "Fv__elbow": 1.0, "Fc__elbow": 1.5, "Fs__elbow": 0.8}
+    once = synthetic(
+        truth,
+        true_values(truth, **friction),
+        8,
+        rate_hz=100,
+        period=None,
+        position_std=1e-5,
+        torque_std=0.1,
+    )
+    given = truth.with_friction_width("elbow", stated)
+    evidence = Evidence(given, gather(Dataset((once,))))
+    start = fit_evidence(evidence, given)
+    found = with_friction_width(evidence, start)
+    assert not start.noise_known
+    assert (found.model.friction_widths[1] != stated) == is_found
+    if is_found:
+        assert found.model.friction_widths[1] == pytest.approx(STATED, rel=0.5)
+        worth = start.error_signal - in_metric_of(evidence, found, start).error_signal
+        assert worth > 2 * np.log(start.rows)

@@ -170,8 +170,8 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
     )
 
 
-def in_metric_of(evidence: Evidence, fitted: EvidenceFit, wider: EvidenceFit) -> EvidenceFit:
-    """Return a fit whose rows are whitened by the noise that a wider model leaves.
+def in_metric_of(evidence: Evidence, fitted: EvidenceFit, other: EvidenceFit) -> EvidenceFit:
+    """Return a fit whose rows are whitened by the noise that another one leaves.
 
     Where much is missing its own noise holds a part of that, and rivals look alike.
 
@@ -179,22 +179,22 @@ def in_metric_of(evidence: Evidence, fitted: EvidenceFit, wider: EvidenceFit) ->
     ----------
     evidence : of both.
     fitted : the model as it fits.
-    wider : the model with what may be missing.
+    other : the fit whose noise counts: of a wider model, or of a rival.
     """
     model, reliable = fitted.model, evidence.criteria.noise.reliable
     columns = [
         [joint_columns(evidence, model, r, j, fitted.values) for j in range(model.robot.n)]
         for r in range(len(evidence.runs))
     ]
-    white = _whiten(evidence, columns, wider.noise, fitted.values)
-    summed = _moments(evidence, model, wider.noise, white)
+    white = _whiten(evidence, columns, other.noise, fitted.values)
+    summed = _moments(evidence, model, other.noise, white)
     solution = regress(summed.pooled(), reliable)
     return replace(
         fitted,
         values=solution.values,
         covariance=solution.covariance,
         solution=solution,
-        noise=wider.noise,
+        noise=other.noise,
         white=white,
         moments=summed,
         error_signal=_signal(evidence, white, solution.values),

@@ -25,7 +25,7 @@ from dynident.diagnosis.search.ranking import rank
 from dynident.diagnosis.search.scoring import candidate_moments
 from dynident.effects import Block, Effect, JointEffect, Parameter, ShapeParameter, catalogue
 from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of
 from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import regression_values
 from dynident.tables import number
@@ -195,15 +195,29 @@ def with_friction_width(evidence: Evidence, fitted: EvidenceFit) -> EvidenceFit:
     for score in rank(evidence, fitted, 0, only=wanted, least=0.0).passing:
         joint = str(score.effect.joint)
         factor, missed = WidthProfile(evidence, fitted, joint).best()
-        drop = fitted.error_signal - missed - 2.0 * np.log(fitted.rows)
+        drop = fitted.error_signal - missed - _price(fitted)
         if drop <= 0 or drop < _best_rival(evidence, fitted, joint):
             continue
         width = factor * WidthProfile(evidence, fitted, joint).width
         model = fitted.model.with_friction_width(joint, width)
-        wider = fit_evidence(evidence, model, fitted)
-        if wider.misfit(fitted) < fitted.misfit(fitted) or wider.error_signal < fitted.error_signal:
-            fitted = wider
+        other = fit_evidence(evidence, model, fitted)
+        # The profile holds Coulomb friction alone: other friction at the joint has the width too.
+        if _drop(evidence, fitted, other) > _price(fitted):
+            fitted = other
     return fitted
+
+
+def _price(fitted: EvidenceFit) -> float:
+    """What a width must explain more than another, squared residual, whitened."""
+    return 2.0 * float(np.log(fitted.rows))
+
+
+def _drop(evidence: Evidence, fitted: EvidenceFit, other: EvidenceFit) -> float:
+    """How much less another fit misses, whitened by the noise of the first.
+
+    Each by its own noise would say nothing where nothing tells the noise from the residual.
+    """
+    return fitted.error_signal - in_metric_of(evidence, other, fitted).error_signal
 
 
 def _reconsidered(evidence: Evidence, fitted: EvidenceFit) -> EvidenceFit:
@@ -219,8 +233,7 @@ def _reconsidered(evidence: Evidence, fitted: EvidenceFit) -> EvidenceFit:
             continue
         model = fitted.model.with_friction_width(joint, float(stated))
         back = fit_evidence(evidence, model, fitted)
-        drop = (back.misfit(back) - fitted.misfit(back)) * fitted.rows / robot.n
-        if drop <= 2.0 * np.log(fitted.rows):
+        if _drop(evidence, back, fitted) <= _price(fitted):
             fitted = back
     return fitted
 
