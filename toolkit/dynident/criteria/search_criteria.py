@@ -53,6 +53,14 @@ class SearchCriteria(CriteriaGroup):
         least=0,
         most=1,
     )
+    in_common: float = criterion(
+        0.25,
+        "1",
+        "share of what the lesser of two effects explains that the other must take away, to be "
+        "named where nothing significant is left of it: with less in common both may be present",
+        over=0,
+        most=1,
+    )
     set_level: float = criterion(
         0.05,
         "1",

@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dynident.criteria import SearchCriteria
 from dynident.diagnosis.details import Withdrawn
-from dynident.diagnosis.search.confidence_set import confidence_set
+from dynident.diagnosis.search.alternatives import alternatives, as_likely
 from dynident.diagnosis.search.ranking import Ranking, rank
 from dynident.diagnosis.search.scoring import Score
 from dynident.effects import Effect
@@ -74,15 +73,13 @@ def choose(evidence: Evidence, fitted: EvidenceFit, ranking: Ranking) -> AddedEf
     if simpler:
         # The column that they share is the same whoever it belongs to: both are named.
         return AddedEffect(simpler[0], ranking.corrected(simpler[0]), (best.effect,))
-    alike = {
-        *indistinguishable(ranking, best, criteria),
-        *_alike_once_fitted(evidence, fitted, ranking),
-    }
-    among = [s for s in passing if s is best or s.effect in alike]
-    as_good = [s for s in among if s.drop >= criteria.simpler_share * best.drop]
+    rivals = alternatives(evidence, fitted, best, as_likely(evidence, fitted, ranking))
+    as_good = [s for s in (best, *rivals) if s.drop >= criteria.simpler_share * best.drop]
     chosen = min(as_good, key=_size)  # the first of the simplest: they stand in order
-    others = tuple(s.effect for s in among if s is not chosen)
-    return AddedEffect(chosen, ranking.corrected(chosen), others)
+    if chosen is not best:
+        others = [s for s in (best, *rivals) if s is not chosen]
+        rivals = alternatives(evidence, fitted, chosen, others)
+    return AddedEffect(chosen, ranking.corrected(chosen), tuple(s.effect for s in rivals))
 
 
 def at_other_joints(
@@ -117,34 +114,6 @@ def at_other_joints(
         AddedEffect(one, ranking.corrected(one), (), with_it=effect.label)
         for one in ranking.passing
     )
-
-
-def _alike_once_fitted(
-    evidence: Evidence, fitted: EvidenceFit, ranking: Ranking
-) -> tuple[Effect, ...]:
-    """Rivals of the best effect that explain the same once each is fitted together with the model.
-
-    Before, columns that are not linear in their values are those of a first guess.
-    """
-    criteria = evidence.criteria.search
-    best, *others = ranking.passing
-    rivals = [
-        s
-        for s in others
-        if s.effect.nonlinear
-        and not s.effect.needs_recording
-        and s.losses is not None
-        and s.drop >= criteria.rival_share * best.drop
-    ]
-    if not (best.effect.nonlinear and not best.effect.needs_recording and rivals):
-        return ()
-
-    def explained(effect: Effect) -> float:
-        wider = fit_evidence(evidence, fitted.model + effect, fitted)
-        return fitted.misfit(fitted) - wider.misfit(fitted)
-
-    most = explained(best.effect)
-    return tuple(s.effect for s in rivals if explained(s.effect) >= (1.0 - criteria.alike) * most)
 
 
 def breaks_its_promise(fitted: EvidenceFit, wider: EvidenceFit, one: Score) -> str:
@@ -188,45 +157,6 @@ def alternatives_only(one: AddedEffect, following: Ranking) -> AddedEffect:
         if e.label not in still or one.score.effect.name in e.contains
     )
     return replace(one, indistinguishable=alternatives)
-
-
-# --- what cannot be told from it -----------------------------------------------------------------
-
-
-def indistinguishable(
-    ranking: Ranking, winner: Score, criteria: SearchCriteria
-) -> tuple[Effect, ...]:
-    """Effects that the data cannot tell from the winner.
-
-    Parameters
-    ----------
-    ranking, winner : of a round, and its best effect.
-    criteria : what counts as alike.
-
-    Returns
-    -------
-    Those of the model confidence set of all effects that pass every gate, and those that explain
-    the same. An effect that contains the winner and adds nothing to it is not named.
-    """
-    rivals = [
-        other
-        for other in ranking.passing
-        if other.losses is not None
-        and other.effect != winner.effect
-        and not (
-            other.effect.joint == winner.effect.joint
-            and winner.effect.name in other.effect.contains
-        )
-    ]
-    if not rivals:
-        return ()
-    losses = np.column_stack([one.losses for one in (winner, *rivals) if one.losses is not None])
-    kept = confidence_set(losses, criteria)
-    return tuple(
-        other.effect
-        for k, other in enumerate(rivals, 1)
-        if k in kept or abs(winner.drop - other.drop) <= criteria.alike * winner.drop
-    )
 
 
 # --- what is dropped again -----------------------------------------------------------------------
