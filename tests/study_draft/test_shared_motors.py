@@ -15,8 +15,13 @@ import pytest
 import dynident as di
 from chains import chain_text
 from dynident.errors import RecordingError
-from dynident.recording import Recording
+from dynident.recording import Column, Recording
 from dynident.study_draft import Decision, LogFacts, StudyDraft, draft_study
+from dynident.study_draft.guesses.amendments import amended, shared
+from dynident.study_draft.guesses.coupled_motors import Coupling
+from dynident.study_draft.guesses.file_reading import Reading
+from dynident.study_draft.guesses.motor_side import expression_of, joint_side
+from dynident.study_draft.shared_motors import with_shared_motors
 from synthetic import smooth_motion
 
 N = 4
@@ -119,6 +124,39 @@ def test_a_heavy_wrist_shows_that_its_motor_turns_two_joints(tmp_path: Path) -> 
         assert draft.otherwise is not None
         alone = {ours: column.name for ours, column in draft.otherwise.columns.items()}
         assert alone == {"q.j3": "m_pos[3]/32", "v.j3": "m_vel[3]/32", "tau.j2": "-45*m_tau[2]"}
+
+
+@pytest.mark.parametrize("turns", [-1.0, 1.0])
+def test_wiring_that_is_mended_after_a_coupling_takes_the_motors_along(
+    tmp_path: Path, turns: float
+) -> None:
+    """Of joints in each other's place, the other reading has one motor at each."""
+    arm = written(tmp_path, chain_text(N, 1), turns)
+    robot = di.Robot.from_file(arm.robot)
+    first = {
+        f"{ours}.{joint}": Column(f"{theirs}[{k}]")
+        for joint, k in zip(robot.names, (0, 1, 3, 2), strict=True)
+        for ours, theirs in (("q", "m_pos"), ("v", "m_vel"), ("tau", "m_tau"))
+    }
+    columns = joint_side(first, robot, [50.0, 40.0, 32.0, -45.0])
+    alone = Reading(robot=robot, columns=columns, geared=True)
+    swapped = shared(alone, Coupling(joint="j2", by="j3", turns=turns))
+
+    def read(reading: Reading) -> tuple[Recording, ...]:
+        path = tmp_path / "run.npz"
+        return (di.read(path, robot.names, reading.columns, robot.kinds),)
+
+    def take(subject: str, choices: list[str], _reason: str) -> int:
+        wanted = subject == "units and signs"
+        return next(k for k, one in enumerate(choices) if (one == "as recorded") != wanted)
+
+    mended = amended(swapped, read, take)
+    (found,) = read(mended)
+    np.testing.assert_allclose(found.q, arm.recording.q, atol=1e-9)
+    _, otherwise = with_shared_motors(mended, (found,), take)
+    assert otherwise is not None
+    one_each = {ours: column.name for ours, column in otherwise.columns.items()}
+    assert one_each == {"q.j3": "m_pos[3]/32", "v.j3": "m_vel[3]/32", "tau.j2": "-45*m_tau[2]"}
 
 
 def test_motors_that_turn_one_joint_each_are_left_alone(tmp_path: Path) -> None:

@@ -44,6 +44,18 @@ class Assignment:
         """The matrix (n, n) that makes positions of joints from recorded ones."""
         return np.diag(self.position_scale) @ np.eye(len(self.position_of))[self.position_of]
 
+    def motors(self, recorded: np.ndarray) -> np.ndarray:
+        """The turns of motors from those of joints, each motor in its joint's place and scale.
+
+        With q' = S P q for joints, and m' = S P m for motors m = M q, they are M' in m' = M' q'.
+
+        Parameters
+        ----------
+        recorded : (n, n) M, turns of the motors behind their gears from those of recorded joints.
+        """
+        at, scale = self.position_of, self.position_scale
+        return scale[:, None] * recorded[np.ix_(at, at)] / scale
+
     def positions_exchanged(self, i: int, j: int) -> Assignment:
         """The positions of two joints exchanged."""
         at = _exchanged(len(self.position_of), i, j)

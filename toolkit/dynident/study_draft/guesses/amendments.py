@@ -161,7 +161,12 @@ def _wiring(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | 
         what="; ".join(guess.findings),
         why="; ".join(dict.fromkeys(guess.evidence)),
         left=guess.left,
-        reading=replace(reading, columns=guess.columns, geared=reading.geared or guess.gears),
+        reading=replace(
+            reading,
+            columns=guess.columns,
+            motors=guess.motors,
+            geared=reading.geared or guess.gears,
+        ),
     )
 
 

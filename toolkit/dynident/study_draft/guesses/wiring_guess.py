@@ -29,6 +29,8 @@ class WiringGuess:
     ----------
     findings, evidence : what is not as it was recorded, and what shows it.
     columns : ours -> theirs, with that mended.
+    motors : (n, n) turns of the motors from those of the joints, with that mended; None where each
+        turns one.
     left : share of the torque that a fit then leaves.
     gears : whether anything was found on the motor side of a gear.
     unknown_gears : joints whose positions are on the motor side of gears, of which the data do not
@@ -38,6 +40,7 @@ class WiringGuess:
     findings: tuple[str, ...]
     evidence: tuple[str, ...]
     columns: dict[str, Column]
+    motors: np.ndarray | None
     left: float
     gears: bool
     unknown_gears: tuple[str, ...]
@@ -81,6 +84,7 @@ def guess_wiring(reading: Reading, rows: WiringRows, recording: Recording) -> Wi
         findings=tuple(fault.what for fault in faults),
         evidence=tuple(fault.evidence for fault in faults),
         columns=_mended(robot, columns, now),
+        motors=None if reading.motors is None else now.motors(reading.motors),
         left=float(np.sqrt(np.mean(result.fit.unexplained))),
         gears=any("side" in fault.kind for fault in faults),
         unknown_gears=tuple(name for name in robot.names if name in several),
