@@ -159,6 +159,37 @@ def test_wiring_that_is_mended_after_a_coupling_takes_the_motors_along(
     assert one_each == {"q.j3": "m_pos[3]/32", "v.j3": "m_vel[3]/32", "tau.j2": "-45*m_tau[2]"}
 
 
+def renamed(columns: dict[str, np.ndarray], before: str) -> dict[str, np.ndarray]:
+    """The same with longer names, as topics of ROS have."""
+    return {name if name == "t" else before + name: x for name, x in columns.items()}
+
+
+def test_a_coupling_of_columns_with_long_names_is_written_as_it_is_read(tmp_path: Path) -> None:
+    arm = written(tmp_path, chain_text(N, 1), -1.0)
+    before = f"/{'left_arm_controller/' * 8}"
+    rewritten(arm, lambda x: renamed(x, before))
+    draft = arm.draft()
+    assert len(draft.columns["q.j3"].name) > 300
+    assert_same(arm.study(draft), arm)
+
+
+@pytest.mark.parametrize(
+    ("before", "message"),
+    [
+        ("x" * 1500, "is longer than 2000 characters. give the columns shorter names in the files"),
+        ("a`b", "has a backtick in its name: no expression can hold it. rename it in the files"),
+    ],
+)
+def test_names_that_no_expression_holds_are_refused(
+    tmp_path: Path, before: str, message: str
+) -> None:
+    arm = written(tmp_path, chain_text(N, 1), -1.0)
+    rewritten(arm, lambda x: renamed(x, before))
+    with pytest.raises(RecordingError, match=re.escape(message)) as caught:
+        arm.draft()
+    assert "\n" not in str(caught.value) and len(str(caught.value)) < 300
+
+
 def test_motors_that_turn_one_joint_each_are_left_alone(tmp_path: Path) -> None:
     """The draft says how the other reading is written."""
     for seed in (1, 2):

@@ -86,7 +86,7 @@ class ColumnEntry(SettingsTable):
     `name` (or a bare string in its place) is the file's name, `name[2]` the third column of a
     table of numbers. What is no name in the file is read as a linear expression of its columns:
     `"q.joint6" = "motor_position[5]/32 - motor_position[4]/45 - 1.5707963"`, with numbers, `pi`,
-    `+ - * /`, signs and parentheses, at most 300 characters. A name that such an expression could
+    `+ - * /`, signs and parentheses, at most 2000 characters. A name that such an expression could
     not hold goes between backticks: "0.5 * `left current (A)` - 0.5 * `right current (A)`". It is
     read by rules and never evaluated as code. Ours is `scale` times the whole.
     """

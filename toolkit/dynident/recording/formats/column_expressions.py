@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 
 from dynident.errors import RecordingError
 
-LONGEST = 300
-"""Characters of an expression."""
+LONGEST = 2000
+"""Characters of an expression: two names of columns may be long, as topics of ROS are."""
 
 _REMEDY = (
     "write numbers, pi, names of columns, + - * / and parentheses, linear in the columns; "

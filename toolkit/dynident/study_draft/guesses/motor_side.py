@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from dynident.errors import RecordingError
 from dynident.recording import Column
-from dynident.recording.formats.column_expressions import ColumnExpression, parse
+from dynident.recording.formats.column_expressions import LONGEST, ColumnExpression, parse
 from dynident.robot import Robot
 
 MOVED = ("q", "v", "a", "q_ref")
@@ -25,8 +25,21 @@ class MadeColumn(Column):
 
     @classmethod
     def of(cls, expression: ColumnExpression) -> MadeColumn:
-        """Write an expression."""
-        return cls(expression.text)
+        """Write an expression.
+
+        Raises
+        ------
+        RecordingError
+            If no study could hold it: a name has a backtick in it, or names are too long.
+        """
+        text = expression.text
+        if odd := [name for name in expression.terms if "`" in name]:
+            what = f"the column {odd[0]!r} has a backtick in its name: no expression can hold it"
+            raise RecordingError(what, "columns", "rename it in the files")
+        if len(text) > LONGEST:
+            what = f"an expression of {text[:40]}... is longer than {LONGEST} characters"
+            raise RecordingError(what, "columns", "give the columns shorter names in the files")
+        return cls(text)
 
 
 def expression_of(column: Column) -> ColumnExpression:
