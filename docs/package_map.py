@@ -18,7 +18,7 @@ FACADES = ("__init__.py", "__init__.pyi")
 FLOORS = (
     ("errors", "words"),
     ("files", "tables"),
-    ("arguments", "late_modules", "progress", "settings", "data_files", "places", "threads"),
+    ("arguments", "late_modules", "progress", "settings", "data_files", "threads"),
     ("criteria", "clusters"),
     ("inertia", "moments", "batch"),
     ("recording",),
@@ -42,6 +42,7 @@ FLOORS = (
     ("reporting",),
     ("explorer",),
     ("cli",),
+    ("__main__",),
 )
 """Rooms (and files beside them), the ground floor first: imports go to floors below."""
 

@@ -45,6 +45,8 @@ LAYOUTS = {
     "joint states by number": ("field.position0 field.position1", "field.effort0 field.effort1"),
     "long names": ("arm_shoulder_position arm_elbow_position", "arm_shoulder_trq arm_elbow_trq"),
     "camel case": ("jointPosition1 jointPosition2", "jointTorque1 jointTorque2"),
+    "units alone": ("axis1_deg axis2_deg", "axis1_Nm axis2_Nm"),
+    "units in brackets": ("J1[rad] J2[rad]", "J1[Nm] J2[Nm]"),
     "a drive's": ("motorPos_1 motorPos_2", "motorCurrent_1 motorCurrent_2"),
 }
 
@@ -93,6 +95,9 @@ def test_measured_torques_come_before_commands_and_the_others_are_told() -> None
         ("velocity_deg_1", np.pi / 180),
         ("time_ms", 1e-3),
         ("tau1_mNm", 1e-3),
+        ("axis1_deg", np.pi / 180),
+        ("axis1_rpm", np.pi / 30),
+        ("axis1_mNm", 1e-3),
     ],
 )
 def test_units_in_names_become_scales(name: str, scale: float) -> None:
@@ -149,11 +154,21 @@ def test_what_is_no_signal_of_a_joint_is_left_alone(name: str) -> None:
         ("A1_torque", "tau", "plain"),
         ("header.stamp.nsecs", "t", "plain"),
         ("tau_current_1", "current", "plain"),
+        ("axis_1_deg/s", "v", "plain"),
+        ("axis_1 [rad/s^2]", "a", "plain"),
+        ("A1_rpm_act", "v", "measured"),
+        ("axis1_deg_soll", "q", "reference"),
     ],
 )
 def test_vendors_words_are_understood(name: str, signal: str, origin: str) -> None:
     role = role_of(name, JOINTS)
     assert role is not None and (role.signal, role.origin) == (signal, origin)
+
+
+@pytest.mark.parametrize("name", ["A1_acc_rad/s^2", "axis_1 [deg/s2]", "accel 1 (rad/s**2)"])
+def test_the_square_of_a_unit_counts_no_joints(name: str) -> None:
+    role = role_of(name, JOINTS)
+    assert role is not None and (role.signal, role.number) == ("a", 1)
 
 
 def test_a_joint_may_be_called_after_a_signal() -> None:

@@ -43,14 +43,24 @@ _OTHER = _set(
 )
 """Words of what is no signal of a joint, or is worked out by a controller: left alone."""
 _SCALES: dict[str, tuple[Signal, float]] = {
-    **dict.fromkeys(_set("deg degree degrees"), ("q", math.pi / 180)),
+    **dict.fromkeys(_set("deg degree degrees dps"), ("q", math.pi / 180)),
+    "rpm": ("v", math.pi / 30),
     **dict.fromkeys(_set("mnm nmm"), ("tau", 1e-3)),
     **dict.fromkeys(_set("ms msec msecs milliseconds"), ("t", 1e-3)),
     **dict.fromkeys(_set("us usec usecs microseconds"), ("t", 1e-6)),
     **dict.fromkeys(_set("ns nsec nsecs nanosec nanosecs nanoseconds"), ("t", 1e-9)),
 }
 """Words for units, of which signal, and what makes ours of them; degrees are of speeds too."""
-_UNITS = _set("rad nm s sec secs second seconds m n")
+_UNITS = _set("rad radian radians nm s sec secs second seconds m n")
+_ANGLES = _set("deg degree degrees rad radian radians")
+_SECONDS = _set("s sec secs second seconds")
+_SIGNAL_OF_UNIT: dict[str, Signal] = {
+    **dict.fromkeys(_set("rpm dps"), "v"),
+    **dict.fromkeys(_set("nm mnm nmm"), "tau"),
+    **dict.fromkeys(_set("ampere amperes"), "current"),
+}
+"""What a unit alone tells, where no word of a name says more; angles go by the seconds behind."""
+_SQUARED = re.compile(r"((?:deg|rad)[a-z]*\W?_?s)(?:\^|\*\*)?2(?!\d)", re.IGNORECASE)
 _ANGULAR: tuple[Signal, ...] = ("q", "v", "a")
 _WORDS = re.compile(r"mNm|Nmm|Nm|[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 
@@ -99,16 +109,19 @@ def role_of(column: str, joints: Sequence[str]) -> ColumnRole | None:
     if _OTHER & set(words):
         return None
     told = max((word for word in words if word in _SIGNAL_OF), key=_strength, default=None)
-    if told is None:
+    named = None if told is None else (_SIGNAL_OF[told], told)
+    by_unit = _by_unit(words)
+    found = by_unit or named if told in (None, "a") else named  # A1 [deg]: an axis
+    if found is None:
         return None
-    signal = _SIGNAL_OF[told]
+    signal, told = found
     rest = [word for word in words if word != told]
     letters = [word for word in words if not word.isdigit()]
     origins: list[Origin] = [_ORIGIN_OF[word] for word in rest if word in _ORIGIN_OF]
     origin: Origin = origins[0] if origins else "plain"
     if origin == "plain" and letters[-1] == "d" and len(letters) > 1:
         origin = "reference"  # tau_J_d, q_d: desired
-    scales = [_SCALES[word] for word in rest if word in _SCALES]
+    scales = [_SCALES[word] for word in words if word in _SCALES]
     known = {*_SCALES, *_UNITS, *_ORIGIN_OF, "d"}
     return ColumnRole(
         column=column,
@@ -148,7 +161,19 @@ def _strength(word: str) -> tuple[bool, bool, bool]:
 
 
 def _words(name: str) -> list[str]:
-    return [word.lower() for word in _WORDS.findall(name)]
+    """Words and numbers of a name; the 2 of rad/s^2 is none, and counts no joints."""
+    return [word.lower() for word in _WORDS.findall(_SQUARED.sub(r"\1 s", name))]
+
+
+def _by_unit(words: Sequence[str]) -> tuple[Signal, str] | None:
+    """Return the signal that a unit among the words tells, and the unit: `axis1_deg`, `J1 [Nm]`."""
+    for k, word in enumerate(words):
+        if word in _ANGLES:
+            behind = [one for one in words[k + 1 : k + 4] if one in _SECONDS]
+            return _ANGULAR[min(len(behind), 2)], word
+        if word in _SIGNAL_OF_UNIT:
+            return _SIGNAL_OF_UNIT[word], word
+    return None
 
 
 def _without_joint(words: list[str], joints: Sequence[str]) -> tuple[list[str], int | None]:
