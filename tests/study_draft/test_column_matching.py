@@ -189,3 +189,27 @@ def test_two_signals_of_one_joint_are_a_choice_never_a_mixture() -> None:
         "q_shoulder ... q_elbow",
         "theta_shoulder ... theta_elbow",
     ]
+
+
+def test_columns_that_no_name_tells_are_those_that_were_said_to_be() -> None:
+    """A clock is told by its steps, and a torque may be an expression of its column."""
+    log = log_of("k1", "k2", "m1", "m2", zeit=CLOCK, zyklus=np.arange(50.0))
+    told = {"q.shoulder": "k2", "q.elbow": "k1", "tau.shoulder": "-m1", "tau.elbow": "0.5*m2"}
+    matched = match(log, two_links(), told=told)
+    found = {ours: theirs.name for ours, theirs in matched.columns(two_links(), {}).items()}
+    assert found == {
+        "t": "zeit",
+        "q.shoulder": "k2",
+        "q.elbow": "k1",
+        "tau.shoulder": "m1",
+        "tau.elbow": "m2",
+    }
+
+
+@pytest.mark.parametrize("missing", ["q.elbow", "tau.shoulder"])
+def test_what_was_said_of_some_joints_only_tells_no_signal(missing: str) -> None:
+    log = log_of("k1", "k2", "m1", "m2", zeit=CLOCK)
+    told = {"q.shoulder": "k1", "q.elbow": "k2", "tau.shoulder": "m1", "tau.elbow": "m2"}
+    del told[missing]
+    with pytest.raises(RecordingError, match="--column"):
+        match(log, two_links(), told=told)

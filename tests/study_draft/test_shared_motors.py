@@ -20,7 +20,7 @@ from dynident.study_draft import Decision, LogFacts, StudyDraft, draft_study
 from dynident.study_draft.guesses.amendments import amended, shared
 from dynident.study_draft.guesses.coupled_motors import Coupling
 from dynident.study_draft.guesses.file_reading import Reading
-from dynident.study_draft.guesses.motor_side import expression_of, joint_side
+from dynident.study_draft.guesses.motor_side import joint_side
 from dynident.study_draft.shared_motors import with_shared_motors
 from synthetic import smooth_motion
 

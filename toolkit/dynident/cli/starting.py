@@ -58,8 +58,8 @@ class _Told:
     "columns",
     multiple=True,
     metavar="NAME=EXPRESSION",
-    help="What one of our columns is made of, as a motor that turns two joints makes it: "
-    "'q.joint6 = motor[5]/32 - motor[4]/45'; torques follow. May be repeated.",
+    help="What one of our columns is: a column whose name does not say so, or what a motor that "
+    "turns two joints makes: 'q.joint6 = motor[5]/32 - motor[4]/45'; torques follow. Repeatable.",
 )
 @click.option("--topic", default="", help="Of bags that hold joint states on several.")
 @click.option(

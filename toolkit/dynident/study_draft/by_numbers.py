@@ -12,13 +12,12 @@ from dynident.errors import RecordingError
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
 from dynident.robot import Robot
-from dynident.study_draft.timing import clock_scale
+from dynident.study_draft.timing import clock_scale, is_clock
 from dynident.wiring.wiring_regression import WiringRegression
 from dynident.wiring.wiring_rows import rows_of
 
 UNUSED = "-"
 _SAMPLES = 6000  # of a file that are looked at
-_UNIFORM = 0.5  # steps of a clock over the usual one, of nine in ten
 _DERIVATIVE = 0.9  # correlation of a speed with the difference of its position
 _SAME = 0.99  # correlation of a position with its reference
 _EXACT = 1e-9  # share that counts as explained in full
@@ -85,7 +84,7 @@ def named_by_numbers(
         If there is no clock and no rate, or no block of columns is a position and its speed.
     """
     x, n = x[:_SAMPLES], robot.n
-    clocks = [k for k in range(x.shape[1]) if _is_clock(x[:, k])]
+    clocks = [k for k in range(x.shape[1]) if is_clock(x[:, k])]
     # Beside a clock, what goes up by one is the number of the sample.
     clocks.sort(key=lambda k: bool(np.all(np.diff(x[:, k]) == 1.0)))
     clock = clocks[0] if clocks and rate_hz is None else None
@@ -133,14 +132,6 @@ def named_by_numbers(
         reason=f"columns {v + 1} to {v + n} are the derivative of {q + 1} to {q + n}, and the "
         "equations of motion explain these best",
     )
-
-
-def _is_clock(x: np.ndarray) -> bool:
-    steps = np.diff(x)
-    usual = float(np.median(steps))
-    if not (usual > 0 and np.all(steps > 0)):
-        return False
-    return bool(np.quantile(np.abs(steps - usual), 0.9) < _UNIFORM * usual)
 
 
 def _roughness(x: np.ndarray) -> float:

@@ -90,7 +90,8 @@ def draft_study(
     notes = _Notes(ask)
     logs = _named(data, described, facts, notes)
     sensors = wrench_groups(list(logs[0].columns), described)
-    matched = match(logs[0], described, ("q",) if sensors else ("q", "tau"))
+    needed = ("q",) if sensors else ("q", "tau")
+    matched = match(logs[0], described, needed, facts.columns)
     chosen = _chosen(matched, notes)
     wrench = wrench_columns(sensors, notes.take)
     columns = matched.columns(described, chosen)
@@ -260,7 +261,7 @@ def _with_clock(
         return {ours: one for ours, one in columns.items() if ours != "t"}
     if matched.time is None:
         what = "no column is a clock that goes forward"
-        remedy = "name it t, or write the study by hand"
+        remedy = "name it t, or give the samples' rate: --rate 125"
         raise RecordingError(what, log.where, remedy)
     column, why = matched.time
     if column.scale != 1.0 or column.name not in log.columns:

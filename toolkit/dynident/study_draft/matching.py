@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 import numpy as np
 
 from dynident.errors import RecordingError
 from dynident.recording import Column
-from dynident.recording.formats.column_expressions import quoted
+from dynident.recording.formats.column_expressions import parse, quoted
 from dynident.robot import Robot
 from dynident.study_draft.column_roles import ColumnRole, Origin, Signal, role_of
 from dynident.study_draft.log import Log
+from dynident.study_draft.timing import is_clock
 
+_SIGNALS: tuple[Signal, ...] = ("q", "v", "tau", "temperature")
 _INCREASING = 0.999  # share of the steps of a clock that go forward
 _MEASURED: tuple[Origin, ...] = ("measured", "plain")
 _ASKED: tuple[Origin, ...] = ("reference", "command")
@@ -78,7 +81,12 @@ class Matched:
         return found
 
 
-def match(log: Log, robot: Robot, needed: Sequence[str] = ("q", "tau")) -> Matched:
+def match(
+    log: Log,
+    robot: Robot,
+    needed: Sequence[str] = ("q", "tau"),
+    told: Mapping[str, str] = MappingProxyType({}),
+) -> Matched:
     """Return the columns of a log by time, signals and joints.
 
     Parameters
@@ -86,6 +94,7 @@ def match(log: Log, robot: Robot, needed: Sequence[str] = ("q", "tau")) -> Match
     log : of which only the clock's numbers are looked at, not those of other columns.
     robot : whose joints they are of.
     needed : signals without which there is no study.
+    told : ours -> a column of the file, or an expression of one, for signals that no name tells.
 
     Raises
     ------
@@ -106,26 +115,53 @@ def match(log: Log, robot: Robot, needed: Sequence[str] = ("q", "tau")) -> Match
         (one for one in positions if one.origin in _MEASURED),
         key=lambda one: one.roles[0].stem not in stems,
     )
-    groups = {
+    groups: dict[str, list[Group]] = {
         "q": measured or [one for one in positions if one.origin == "reference"],
         "v": _groups(roles, "v", _MEASURED, robot),
         "tau": torques,
         "temperature": _groups(roles, "temperature", _MEASURED, robot),
         "q_ref": [one for one in positions if one.origin in _ASKED and measured],
     }
+    for signal in _SIGNALS:
+        groups[signal] = groups[signal] or _stated(told, signal, robot, log.columns)
     for signal, what in (("q", "positions"), ("tau", "torques or currents")):
         if signal in needed and not groups[signal]:
             if log.trouble is not None:
                 raise log.trouble
             shown = ", ".join(list(log.columns)[:20]) + (", ..." if len(log.columns) > 20 else "")
             remedy = (
-                f"it holds {shown}; joints: {', '.join(robot.names)}. Write the study by hand, "
-                "with [columns]"
+                f"it holds {shown}; joints: {', '.join(robot.names)}. Say which they are, "
+                f'--column "{signal}.{robot.names[0]} = NAME" for each joint'
             )
             lack = f"no {what} of {robot.n} joints are told by name"
             raise RecordingError(lack, log.where, remedy)
     found = {signal: tuple(some) for signal, some in groups.items() if some}
     return Matched(time=_clock(log, roles), groups=found)
+
+
+def _stated(
+    told: Mapping[str, str], signal: Signal, robot: Robot, names: Collection[str]
+) -> list[Group]:
+    """The group of columns that were stated of every joint, each an expression of one column."""
+    roles = []
+    for number, joint in enumerate(robot.names):
+        text = told.get(f"{signal}.{joint}", "")
+        if not text:
+            return []
+        terms = [text] if text in names else [*parse(text).terms]
+        if len(terms) != 1 or terms[0] not in names:
+            return []
+        role = ColumnRole(
+            column=terms[0],
+            signal=signal,
+            word=signal,
+            origin="plain",
+            joint=number,
+            number=None,
+            stem=(),
+        )
+        roles.append(role)
+    return [Group(roles=tuple(roles), reason="so it was said")]
 
 
 def _groups(
@@ -185,7 +221,11 @@ def _clock(log: Log, roles: Sequence[ColumnRole]) -> tuple[Column, str] | None:
     for role in sorted(candidates, key=lambda one: len(one.stem)):
         if _goes_forward(log.columns[role.column]):
             return Column(role.column, role.scale), "it goes forward"
-    return None
+    named = {role.column for role in roles}
+    steady = [name for name, x in log.columns.items() if name not in named and is_clock(x)]
+    # Beside a clock, what goes up by one is the number of the sample.
+    steady.sort(key=lambda name: bool(np.all(np.diff(log.columns[name]) == 1.0)))
+    return (Column(steady[0]), "it alone goes forward, step by step") if steady else None
 
 
 def _goes_forward(x: np.ndarray) -> bool:

@@ -19,9 +19,24 @@ _FASTEST = 2e4  # Hz that a robot is sampled at
 _REPEATS = 0.05  # of the motion that two repetitions may differ by
 _DERIVATIVE = 0.9  # correlation of a speed with the difference of its position
 _NEAR = 0.2  # of a ratio of units, by which it may miss one
+_UNIFORM = 0.5  # steps of a clock over the usual one, of nine in ten
 _WHOLE = 0.3  # samples by which a period is known
 _EVERY = 4  # of so many recordings one is held out
 _TRAIN, _TEST = ("train", "fit", "ident", "exc"), ("test", "val", "check")
+
+
+def is_clock(x: np.ndarray) -> bool:
+    """Return whether numbers go forward, nine in ten of them by a like step.
+
+    Parameters
+    ----------
+    x : (T,) of a column.
+    """
+    steps = np.diff(x)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    if not (usual > 0 and np.all(steps > 0)):
+        return False
+    return bool(np.quantile(np.abs(steps - usual), 0.9) < _UNIFORM * usual)
 
 
 def clock_scale(t: np.ndarray) -> tuple[float, str]:
