@@ -11,7 +11,8 @@ from dynident.closed_loop import Controller, Experiment, Fourier, Sensors, TrueE
 from dynident.closed_loop import ExperimentRun as Motion
 from dynident.diagnosis import diagnose
 from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import fit_evidence, model_columns
+from dynident.evidence.evidence_fit import fit_evidence
+from dynident.evidence.model_columns import model_columns
 from dynident.evidence.simulated_motion import motion_of_loop
 from dynident.model import Model
 from dynident.recording import Dataset

@@ -25,9 +25,10 @@ from dynident.diagnosis.search.withdrawal import Path
 from dynident.diagnosis.verdict import noise_source, notes_on, verdict_of
 from dynident.errors import FitError
 from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import EvidenceFit, rows_of_run
+from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut, on_recordings
 from dynident.evidence.maps import residual_maps
+from dynident.evidence.model_columns import rows_of_run
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import rows_of_recordings, sources_of
 from dynident.fitting.uncertainty.row_errors import row_covariance

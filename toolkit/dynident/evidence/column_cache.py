@@ -1,7 +1,8 @@
 """Columns that were evaluated, by all that they depend on: nothing is ever invalidated.
 
 Four kinds of columns are kept, each as long as something can ask for it again. Those that follow
-from the motion alone live as long as the motion. Those that depend on the fit belong to a
+from the motion alone live as long as the motion, put together joint by joint for its rows as long
+as the recording whose rows these are. Those that depend on the fit belong to a
 linearisation, the model and the values at which they were taken; the latest one is kept, and with
 another one goes all that belongs to an older. Those of a first look live as long as that look.
 Of shapes that are tried once, a search from other beginnings tries many again: the latest are kept.
@@ -18,6 +19,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from dynident.fitting.sampling import Sampled
 from dynident.recording import Motion
 
 _LATEST = 2**26
@@ -58,6 +60,7 @@ class ColumnCache:
 
     def __init__(self) -> None:
         self._of_motions: WeakKeyDictionary[Motion, Kept] = WeakKeyDictionary()
+        self._of_rows: WeakKeyDictionary[Sampled, Kept] = WeakKeyDictionary()
         self._of_looks: WeakKeyDictionary[FirstLook, Kept] = WeakKeyDictionary()
         self._linearisation: Hashable = None
         self.tried = Tried()
@@ -68,6 +71,10 @@ class ColumnCache:
     def along(self, motion: Motion) -> Kept:
         """Return what follows from a motion alone."""
         return self._of_motions.setdefault(motion, {})
+
+    def rows_of(self, sampled: Sampled) -> Kept:
+        """Return what follows from the motion alone and is put together for a recording's rows."""
+        return self._of_rows.setdefault(sampled, {})
 
     def at(self, linearisation: Hashable) -> Kept:
         """Return what depends on a linearisation; what belongs to an older one is gone."""

@@ -21,6 +21,8 @@ from dynident.evidence.windows import Source, sources
 from dynident.fitting.sampling import Sampled, decimate_each
 from dynident.model import Model
 
+_NO_VALUES = np.zeros(0)
+"""For columns that depend on none."""
 _SHARED = 50_000
 """Samples up to which a recording's torque and its derivatives are kept for several effects."""
 _TOGETHER = 500_000
@@ -66,6 +68,36 @@ class Evidence:
     def rigid(self, run: int) -> list[RigidColumns]:
         """Columns of the base parameters for each replicate."""
         return [self._rigid(sampled, self.model) for sampled in self.runs[run].replicates]
+
+    def loading(self, sampled: Sampled, joint: int) -> np.ndarray:
+        """Which of the base parameters load a joint, (u,)."""
+        known, key = self.cache.rows_of(sampled), (self.model.robot, "loading", joint)
+        if key not in known:
+            known[key] = self._rigid(sampled, self.model).places[joint]
+        return known[key]
+
+    def torque(self, sampled: Sampled, joint: int) -> np.ndarray:
+        """Measured torque at a joint (T, 1); one and the same array whenever it is asked for."""
+        known, key = self.cache.rows_of(sampled), ("torque", joint)
+        if key not in known:
+            known[key] = sampled.tau[:, [joint]]
+        return known[key]
+
+    def plain_parts(self, sampled: Sampled, model: Model, joint: int) -> tuple[np.ndarray, ...]:
+        """Columns of a model at a joint as far as they follow from the motion alone, (T, k) each.
+
+        The base parameters' that load the joint, then those of each effect that acts there, in the
+        order of the model. They are the very same arrays as long as these effects are the same: a
+        fit with something else at another joint needs nothing of this one anew.
+        """
+        acting = model.acting_at(joint, carries_payload=bool(sampled.recording.payload))
+        known = self.cache.rows_of(sampled)
+        key = (self.model.robot, joint, acting.known_by)
+        if key not in known:
+            rigid = self._rigid(sampled, self.model).rows[joint].T
+            columns = (self._of(e, sampled, model, _NO_VALUES)[:, at] for e, at in acting.plain)
+            known[key] = (rigid, *columns)
+        return known[key]
 
     def of(self, effect: Effect, run: int, model: Model, values: np.ndarray | None) -> Signals:
         """Columns of an effect at the joints where it acts in one run.
@@ -179,7 +211,7 @@ class Evidence:
         For each recording: those of each shape.
         """
         sources = [self._source(one, effects[0]) for one in every]
-        keys = {_plain_key(effect, model): effect for effect in effects}
+        keys = {model.known_by(effect): effect for effect in effects}
         places = {source.key: source for source in sources}
         found = {place: self._looked_up(source, keys, model) for place, source in places.items()}
         missing = {place: tuple(key for key in keys if key not in found[place]) for place in places}
@@ -197,7 +229,7 @@ class Evidence:
                         known[key] = one
                     else:
                         self.cache.tried.put((place, key), one)
-        wanted = [_plain_key(effect, model) for effect in effects]
+        wanted = [model.known_by(effect) for effect in effects]
         return [[found[source.key][key][source.rows] for key in wanted] for source in sources]
 
     def _looked_up(self, source: Source, keys: Mapping[Hashable, Effect], model: Model) -> Kept:
@@ -252,7 +284,7 @@ class Evidence:
         """Evaluate the rigid body and many effects in one pass, as far as they are not known."""
         known, base = self._known(source), self.model.base.independent
         at_once = self._evaluated_at_once(source.sampled)
-        wanted = [e for e in effects if e in at_once and _plain_key(e, model) not in known]
+        wanted = [e for e in effects if e in at_once and model.known_by(e) not in known]
         new = self.model.robot not in known
 
         def evaluate(block: Block) -> list[np.ndarray]:
@@ -265,7 +297,7 @@ class Evidence:
         found = source.sampled.decimate(model, evaluate)
         if len(found) > len(wanted):
             known[self.model.robot] = RigidColumns.of(self.model.robot, base, found.pop(0))
-        known.update(zip([_plain_key(effect, model) for effect in wanted], found, strict=True))
+        known.update(zip([model.known_by(effect) for effect in wanted], found, strict=True))
 
     def _together(
         self, variants: Sequence[Effect], model: Model, values: np.ndarray
@@ -393,23 +425,18 @@ class Evidence:
         if key not in kept:
             rigid = self._rigid(sampled, model)
             torque = rigid.times(values[: rigid.size])
-            for effect in model.effects:
-                if effect.needs_torque or (effect.is_payload and not sampled.recording.payload):
-                    continue
-                columns = self._of(effect, sampled, model, values)
-                own = values[model.slices[effect.label]]
-                torque[:, list(effect.acting_at(model.robot))] += columns @ own
+            carried = bool(sampled.recording.payload)
+            for joint in range(model.robot.n):
+                acting = model.acting_at(joint, carries_payload=carried)
+                _, *columns = self.plain_parts(sampled, model, joint)
+                for (effect, _), one in zip(acting.plain, columns, strict=True):
+                    torque[:, joint] += one @ values[model.slices[effect.label]]
+                for effect, at in acting.dependent:
+                    if not effect.needs_torque:
+                        columns = self._of(effect, sampled, model, values)[:, at]
+                        torque[:, joint] += columns @ values[model.slices[effect.label]]
             kept[key] = torque
         return kept[key]
 
     def _rows(self, sampled: Sampled, model: Model) -> Block:
         return model.block(sampled.t, sampled.q, sampled.v, sampled.a)
-
-
-def _plain_key(effect: Effect, model: Model) -> Hashable:
-    """What columns depend on that follow from the motion alone: dry friction where they act."""
-    if not effect.reverses:
-        return model.robot, effect
-    names, widths = model.robot.names, model.friction_widths
-    joints = [joint for joint in (effect.joint, effect.source) if joint is not None]
-    return model.robot, effect, tuple(widths[names.index(joint)] for joint in joints or names)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, reduce
-from operator import add
+from functools import cached_property
 
 import numpy as np
 
@@ -13,17 +12,15 @@ from dynident.criteria import Criteria
 from dynident.evidence.columns import Evidence
 from dynident.evidence.joint_columns import JointColumns, WhiteColumns
 from dynident.evidence.joint_residual import JointResidual
+from dynident.evidence.model_columns import joint_columns
 from dynident.evidence.noise_model import NoiseModel, flat_noise
-from dynident.evidence.runs import Run, Signals
+from dynident.evidence.runs import Run
 from dynident.evidence.time_varying import time_varying_columns, time_varying_mask
 from dynident.fitting.fixed_point import FixedPoint
 from dynident.model import Model
 from dynident.moments.replicates import time_varying_products
 from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import MomentSolution, regress, regression_values
-
-_PART = 8192
-"""Rows of all joints that are written out at a time."""
 
 White = tuple[tuple[WhiteColumns, ...], ...]
 """Whitened columns of each run, of each joint."""
@@ -128,10 +125,11 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
     noise = tuple(flat_noise(std or 1.0) for std in torque_std) if near is None else near.noise
     known = any(run.kind != "single" for run in evidence.runs)
     reliable = evidence.criteria.noise.reliable
-    columns, values, fixed_point, white = [], at, FixedPoint(), None
+    columns, values, fixed_point = [], at, FixedPoint()
+    white = None if near is None else near.white
     for round in range(criteria.value_rounds if model.needs_values else criteria.noise_rounds):
         if not columns or model.needs_values:
-            model, white = model.at(at), None
+            model = model.at(at)
             columns = [
                 [joint_columns(evidence, model, r, j, at) for j in range(n)]
                 for r in range(len(evidence.runs))
@@ -186,7 +184,7 @@ def in_metric_of(evidence: Evidence, fitted: EvidenceFit, other: EvidenceFit) ->
         [joint_columns(evidence, model, r, j, fitted.values) for j in range(model.robot.n)]
         for r in range(len(evidence.runs))
     ]
-    white = _whiten(evidence, columns, other.noise, fitted.values)
+    white = _whiten(evidence, columns, other.noise, fitted.values, fitted.white)
     summed = _moments(evidence, model, other.noise, white)
     solution = regress(summed.pooled(), reliable)
     return replace(
@@ -235,78 +233,6 @@ def _keeping_dependent(model: Model, at: np.ndarray, found: np.ndarray) -> np.nd
     return values
 
 
-def model_columns(
-    evidence: Evidence, model: Model, run: int, joint: int, values: np.ndarray | None
-) -> Signals:
-    """Columns of a model and the torque at one joint.
-
-    Parameters
-    ----------
-    evidence, run : recordings, and which one of them.
-    model : with its effects and their shapes.
-    joint : column of the joint.
-    values : (p,) at which columns that depend on the fit are taken; None for zeros.
-
-    Returns
-    -------
-    (T, p + 1) for each replicate of the run.
-    """
-    return [one.dense() for one in joint_columns(evidence, model, run, joint, values)]
-
-
-def joint_columns(
-    evidence: Evidence, model: Model, run: int, joint: int, values: np.ndarray | None
-) -> list[JointColumns]:
-    """As `model_columns`, without columns that are zero throughout.
-
-    Parameters
-    ----------
-    evidence, run, model, joint, values : as for `model_columns`.
-
-    Returns
-    -------
-    One for each replicate of the run.
-    """
-    replicates, size = evidence.runs[run].replicates, model.size
-    payload = float(bool(evidence.runs[run].recording.payload))
-    rigid = evidence.rigid(run)
-    places, parts = [rigid[0].places[joint]], [[one.rows[joint].T] for one in rigid]
-    for effect in model.effects:
-        joints = effect.acting_at(model.robot)
-        if joint not in joints or (effect.is_payload and not payload):
-            continue
-        own, at = model.slices[effect.label], joints.index(joint)
-        places.append(np.arange(own.start, own.stop))
-        for some, columns in zip(parts, evidence.of(effect, run, model, values), strict=True):
-            some.append(columns[:, at])
-    everywhere = np.append(np.concatenate(places), size)
-    return [
-        JointColumns(size + 1, everywhere, (*some, one.tau[:, [joint]]))
-        for some, one in zip(parts, replicates, strict=True)
-    ]
-
-
-def rows_of_run(
-    evidence: Evidence, model: Model, run: int, values: np.ndarray
-) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Rows of the regression of one recording as measured, a part of it at a time.
-
-    Parameters
-    ----------
-    evidence, run, model, values : as for `model_columns`.
-
-    Yields
-    ------
-    columns (T, n, p) and torque (T, n)
-    """
-    joints = range(model.robot.n)
-    measured = [joint_columns(evidence, model, run, j, values)[0] for j in joints]
-    for start in range(0, len(evidence.runs[run].replicates[0].t), _PART):
-        part = slice(start, start + _PART)
-        whole = np.stack([one.among(part).dense() for one in measured], axis=1)
-        yield whole[:, :, :-1], whole[:, :, -1]
-
-
 def residuals(evidence: Evidence, model: Model, values: np.ndarray) -> list[np.ndarray]:
     """Torque minus prediction of each run, folded.
 
@@ -331,14 +257,22 @@ def residuals(evidence: Evidence, model: Model, values: np.ndarray) -> list[np.n
 
 
 def _whiten(evidence: Evidence, columns, noise, values, before: White | None = None) -> White:
-    """Whiten the columns; those that were whitened by another noise of no colour are known."""
+    """Whiten the columns; those that were whitened before, of whatever model, are known.
+
+    Parameters
+    ----------
+    evidence, columns : recordings, and their columns for each run, joint and replicate.
+    noise : of each joint.
+    values : (p,) the latest parameters.
+    before : of an earlier round, or of the fit of a like model.
+    """
     found = []
     for r, (run, joints) in enumerate(zip(evidence.runs, columns, strict=True)):
         here = []
         for j, signals in enumerate(joints):
             known = None
-            if before is not None and run.columns_from == "recording":
-                known = before[r][j].again(noise[j])
+            if before is not None and r < len(before):
+                known = before[r][j].again(run, noise[j], signals)
             here.append(known or WhiteColumns.of(run, j, noise[j], _moved(run, signals, values)))
         found.append(tuple(here))
     return tuple(found)
@@ -370,7 +304,7 @@ def _moved(run: Run, signals: Sequence[JointColumns], values: np.ndarray) -> Seq
 def _moments(evidence: Evidence, model: Model, noise, white: White) -> SecondMoments:
     found, time_varying = [], time_varying_mask(model)
     for r, (run, joints) in enumerate(zip(evidence.runs, white, strict=True)):
-        here = reduce(add, (w.moments for w in joints))
+        here = WhiteColumns.moments(joints)
         if run.kind == "repeated" and time_varying.any():
             own = [
                 time_varying_columns(evidence, model, r, j, noise[j], w.dense())

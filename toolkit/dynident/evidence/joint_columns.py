@@ -133,8 +133,9 @@ class WhiteColumns:
     Attributes
     ----------
     run : whose rows they are.
-    noise : by which they are whitened.
+    noise : by which the rows are whitened.
     size, places : as of `JointColumns`.
+    parts : of each replicate, the columns that were whitened.
     rows : (P, S, u) whitened, but for a factor.
     squares : (B, u, u) moments of these rows.
     factor : by which the rows are to be multiplied.
@@ -144,6 +145,7 @@ class WhiteColumns:
     noise: NoiseModel
     size: int
     places: np.ndarray
+    parts: tuple[tuple[np.ndarray, ...], ...]
     rows: np.ndarray
     squares: SecondMoments
     factor: float = 1.0
@@ -164,29 +166,60 @@ class WhiteColumns:
         -------
         With their moments.
         """
-        one = columns[0]
-        rows = run.whitened_parts([each.parts for each in columns], joint, noise)
+        one, parts = columns[0], tuple(each.parts for each in columns)
+        rows = run.whitened_parts(parts, joint, noise)
         return cls(
             run=run,
             noise=noise,
             size=one.size,
             places=one.places,
+            parts=parts,
             rows=rows,
             squares=run.moments(rows, rows),
         )
 
-    def again(self, noise: NoiseModel) -> WhiteColumns | None:
-        """Return the same columns whitened by another noise; None where that is no factor."""
-        if not (self.noise.is_flat and noise.is_flat):
-            return None
-        factor = self.factor * _flat_weight(noise) / _flat_weight(self.noise)
-        return replace(self, noise=noise, factor=factor)
+    def again(
+        self, run: Run, noise: NoiseModel, columns: Sequence[JointColumns]
+    ) -> WhiteColumns | None:
+        """Return columns that are these, maybe of another model, whitened by another noise.
 
-    @property
-    def moments(self) -> SecondMoments:
-        """Moments of the model's columns and the torque, (B, p + 1, p + 1)."""
-        grid = np.ix_(np.arange(len(self.squares.total)), self.places, self.places)
-        return _spread(self.squares, (self.size, self.size), grid, self.factor**2)
+        Parameters
+        ----------
+        run, noise, columns : as for `of`.
+
+        Returns
+        -------
+        None where they are others, or the other noise is more than a factor.
+        """
+        if run is not self.run or not self._are_of(columns):
+            return None
+        one, factor = columns[0], 1.0
+        if noise is not self.noise:
+            if not (self.noise.is_flat and noise.is_flat):
+                return None
+            factor = _flat_weight(noise) / _flat_weight(self.noise)
+        return replace(self, size=one.size, places=one.places, factor=factor)
+
+    def _are_of(self, columns: Sequence[JointColumns]) -> bool:
+        """Whether these are the very arrays that were whitened."""
+        return len(columns) == len(self.parts) and all(
+            len(one.parts) == len(parts)
+            and all(new is old for new, old in zip(one.parts, parts, strict=True))
+            for one, parts in zip(columns, self.parts, strict=True)
+        )
+
+    @staticmethod
+    def moments(every: Sequence[WhiteColumns]) -> SecondMoments:
+        """Moments of a model's columns and the torque over all joints of a run, (B, p+1, p+1)."""
+        first, size = every[0].squares, every[0].size
+        total = np.zeros((len(first.total), size, size))
+        free = None if first.noise_free is None else np.zeros(total.shape)
+        for one in every:
+            grid = np.ix_(np.arange(len(total)), one.places, one.places)
+            total[grid] += one.factor**2 * one.squares.total
+            if free is not None:
+                free[grid] += one.factor**2 * one.squares.signal
+        return SecondMoments(total, sum(one.squares.counts for one in every), None, free)
 
     def moments_with(self, white: np.ndarray) -> SecondMoments:
         """Moments of the same with other whitened columns (P, S, k), (B, p + 1, k)."""

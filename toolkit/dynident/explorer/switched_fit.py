@@ -13,9 +13,10 @@ from dynident.diagnosis.search.refusal import impossible_in
 from dynident.effects import Effect
 from dynident.evidence import ResidualMap
 from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import fit_evidence, model_columns
+from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.held_out import HeldOut, on_blocks, on_recordings
 from dynident.evidence.maps import residual_maps
+from dynident.evidence.model_columns import model_columns
 from dynident.evidence.runs import gather
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import LeastSquares, estimate_of

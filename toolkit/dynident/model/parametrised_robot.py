@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -11,6 +12,34 @@ import numpy as np
 from dynident.effects import FRICTION_WIDTH, Effect, Law, effects_of
 from dynident.errors import EffectError
 from dynident.robot import BaseParameters, Robot, nearest_parameters, structural_base
+
+
+@dataclass(frozen=True, eq=False)
+class ActingEffects:
+    """Effects of a model at one joint, each with that joint's number among those where it acts.
+
+    Attributes
+    ----------
+    plain : effects whose columns follow from the motion alone.
+    dependent : effects whose columns depend on the fit.
+    known_by : what the columns of the plain ones depend on besides the motion.
+    places : numbers of the parameters of the plain ones, then of the dependent ones.
+    """
+
+    plain: tuple[tuple[Effect, int], ...]
+    dependent: tuple[tuple[Effect, int], ...]
+    known_by: tuple[Hashable, ...]
+    places: np.ndarray
+
+    @classmethod
+    def of(cls, model: ParametrisedRobot, at: Sequence[tuple[Effect, int]]) -> ActingEffects:
+        """Return some effects of a model as those at a joint."""
+        plain = tuple(one for one in at if not one[0].depends_on_fit)
+        dependent = tuple(one for one in at if one[0].depends_on_fit)
+        slices = (model.slices[effect.label] for effect, _ in (*plain, *dependent))
+        places = [np.arange(one.start, one.stop) for one in slices]
+        known_by = tuple(model.known_by(effect) for effect, _ in plain)
+        return cls(plain, dependent, known_by, np.concatenate([np.empty(0, dtype=int), *places]))
 
 
 @dataclass(frozen=True)
@@ -131,6 +160,31 @@ class ParametrisedRobot:
             found[effect.label] = slice(start, stop)
             start = stop
         return found
+
+    def acting_at(self, joint: int, *, carries_payload: bool) -> ActingEffects:
+        """Return the effects that change a joint's torque."""
+        key = joint, carries_payload
+        if key not in self._acting:
+            at = [
+                (effect, joints.index(joint))
+                for effect in self.effects
+                if carries_payload or not effect.is_payload
+                if joint in (joints := effect.acting_at(self.robot))
+            ]
+            self._acting[key] = ActingEffects.of(self, at)
+        return self._acting[key]
+
+    def known_by(self, effect: Effect) -> Hashable:
+        """What columns depend on that follow from the motion alone: dry friction where they act."""
+        if not effect.reverses:
+            return self.robot, effect
+        names, widths = self.robot.names, self.friction_widths
+        joints = [joint for joint in (effect.joint, effect.source) if joint is not None]
+        return self.robot, effect, tuple(widths[names.index(joint)] for joint in joints or names)
+
+    @cached_property
+    def _acting(self) -> dict[tuple[int, bool], ActingEffects]:
+        return {}
 
     @property
     def size(self) -> int:

@@ -14,8 +14,9 @@ import numpy as np
 from dynident.criteria import VerdictCriteria
 from dynident.diagnosis.verdict import within_noise
 from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import EvidenceFit, model_columns
+from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut, HeldOutRun
+from dynident.evidence.model_columns import model_columns
 from dynident.evidence.runs import gather
 from dynident.fitting.sampling import sample
 from dynident.recording import Dataset, Recording, resolution, uniform

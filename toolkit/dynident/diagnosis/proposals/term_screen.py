@@ -16,7 +16,8 @@ import numpy as np
 
 from dynident.diagnosis.proposals.term_library import Factor, LibraryTerm
 from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import EvidenceFit, model_columns
+from dynident.evidence.evidence_fit import EvidenceFit
+from dynident.evidence.model_columns import model_columns
 from dynident.evidence.runs import Run
 from dynident.formulas import Signal, evaluate, parse_formula
 from dynident.moments.second_moments import SecondMoments
