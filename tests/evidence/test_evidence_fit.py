@@ -10,7 +10,9 @@ import pytest
 import dynident as di
 from dynident.effects import catalogue
 from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import fit_evidence
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of
+from dynident.evidence.joint_columns import WhiteColumns
+from dynident.evidence.noise_model import flat_noise
 from dynident.evidence.runs import gather
 from problem_scripts import PROBLEMS
 
@@ -31,3 +33,45 @@ def test_load_and_elasticity_settle_together_from_a_robot_without_bodies() -> No
     assert mu == pytest.approx(alone[0].values[-1], abs=3 * sigma[0])
     assert c == pytest.approx(alone[1].values[-1], abs=3 * sigma[1])
     assert both.error_total <= 1.01 * min(one.error_total for one in alone)
+
+
+def test_what_changes_at_one_joint_leaves_the_columns_of_the_others() -> None:
+    """Of a wider model, columns where nothing changed are not evaluated, nor whitened, again."""
+    study = di.load(PROBLEMS / "hidden_effect" / "study.toml")
+    runs = gather(replace(study.train, recordings=study.train.recordings[:1]))
+    evidence = Evidence(study.model, runs)
+    fitted = fit_evidence(evidence, study.model)
+    model = study.model + catalogue()["load_friction"]("elbow")
+    wider, anew = (
+        fit_evidence(one, model, fitted) for one in (evidence, Evidence(study.model, runs))
+    )
+    same = [
+        all(a is b for a, b in zip(one.parts[0], two.parts[0], strict=False))
+        for one, two in _joints(fitted, wider)
+    ]
+    assert same == [True, False]  # shoulder, elbow
+    flat = replace(fitted, noise=tuple(flat_noise(1.0) for _ in fitted.noise))
+    plain = in_metric_of(evidence, flat, flat)
+    wide = in_metric_of(evidence, replace(wider, white=plain.white), flat)
+    assert [one.rows is two.rows for one, two in _joints(plain, wide)] == [True, False]
+    np.testing.assert_allclose(wider.values, anew.values, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(wider.moments.signal, anew.moments.signal, rtol=1e-9, atol=1e-9)
+
+
+def test_rows_that_no_longer_count_are_whitened_again() -> None:
+    study = di.load(PROBLEMS / "hidden_effect" / "study.toml")
+    runs = gather(replace(study.train, recordings=study.train.recordings[:1]))
+    evidence = Evidence(study.model, runs)
+    fitted = fit_evidence(evidence, study.model)
+    sticks = np.zeros(runs[0].replicates[0].tau.shape, dtype=bool)
+    sticks[: len(sticks) // 4] = True
+    fewer = evidence.with_runs((replace(runs[0], uncertain=sticks),))
+    beside = fit_evidence(fewer, study.model, fitted)
+    anew = fit_evidence(Evidence(study.model, fewer.runs), study.model, fitted)
+    np.testing.assert_allclose(beside.values, anew.values, rtol=1e-9, atol=1e-12)
+    assert np.abs(beside.values - fitted.values).max() > 1e-6
+
+
+def _joints(one: EvidenceFit, two: EvidenceFit) -> list[tuple[WhiteColumns, WhiteColumns]]:
+    """White columns of two fits in their first run, joint by joint."""
+    return list(zip(one.white[0], two.white[0], strict=True))
