@@ -15,7 +15,7 @@ from dynident.robot import BaseParameters, Robot, nearest_parameters, structural
 
 
 @dataclass(frozen=True, eq=False)
-class ActingEffects:
+class JointEffects:
     """Effects of a model at one joint, each with that joint's number among those where it acts.
 
     Attributes
@@ -32,7 +32,7 @@ class ActingEffects:
     places: np.ndarray
 
     @classmethod
-    def of(cls, model: ParametrisedRobot, at: Sequence[tuple[Effect, int]]) -> ActingEffects:
+    def of(cls, model: ParametrisedRobot, at: Sequence[tuple[Effect, int]]) -> JointEffects:
         """Return some effects of a model as those at a joint."""
         plain = tuple(one for one in at if not one[0].depends_on_fit)
         dependent = tuple(one for one in at if one[0].depends_on_fit)
@@ -161,7 +161,7 @@ class ParametrisedRobot:
             start = stop
         return found
 
-    def acting_at(self, joint: int, *, carries_payload: bool) -> ActingEffects:
+    def acting_at(self, joint: int, *, carries_payload: bool) -> JointEffects:
         """Return the effects that change a joint's torque."""
         key = joint, carries_payload
         if key not in self._acting:
@@ -171,7 +171,7 @@ class ParametrisedRobot:
                 if carries_payload or not effect.is_payload
                 if joint in (joints := effect.acting_at(self.robot))
             ]
-            self._acting[key] = ActingEffects.of(self, at)
+            self._acting[key] = JointEffects.of(self, at)
         return self._acting[key]
 
     def known_by(self, effect: Effect) -> Hashable:
@@ -183,7 +183,7 @@ class ParametrisedRobot:
         return self.robot, effect, tuple(widths[names.index(joint)] for joint in joints or names)
 
     @cached_property
-    def _acting(self) -> dict[tuple[int, bool], ActingEffects]:
+    def _acting(self) -> dict[tuple[int, bool], JointEffects]:
         return {}
 
     @property
