@@ -84,11 +84,21 @@ class Evidence:
         return known[key]
 
     def plain_parts(self, sampled: Sampled, model: Model, joint: int) -> tuple[np.ndarray, ...]:
-        """Columns of a model at a joint as far as they follow from the motion alone, (T, k) each.
+        """Columns of a model at a joint as far as they follow from the motion alone.
 
-        The base parameters' that load the joint, then those of each effect that acts there, in the
-        order of the model. They are the very same arrays as long as these effects are the same: a
-        fit with something else at another joint needs nothing of this one anew.
+        They are the very same arrays as long as the effects at the joint are the same: a fit with
+        something else at another joint needs nothing of this one anew.
+
+        Parameters
+        ----------
+        sampled : the recording.
+        model : with its effects and their shapes.
+        joint : column of the joint.
+
+        Returns
+        -------
+        (T, k) of the base parameters that load the joint, then of each effect that acts there, in
+        the order of the model.
         """
         acting = model.acting_at(joint, carries_payload=bool(sampled.recording.payload))
         known = self.cache.rows_of(sampled)
