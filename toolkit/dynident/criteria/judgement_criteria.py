@@ -226,6 +226,13 @@ class VerdictCriteria(CriteriaGroup):
     not_nothing: float = criterion(
         0.5, "1", "systematic residual over noise from which a verdict says that something is left"
     )
+    unlike: float = criterion(
+        2.0,
+        "1",
+        "residual of a test recording over what training and the parameters' uncertainty make "
+        "expect, from which it is said to be unlike the training recordings",
+        least=1,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,6 +18,7 @@ from dynident.diagnosis.detection_limits import detection_limits
 from dynident.diagnosis.nuisances.contacts import Disturbance, contact_candidates
 from dynident.diagnosis.nuisances.quantisation import rounding_notes, with_rounding
 from dynident.diagnosis.nuisances.sticking import shares_left_out
+from dynident.diagnosis.nuisances.unlike_recordings import unlike_notes
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.search.refusal import impossible_joints_of
@@ -128,6 +129,7 @@ def assemble(
         traces=_traces(given, before, after),
         notes=(
             *notes_on(evidence, held, stages[-1], source, search.doubtful),
+            *unlike_notes(evidence, held, stages[-1]),
             *rounding_notes(after, given.robot.names, evidence.criteria.verdict),
             *path.notes,
             *search.notes,

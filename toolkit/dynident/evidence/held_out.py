@@ -74,6 +74,10 @@ class HeldOut:
         """Root mean square of the residual, (n,)."""
         return self._rms([run.residual for run in self.runs])
 
+    def of(self, run: HeldOutRun) -> HeldOut:
+        """The same of one recording alone, without its noise."""
+        return replace(self, runs=(run,), noise_std=None, ratio=None, least_ratio=None)
+
     def _rms(self, values: list[np.ndarray]) -> np.ndarray:
         """Root mean square of what each run has, (T, n), over the rows that are judged."""
         certain = np.concatenate([run.certain for run in self.runs])
@@ -122,7 +126,7 @@ def on_recordings(evidence: Evidence, fitted: EvidenceFit | Estimate) -> HeldOut
             )
         )
         folded.append(np.stack([run.fold(one) for one in left], axis=-1))
-        doubt.append(np.array([_doubt(c[0], fitted) for c in joints]))
+        doubt.append(np.array([prediction_variance(c[0], fitted) for c in joints]))
     return _judged(evidence, tuple(runs), folded, doubt)
 
 
@@ -158,7 +162,7 @@ def on_blocks(evidence: Evidence, fitted: EvidenceFit) -> HeldOut:
             )
         )
         folded.append(residual)
-        doubt.append(np.array([_doubt(c[0], fitted) for c in joints]))
+        doubt.append(np.array([prediction_variance(c[0], fitted) for c in joints]))
     return _judged(evidence, tuple(runs), folded, doubt)
 
 
@@ -198,8 +202,18 @@ def with_noise_of(judged: HeldOut, noise: HeldOut, criteria: NoiseCriteria) -> H
     )
 
 
-def _doubt(columns: JointColumns, fitted: EvidenceFit | Estimate) -> float:
-    """Mean square of the torque that the covariance of the parameters makes uncertain."""
+def prediction_variance(columns: JointColumns, fitted: EvidenceFit | Estimate) -> float:
+    """Mean square of a joint's torque that the covariance of the parameters makes uncertain.
+
+    Parameters
+    ----------
+    columns : of the model along a recording, and the torque.
+    fitted : the model.
+
+    Returns
+    -------
+    (N m)^2 or N^2
+    """
     used, places = columns.used[:, :-1], columns.places[:-1]
     doubt = fitted.covariance[np.ix_(places, places)]
     return float(np.mean(np.sum((used @ doubt) * used, axis=1)))

@@ -1,0 +1,61 @@
+"""Test recordings that are not as the training ones: a load, a mounting, another temperature.
+
+What a model lacks it lacks in training as well, as long as the motions are alike. So a recording
+that is predicted far worse than the training ones are fitted, and worse than the uncertainty of the
+parameters makes expect, was recorded under other circumstances, or moves where they do not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import chdtri
+
+from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence_fit import EvidenceFit
+from dynident.evidence.held_out import on_recordings, prediction_variance
+from dynident.evidence.model_columns import joint_columns
+from dynident.tables import percent
+
+_SHOWN = 4
+"""Recordings that are named."""
+
+
+def unlike_notes(evidence: Evidence, held: Evidence | None, fitted: EvidenceFit) -> tuple[str, ...]:
+    """Name the test recordings that are predicted far worse than training makes expect.
+
+    Parameters
+    ----------
+    evidence, held : of the training and of the test recordings; `held` may be None.
+    fitted : the final model.
+
+    Returns
+    -------
+    One sentence or two; empty where every recording is as expected.
+    """
+    if held is None:
+        return ()
+    trained, judged = on_recordings(evidence, fitted), on_recordings(held, fitted)
+    model, names = fitted.model, fitted.model.robot.names
+    most = evidence.criteria.verdict.unlike
+    # As large as the parameters' error is at worst, not in the mean.
+    largest = float(chdtri(1, 1.0 - evidence.criteria.noise.confidence))
+    found = []
+    for r, run in enumerate(judged.runs):
+        each = [joint_columns(held, model, r, j, fitted.values)[0] for j in range(len(names))]
+        doubt = np.array([prediction_variance(one, fitted) for one in each])
+        alone = judged.of(run)
+        expected = np.sqrt(trained.residual_rms**2 + largest * doubt)
+        over = alone.residual_rms / np.where(expected > 0, expected, np.inf)
+        worst = int(np.argmax(over))
+        if over[worst] >= most:
+            here, there = (percent(one.joint_errors[worst]) for one in (alone, trained))
+            found.append(f"{run.name} ({names[worst]}: {here} of its torque, {there} in training)")
+    if not found:
+        return ()
+    shown = found[:_SHOWN] + ([f"{len(found) - _SHOWN} more"] if len(found) > _SHOWN else [])
+    return (
+        f"Predicted far worse than the training recordings are fitted: {', '.join(shown)}. "
+        "Something is not as there (a load, the mounting, a temperature, a calibration), or the "
+        "motion shows what theirs do not. A load is said by payload = true in the entry of the "
+        "recording, and known only if a training recording has it too.",
+    )
