@@ -11,6 +11,7 @@ from dynident import diagnose as find
 from dynident.diagnosis import Diagnosis, procedure
 from dynident.diagnosis.search.ranking import rank
 from dynident.diagnosis.search.refusal import newly_impossible
+from dynident.diagnosis.search.scoring import Score, impossible
 from dynident.diagnosis.search.selection import breaks_its_promise
 from dynident.effects import effects_of
 from dynident.evidence.columns import Evidence
@@ -97,3 +98,24 @@ def test_a_promise_is_broken_by_what_is_fitted_not_by_what_it_was_scored() -> No
     assert "explains 0.0 % of the residual" in breaks_its_promise(fitted, fitted, promising)
     assert "promise 50.0 %" in breaks_its_promise(fitted, fitted, promising)
     assert breaks_its_promise(fitted, fitted, replace(one, drop=0.0)) == ""
+
+
+def test_friction_that_no_torque_has_overcome_is_impossible() -> None:
+    """The foot of a narrow law fits with any level: the joint would not have moved with it."""
+    (law,) = effects_of("stribeck_friction@elbow", FULL.robot)
+    model = FULL + law.shaped(0.01)
+    evidence = Evidence(FULL, gather(recordings(model, {"Fs__elbow": 0.6}, 1)))
+    fitted, wider = fit_evidence(evidence, FULL), fit_evidence(evidence, model)
+    peak = float(fitted.torque_peaks[1])
+    assert 2.0 < peak < 20.0
+    blank = Score(effect=law, payload_recordings=None, not_identifiable=False)
+    assert not impossible(replace(blank, values=(0.9 * peak,), sigma=(0.1,)), fitted)
+    assert not impossible(replace(blank, values=(1.1 * peak,), sigma=(peak,)), fitted)
+    beyond = impossible(replace(blank, values=(3.0 * peak,), sigma=(0.1,)), fitted)
+    assert beyond.startswith("would need Fs = ") and "elbow, which moved with" in beyond
+    assert not newly_impossible(evidence, fitted, wider)
+    values = np.array(wider.values)
+    values[model.slices[law.label]] = 3.0 * peak
+    assert "elbow, which moved with" in newly_impossible(
+        evidence, fitted, replace(wider, values=values)
+    )

@@ -103,6 +103,7 @@ def fitted(known: SecondMoments) -> EvidenceFit:
         error_signal=unused,
         squares=unused,
         variances=unused,
+        torque_peaks=np.full(MODEL.robot.n, np.inf),
     )
 
 

@@ -26,13 +26,14 @@ from dynident.diagnosis.search.withdrawal import Path
 from dynident.diagnosis.verdict import noise_source, notes_on, verdict_of
 from dynident.errors import FitError
 from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import EvidenceFit
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import HeldOut, on_recordings
 from dynident.evidence.maps import residual_maps
 from dynident.evidence.model_columns import rows_of_run
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import rows_of_recordings, sources_of
 from dynident.fitting.uncertainty.row_errors import row_covariance
+from dynident.fitting.uncertainty.shape_errors import with_shape_errors
 from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.recording.dataset import NoiseSource
@@ -106,7 +107,7 @@ def assemble(
     steps = (*contacts, *_advised(steps, Adviser.of(evidence, stages[-1])))
     source = noise_source(evidence, held)
     verdict = verdict_of(before, after, steps, rounds[-1], evidence.criteria.verdict)
-    final = _estimate(evidence, stages[-1], train)
+    final = _with_shapes(evidence, stages[-1], train)
     impossible = ()
     if verdict != "unexplained":
         impossible = impossible_joints_of(evidence, final.model, final.values, final.covariance)
@@ -123,7 +124,7 @@ def assemble(
         steps=steps,
         candidates=_revealed(first, evidence, start),
         remaining=_candidates(rounds[-1], after.error, stages[-1]),
-        before=_estimate(evidence, start, train),
+        before=_with_shapes(evidence, start, train),
         after=final,
         maps=residual_maps(given, before, after, evidence.criteria.maps),
         traces=_traces(given, before, after),
@@ -218,8 +219,23 @@ def _candidates(ranking: Ranking, error: float, fitted: EvidenceFit) -> tuple[Ca
     return tuple(found)
 
 
+def _with_shapes(evidence: Evidence, fitted: EvidenceFit, train: Dataset) -> Estimate:
+    """The fit of the diagnosis as an `Estimate` that takes no shape and no width as known."""
+
+    def again(wider: Model) -> Estimate:
+        return _estimate(evidence, fit_evidence(evidence, wider, fitted), train)
+
+    given, own = evidence.model.friction_widths, fitted.model.friction_widths
+    sought = [
+        joint
+        for joint, stated, found in zip(fitted.model.robot.names, given, own, strict=True)
+        if found != stated
+    ]
+    return with_shape_errors(_estimate(evidence, fitted, train), again, sought)
+
+
 def _estimate(evidence: Evidence, fitted: EvidenceFit, train: Dataset) -> Estimate:
-    """The fit of the diagnosis as an `Estimate`."""
+    """The fit of the diagnosis as an `Estimate`, at the shapes and widths that it has."""
     judged = on_recordings(evidence, fitted)
     model = fitted.model
     # Rows that span what the data show: not the directions in which the columns are noise.

@@ -10,7 +10,12 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Parameter:
-    """A linear parameter of an effect: its name, unit, physical bounds, and what it is in words."""
+    """A linear parameter of an effect: its name, unit, physical bounds, and what it is in words.
+
+    Attributes
+    ----------
+    is_level : whether it is a level of dry friction, which a joint that moves has overcome.
+    """
 
     name: str
     unit: str
@@ -18,6 +23,7 @@ class Parameter:
     upper: float = np.inf
     _: KW_ONLY
     means: str = ""
+    is_level: bool = False
 
 
 @dataclass(frozen=True)

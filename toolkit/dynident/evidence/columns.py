@@ -59,6 +59,12 @@ class Evidence:
         """Return the evidence of other runs: what is known of their motions is still known."""
         return replace(self, runs=runs)
 
+    @cached_property
+    def torque_peaks(self) -> np.ndarray:
+        """Largest torque that was measured at each joint, (n,) N m or N."""
+        every = (one.tau for run in self.runs for one in run.replicates)
+        return np.max([np.abs(tau).max(axis=0) for tau in every], axis=0)
+
     def looked_at_anew(self) -> Evidence:
         """Return the evidence without a first look: the model has become another one."""
         return replace(self, look=FirstLook())

@@ -44,6 +44,7 @@ class EvidenceFit:
     error_signal : squared systematic residual, whitened: what no noise explains, in this metric.
     squares : (n,) mean systematic square of the residual, (N m)^2 or N^2.
     variances : (n,) of the noise; of the torque, where the noise is unknown or zero.
+    torque_peaks : (n,) largest torque that was measured, N m or N.
     """
 
     criteria: Criteria
@@ -58,6 +59,7 @@ class EvidenceFit:
     error_signal: float
     squares: np.ndarray
     variances: np.ndarray
+    torque_peaks: np.ndarray
 
     def misfit(self, over: EvidenceFit) -> float:
         """Systematic square over the variances of another fit, summed over joints.
@@ -165,6 +167,7 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
         variances=np.array(
             [one.variance or s**2 or 1.0 for one, s in zip(left, torque_std, strict=True)]
         ),
+        torque_peaks=evidence.torque_peaks,
     )
 
 

@@ -83,6 +83,8 @@ class Estimate(Shown):
     sigma_words : what the standard deviations hold, where the method has its own.
     headline : what is to be read before any number: that the model is rejected; empty if it is not.
     shapes : parameters inside effects, as they were found.
+    trading_off : names of parameters of which the data tell no size, because another shape of their
+        effect with another size does the same.
     """
 
     model: Model
@@ -105,6 +107,7 @@ class Estimate(Shown):
     sigma_words: str = ""
     headline: str = ""
     shapes: tuple[ShapeValue, ...] = ()
+    trading_off: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -116,7 +119,7 @@ class Estimate(Shown):
         """Which parameters are identified, alone or as the head of a combination, (p,) bool."""
         found = np.zeros(self.model.size, dtype=bool)
         found[list(self.basis.independent)] = True
-        return found
+        return found & ~np.isin(self.names, self.trading_off)
 
     @property
     def sigma(self) -> np.ndarray:
@@ -169,6 +172,8 @@ class Estimate(Shown):
         rows = []
         for i, name in enumerate(self.names):
             expression = heads.get(i, "not identified on its own, only in combinations")
+            if name in self.trading_off:
+                expression = "not determined: size and shape trade off"
             if expression == name:
                 expression = self.model.expressions[i]
             rows.append(

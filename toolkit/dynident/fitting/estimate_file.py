@@ -91,6 +91,8 @@ def _estimate(content: EstimateFile, model: Model, where: str) -> Estimate:
         _require_count(phi, len(PARAMETERS), f"links.{name}", where)
     for key in ("torque_std", "joint_errors"):
         _require_count(getattr(content, key), n, key, where)
+    kept = {names[i] for i in content.basis.independent if i < p}
+    open_ = [one.name for one in content.parameters if one.sigma is None and one.name in kept]
     links = None
     if content.links is not None:
         links = {name: np.array(phi, dtype=float) for name, phi in content.links.items()}
@@ -120,6 +122,7 @@ def _estimate(content: EstimateFile, model: Model, where: str) -> Estimate:
             )
             for one in content.shapes
         ),
+        trading_off=tuple(open_) if np.any(square) else (),
     )
 
 

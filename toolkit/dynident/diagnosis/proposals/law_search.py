@@ -21,7 +21,7 @@ from dynident.effects import Effect, LawEffect, law_effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of
 from dynident.evidence.held_out import HeldOut
-from dynident.fitting.uncertainty.shape_errors import ShapeSlope
+from dynident.fitting.uncertainty.shape_slopes import ShapeSlope
 
 _SAME_SHAPE = 0.1
 _AT_BOUND = 1e-3

@@ -61,6 +61,10 @@ def alternatives(
     evidence, fitted : the data, and the model as it fits them without either.
     one : the effect.
     rivals : those that are as likely.
+
+    Returns
+    -------
+    Some of the rivals, in their order.
     """
     if not rivals:
         return []

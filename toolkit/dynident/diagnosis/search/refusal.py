@@ -18,7 +18,13 @@ from dynident.errors import RecordingError
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.runs import gather
-from dynident.model import Impossible, Model, impossible_at, impossible_joints
+from dynident.model import (
+    Impossible,
+    Model,
+    impossible_at,
+    impossible_joints,
+    levels_not_met,
+)
 from dynident.recording import Dataset, default_filter
 from dynident.tables import percent
 
@@ -54,12 +60,10 @@ def impossible_in(
     fitted : the model as it fits them.
     gates : from how many standard deviations something is impossible.
     """
-    return impossible_at(
-        fitted.model,
-        fitted.values,
-        fitted.covariance,
-        recorded_states(evidence, fitted.model),
-        gates,
+    found = fitted.model, fitted.values, fitted.covariance
+    return (
+        *impossible_at(*found, recorded_states(evidence, fitted.model), gates),
+        *levels_not_met(*found, evidence.torque_peaks, gates),
     )
 
 

@@ -21,7 +21,7 @@ from dynident.evidence.time_varying import (
     time_varying_mask,
     time_varying_variants,
 )
-from dynident.model import Model
+from dynident.model import Model, not_met
 from dynident.moments.replicates import time_varying_products
 from dynident.moments.second_moments import SecondMoments
 
@@ -232,7 +232,8 @@ def impossible(one: Score, fitted: EvidenceFit) -> str:
     """What is physically impossible in a score's values; empty where nothing is.
 
     Of several values some may leave their bounds by their uncertainty. A single one that is out of
-    them says that at its bound, where there is no effect, the data are explained better.
+    them says that at its bound, where there is no effect, the data are explained better. A level of
+    friction is impossible where the joint moved with less.
     """
     if one.not_identifiable:
         return ""
@@ -242,6 +243,10 @@ def impossible(one: Score, fitted: EvidenceFit) -> str:
         slack = deviations * sigma
         if value < parameter.lower - slack or value > parameter.upper + slack:
             return f"would need {parameter.name} = {value:.3g} {parameter.unit}"
+        if parameter.is_level and one.effect.joint is not None:
+            peak = float(fitted.torque_peaks[fitted.model.robot.names.index(one.effect.joint)])
+            if value > peak + fitted.criteria.gates.beyond_bounds * sigma:
+                return f"would need {not_met(parameter, value, one.effect.joint, peak)}"
     return ""
 
 

@@ -36,6 +36,7 @@ class CoulombFriction(JointEffect):
                 force_unit(robot, self.joint),
                 0.0,
                 means="dry friction, the same at every speed",
+                is_level=True,
             ),
         )
 

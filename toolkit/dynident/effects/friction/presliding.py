@@ -44,6 +44,7 @@ class Presliding(JointEffect):
                 force_unit(robot, self.joint),
                 0.0,
                 means="dry friction that builds up over a distance",
+                is_level=True,
             ),
         )
 

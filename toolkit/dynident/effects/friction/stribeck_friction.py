@@ -47,6 +47,7 @@ class StribeckFriction(JointEffect):
                 force_unit(robot, self.joint),
                 0.0,
                 means="dry friction at creeping speed, beyond that of gliding",
+                is_level=True,
             ),
         )
 

@@ -4,95 +4,60 @@ At the shapes that fit best, the torque is linear in small changes of them: thei
 columns more. The covariance of the fit with these columns is that of all parameters together
 (Gauss-Newton; Seber and Wild, *Nonlinear Regression*, 2003, section 2.1); without them the linear
 parameters would be as certain as if the shapes were known.
+
+That holds as far as the torque is straight in a shape over the interval that comes out. Where this
+takes an effect that is surely there down to nothing, or a change of the shape is just what other
+sizes make, then the size is not determined: it and the shape trade off. No number is said of it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from dynident.effects import Block, Effect, Needs, Parameter
 from dynident.fitting.estimate import Estimate, ShapeValue
 from dynident.fitting.row_objective import shaped_effects
+from dynident.fitting.uncertainty.shape_slopes import ShapeSlope, width_slope
 from dynident.model import Model
 
 _KNOWN = "sigma takes {} as known, which they are not."
+_QUANTILE = 1.959964
+"""Standard errors to each side of a 95 % interval."""
+_MADE_OF = 0.1
+"""Share (in norm) of a shape's derivative from which the column of a parameter makes it."""
 
 
-@dataclass(frozen=True)
-class ShapeSlope(Effect):
-    """The derivatives of an effect's torque by the coordinates of its shapes.
-
-    Attributes
-    ----------
-    of : the effect.
-    values : of its linear parameters.
-    """
-
-    of: Effect | None = None
-    values: tuple[float, ...] = ()
-    in_catalogue: ClassVar[bool] = False
-
-    @property
-    def effect(self) -> Effect:
-        """The effect itself."""
-        assert self.of is not None
-        return self.of
-
-    @property
-    def name(self) -> str:  # type: ignore[override]
-        """Of no effect in the catalogue."""
-        return f"shape of {self.effect.name}"
-
-    @property
-    def needs(self) -> Needs:  # type: ignore[override]
-        """As the effect."""
-        return self.effect.needs
-
-    @property
-    def time_varying(self) -> bool:  # type: ignore[override]
-        """As the effect."""
-        return self.effect.time_varying
-
-    def on(self, robot) -> ShapeSlope:
-        return self
-
-    def parameters(self, robot) -> tuple[Parameter, ...]:
-        return tuple(Parameter(s.name, "1") for s in self.effect.shape_parameters(robot))
-
-    def columns(self, block: Block) -> np.ndarray:
-        slopes = self.effect.sensitivities(block)
-        assert slopes is not None
-        return np.einsum("tnks,k->tns", slopes, np.array(self.values))
-
-
-def with_shape_errors(estimate: Estimate, fit: Callable[[Model], Estimate] | None) -> Estimate:
+def with_shape_errors(
+    estimate: Estimate, fit: Callable[[Model], Estimate] | None, widths: Sequence[str] = ()
+) -> Estimate:
     """Return an estimate whose sigma holds that shapes are estimated, and that lists them.
 
     Parameters
     ----------
     estimate : of a model at its best shapes.
     fit : the same method, of another model; None where its sigma cannot hold them.
+    widths : joints whose friction width was estimated from the same data, too.
+
+    Returns
+    -------
+    With `trading_off`: parameters that these data do not tell from a shape.
     """
     model, robot = estimate.model, estimate.model.robot
     shaped = shaped_effects(model)
     slopes = tuple(
         ShapeSlope(e.joint, e.source, of=e, values=tuple(estimate.effect_values(e.label).tolist()))
         for e in shaped
-        if fit and type(e).sensitivities is not Effect.sensitivities and not e.nonlinear
-        if np.any(estimate.effect_values(e.label))
+        if fit and not e.nonlinear and np.any(estimate.effect_values(e.label))
     )
     known = [e.label for e in shaped if e.label not in {s.effect.label for s in slopes}]
+    sought = [width_slope(model, estimate.values, joint) for joint in widths]
+    added = (*slopes, *(one for one in sought if one is not None))
     sigma: dict[str, np.ndarray] = {}
-    if fit and slopes and np.any(estimate.covariance):
-        whole = fit(replace(model, effects=(*model.effects, *slopes)))
-        size = model.size
-        # Rows of what is not identified beside the slopes would be zero: then it is as before.
-        if whole.identified[:size].sum() == estimate.identified.sum():
-            estimate = replace(estimate, covariance=whole.covariance[:size, :size])
+    if fit and added and np.any(estimate.covariance):
+        whole = fit(replace(model, effects=(*model.effects, *added)))
+        estimate = _widened(estimate, whole, [model.slices[s.effect.label] for s in slopes])
         spread = whole.sigma
         sigma = {s.effect.label: spread[whole.model.slices[s.label]] for s in slopes}
     found = []
@@ -112,3 +77,40 @@ def with_shape_errors(estimate: Estimate, fit: Callable[[Model], Estimate] | Non
     if known and np.any(estimate.covariance):
         notes = (*notes, _KNOWN.format(f"the shapes of {', '.join(known)}"))
     return replace(estimate, shapes=tuple(found), notes=notes)
+
+
+def _widened(estimate: Estimate, whole: Estimate, shaped: Sequence[slice]) -> Estimate:
+    """Return an estimate with the covariance that its parameters have beside those of shapes.
+
+    Parameters
+    ----------
+    estimate : with the shapes as known.
+    whole : with their derivatives as columns more.
+    shaped : parameters of effects with a shape.
+    """
+    size, names, sigma = estimate.model.size, estimate.names, estimate.sigma
+    lost = estimate.identified & ~whole.identified[:size]
+    trading = [*np.flatnonzero(lost), *_makes_a_slope(whole, size)]
+    covariance = np.where(np.outer(lost, lost), 0.0, whole.covariance[:size, :size])
+    wide = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
+    values = np.array(estimate.values)
+    values[list(estimate.basis.independent)] = estimate.basis.coordinates(estimate.values)
+    reach = np.abs(values) / _QUANTILE
+    for own in shaped:
+        trading += [i for i in range(own.start, own.stop) if sigma[i] < reach[i] <= wide[i]]
+    return replace(
+        estimate,
+        covariance=covariance,
+        trading_off=tuple(names[i] for i in sorted(set(trading)) if estimate.identified[i]),
+    )
+
+
+def _makes_a_slope(whole: Estimate, size: int) -> list[int]:
+    """Which of the first parameters make what a change of a shape does, where it is no other."""
+    basis, found = whole.basis, []
+    heads = np.array(basis.independent)
+    for k, index in enumerate(basis.dependent):
+        if index >= size:
+            share = np.abs(basis.K[:, k]) * basis.scale[heads]
+            found += heads[share > _MADE_OF * basis.scale[index]].tolist()
+    return [i for i in found if i < size]

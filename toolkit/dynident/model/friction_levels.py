@@ -1,0 +1,72 @@
+"""Whether dry friction may have the levels that a model's values say.
+
+In: a model, its values with their covariance, and the torques that moved its joints. Out: levels
+that these joints would not have overcome.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from dynident.criteria import GateCriteria
+from dynident.effects import Parameter
+from dynident.model.possible_values import Impossible
+from dynident.model.torque_model import Model
+from dynident.tables import number
+
+
+def levels_not_met(
+    model: Model,
+    values: np.ndarray,
+    covariance: np.ndarray,
+    peaks: np.ndarray,
+    criteria: GateCriteria,
+) -> Iterator[Impossible]:
+    """Levels of dry friction above the largest torque with which the joint nevertheless moved.
+
+    A law may rise to such a level only where nothing was recorded: what fits is its foot.
+
+    Parameters
+    ----------
+    model, values, covariance, criteria : as in `impossible_at`.
+    peaks : (n,) largest torque that was measured at each joint, N m or N.
+
+    Yields
+    ------
+    Each level that is beyond doubt above the peak of its joint.
+    """
+    sigma = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
+    for effect in model.effects:
+        own = model.slices[effect.label]
+        parameters = effect.parameters(model.robot)
+        for parameter, value, s in zip(parameters, values[own], sigma[own], strict=True):
+            if effect.joint is None or not parameter.is_level:
+                continue
+            peak = float(peaks[model.robot.names.index(effect.joint)])
+            if value > peak + criteria.beyond_bounds * s:
+                yield Impossible(
+                    where=f"{parameter.name} of {effect.label}",
+                    what=not_met(parameter, float(value), effect.joint, peak),
+                    value=float(peak - value),
+                    std=float(s),
+                )
+
+
+def not_met(parameter: Parameter, value: float, joint: str, peak: float) -> str:
+    """Say of a level of friction that the joint has moved with less.
+
+    Parameters
+    ----------
+    parameter, value, joint : the level, and where.
+    peak : largest torque measured there, N m or N.
+
+    Returns
+    -------
+    A clause with both.
+    """
+    return (
+        f"{parameter.name} = {number(value, 3)} {parameter.unit} at {joint}, which moved with "
+        f"{number(peak, 3)} {parameter.unit} at most"
+    )
