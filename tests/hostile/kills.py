@@ -13,21 +13,29 @@ import signal
 import sys
 import tempfile
 import time
+import tomllib
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import dynident as di
 from dynident.cli import main as command
+from dynident.explorer.effect_choices import EffectChoice
+from dynident.explorer.local_server import LocalServer
+from dynident.recording import write
 from dynident.robot import Robot
 from hostile.case import place
 from hostile.experiments import EXPERIMENT
 from hostile.worker import load_libraries
+from laws_hidden import recordings as hidden_recordings
 from loop_studies import LOOP_STUDY, write_loop_study
 from study_files import CONTROLLER, STUDY, edited, write_study
+from synthetic import ARM
 
 WRITING = "dynident/files.py"
 
@@ -40,10 +48,16 @@ class Writer:
     ----------
     words : of the command.
     results : files that it writes, with what reads them or raises.
+    folder : in which others may stand beside them.
     """
 
     words: tuple[str, ...]
     results: dict[str, Callable[[Path], object]]
+    folder: str = ""
+
+    def may_write(self, file: str) -> bool:
+        """Whether a file is in the folder that it fills."""
+        return bool(self.folder) and file.startswith(f"{self.folder}/")
 
 
 def _page(path: Path) -> None:
@@ -57,6 +71,14 @@ def _picture(path: Path) -> None:
 
 def _tables(path: Path) -> None:
     assert di.read(path).samples > 2
+
+
+def _reference(path: Path) -> None:
+    assert np.loadtxt(path, delimiter=",", skiprows=1).shape[1] == 5
+
+
+def _toml(path: Path) -> None:
+    tomllib.loads(path.read_text())
 
 
 WRITERS = {
@@ -93,12 +115,56 @@ WRITERS = {
     ),
     "experiment": Writer(
         words=("simulate", "experiment.toml", "--out", "virtual"),
-        results={"virtual/run1.csv": _tables, "virtual/study.toml": Path.read_text},
+        results={"virtual/run1.csv": _tables, "virtual/study.toml": _toml},
+        folder="virtual",
     ),
     "demo": Writer(words=("demo", "--to", "demo.html"), results={"demo.html": _page}),
+    "demo of a design": Writer(
+        words=("demo", "--design", "settled"),
+        results={"settled/study.toml": _toml, "settled/next/design.toml": _toml},
+        folder="settled",
+    ),
+    "design": Writer(
+        words=("design", "study.toml", "--starts", "1", "--harmonics", "3", "--out", "next"),
+        results={
+            "next/reference.csv": _reference,
+            "next/robot.urdf": Robot.from_file,
+            "next/experiment.toml": _toml,
+            "next/motion.html": _page,
+            "next/design.toml": _toml,
+        },
+    ),
+    "changes": Writer(
+        words=("changes", "before.json", "after.json", "--to", "old.html"),
+        results={"old.html": _page},
+    ),
+    "instruments": Writer(
+        words=("fit", "loop/study.toml", "--method", "iv", "--plot", "old.png"),
+        results={"old.png": _picture},
+    ),
+    "laws": Writer(
+        words=("explain", "law/study.toml", "--laws", "l.toml"), results={"l.toml": _toml}
+    ),
+    "open": Writer(words=("open", "study.toml", "--no-browser"), results={"study.toml": di.load}),
 }
 
-LONG = ("refit in place", "show", "explain", "report", "simulate", "experiment", "demo")
+ALIKE = {"explain --design": "design"}
+"""Options that write with the code of another writer, and take long to get there."""
+IN_PLACE = ("add study", "open study")
+"""Arguments that are written to as well as read."""
+_OF_STUDIES = ("compare", "design", "diagnose", "explain", "fit", "payload", "report", "show")
+READ = frozenset(
+    {
+        *(f"{one} study" for one in _OF_STUDIES),
+        *(f"changes {one}" for one in ("before", "after", "--study", "--effects")),
+        *(f"refit {one}" for one in ("what", "--study", "--effects", "--robot")),
+        *("check robot", "check --effects", "design --limits", "init robot"),
+        *("simulate file", "simulate --estimate"),
+    }
+)
+"""Arguments and options that name files which are read, and left as they are."""
+
+LONG = tuple(WRITERS.keys() - {"add", "fit", "refit", "init", "changes", "open"})
 """Commands that take seconds: `make test-fast` leaves them out."""
 each_writer = pytest.mark.parametrize(
     "name",
@@ -119,6 +185,47 @@ def prepare(folder: Path) -> None:
     place(folder / "experiment.toml", EXPERIMENT)
     place(folder / "old.html", "<html>\nan older page</html>")
     place(folder / "old.png", b"\x89PNG older IEND\xae\x42\x60\x82")
+    for name, text in zip(("before.json", "after.json"), _estimates(), strict=True):
+        place(folder / name, text)
+    (folder / "law").mkdir()
+    (folder / "law" / "arm.urdf").write_text(ARM)
+    for one, text in zip(("train.csv", "test.csv"), _with_a_law(), strict=True):
+        place(folder / "law" / one, text)
+    place(folder / "law" / "study.toml", STUDY.replace(*_ALL_FRICTION))
+
+
+_ALL_FRICTION = (
+    'effects = ["viscous_friction"]',
+    'effects = ["viscous_friction", "coulomb_friction"]',
+)
+
+
+@cache
+def _estimates() -> tuple[str, str]:
+    """Two estimates of the arm, from recordings of their own."""
+    with tempfile.TemporaryDirectory(prefix="kills.") as name:
+        study = di.load(write_study(Path(name)))
+        found = [di.fit(study.model, one) for one in (study.train, study.test)]
+        first, second = (one.save(Path(name) / "fit.json").read_text() for one in found)
+    return first, second
+
+
+@cache
+def _with_a_law() -> tuple[bytes, bytes]:
+    """Two recordings of an arm with a law at its elbow that no catalogue has."""
+    with tempfile.TemporaryDirectory(prefix="kills.") as name:
+        made = hidden_recordings({"c*q*load": 0.2})[:2]
+        first, second = (write(one, Path(name) / "one.csv").read_bytes() for one in made)
+    return first, second
+
+
+def _click(self: LocalServer) -> None:
+    """Do what a click on the page of `dynident open` does, in the place of waiting for one."""
+    opened = self.versions.latest()
+    effect = opened.study.model + "coulomb_friction@elbow"
+    choice = EffectChoice(effect=effect.effects[-1], group="others", words="")
+    self.versions.write([choice], opened.digest, "tab")
+    self.versions.stop()
 
 
 def content(folder: Path) -> dict[str, bytes]:
@@ -153,6 +260,7 @@ def started(
         if errors is not None:  # pytest has put streams of its own in their place
             sys.stdout = os.fdopen(1, "w", closefd=False)
             sys.stderr = os.fdopen(2, "w", closefd=False)
+        LocalServer.serve = _click
         if line is not None:
             sys.settrace(_killer(line))
         command(words)
@@ -234,7 +342,7 @@ def damage(writer: Writer, kill: Callable[[Path], int]) -> tuple[bool, list[str]
                     writer.results[file](folder / file)
                 except Exception as error:
                     lost.append(f"{file} is broken: {error}")
-            elif not hidden and not file.startswith("virtual/"):
+            elif not hidden and not writer.may_write(file):
                 lost.append(f"{file} is changed")
         if status == 0 and len(after) < len(before):
             lost.append("it said that all was well")

@@ -3,10 +3,25 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
+import click
 import pytest
 
-from hostile.kills import WRITERS, at_line, at_moment, damage, each_writer, uninterrupted
+from dynident.cli import commands, main
+from hostile.kills import (
+    ALIKE,
+    IN_PLACE,
+    READ,
+    WRITERS,
+    at_line,
+    at_moment,
+    content,
+    damage,
+    each_writer,
+    prepare,
+    uninterrupted,
+)
 
 pytestmark = [
     pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks here"),
@@ -29,3 +44,40 @@ def test_a_kill_leaves_the_old_or_the_new(name):
 def test_what_nobody_kills_is_written(name):
     files = uninterrupted(WRITERS[name]).files
     assert set(WRITERS[name].results) <= set(files)
+
+
+def test_every_command_that_writes_is_among_those_that_are_killed() -> None:
+    """Whatever names a file in a command is said to be read alone, or is written by a writer."""
+    named = {
+        f"{name} {one.opts[0]}"
+        for name, command in commands.commands.items()
+        for one in command.params
+        if isinstance(one.type, click.Path | click.File)
+    }
+    killed = {
+        f"{one.words[0]} {word}"
+        for one in WRITERS.values()
+        for word in one.words
+        if word[:2] == "--"
+    }
+    in_place = {one for one in IN_PLACE if one.split()[0] in {w.words[0] for w in WRITERS.values()}}
+    alike = {option for option, writer in ALIKE.items() if writer in WRITERS}
+    written = {one for one in killed if one in named} | in_place | alike
+    assert not written & READ
+    assert written | READ == named
+    assert commands.commands.keys() == {one.split()[0] for one in named}
+
+
+def test_commands_that_name_no_file_to_write_leave_the_folder_as_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written = {one.words[0] for one in WRITERS.values()}
+    only_read = set(commands.commands) - written
+    assert only_read == {"check", "compare", "diagnose", "payload"}
+    prepare(tmp_path)
+    before = content(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    for name in sorted(only_read):
+        with pytest.raises(SystemExit):
+            main((name, "arm.urdf" if name == "check" else "whole.toml"))
+    assert content(tmp_path) == before
