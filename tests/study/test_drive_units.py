@@ -13,6 +13,7 @@ from click.testing import CliRunner
 from dynident.cli import commands
 from dynident.errors import StudyError
 from dynident.fitting import fit
+from dynident.fitting.drive_gains import with_gain_errors
 from dynident.inertia import from_com
 from dynident.model import Model
 from dynident.recording import Recording, write
@@ -130,6 +131,32 @@ def test_a_fit_prints_the_gains_first_and_has_their_errors(tmp_path: Path) -> No
     plain = fit(made.model, made.train).sigma
     wide = np.array([one["sigma"] for one in said["parameters"]])
     assert np.all(wide >= plain * (1 - 1e-9)) and np.any(wide > 1.1 * plain)
+
+
+def test_an_explanation_and_its_report_have_the_gains_with_their_intervals(tmp_path: Path) -> None:
+    """The gains are the answer, and what rests on them holds their errors."""
+    path = written(tmp_path)
+    page = tmp_path / "report.html"
+    words = ["explain", str(path), "--most", "0", "--propose", "never", "--report", str(page)]
+    done = CliRunner().invoke(commands, words)
+    assert done.exit_code == 0, done.output
+    drives = load(path).drives
+    assert drives is not None
+    for low, high in drives.intervals:
+        between = f"{low:.4g} to {high:.4g}"
+        assert between in done.stdout and between in page.read_text()
+    said = " ".join(done.stdout.split())
+    assert "It holds the errors of the gains and loads too." in said
+    assert "What is said in N m of torques is A times these gains." in said
+
+
+def test_sigma_beside_other_effects_takes_the_gains_for_known_and_says_so(study) -> None:
+    made = study()
+    assert made.drives is not None
+    estimate = fit(made.model + "joint_spring@elbow", made.train)
+    shown = with_gain_errors(estimate, made.drives)
+    np.testing.assert_array_equal(shown.sigma, estimate.sigma)
+    assert "It takes the gains and loads for known" in shown.words_of_sigma
 
 
 @pytest.mark.parametrize("command", ["compare", "diagnose"])

@@ -186,7 +186,7 @@ def diagnosis_of(
     What the search found, torques in the unit in which they were recorded.
     """
     from dynident.diagnosis import diagnose as search
-    from dynident.diagnosis.recorded_units import in_recorded_units
+    from dynident.diagnosis.recorded_units import in_recorded_units, with_gains
 
     with progress("diagnosing") as show_progress:
         found = search(
@@ -200,7 +200,7 @@ def diagnosis_of(
             criteria=study.criteria,
             progress=show_progress,
         )
-    return in_recorded_units(found, study.drives)
+    return in_recorded_units(with_gains(found, study.drives), study.drives)
 
 
 def proposed_laws(diagnosis: Diagnosis, number: int, study: Path) -> tuple[Law, ...]:

@@ -13,7 +13,23 @@ from dynident.diagnosis.details import JointResult, Trace
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.switches import Switches
 from dynident.evidence.maps import ResidualMap
-from dynident.fitting.drive_gains import DriveGains
+from dynident.fitting.drive_gains import DriveGains, with_gain_errors
+
+
+def with_gains(diagnosis: Diagnosis, drives: DriveGains | None) -> Diagnosis:
+    """Return a diagnosis with the gains and loads that it rests on, and with their errors.
+
+    Parameters
+    ----------
+    diagnosis : of recordings that `in_newton_metres` made.
+    drives : by which it did; None where nothing had to be found.
+    """
+    if drives is None:
+        return diagnosis
+    before = with_gain_errors(diagnosis.before, drives)
+    same = diagnosis.after is diagnosis.before
+    after = before if same else with_gain_errors(diagnosis.after, drives)
+    return replace(diagnosis, drives=drives, before=before, after=after)
 
 
 def in_recorded_units(diagnosis: Diagnosis, drives: DriveGains | None) -> Diagnosis:

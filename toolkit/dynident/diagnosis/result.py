@@ -24,6 +24,7 @@ from dynident.diagnosis.proposals.proposal import Proposal
 from dynident.diagnosis.switches import Switches
 from dynident.diagnosis.track_record import JOINTS, TrackRecord, track_record
 from dynident.evidence.maps import ResidualMap
+from dynident.fitting.drive_gains import DriveGains
 from dynident.fitting.estimate import DataSource, Estimate
 from dynident.recording import RowCount
 from dynident.recording.dataset import NoiseSource
@@ -79,6 +80,8 @@ class Diagnosis(Shown):
     reversals_left_out : share of the rows, for joints whose dry friction may follow another law at
         its reversals: these rows count neither in the fit nor in the errors.
     switches : every choice among the effects added, fitted and judged, where that was asked for.
+    drives : gains by which currents became torques, and loads that were identified; None where
+        nothing had to be found.
     """
 
     verdict: Verdict
@@ -105,6 +108,7 @@ class Diagnosis(Shown):
     residual_dependence: tuple[JointDependence, ...] = ()
     reversals_left_out: Mapping[str, float] = field(default_factory=dict)
     switches: Switches | None = None
+    drives: DriveGains | None = None
 
     @property
     def best(self) -> Step | None:

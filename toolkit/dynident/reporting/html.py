@@ -187,6 +187,7 @@ def _diagnosis_page(
         remaining=remaining_table(diagnosis),
         limits=limit_table(diagnosis.detection_limits) if diagnosis.detection_limits else None,
         not_identifiable=not_identifiable_table(diagnosis),
+        drives=() if diagnosis.drives is None else diagnosis.drives.tables(),
         of_effects=replace(parameters, rows=parameters.rows[bodies:]),
         of_bodies=replace(parameters, rows=parameters.rows[:bodies], notes=()),
         fit_error=diagnosis.after.error_table(),

@@ -155,11 +155,20 @@ class DriveGains(Shown):
     def table(self) -> Table:
         """A row for each joint."""
         rows = tuple(
-            (name, number(gain), number(sigma, 2), unit, finding, f"{number(left, 3)} {self.unit}")
-            for name, gain, sigma, unit, finding, left in zip(
+            (
+                name,
+                number(gain),
+                number(sigma, 2),
+                _between(interval),
+                unit,
+                finding,
+                f"{number(left, 3)} {self.unit}",
+            )
+            for name, gain, sigma, interval, unit, finding, left in zip(
                 self.joints,
                 self.gains,
                 self.sigma,
+                self.intervals,
                 self.units,
                 self.findings,
                 self.residual_std,
@@ -167,6 +176,7 @@ class DriveGains(Shown):
             )
         )
         notes = [self.sentence, *filter(None, [self.remedy])]
+        notes.append(f"What is said in N m of torques is {self.unit} times these gains.")
         if any(len(group) > 1 for group in self.groups):
             notes.append("sigma of such a gain is that of its ratio to the mean of its group.")
         notes += self.doubts
@@ -174,7 +184,7 @@ class DriveGains(Shown):
             names = [n for n, gain in zip(self.joints, self.gains, strict=True) if gain < 0]
             what = "the recorded sign is opposite to the joint's"
             notes.append(f"A negative gain ({', '.join(names)}): {what}.")
-        columns = ("joint", "gain", "sigma", "unit", "found", "left (std)")
+        columns = ("joint", "gain", "sigma", "95 % interval", "unit", "found", "left (std)")
         return Table("Gains of the drives", columns, rows, tuple(notes))
 
     def tables(self) -> tuple[Table | str, ...]:
@@ -236,3 +246,11 @@ class DriveGains(Shown):
             )
         )
         return f"torque from {self.unit} by {said}"
+
+
+def _between(interval: np.ndarray) -> str:
+    """An interval as a table has it; a dash where there is none."""
+    if not np.isfinite(interval).all():
+        return "-"
+    low, high = (number(x) for x in interval)
+    return f"{low} to {high}"
