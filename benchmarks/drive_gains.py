@@ -108,7 +108,7 @@ def true_robot(seed: int, effects: tuple[str, ...]) -> TrueRobot:
         for joint in robot.names if name in effects else ():
             values[model.slices[f"{name}@{joint}"]] = rng.uniform(low, high)
     gains = np.exp(rng.uniform(np.log(1.0), np.log(30.0), JOINTS))
-    loads = {"": np.zeros(10), "tool": _body(rng), "crate": _body(rng)}
+    loads = {"": np.zeros(10), "tool": drawn_body(rng), "crate": drawn_body(rng)}
     return TrueRobot(model, values, described, gains, loads)
 
 
@@ -118,7 +118,8 @@ def _drawn(robot: Robot, rng: np.random.Generator) -> Robot:
     return robot.with_theta(np.concatenate(theta))
 
 
-def _body(rng: np.random.Generator) -> np.ndarray:
+def drawn_body(rng: np.random.Generator) -> np.ndarray:
+    """Parameters (10,) of a body of 1 to 3 kg."""
     return _points(rng, rng.uniform(1, 3), 0.05, rng.uniform(-0.1, 0.1, 3))
 
 
@@ -158,7 +159,7 @@ def identified(case: Case, robot: TrueRobot, data: tuple[Recording, ...]) -> Dri
     tool = to_com(robot.loads["tool"])
     known = Load(name="tool", mass=tool.mass)
     if not case.mass_only:
-        six = tuple(float(tool.inertia_com[place]) for place in _PLACES)
+        six = tuple(float(tool.inertia_com[place]) for place in INERTIA_PLACES)
         known = Load(name="tool", mass=tool.mass, centre=tuple(tool.com), inertia=six)
     loads = {"tool": known, "crate": Load(name="crate")}
     names = robot.model.robot.names
@@ -167,7 +168,7 @@ def identified(case: Case, robot: TrueRobot, data: tuple[Recording, ...]) -> Dri
     return fit_drive_gains(GainProblem(robot.told, Dataset(data), gains, used))
 
 
-_PLACES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+INERTIA_PLACES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
 def judge(case: Case, robot: TrueRobot, found: DriveGains, tally: Tally) -> None:
@@ -184,7 +185,7 @@ def judge(case: Case, robot: TrueRobot, found: DriveGains, tally: Tally) -> None
     if found.groups:
         return
     tally.masses.append(abs(crate.values[0] / truth.mass - 1))
-    inertia = [truth.inertia_com[place] for place in _PLACES]
+    inertia = [truth.inertia_com[place] for place in INERTIA_PLACES]
     tally.load += list((crate.values - [truth.mass, *truth.com, *inertia]) / crate.sigma)
     n, p = JOINTS, robot.model.size
     sigma = np.sqrt(np.diag(found.covariance)[n : n + p])
