@@ -24,6 +24,9 @@ demo: install
 # Work is stolen by the half, so that a file mostly stays with one worker and what its tests share is
 # made once. Where a worker dies its test has failed and the rest goes on; `loadfile` would hang.
 test test-fast: export OMP_NUM_THREADS = 1
+# Where an environment forbids bytecode, every worker and every process that a test begins would
+# compile the package and the tests anew.
+test test-fast: export PYTHONDONTWRITEBYTECODE =
 
 test: install
 	$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal

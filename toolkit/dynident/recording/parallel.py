@@ -204,7 +204,9 @@ class ParallelFilter:
         for group in _narrow_together(xs):
             rows = self.rows(len(group[0])) if block is None else block.rows
             flat = [np.asarray(x, dtype=float).reshape(len(x), _width(x)) for x in group]
-            together = self._filtered(flat[0] if len(flat) == 1 else np.hstack(flat), rows)
+            # Samples side by side: written and read in one piece, several times as fast.
+            joined = flat[0] if len(flat) == 1 else np.concatenate([x.T for x in flat]).T
+            together = self._filtered(joined, rows)
             parts = np.split(together, np.cumsum([_width(x) for x in group[:-1]]), axis=1)
             found += [
                 np.ascontiguousarray(part).reshape(len(rows), *x.shape[1:])
