@@ -62,8 +62,9 @@ def check_diagnosis(said: dict[str, Any], source: str) -> None:
         assert set(step) == {
             *("effect", "joint", "source", "test_error_before", "test_error_after"),
             "indistinguishable",
+            "fall_standard_error",
         }
-        assert is_place(step)
+        assert is_place(step) and number(step["fall_standard_error"], 0)
         assert number(step["test_error_before"], 0) and number(step["test_error_after"], 0)
         for other in step["indistinguishable"]:
             assert set(other) == {"effect", "joint", "source"} and is_place(other)

@@ -273,3 +273,27 @@ def test_an_estimate_is_fitted_anew_and_the_answer_says_with_what(model: Model) 
     found = find(given, Dataset(train), most=0)
     assert found.fitted_by == found.before.method != given.method
     assert any(found.fitted_by in note for note in found.joint_table().notes)
+
+
+def test_the_gain_of_a_candidate_is_the_fall_of_the_step_that_adds_it_alone() -> None:
+    """Each joint is weighted by its noise in the search; the error that is shown weights none.
+
+    Shoulder and elbow have torques of very different size: shares of both sums differ.
+    """
+    model = Model(arm()) + "viscous_friction" + "coulomb_friction"
+    found = diagnosed(model, "joint_spring@elbow", {"k__elbow": 2.5, "c__elbow": -0.4})
+    (step,) = found.steps
+    (one,) = [c for c in found.candidates if c.effect.label == step.effect.label]
+    assert one.test_gain == pytest.approx(step.fall, rel=0.01)
+    assert found.to_dict()["candidates"][0]["test_gain"] == one.test_gain
+    error = step.fall_standard_error
+    assert error is not None and 0.0 < error < 0.5 * step.fall and not step.uncertain
+    assert found.to_dict()["steps"][0]["fall_standard_error"] == error
+    tried = [c for c in found.candidates if c.test_gain is not None]
+    assert 10 <= len(tried) < len(found.candidates)
+    said = {(c["effect"], c["joint"], c["source"]): c for c in found.to_dict()["candidates"]}
+    assert all(
+        said[c.effect.name, c.effect.joint, c.effect.source]["test_gain"] == 0.0
+        for c in found.candidates
+        if c.test_gain is None
+    )

@@ -19,7 +19,7 @@ def candidates(
             effect=effect,
             status=status,
             p_value=None,
-            test_gain=0.0,
+            test_gain=None,
             values=(),
             remark=remark.format(effect.joint),
         )

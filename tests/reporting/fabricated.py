@@ -245,7 +245,7 @@ def diagnosis(
             effect=effect("rotor_inertia", joints[0]),
             status="absorbed",
             p_value=None,
-            test_gain=0.0,
+            test_gain=None,
             values=(),
             remark="Izz of the first link takes its place; "
             f"lock {joints[0]}'s gravity load to see it.",

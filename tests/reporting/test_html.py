@@ -187,7 +187,7 @@ def test_absorbed_without_a_remark_names_its_experiment(found):
     hidden = effect("rotor_inertia", "shoulder")
     only = replace(
         found,
-        candidates=(Candidate(effect=hidden, status="absorbed", p_value=None, test_gain=0.0),),
+        candidates=(Candidate(effect=hidden, status="absorbed", p_value=None, test_gain=None),),
     )
     assert hidden.advice in Elements(page(only)).text
 

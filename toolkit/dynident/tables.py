@@ -155,6 +155,13 @@ def percent(value: float | None, digits: int = 2) -> str:
     return f"{100 * value:.{digits}f} %"
 
 
+def points(value: float | None) -> str:
+    """A difference of two fractions in percentage points, a dash where there is none."""
+    if value is None or value != value:
+        return "-"
+    return f"{round(100 * value, 2) + 0.0:.2f}"
+
+
 def _print(console, table: Table) -> None:
     from rich import box
     from rich.table import Table as RichTable

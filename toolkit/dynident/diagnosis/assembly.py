@@ -6,6 +6,7 @@ effect with the experiment that would show it or distinguish it, residual maps, 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -13,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from dynident.diagnosis.advice.experiments import Adviser
+from dynident.diagnosis.candidate_gains import candidate_gains
 from dynident.diagnosis.details import Candidate, JointResult, Status, Step, TestError, Trace
 from dynident.diagnosis.detection_limits import detection_limits
 from dynident.diagnosis.nuisances.contacts import Disturbance, contact_candidates
@@ -23,13 +25,14 @@ from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.search.refusal import impossible_joints_of
 from dynident.diagnosis.search.withdrawal import Path
-from dynident.diagnosis.verdict import noise_source, notes_on, verdict_of
+from dynident.diagnosis.verdict import noise_source, notes_on, notes_on_steps, verdict_of
 from dynident.errors import FitError
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import HeldOut, on_recordings
 from dynident.evidence.maps import residual_maps
 from dynident.evidence.model_columns import rows_of_run
+from dynident.evidence.paired_falls import fall_standard_error
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import rows_of_recordings, sources_of
 from dynident.fitting.uncertainty.row_errors import row_covariance
@@ -39,6 +42,8 @@ from dynident.recording import Dataset
 from dynident.recording.dataset import NoiseSource
 from dynident.robot import base_parameters
 
+_SHOWN = 10
+"""Candidates in a table."""
 _RANK_TOLERANCE = 1e-6  # of what comes from squares, in which half of the digits are gone
 
 _METHODS: dict[NoiseSource, str] = {
@@ -98,6 +103,7 @@ def assemble(
             test_error_after=new.error,
             indistinguishable=one.indistinguishable,
             p_value=one.p_value,
+            fall_standard_error=fall_standard_error(old, new, evidence.criteria.search.set_block),
         )
         for one, stage, (old, new) in zip(path.found, stages[1:], pairwise(judged), strict=True)
     )
@@ -115,7 +121,9 @@ def assemble(
     complete, left = verdict == "nothing_missing", shares_left_out(evidence)
     limits = detection_limits(evidence, held, stages[-1], rounds[-1]) if complete else ()
     pushed = contact_candidates(given, evidence, search.disturbances)
-    first = _merged(_candidates(rounds[0], before.error, start), pushed)
+    gains = candidate_gains(rounds[0], evidence, held, start, before.error, _SHOWN)
+    first = _merged(_candidates(rounds[0], gains), pushed)
+    gains = candidate_gains(rounds[-1], evidence, held, stages[-1], after.error, 0)
     return Diagnosis(
         verdict=verdict,
         noise_source=source,
@@ -123,7 +131,7 @@ def assemble(
         test_error=TestError(before=first_error, after=after.error, noise_floor=after.floor),
         steps=steps,
         candidates=_revealed(first, evidence, start),
-        remaining=_candidates(rounds[-1], after.error, stages[-1]),
+        remaining=_candidates(rounds[-1], gains),
         before=_with_shapes(evidence, start, train),
         after=final,
         maps=residual_maps(given, before, after, evidence.criteria.maps),
@@ -132,6 +140,7 @@ def assemble(
             *notes_on(evidence, held, stages[-1], source, search.doubtful),
             *unlike_notes(evidence, held, stages[-1]),
             *rounding_notes(after, given.robot.names, evidence.criteria.verdict),
+            *notes_on_steps(steps, held),
             *path.notes,
             *search.notes,
         ),
@@ -196,22 +205,18 @@ def _joint_results(given: Model, before: HeldOut, after: HeldOut) -> tuple[Joint
     )
 
 
-def _candidates(ranking: Ranking, error: float, fitted: EvidenceFit) -> tuple[Candidate, ...]:
-    total = fitted.error_total
+def _candidates(ranking: Ranking, gains: Mapping[str, float]) -> tuple[Candidate, ...]:
     found = []
     for score, refusal in zip(ranking.scores, ranking.refusals, strict=True):
         status: Status = (
             "absorbed" if score.not_identifiable else "not_material" if refusal else "material"
         )
-        # Held out where it was cross-validated, else the drop less its price.
-        gain = score.gains.sum() if score.gains is not None else score.penalised
-        share = min(max(float(gain) / total, -1.0), 1.0) if np.isfinite(gain) else 0.0
         found.append(
             Candidate(
                 effect=score.effect,
                 status=status,
                 p_value=None if score.not_identifiable else ranking.corrected(score),
-                test_gain=error * (1.0 - float(np.sqrt(1.0 - share))),
+                test_gain=gains.get(score.effect.label),
                 values=score.values,
                 remark=refusal,
             )

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from dynident.effects import Effect
+from dynident.tables import number, points
 
 Status = Literal["material", "not_material", "absorbed"]
 
@@ -24,7 +25,8 @@ class Candidate:
         "absorbed" (not identifiable: the model's own parameters take its place in this data).
     p_value : of the hypothesis that it has no part, corrected for the number of candidates;
         None where it is not identifiable.
-    test_gain : cross-validated drop of the relative torque error if it were added.
+    test_gain : by how much the relative torque error on held-out data falls with it alone added
+        and all but the widths of dry friction fitted anew; None where that was not tried.
     values : its parameters if it were added.
     remark : which gate it does not pass, or the experiment that would show it.
     """
@@ -32,7 +34,7 @@ class Candidate:
     effect: Effect
     status: Status
     p_value: float | None
-    test_gain: float
+    test_gain: float | None
     values: tuple[float, ...] = ()
     remark: str = ""
 
@@ -59,6 +61,8 @@ class Step:
     indistinguishable : effects that are indistinguishable from it with this data.
     p_value : as in `Candidate`.
     advice : the experiment that would distinguish it from those; empty where there are none.
+    fall_standard_error : of the fall from `test_error_before` to `test_error_after`, over blocks of
+        time, see `dynident.evidence.paired_falls`; None where it is not known.
     """
 
     effect: Effect
@@ -68,6 +72,31 @@ class Step:
     indistinguishable: tuple[Effect, ...]
     p_value: float
     advice: str = ""
+    fall_standard_error: float | None = None
+
+    @property
+    def fall(self) -> float:
+        """By how much the relative torque error on the test recordings falls."""
+        return self.test_error_before - self.test_error_after
+
+    @property
+    def uncertain(self) -> bool:
+        """Whether its fall is within two standard errors: blocks of time scatter as much."""
+        error = self.fall_standard_error
+        return error is not None and self.fall <= 2.0 * error
+
+    @property
+    def fall_in_words(self) -> str:
+        """The fall in percentage points, with its standard error where that is known."""
+        if self.fall_standard_error is None:
+            return points(self.fall)
+        doubt = ", uncertain" if self.uncertain else ""
+        return f"{points(self.fall)} \u00b1 {number(100 * self.fall_standard_error, 2)}{doubt}"
+
+    def doubt(self) -> dict[str, float]:
+        """The standard error of the fall as JSON has it; empty where it is not known."""
+        error = self.fall_standard_error
+        return {} if error is None else {"fall_standard_error": error}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,12 +197,8 @@ def named_together(steps: Sequence[Step]) -> list[str]:
     What every joint has is named once, with its joints.
     """
     added = {one.effect.label for one in steps}
-    groups: dict[str, list[Step]] = {}
-    for step in steps:
-        together = step.effect.at_every_joint
-        groups.setdefault(step.effect.name if together else step.effect.label, []).append(step)
     found = []
-    for group in groups.values():
+    for group in together(steps):
         first, joints = group[0].effect, [str(one.effect.joint) for one in group]
         title = first.title
         if len(group) > 1:
@@ -181,6 +206,39 @@ def named_together(steps: Sequence[Step]) -> list[str]:
         others = [e.title for s in group for e in s.indistinguishable if e.label not in added]
         found.append(title + (f" (or {' or '.join(dict.fromkeys(others))})" if others else ""))
     return found
+
+
+def together(steps: Sequence[Step]) -> list[list[Step]]:
+    """Steps that are told as one, what every joint has; each of the others alone."""
+    groups: dict[str, list[Step]] = {}
+    for step in steps:
+        one = step.effect.at_every_joint
+        groups.setdefault(step.effect.name if one else step.effect.label, []).append(step)
+    return list(groups.values())
+
+
+def step_notes(steps: Sequence[Step]) -> tuple[str, ...]:
+    """How a table of steps is to be read; empty where no standard error is known."""
+    if all(one.fall_standard_error is None for one in steps):
+        return ()
+    uncertain = any(one.uncertain for one in steps)
+    words = " Uncertain: a fall within two standard errors." if uncertain else ""
+    return (
+        "Fall \u00b1 its standard error over blocks of time, both errors on the same blocks. That "
+        f"an effect is the best of many that were tried is not in it.{words}",
+    )
+
+
+def gain_notes(candidates: Sequence[Candidate]) -> tuple[str, ...]:
+    """What the gain in a table of candidates is, and that it is not what they stand in order of."""
+    if all(one.test_gain is None for one in candidates):
+        return ()
+    untried = any(one.test_gain is None for one in candidates)
+    return (
+        "Gain: fall of the same held-out error with this effect alone added. p, finding and order "
+        "are those of the search, on the training recordings, each joint weighted by its noise"
+        f"{'; -: not fitted with the model' if untried else ''}.",
+    )
 
 
 def place(effect: Effect) -> dict[str, str | None]:

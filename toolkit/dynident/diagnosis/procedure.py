@@ -107,8 +107,8 @@ def diagnose(
     most : effects that are added at most, one at several joints counting once; None for
         `SearchCriteria.most_effects`.
     propose : when laws are proposed for what the catalogue leaves: "unexplained", where a residual
-        beyond a known noise remains; "always", and what the residual depends on is looked for
-        whatever the verdict; "never".
+        beyond a known noise remains, and no effect of the catalogue could be added; "always", and
+        what the residual depends on is looked for whatever the verdict; "never".
     switches : "all": every choice among the effects added is fitted and judged, too, for a page
         on which they are switched on and off (`dynident.diagnosis.switches`).
     criteria : the numbers that decide the answer, see `dynident.criteria`.
@@ -349,7 +349,7 @@ def _pruned(stage: Stage, task: DiagnosisTask) -> tuple[Stage, Path]:
 
 def _judge(stage: Stage, path: Path, task: DiagnosisTask) -> Diagnosis:
     """Say what held-out data say of the path that the model has gone."""
-    reached, held = stage.proposals >= task.most > 0, _decided(stage)
+    reached, held = stage.proposals >= task.most, _decided(stage)
     search = Search(
         evidence=stage.evidence,
         path=path,
@@ -374,7 +374,8 @@ def _asks_for_laws(answer: Diagnosis, task: DiagnosisTask) -> bool:
     if task.propose == "never" or answer.impossible or not task.most:
         return False
     left = answer.verdict == "unexplained" and answer.noise_source != "unknown"
-    return left or task.propose == "always"
+    # Where its limit ended the search, what the catalogue leaves is not known yet.
+    return (left and answer.limit is None) or task.propose == "always"
 
 
 def _with_dependence(found: Diagnosis, stage: Stage, path: Path, task: DiagnosisTask) -> Diagnosis:

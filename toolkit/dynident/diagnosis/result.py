@@ -15,11 +15,13 @@ from dynident.diagnosis.details import (
     TestError,
     Trace,
     Withdrawn,
-    named_together,
+    gain_notes,
     place,
+    step_notes,
 )
 from dynident.diagnosis.detection_limits import DetectionLimit, limit_table
 from dynident.diagnosis.effect_groups import hidden_effects
+from dynident.diagnosis.leading_effects import LeadingEffects
 from dynident.diagnosis.proposals.proposal import Proposal
 from dynident.diagnosis.switches import Switches
 from dynident.diagnosis.track_record import JOINTS, TrackRecord, track_record
@@ -28,7 +30,7 @@ from dynident.fitting.drive_gains import DriveGains
 from dynident.fitting.estimate import DataSource, Estimate
 from dynident.recording import RowCount
 from dynident.recording.dataset import NoiseSource
-from dynident.tables import Shown, Table, finite, mostly_noise, number, p_value, percent
+from dynident.tables import Shown, Table, finite, mostly_noise, number, p_value, percent, points
 from dynident.wiring import Fault
 
 Verdict = Literal["nothing_missing", "explained", "unexplained"]
@@ -129,9 +131,16 @@ class Diagnosis(Shown):
         said = " ".join([self._verdict_in_words, *self.left_out_in_words])
         if self.limit is None:
             return said
+        return f"{said} {self.limit_in_words}: allow more (--most)."
+
+    @property
+    def limit_in_words(self) -> str:
+        """That the search was stopped, without a full stop; empty where it ended by itself."""
+        if self.limit is None:
+            return ""
         return (
-            f"{said} The search ended at its limit of {self.limit} additions, "
-            "and more effects are significant and relevant: allow more (--most)."
+            f"The search ended at its limit of {self.limit} additions, and more effects are "
+            "significant and relevant"
         )
 
     @property
@@ -148,7 +157,7 @@ class Diagnosis(Shown):
 
     @property
     def _verdict_in_words(self) -> str:
-        effects = ", ".join(named_together(self.steps))
+        effects = LeadingEffects.of(self.steps).in_words
         if self.impossible:
             added = f" {effects} added, but" if effects else ""
             return (
@@ -156,6 +165,8 @@ class Diagnosis(Shown):
                 f"{', '.join(self.impossible)}. Is the sign, the unit or the order of a column "
                 "wrong, or is the description another robot's?"
             )
+        if self.limit is not None and self.verdict == "unexplained":
+            return self._stopped(effects)
         if self.noise_source == "unknown" and self.verdict == "unexplained" and not effects:
             return "Effects are significant and relevant, and none was added; the noise is unknown."
         if self.noise_source == "unknown":
@@ -175,6 +186,22 @@ class Diagnosis(Shown):
                 "explains it."
             )
         return _VERDICTS[self.verdict].format(effects=effects)
+
+    def _stopped(self, effects: str) -> str:
+        """The verdict where the limit ended the search: what else the catalogue has is not known.
+
+        Parameters
+        ----------
+        effects : that were added, in words; may be empty.
+        """
+        if self.noise_source == "unknown":
+            left = "The noise is unknown."
+        else:
+            left = "A residual beyond the noise remains."
+        if not effects:
+            return left
+        before, after = percent(self.test_error.before), percent(self.test_error.after)
+        return f"Adding {effects} brings the error from {before} to {after}. {left}"
 
     @property
     def track_record(self) -> TrackRecord | None:
@@ -229,6 +256,7 @@ class Diagnosis(Shown):
                     "test_error_before": step.test_error_before,
                     "test_error_after": step.test_error_after,
                     "indistinguishable": [place(effect) for effect in step.indistinguishable],
+                    **step.doubt(),
                 }
                 for step in self.steps
             ],
@@ -237,7 +265,8 @@ class Diagnosis(Shown):
                     **place(c.effect),
                     "status": c.status,
                     "p_value": c.p_value,
-                    "test_gain": c.test_gain,
+                    # A number always, as others rely on: none was shown where none was tried.
+                    "test_gain": c.test_gain or 0.0,
                 }
                 for c in self.candidates
             ],
@@ -333,13 +362,14 @@ class Diagnosis(Shown):
             (
                 c.effect.label,
                 p_value(c.p_value),
-                f"{round(100 * c.test_gain, 2) + 0.0:.2f}",
+                points(c.test_gain),
                 c.finding,
             )
             for c in shown
         )
         hidden = hidden_effects(self.candidates, len(self.joints))
-        notes = tuple(f"Not identifiable: {one.title}. {one.remark}" for one in hidden)
+        unseen = (f"Not identifiable: {one.title}. {one.remark}" for one in hidden)
+        notes = (*gain_notes(shown), *unseen)
         columns = ("effect", "p", "gain, points", "finding")
         return Table("Candidates, tried on the model as given", columns, rows, notes)
 
@@ -350,12 +380,19 @@ class Diagnosis(Shown):
                 step.effect.label,
                 percent(step.test_error_before),
                 percent(step.test_error_after),
+                step.fall_in_words,
                 ", ".join(self._alternatives(step)) or "none",
             )
             for step in self.steps
         )
-        columns = ("effect added", "held-out error before", "after", "cannot be told from")
-        return Table("Effects added", columns, rows)
+        columns = (
+            "effect added",
+            "held-out error before",
+            "after",
+            "fall, points",
+            "cannot be told from",
+        )
+        return Table("Effects added", columns, rows, step_notes(self.steps))
 
     def _alternatives(self, step: Step) -> list[str]:
         # Two effects that share a column may both be added: then only that column is in doubt.

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
 from dynident.criteria import VerdictCriteria
+from dynident.diagnosis.details import Step
 from dynident.diagnosis.nuisances.friction_width import friction_width_notes
 from dynident.diagnosis.nuisances.sticking import sticking_notes
 from dynident.diagnosis.result import Verdict
@@ -59,6 +60,30 @@ def noise_source(evidence: Evidence, held: Evidence | None) -> NoiseSource:
     if "repeated" in kinds:
         return "replicates"
     return "given" if "noise_augmented" in kinds else "unknown"
+
+
+def notes_on_steps(steps: Sequence[Step], held: Evidence | None) -> tuple[str, ...]:
+    """Return what is doubtful of the falls of a path, in plain words.
+
+    Parameters
+    ----------
+    steps : the effects added.
+    held : of the test recordings; None where blocks of time are held out.
+    """
+    notes = []
+    if steps and held is None:
+        notes.append(
+            "The held-out blocks of time that judge the effects helped to choose them, too: the "
+            "error with them may be a little too low. Test recordings would judge them afresh."
+        )
+    uncertain = [one.effect.title for one in steps if one.uncertain]
+    if uncertain:
+        falls = "the fall with it is" if len(uncertain) == 1 else "the fall with each is"
+        notes.append(
+            f"{', '.join(uncertain)}: {falls} within two standard errors over "
+            "blocks of time, and may be chance."
+        )
+    return tuple(notes)
 
 
 def notes_on(

@@ -24,6 +24,8 @@ class HeldOutRun:
     Attributes
     ----------
     certain : (T, n) mask of the rows by which a joint is judged: its dry friction is known.
+    block : (T,) number of the block of time that each row is in; None where they are not cut into
+        any.
     """
 
     name: str
@@ -34,6 +36,7 @@ class HeldOutRun:
     a: np.ndarray
     measured: np.ndarray
     predicted: np.ndarray
+    block: np.ndarray | None = None
 
     @property
     def residual(self) -> np.ndarray:
@@ -123,6 +126,7 @@ def on_recordings(evidence: Evidence, fitted: EvidenceFit | Estimate) -> HeldOut
                 a=first.a[kept],
                 measured=first.tau[kept],
                 predicted=predicted[kept],
+                block=run.block_of_rows[kept],
             )
         )
         folded.append(np.stack([run.fold(one) for one in left], axis=-1))
@@ -159,6 +163,7 @@ def on_blocks(evidence: Evidence, fitted: EvidenceFit) -> HeldOut:
                 a=first.a[rows],
                 measured=tau,
                 predicted=tau - misfit,
+                block=run.block_of_rows[rows],
             )
         )
         folded.append(residual)

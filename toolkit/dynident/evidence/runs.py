@@ -113,6 +113,18 @@ class Run:
         return whole if self.left_out is None else ~self.left_out
 
     @property
+    def block_of_rows(self) -> np.ndarray:
+        """The block of instants, by number, that each row is in, (T,); all its repetitions alike.
+
+        Rows before the first instant and after the last one are in the block that is next to them.
+        """
+        blocks = np.repeat(np.arange(len(self.edges) - 1), np.diff(self.edges))
+        rows, first = np.unique(self.index, return_index=True)
+        of_rows = blocks[first % self.index.shape[1]]
+        near = np.searchsorted(rows, np.arange(len(self.replicates[0].t)), side="right") - 1
+        return of_rows[np.maximum(near, 0)]
+
+    @property
     def recording(self) -> Recording:
         """The recording itself."""
         return self.replicates[0].recording

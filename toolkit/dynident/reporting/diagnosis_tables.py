@@ -14,13 +14,13 @@ from pathlib import Path
 from dynident import files
 from dynident.batch import evaluations
 from dynident.closed_loop import loop_evaluations
-from dynident.diagnosis.details import Candidate, Step
+from dynident.diagnosis.details import Candidate, Step, gain_notes, step_notes
 from dynident.diagnosis.effect_groups import hidden_effects
 from dynident.diagnosis.proposals.proposal import Proposal
 from dynident.diagnosis.result import Diagnosis
 from dynident.reporting.content import first_set
 from dynident.reporting.joint_states import states
-from dynident.tables import Table, number, p_value, percent
+from dynident.tables import Table, number, p_value, percent, points
 
 
 def joint_table(diagnosis: Diagnosis) -> Table:
@@ -71,6 +71,7 @@ def step_table(diagnosis: Diagnosis) -> Table:
             _values(diagnosis, step),
             percent(step.test_error_before),
             percent(step.test_error_after),
+            step.fall_in_words,
             p_value(step.p_value),
             ", ".join(effect.title for effect in step.indistinguishable) or "nothing",
         )
@@ -82,10 +83,11 @@ def step_table(diagnosis: Diagnosis) -> Table:
         "values when added",
         "error before",
         "error after",
+        "fall, points",
         "p",
         "cannot be told from",
     )
-    return Table("Effects added, in order", columns, rows)
+    return Table("Effects added, in order", columns, rows, step_notes(diagnosis.steps))
 
 
 def _values(diagnosis: Diagnosis, step: Step) -> str:
@@ -109,13 +111,14 @@ def candidate_table(diagnosis: Diagnosis, shown: tuple[Candidate, ...]) -> Table
         (
             ("\u2503 " if c.effect.label in bracketed else "") + c.effect.title,
             p_value(c.p_value),
-            f"{round(100 * c.test_gain, 2) + 0.0:.2f}",
+            points(c.test_gain),
             "added" if c.effect.label in added else c.finding,
         )
         for c in shown
     )
     columns = ("effect", "p", "gain, points", "finding")
-    notes = ("\u2503 These cannot be told apart with this data.",) if bracketed else ()
+    told = ("\u2503 These cannot be told apart with this data.",) if bracketed else ()
+    notes = (*told, *gain_notes(shown))
     return Table("Candidates, tried on the model as given", columns, rows, notes)
 
 

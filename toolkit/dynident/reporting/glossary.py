@@ -21,14 +21,20 @@ _SHOWS: dict[str, str] = {
 _CONCEPTS: dict[str, str] = {
     "95 % interval": "where the true value lies in 19 of 20 such studies, if the model lacks "
     "nothing; the note below the table says what these intervals hold.",
-    "gain": "by how many percentage points the torque error on held-out blocks of time would fall "
-    "with an effect added.",
-    "held out": "not used by any fit: a model is judged on motions that it has not seen.",
+    "fall": "of a step: by how many percentage points the torque error on held-out data falls when "
+    "the effect is added to those before it; with its standard error over blocks of time. It is "
+    "uncertain where it is within two of these.",
+    "gain": "of a candidate: by how many percentage points the same error falls when it is added "
+    "alone to the model, and all but the widths of dry friction is fitted anew. What two "
+    "candidates share is in the gain of both: gains do not add up.",
+    "held out": "not used by the fit that is judged: test recordings; without any, each block of "
+    "time of the recordings, predicted by a fit to all others.",
     "noise floor": "the torque error that noise alone would make; no model can get below it.",
-    "p": "how probable so large a gain would be by chance, all candidates counted.",
+    "p": "how probable it is that an effect which has no part explains so much of the training "
+    "recordings, all candidates counted.",
     "residual": "measured less predicted torque.",
     "significant and relevant": "of an effect: too large for chance, large enough to matter, and "
-    "of use on held-out blocks of time.",
+    "of use on blocks of time of the training recordings that were held out in turn.",
     "systematic / noise": "the part of the residual that repeats over the part that does not, root "
     "mean squares; below 0.3 it does not matter.",
     "torque error": "size (root mean square) of the residual over the size of the torque.",

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from dynident.diagnosis.effect_groups import in_words
+from dynident.diagnosis.leading_effects import LeadingEffects
 from dynident.diagnosis.result import Diagnosis
 from dynident.reporting.content import step_groups
 from dynident.tables import percent
@@ -14,6 +16,8 @@ Mark = Literal["\u2713", "!", "?"]
 
 _COLOURS: dict[Mark, str] = {"\u2713": "nothing_missing", "!": "unexplained", "?": "unknown"}
 _WITHIN, _SMALLER = "within the noise", "smaller than the noise, though not nothing"
+_MOST_NAMED = 2
+"""Effects that the sentence names."""
 _NOT_KNOWN = "The noise is unknown, so more may be missing."
 
 
@@ -56,7 +60,7 @@ def headline(diagnosis: Diagnosis) -> Headline:
         found = Headline(mark, found.title, said)
     if diagnosis.limit is None:
         return found
-    said = f"{found.sentence} The search ended at its limit of {diagnosis.limit} additions."
+    said = f"{found.sentence} {diagnosis.limit_in_words}."
     return Headline(found.mark, found.title, said)
 
 
@@ -65,15 +69,27 @@ def _of_verdict(diagnosis: Diagnosis) -> Headline:
     known = diagnosis.noise_source != "unknown"
     if not diagnosis.steps:
         return _nothing_added(diagnosis, known)
-    count = len(diagnosis.steps)
-    title = f"{count} effects found" if count > 1 else "one effect found"
+    title, stopped = _title(diagnosis), diagnosis.limit is not None
     if not known:
-        more = " More effects are significant." if diagnosis.verdict == "unexplained" else ""
+        more = diagnosis.verdict == "unexplained" and not stopped
+        more = " More effects are significant." if more else ""
         return Headline("?", f"{title}, noise unknown", f"{added} {fall}.{more} {_NOT_KNOWN}")
     if diagnosis.verdict == "unexplained":
-        said = f"{added} {fall}, and a residual beyond the noise remains unexplained."
+        none = "" if stopped else " unexplained"
+        said = f"{added} {fall}, and a residual beyond the noise remains{none}."
         return Headline("!", f"{title}, a residual remains", said)
     return Headline("\u2713", title, f"{added} {fall}; what remains is {_rest(diagnosis)}.")
+
+
+def _title(diagnosis: Diagnosis) -> str:
+    """How many effects were found, and how many of them carry most of the fall."""
+    count, found = len(diagnosis.steps), LeadingEffects.of(diagnosis.steps)
+    if count == 1:
+        return "one effect found"
+    if not found.smaller:
+        return f"{count} effects found"
+    main = len(found.leading)
+    return f"{in_words(main)} main effect{'s' if main > 1 else ''} found"
 
 
 def _rest(diagnosis: Diagnosis) -> str:
@@ -84,9 +100,8 @@ def _rest(diagnosis: Diagnosis) -> str:
 def _nothing_added(diagnosis: Diagnosis, known: bool) -> Headline:
     if diagnosis.verdict == "unexplained":
         if known:
-            said = (
-                "A residual beyond the noise remains, and no effect of the catalogue explains it."
-            )
+            none = ", and no effect of the catalogue explains it"
+            said = f"A residual beyond the noise remains{none if diagnosis.limit is None else ''}."
             return Headline("!", "a residual remains", said)
         said = f"Effects are significant, and none was added. {_NOT_KNOWN}"
         return Headline("?", "nothing added, noise unknown", said)
@@ -101,13 +116,23 @@ def _nothing_added(diagnosis: Diagnosis, known: bool) -> Headline:
 
 
 def _added(diagnosis: Diagnosis) -> str:
-    groups = step_groups(diagnosis)
+    groups, found = step_groups(diagnosis), LeadingEffects.of(diagnosis.steps)
+    count = len(diagnosis.steps)
+    if found.smaller:
+        main, names = len(found.leading), " and ".join(found.names)
+        named = _capitalised(names) if main <= _MOST_NAMED else f"{main} effects"
+        verb = "carries" if main == 1 else "carry"
+        return f"{named} {verb} {found.carried} by which {count} effects take"
     if len(groups) != 1:
-        return f"{len(diagnosis.steps)} effects take"
+        return f"{count} effects take"
     only = groups[0]
     others = " or ".join(dict.fromkeys(one.title for one in only.others))
-    name = f"{only.title[0].upper()}{only.title[1:]}"
+    name = _capitalised(only.title)
     return f"{name} (or {others}) takes" if others else f"{name} takes"
+
+
+def _capitalised(words: str) -> str:
+    return f"{words[0].upper()}{words[1:]}"
 
 
 def _fall(diagnosis: Diagnosis) -> str:

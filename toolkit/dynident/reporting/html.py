@@ -146,7 +146,7 @@ def _diagnosis_page(
         figures["switch"] = switch.figure
     if len(diagnosis.joints) > 1:
         figures["joints"] = joint_errors(diagnosis)
-    if ranked(diagnosis):
+    if any(one.test_gain is not None for one in ranked(diagnosis)):
         figures["ranking"] = pictures.ranking(diagnosis)
     for name, trace in zip(names, diagnosis.traces, strict=True):
         figures[name] = pictures.measured_and_predicted(diagnosis, trace, points)
@@ -183,6 +183,7 @@ def _diagnosis_page(
         thinned=any(len(trace.t) > points for trace in diagnosis.traces),
         joint_maps=joint_maps,
         candidates=candidate_table(diagnosis, ranked(diagnosis)),
+        gains="ranking" in figures,
         weaker=candidate_table(diagnosis, ranked(diagnosis, len(diagnosis.candidates))[10:]),
         remaining=remaining_table(diagnosis),
         limits=limit_table(diagnosis.detection_limits) if diagnosis.detection_limits else None,

@@ -34,7 +34,10 @@ def next_steps(diagnosis: Diagnosis) -> tuple[Advice, ...]:
     if diagnosis.wiring:
         return tuple(_to_mend(fault) for fault in diagnosis.wiring)
     found = _to_add(diagnosis)
-    if diagnosis.verdict == "unexplained" and diagnosis.noise_source != "unknown":
+    if diagnosis.limit is not None:
+        what = "Allow the search more additions (--most)."
+        found.append(Advice(what, f"{diagnosis.limit_in_words}."))
+    elif diagnosis.verdict == "unexplained" and diagnosis.noise_source != "unknown":
         found.append(_unexplained(diagnosis))
     if diagnosis.noise_source == "unknown":
         found.append(_to_repeat(diagnosis))

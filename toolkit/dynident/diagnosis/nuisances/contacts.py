@@ -219,7 +219,7 @@ def contact_candidates(
                     effect=effect,
                     status="not_material",
                     p_value=1.0,
-                    test_gain=0.0,
+                    test_gain=None,
                     remark="no burst differs from one repetition to another",
                 )
             )
@@ -229,7 +229,7 @@ def contact_candidates(
                     effect=effect,
                     status="absorbed",
                     p_value=None,
-                    test_gain=0.0,
+                    test_gain=None,
                     remark=effect.advice,
                 )
             )

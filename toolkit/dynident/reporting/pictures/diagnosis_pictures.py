@@ -101,11 +101,13 @@ def _text_place(row: Bar, widest: float) -> str:
 
 
 def ranking(diagnosis: Diagnosis, most: int = 10) -> go.Figure:
-    """Candidates by how far each would bring the held-out error down, best at the top.
+    """Candidates by how far each alone brings the held-out error down, in the search's order.
 
-    Those that the data cannot tell apart from the first effect added are bracketed.
+    Those that were not tried so are not drawn. Those that the data cannot tell apart from the first
+    effect added are bracketed.
     """
-    shown = ranked(diagnosis, most)
+    drawn = [(c, 100 * c.test_gain) for c in ranked(diagnosis, most) if c.test_gain is not None]
+    shown, gains = [c for c, _ in drawn], [gain for _, gain in drawn]
     figure = go.Figure()
     for status, name, symbol in (
         ("material", "significant and relevant", "circle"),
@@ -115,7 +117,7 @@ def ranking(diagnosis: Diagnosis, most: int = 10) -> go.Figure:
         colour = AFTER_COLOUR if status == "material" else GREY
         figure.add_trace(
             go.Scatter(
-                x=[100 * shown[i].test_gain for i in rows],
+                x=[gains[i] for i in rows],
                 y=rows,
                 mode="markers",
                 name=name,
@@ -126,14 +128,12 @@ def ranking(diagnosis: Diagnosis, most: int = 10) -> go.Figure:
         )
         for i in rows:
             stem = {"color": colour, "width": 2}
-            x1 = 100 * shown[i].test_gain
-            figure.add_shape(type="line", x0=0, x1=x1, y0=i, y1=i, line=stem, layer="below")
+            figure.add_shape(type="line", x0=0, x1=gains[i], y0=i, y1=i, line=stem, layer="below")
     members = [i for i, c in enumerate(shown) if c.effect.label in first_set(diagnosis)]
     if len(members) > 1:
         _bracket(figure, members)
-    figure.update_xaxes(
-        title="held-out error would fall by (points)", zeroline=True, fixedrange=True
-    )
+    title = "gain: fall of held-out error with it alone (points)"
+    figure.update_xaxes(title=title, zeroline=True, fixedrange=True)
     figure.update_yaxes(
         tickvals=list(range(len(shown))),
         ticktext=["<br>".join(plain(line) for line in wrapped(c.effect.title)) for c in shown],

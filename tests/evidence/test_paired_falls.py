@@ -1,0 +1,110 @@
+"""The standard error of a fall of the held-out error is its scatter over recordings like these."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dynident.criteria import DEFAULTS
+from dynident.evidence.held_out import HeldOut, HeldOutRun
+from dynident.evidence.paired_falls import fall_standard_error
+from dynident.evidence.runs import gather
+from dynident.model import Model
+from dynident.recording import Dataset
+from synthetic import arm, synthetic, true_values
+
+BLOCKS, ROWS = 20, 40
+
+
+def judged(measured: np.ndarray, residual: np.ndarray) -> HeldOut:
+    """What a model that leaves this (T, 2) residual misses of the torque, in equal blocks."""
+    rows = len(measured)
+    run = HeldOutRun(
+        name="run",
+        certain=np.ones(measured.shape, dtype=bool),
+        t=np.arange(rows) * 0.01,
+        q=measured,
+        v=measured,
+        a=measured,
+        measured=measured,
+        predicted=measured - residual,
+        block=np.arange(rows) * BLOCKS // rows,
+    )
+    return HeldOut(runs=(run,), noise_std=None, ratio=None, least_ratio=None, inflation=np.ones(2))
+
+
+def slow(stream: np.random.Generator, memory: float) -> np.ndarray:
+    """First-order noise (T, 2) of unit variance, which forgets within `memory` rows."""
+    kept = np.exp(-1.0 / memory) if memory else 0.0
+    white = stream.standard_normal((BLOCKS * ROWS, 2))
+    found = white.copy()
+    for k in range(1, len(found)):
+        found[k] = kept * found[k - 1] + np.sqrt(1.0 - kept**2) * white[k]
+    return found
+
+
+def pair(seed: int, memory: float, missing: float) -> tuple[HeldOut, HeldOut]:
+    """A model that lacks an effect, and the one with it: both have what is left in common."""
+    stream = np.random.default_rng(seed)
+    torque, shape, rest = (slow(stream, memory) for _ in range(3))
+    torque = torque * [20.0, 3.0]
+    rest = rest * (1.0 + np.abs(torque) / 10.0)
+    before, after = missing * shape + rest, 0.1 * missing * shape + rest
+    return judged(torque, before), judged(torque, after)
+
+
+@pytest.mark.parametrize("memory", [0.0, 12.0])
+@pytest.mark.parametrize("missing", [0.3, 3.0])
+def test_it_is_the_scatter_of_the_fall(memory: float, missing: float) -> None:
+    """Over 300 records, of residuals that blocks share with their neighbours, too."""
+    pairs = [pair(seed, memory, missing) for seed in range(300)]
+    falls = np.array([before.error - after.error for before, after in pairs])
+    told = np.array([fall_standard_error(*both, together=2) or np.nan for both in pairs])
+    assert np.sqrt(np.mean(told**2)) == pytest.approx(falls.std(), rel=0.2)
+    covered = np.abs(falls - falls.mean()) <= 2.0 * told
+    assert 0.88 < covered.mean() <= 0.99
+
+
+def test_errors_are_paired() -> None:
+    """What is as hard for both models is no doubt about their difference."""
+    before, after = pair(7, 0.0, 0.3)
+    again = judged(before.runs[0].measured, before.runs[0].residual)
+    assert fall_standard_error(before, again, together=2) == pytest.approx(0.0, abs=1e-15)
+    known = fall_standard_error(before, after, together=2)
+    errors = [
+        fall_standard_error(
+            judged(one.runs[0].measured, 0.0 * before.runs[0].residual), one, together=2
+        )
+        for one in (before, after)
+    ]
+    assert known is not None and all(known < 0.5 * (one or 0.0) for one in errors)
+
+
+def test_a_few_blocks_tell_no_standard_error() -> None:
+    before, after = pair(7, 0.0, 0.3)
+    runs = [one.runs[0] for one in (before, after)]
+    few = [
+        HeldOut(
+            runs=(HeldOutRun(**{**vars(run), "block": run.block * 3 // BLOCKS}),),
+            noise_std=None,
+            ratio=None,
+            least_ratio=None,
+            inflation=np.ones(2),
+        )
+        for run in runs
+        if run.block is not None
+    ]
+    assert fall_standard_error(*few, together=2) is None
+
+
+@pytest.mark.parametrize("period", [None, 8.0])
+def test_repetitions_of_an_instant_are_in_one_block(period: float | None) -> None:
+    model = Model(arm()) + "viscous_friction"
+    truth = true_values(model, Fv__shoulder=1.2, Fv__elbow=0.5)
+    recording = synthetic(model, truth, 0, rate_hz=250.0, torque_std=0.3).replace(period=period)
+    (run,) = gather(Dataset((recording,)), DEFAULTS.noise)
+    blocks = run.block_of_rows
+    assert blocks.shape == run.replicates[0].t.shape
+    for repetition in run.index:
+        for number, (start, stop) in enumerate(zip(run.edges[:-1], run.edges[1:], strict=True)):
+            assert np.all(blocks[repetition[start:stop]] == number)

@@ -1,0 +1,72 @@
+"""Which of the effects added carry the fall of the held-out error, and which are small beside them.
+
+Effects that every joint has and that were added together count as one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from dynident.diagnosis.details import Step, named_together, together
+from dynident.diagnosis.effect_groups import in_words
+from dynident.tables import points
+
+MOST_OF_IT = 0.9
+"""Share of the whole fall that the effects which lead a verdict carry together, at least."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeadingEffects:
+    """The fewest effects that carry most of the fall, and the rest.
+
+    Attributes
+    ----------
+    leading, smaller : one or more steps each, in the order in which they were added; without
+        smaller ones all effects are needed to carry so much.
+    """
+
+    leading: tuple[tuple[Step, ...], ...]
+    smaller: tuple[tuple[Step, ...], ...]
+
+    @classmethod
+    def of(cls, steps: Sequence[Step]) -> LeadingEffects:
+        """Divide the effects of a path: the largest falls first, until they make most of it."""
+        groups = [tuple(group) for group in together(steps)]
+        falls = [_fall(group) for group in groups]
+        order = sorted(range(len(groups)), key=lambda k: -falls[k])
+        many, carried = 0, 0.0
+        while many < len(groups) and (many == 0 or carried < MOST_OF_IT * sum(falls)):
+            carried += falls[order[many]]
+            many += 1
+        first, last = sorted(order[:many]), sorted(order[many:])
+        return cls(leading=tuple(groups[k] for k in first), smaller=tuple(groups[k] for k in last))
+
+    @property
+    def carried(self) -> str:
+        """How much of the fall the leading ones make, as "7.06 of the 7.60 points"."""
+        own = sum(map(_fall, self.leading))
+        return f"{points(own)} of the {points(own + sum(map(_fall, self.smaller)))} points"
+
+    @property
+    def in_words(self) -> str:
+        """The effects with everything that cannot be told from them, those that lead first."""
+        named = ", ".join(self.names)
+        if not self.smaller:
+            return named
+        count = len(self.smaller)
+        others = ", ".join(named_together([step for group in self.smaller for step in group]))
+        return (
+            f"{named} ({self.carried} by which the held-out error falls) and {in_words(count)} "
+            f"smaller {'one' if count == 1 else 'ones'} "
+            f"({points(sum(map(_fall, self.smaller)))} points: {others})"
+        )
+
+    @property
+    def names(self) -> list[str]:
+        """Each of the leading ones with what cannot be told from it."""
+        return named_together([step for group in self.leading for step in group])
+
+
+def _fall(group: Sequence[Step]) -> float:
+    return sum(step.fall for step in group)

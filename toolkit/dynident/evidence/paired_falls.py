@@ -1,0 +1,64 @@
+"""By how much the held-out error falls from one model to another, and how sure that is.
+
+Both models are judged on the same rows, and what is hard to predict is so for both: their errors
+are paired, block of time by block of time, and the standard error is that of the difference.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.evidence.held_out import HeldOut
+
+
+def fall_standard_error(before: HeldOut, after: HeldOut, together: int) -> float | None:
+    """Return the standard error of the fall `before.error - after.error`.
+
+    By the jackknife over blocks of time, neighbours left out together, as what is left of one goes
+    on in the next (H. R. Kuensch, "The jackknife and the bootstrap for general stationary
+    observations", Annals of Statistics 17 (1989)). It is the scatter over the blocks judged: how
+    uncertain the fits are, and that an effect was chosen among many, is no part of it.
+
+    Parameters
+    ----------
+    before, after : two models on the same rows.
+    together : consecutive blocks that are left out at a time.
+
+    Returns
+    -------
+    Of the relative torque error, as `HeldOut.error`; None with fewer blocks than two such lots.
+    """
+    rows, torque, old = _sums(before)
+    _, _, new = _sums(after)
+    count = len(rows)
+    if count < max(2 * together, 3):
+        return None
+    left = np.maximum(_without(rows, together), 1)
+    each = (np.sum(_without(one, together) / left, axis=1) for one in (torque, old, new))
+    whole, given, wider = each
+    if not np.all(whole > 0):
+        return None
+    falls = np.sqrt(given / whole) - np.sqrt(wider / whole)
+    return float(np.sqrt((count - together) / together * np.var(falls)))
+
+
+def _without(summed: np.ndarray, together: int) -> np.ndarray:
+    """Sums over all blocks but a lot of consecutive ones, from each block on, (B, n)."""
+    lots = np.sum([np.roll(summed, -k, axis=0) for k in range(together)], axis=0)
+    return summed.sum(axis=0) - lots
+
+
+def _sums(judged: HeldOut) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows that count, and squares of torque and residual over them, in each block, (B, n) each."""
+    found = []
+    for run in judged.runs:
+        if run.block is None:
+            continue
+        squares = (np.ones_like(run.measured), run.measured**2, run.residual**2)
+        counted = [np.where(run.certain, one, 0.0) for one in squares]
+        for block in np.unique(run.block):
+            found.append([one[run.block == block].sum(axis=0) for one in counted])
+    n = judged.runs[0].measured.shape[1]
+    rows, torque, left = np.moveaxis(np.array(found).reshape(-1, 3, n), 1, 0)
+    kept = rows.any(axis=1)
+    return rows[kept], torque[kept], left[kept]
