@@ -137,9 +137,7 @@ def value_table(estimate: Estimate, labels: Sequence[str], impossible: Sequence[
                     _row(model.names[i], float(estimate.values[i]), sigma[i], model.units[i])
                 )
             for shape in estimate.shapes:
-                if shape.name in [
-                    effect.parameter_name(one.name) for one in effect.shape_parameters(model.robot)
-                ]:
+                if shape.name in model.shape_names[effect.label]:
                     rows.append(_row(shape.name, shape.value, shape.sigma, shape.unit))
     notes = [estimate.headline] if estimate.headline else []
     if impossible:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -137,19 +137,50 @@ class ParametrisedRobot:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of the parameters, those of effects as `Fv@joint`."""
-        return (*(self.base.names[i] for i in self.base.independent), *self._of_effects("name"))
+        """Names of the parameters, those of effects as `Fv@joint`; no two alike."""
+        rigid = (self.base.names[i] for i in self.base.independent)
+        return (*rigid, *self._effect_names)
+
+    @cached_property
+    def _effect_names(self) -> tuple[str, ...]:
+        linear, _ = self._names_by_effect
+        return tuple(name for names in linear.values() for name in names)
+
+    @property
+    def shape_names(self) -> Mapping[str, tuple[str, ...]]:
+        """Names of the parameters inside each effect, by its label; as `names`, no two alike."""
+        return self._names_by_effect[1]
+
+    @cached_property
+    def _names_by_effect(self) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:
+        """Names of linear parameters and of those inside, by the labels of the effects.
+
+        Where a name is taken, by another effect at the same joint, that of the effect stands before
+        it: `torque_ripple.k@elbow` beside the `k@elbow` of a spring.
+        """
+        linear, inside = {}, {}
+        taken: set[str] = set()
+        for found, parameters in (
+            (linear, [effect.parameters(self.robot) for effect in self.effects]),
+            (inside, [effect.shape_parameters(self.robot) for effect in self.effects]),
+        ):
+            for effect, each in zip(self.effects, parameters, strict=True):
+                names = [effect.parameter_name(one.name) for one in each]
+                names = [f"{effect.name}.{one}" if one in taken else one for one in names]
+                found[effect.label] = tuple(names)
+                taken |= set(names)
+        return linear, inside
 
     @cached_property
     def expressions(self) -> tuple[str, ...]:
         """Each parameter as a combination of standard parameters."""
-        return (*self.base.expressions, *self._of_effects("name"))
+        return (*self.base.expressions, *self._effect_names)
 
     @cached_property
     def units(self) -> tuple[str, ...]:
         """Unit of each parameter."""
         rigid = (self.robot.parameter_units[i] for i in self.base.independent)
-        return (*rigid, *self._of_effects("unit"))
+        return (*rigid, *(p.unit for e in self.effects for p in e.parameters(self.robot)))
 
     @cached_property
     def slices(self) -> dict[str, slice]:
@@ -224,14 +255,6 @@ class ParametrisedRobot:
         loads = (found[self.slices[e.label]] for e in self.effects if e.linear_in_torque)
         shares = np.concatenate([np.zeros(1), *loads])
         return at + 2.0 / max(2.0 + shares.min() + shares.max(), 0.1) * (found - at)
-
-    def _of_effects(self, attribute: str) -> tuple[str, ...]:
-        found = []
-        for effect in self.effects:
-            for parameter in effect.parameters(self.robot):
-                value = str(getattr(parameter, attribute))
-                found.append(effect.parameter_name(value) if attribute == "name" else value)
-        return tuple(found)
 
     # --- the robot that the parameters describe -------------------------------------------------
 

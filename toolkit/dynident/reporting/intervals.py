@@ -137,10 +137,10 @@ def _placed(means: str, effect: Effect) -> str:
 
 
 def _shape_rows(estimate: Estimate) -> list[tuple[str, ...]]:
-    robot = estimate.model.robot
+    model = estimate.model
     return [
         (
-            effect.parameter_name(one.name),
+            name,
             _placed(one.means, effect),
             number(x, 4),
             "-",
@@ -148,8 +148,13 @@ def _shape_rows(estimate: Estimate) -> list[tuple[str, ...]]:
             one.unit,
             "",
         )
-        for effect in estimate.model.effects
-        for one, x in zip(effect.shape_parameters(robot), effect.shape, strict=False)
+        for effect in model.effects
+        for name, one, x in zip(
+            model.shape_names[effect.label],
+            effect.shape_parameters(model.robot),
+            effect.shape,
+            strict=False,
+        )
     ]
 
 

@@ -91,7 +91,7 @@ def lone_parameters(estimate: Estimate, labels: tuple[str, ...]) -> tuple[LonePa
                     sigma=float(estimate.sigma[i]),
                 )
             )
-        shapes = {effect.parameter_name(s.name) for s in effect.shape_parameters(model.robot)}
+        shapes = model.shape_names[effect.label]
         found += [
             LoneParameter(
                 effect=effect.label,

@@ -64,10 +64,11 @@ def with_shape_errors(
     for effect in shaped:
         parameters = effect.shape_parameters(robot)
         each = sigma.get(effect.label, np.full(len(parameters), np.nan))
-        for parameter, value, one in zip(parameters, effect.shape, each, strict=True):
+        names = model.shape_names[effect.label]
+        for name, parameter, value, one in zip(names, parameters, effect.shape, each, strict=True):
             found.append(
                 ShapeValue(
-                    name=effect.parameter_name(parameter.name),
+                    name=name,
                     value=value,
                     sigma=float(one * parameter.slope(value)),
                     unit=parameter.unit,
