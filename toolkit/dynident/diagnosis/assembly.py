@@ -134,7 +134,7 @@ def assemble(
         remaining=_candidates(rounds[-1], gains),
         before=_with_shapes(evidence, start, train),
         after=final,
-        maps=residual_maps(given, before, after, evidence.criteria.maps),
+        maps=residual_maps(given, before, after, evidence.criteria),
         traces=_traces(given, before, after),
         notes=(
             *notes_on(evidence, held, stages[-1], source, search.doubtful),

@@ -353,7 +353,31 @@ class Diagnosis(Shown):
     def map_table(self) -> Table:
         """Where the model fails, one sentence for each thing seen."""
         seen = tuple((m.joint, m.against, m.sentence) for m in self.maps if m.sentence)
-        return Table("Where the given model fails", ("joint", "against", "what is seen"), seen)
+        notes = (self.silent_maps,) if self.silent_maps else ()
+        return Table(
+            "Where the given model fails", ("joint", "against", "what is seen"), seen, notes
+        )
+
+    @property
+    def silent_maps(self) -> str:
+        """At which joints something may be left that no map has a name for; empty for none."""
+        named = {one.joint for one in self.maps if one.sentence}
+        least = self.criteria.verdict.within_noise
+        left = [
+            one
+            for one in sorted(self.joints, key=lambda one: one.error_before, reverse=True)
+            if one.error_before > 0
+            and one.name not in named
+            and (one.ratio_before is None or one.ratio_before > least)
+        ]
+        if not self.maps or not left:
+            return ""
+        each = ", ".join(f"{one.name} ({percent(one.error_before)})" for one in left)
+        return (
+            f"No shape that the catalogue has a name for stands out at {each}; in brackets what "
+            "the model leaves of the torque. Each map is against the joint's own motion: what "
+            "another joint does to it shows in none."
+        )
 
     def candidate_table(self, most: int = 10) -> Table:
         """The ranking on the model as given."""

@@ -118,7 +118,7 @@ class Comparison(Shown):
                 notes=(*notes, *loops.notes),
             )
             loops = None
-        seen = residual_maps(self.models[-1], last, last, self.criteria.maps)
+        seen = residual_maps(self.models[-1], last, last, self.criteria)
         where = tuple((m.joint, m.against, m.sentence) for m in seen if m.sentence)
         first = (errors, loops) if loops else (errors,)
         title = "Where the model fails" if alone else f"Where '{self.names[-1]}' fails"

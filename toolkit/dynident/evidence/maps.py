@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from scipy import special
 
-from dynident.criteria import DEFAULTS, MapCriteria
-from dynident.effects import catalogue
+from dynident.criteria import DEFAULTS, Criteria, MapCriteria
+from dynident.effects import ResidualPicture, catalogue
 from dynident.evidence.held_out import HeldOut
 from dynident.model import Model
 from dynident.robot import Robot
+
+_LEAST_BLOCKS = 4
+"""Of time, below which nothing is said of a shape where the noise is unknown."""
 
 Space = Literal["linear", "root"]
 """In what classes of a quantity are of equal width."""
@@ -48,7 +51,7 @@ class ResidualMap:
 
 
 def residual_maps(
-    model: Model, before: HeldOut, after: HeldOut, criteria: MapCriteria = DEFAULTS.maps
+    model: Model, before: HeldOut, after: HeldOut, criteria: Criteria = DEFAULTS
 ) -> tuple[ResidualMap, ...]:
     """Residual maps of every joint on held-out data.
 
@@ -56,7 +59,7 @@ def residual_maps(
     ----------
     model : as given: what its effects can fit is cleared away before a shape is named.
     before, after : of the model as given and of the final one, on the same recordings.
-    criteria : when a map shows something.
+    criteria : when a map shows something, and what no processing resolves.
 
     Returns
     -------
@@ -69,10 +72,9 @@ def residual_maps(
 
 
 def _of_joint(
-    model: Model, j: int, before: HeldOut, after: HeldOut, criteria: MapCriteria
+    model: Model, j: int, before: HeldOut, after: HeldOut, whole: Criteria
 ) -> Iterator[ResidualMap]:
-    robot = model.robot
-    fitted = {e.name for e in model.effects if e.joint == robot.names[j]}
+    robot, criteria = model.robot, whole.maps
     certain = np.concatenate([run.certain[:, j] for run in before.runs])
     if not certain.any():
         return
@@ -81,6 +83,8 @@ def _of_joint(
     )
     motion = robot.units[j]
     noise = None if before.noise_std is None else float(before.noise_std[j])
+    blocks = _blocks(before)[certain]
+    small = before.residual_rms[j] <= whole.verdict.resolution * before.torque_rms[j]
     quantities = {
         "velocity": (f"{motion}/s", [run.v[:, j] for run in before.runs]),
         "position": (motion, [run.q[:, j] for run in before.runs]),
@@ -97,7 +101,9 @@ def _of_joint(
         spread = np.sqrt(before.inflation[j] / count)
         band = np.full(len(at), np.nan) if noise is None else criteria.band * noise * spread
         sigma = (noise if noise is not None else float(np.std(old))) * spread
-        sentence = _sentence(against, at, (means[:, 0], sigma), fitted, criteria)
+        rows = None if noise is not None else (x, old, blocks)
+        seen = _Seen(at=at, mean=means[:, 0], sigma=sigma, rows=rows)
+        sentence = "" if small else _sentence(_shapes(model, j, against), seen, criteria)
         yield ResidualMap(
             joint=robot.names[j],
             torque_unit=robot.torque_units[j],
@@ -139,15 +145,58 @@ def _binned(
     return at[kept], means[kept], counts[kept]
 
 
-def _sentence(
-    against: str,
-    at: np.ndarray,
-    seen_with_sigma: tuple[np.ndarray, np.ndarray],
-    fitted: set[str],
-    criteria: MapCriteria,
-) -> str:
+@dataclass(frozen=True, kw_only=True)
+class _Seen:
+    """What a map shows.
+
+    Attributes
+    ----------
+    at, mean, sigma : (B,) centres of the classes, mean residuals and their standard errors.
+    rows : the quantity, the residual and the block of time of each row, (T,) each, where the noise
+        is unknown: whether a shape is chance is then asked of the blocks. None where it is known.
+    """
+
+    at: np.ndarray
+    mean: np.ndarray
+    sigma: np.ndarray
+    rows: tuple[np.ndarray, np.ndarray, np.ndarray] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Shape:
+    """A shape by which an effect at a joint is recognised.
+
+    Attributes
+    ----------
+    picture : of the effect.
+    fitted : whether the model has the effect.
+    positive : whether no value below zero is possible: the shape upside down is not its.
+    """
+
+    picture: ResidualPicture
+    fitted: bool
+    positive: bool
+
+
+def _shapes(model: Model, joint: int, against: str) -> tuple[_Shape, ...]:
+    """Shapes that effects at a joint make in a map against one quantity."""
+    robot = model.robot
+    name = robot.names[joint]
+    fitted = {e.name for e in model.effects if e.joint == name}
+    found = []
+    for kind in catalogue().values():
+        pictures = [one for one in kind.pictures if one.against == against]
+        here = [one for one in kind.candidates(robot) if one.joint == name] if pictures else []
+        bounds = [p.lower for one in here[:1] for p in one.parameters(robot)]
+        positive = bool(bounds) and min(bounds) >= 0.0
+        known = any(one.name in fitted for one in here)
+        found += [_Shape(picture=one, fitted=known, positive=positive) for one in pictures]
+    return tuple(found)
+
+
+def _sentence(shapes: Sequence[_Shape], seen: _Seen, criteria: MapCriteria) -> str:
     """The shape that a map shows, if it shows one beyond the noise."""
-    mean, sigma = seen_with_sigma
+    at, mean, sigma = seen.at, seen.mean, seen.sigma
     if not np.all(sigma > 0):
         return ""
     weight = 1.0 / sigma
@@ -155,32 +204,66 @@ def _sentence(
     if special.chdtrc(len(at), power) > criteria.level:
         return ""
     scale = float(np.abs(at).max()) or 1.0
-    pictures = [
-        (name, picture)
-        for name, kind in catalogue().items()
-        for picture in kind.pictures
-        if picture.against == against
-    ]
     # The fit has taken out of the map what its own columns can explain: out of the shapes too.
-    known = [one.of(at, scale) * weight for name, one in pictures if name in fitted]
-    clear = _clearing(np.array(known).T) if known else np.eye(len(at))
-    seen = clear @ (mean * weight)
-    best, share = "", 0.0
-    for name, picture in pictures:
-        if name in fitted:
-            continue
-        column = clear @ (picture.of(at, scale) * weight)
-        norm = float(column @ column)
-        explained = float(column @ seen) ** 2 / (norm * power) if norm > 0 else 0.0
-        if explained > share:
-            best, share = picture.words, explained
-    return f"{best} ({100 * share:.0f} % of what is seen here)" if share >= criteria.share else ""
+    known = [one.picture for one in shapes if one.fitted]
+    clear = _clearing([one.of(at, scale) * weight for one in known], len(at))
+    left = clear @ (mean * weight)
+    asked = [one for one in shapes if not one.fitted]
+    best, share = None, 0.0
+    for one in asked:
+        column = clear @ (one.picture.of(at, scale) * weight)
+        norm, along = float(column @ column), float(column @ left)
+        explained = along**2 / (norm * power) if norm > 0 else 0.0
+        if explained > share and (along > 0 or not one.positive):
+            best, share = one.picture, explained
+    if best is None or share < criteria.share:
+        return ""
+    if seen.rows is not None:
+        x, residual, blocks = seen.rows
+        column = best.of(x, scale)
+        if known:
+            basis = np.linalg.qr(np.array([one.of(x, scale) for one in known]).T)[0]
+            column = column - basis @ (basis.T @ column)
+        if _chance(column, residual, blocks) * len(asked) > criteria.level:
+            return ""
+    return f"{best.words} ({100 * share:.0f} % of what is seen here)"
 
 
-def _clearing(columns: np.ndarray) -> np.ndarray:
-    """Projection onto what columns (B, k) cannot explain, (B, B)."""
-    basis = np.linalg.qr(columns)[0]
-    return np.eye(len(columns)) - basis @ basis.T
+def _chance(column: np.ndarray, residual: np.ndarray, blocks: np.ndarray) -> float:
+    """P value of a column's part in a residual, with blocks of time as the sampling units.
+
+    Neighbours may go on in each other, as Newey and West have it (Econometrica 55, 1987), which
+    counts where it makes the part less certain.
+    """
+    _, number = np.unique(blocks, return_inverse=True)
+    count, norm = int(number.max()) + 1, float(column @ column)
+    if count < _LEAST_BLOCKS or not norm > 0:
+        return 1.0
+    part = float(column @ residual) / norm
+    scores = np.bincount(number, weights=column * (residual - part * column))
+    spread = float(scores @ scores) + max(float(scores @ np.roll(scores, 1)), 0.0)
+    if not spread > 0:
+        return 0.0
+    t = part * norm / np.sqrt(spread * count / (count - 1))
+    return float(2.0 * special.stdtr(count - 1, -abs(t)))
+
+
+def _blocks(judged: HeldOut) -> np.ndarray:
+    """Block of time of each row, numbered over all runs; a run that is not cut is one block."""
+    found, first = [], 0
+    for run in judged.runs:
+        own = np.zeros(len(run.t), dtype=int) if run.block is None else run.block
+        found.append(own + first)
+        first += int(own.max(initial=0)) + 1
+    return np.concatenate(found)
+
+
+def _clearing(columns: Sequence[np.ndarray], count: int) -> np.ndarray:
+    """Projection onto what columns (B,) cannot explain, (B, B)."""
+    if not columns:
+        return np.eye(count)
+    basis = np.linalg.qr(np.array(columns).T)[0]
+    return np.eye(count) - basis @ basis.T
 
 
 def _spectrum(

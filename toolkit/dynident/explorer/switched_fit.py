@@ -111,7 +111,7 @@ class Refitter:
 
     def maps(self, before: SwitchedFit, after: SwitchedFit) -> tuple[ResidualMap, ...]:
         """Return the residual maps of two fits on what both have not seen."""
-        return residual_maps(self.model, before.judged, after.judged, self.study.criteria.maps)
+        return residual_maps(self.model, before.judged, after.judged, self.study.criteria)
 
     @single_threaded
     def _fit(self, effects: tuple[Effect, ...]) -> SwitchedFit:
