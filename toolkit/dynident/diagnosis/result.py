@@ -44,7 +44,7 @@ _VERDICTS: dict[Verdict, str] = {
 
 _VERDICTS_WITHOUT_NOISE: dict[Verdict, str] = {
     "nothing_missing": "No effect in the catalogue is significant, relevant and of use on held-out "
-    "data; the noise is unknown, so whether something else is missing cannot be said.",
+    "blocks of time; the noise is unknown, so whether something else is missing cannot be said.",
     "explained": "Added: {effects}. No further effect is significant and relevant; the noise is "
     "unknown, so whether something else is missing cannot be said.",
     "unexplained": "Added: {effects}. More effects are significant and relevant; the noise is "
@@ -116,6 +116,11 @@ class Diagnosis(Shown):
     def best(self) -> Step | None:
         """The first effect to add; None where nothing is to be added."""
         return self.steps[0] if self.steps else None
+
+    @property
+    def held_out(self) -> str:
+        """What the errors are of: recordings of their own, or blocks of time of those fitted."""
+        return "held-out data" if self.test_sources else "held-out blocks of time"
 
     @property
     def fitted_by(self) -> str:
@@ -340,7 +345,7 @@ class Diagnosis(Shown):
         floor = percent(overall.noise_floor)
         total = ("all", percent(overall.before), percent(overall.after), floor, "", "")
         return Table(
-            "Relative torque error on held-out data",
+            f"Relative torque error on {self.held_out}",
             ("joint", "before", "after", "noise floor", "systematic / noise", "and after"),
             (*rows, total),
             (

@@ -106,7 +106,8 @@ class Comparison(Shown):
         alone = len(self.names) == 1
         named = ("torque error",) if alone else (f"error, {name}" for name in self.names)
         columns = ("joint", *named, "noise floor")
-        errors = Table("Relative torque error on held-out recordings", columns, tuple(rows), notes)
+        title = f"Relative torque error on held-out {last.what}"
+        errors = Table(title, columns, tuple(rows), notes)
         loops = loop_table(self.names, self._loops, robot.names)
         if loops and alone:
             # One table: the simulated loop beside what the regression leaves.

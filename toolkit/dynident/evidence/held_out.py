@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from scipy import special
@@ -58,6 +59,8 @@ class HeldOut:
     inflation : (n,) variance of a mean of consecutive noise over that of white noise.
     rounding : (n,) mean square of the residual that encoders' steps leave; None where that was not
         looked at.
+    what : recordings that no fit has seen, or blocks of time of those that were fitted, each
+        predicted by a fit to all others.
     """
 
     runs: tuple[HeldOutRun, ...]
@@ -66,6 +69,7 @@ class HeldOut:
     least_ratio: np.ndarray | None
     inflation: np.ndarray
     rounding: np.ndarray | None = None
+    what: Literal["recordings", "blocks of time"] = "recordings"
 
     @property
     def torque_rms(self) -> np.ndarray:
@@ -168,7 +172,8 @@ def on_blocks(evidence: Evidence, fitted: EvidenceFit) -> HeldOut:
         )
         folded.append(residual)
         doubt.append(np.array([prediction_variance(c[0], fitted) for c in joints]))
-    return _judged(evidence, tuple(runs), folded, doubt)
+    judged = _judged(evidence, tuple(runs), folded, doubt)
+    return replace(judged, what="blocks of time")
 
 
 def with_noise_of(judged: HeldOut, noise: HeldOut, criteria: NoiseCriteria) -> HeldOut:

@@ -356,4 +356,6 @@ def _decision(basis: BaseParameters) -> str:
     if basis.rank == len(basis.names):
         least = float(basis.diagonal[-1] / basis.diagonal[0])
         return f"full rank, smallest direction {least:.2g} of the largest"
+    if not np.isfinite(basis.gap):
+        return f"at tolerance {basis.tolerance:.0e}, the others only in combination with these"
     return f"rank gap {basis.gap:.2g} at tolerance {basis.tolerance:.0e}"
