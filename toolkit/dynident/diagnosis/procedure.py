@@ -32,8 +32,7 @@ from dynident.arguments import checked
 from dynident.closed_loop import Controller
 from dynident.criteria import DEFAULTS, Criteria
 from dynident.diagnosis.assembly import Search, assemble
-from dynident.diagnosis.dependence.residual_dependence import residual_dependence
-from dynident.diagnosis.dependence.residual_record import joined, residual_records
+from dynident.diagnosis.dependence.what_is_left import doubted, with_dependence
 from dynident.diagnosis.details import Withdrawn
 from dynident.diagnosis.nuisances.contacts import Contacts
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
@@ -69,7 +68,7 @@ from dynident.effects import Effect
 from dynident.errors import FitError
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
-from dynident.evidence.held_out import on_blocks, on_recordings
+from dynident.evidence.held_out import on_recordings
 from dynident.evidence.runs import gather
 from dynident.evidence.simulated_motion import motion_of_loop
 from dynident.fitting.estimate import Estimate
@@ -107,8 +106,9 @@ def diagnose(
     most : effects that are added at most, one at several joints counting once; None for
         `SearchCriteria.most_effects`.
     propose : when laws are proposed for what the catalogue leaves: "unexplained", where a residual
-        beyond a known noise remains, and no effect of the catalogue could be added; "always", and
-        what the residual depends on is looked for whatever the verdict; "never".
+        beyond a known noise remains, or one that follows the motion, and no effect of the catalogue
+        could be added; "always", and what the residual depends on is looked for whatever the
+        verdict; "never".
     switches : "all": every choice among the effects added is fitted and judged, too, for a page
         on which they are switched on and off (`dynident.diagnosis.switches`).
     criteria : the numbers that decide the answer, see `dynident.criteria`.
@@ -151,7 +151,10 @@ def diagnose(
     settled, path = _settle(_search_globally(start, extended, task), task)
     found = answered_by(faults, _judge(settled, path, task))
     asked = found.verdict == "unexplained" or propose == "always"
-    return _with_dependence(found, settled, path, task) if asked and not faults else found
+    if not asked or faults:
+        return found
+    progress("looking for what the residual depends on")
+    return with_dependence(found, settled.evidence, _decided(settled), path)
 
 
 def _compare(
@@ -360,6 +363,9 @@ def _judge(stage: Stage, path: Path, task: DiagnosisTask) -> Diagnosis:
         limit=task.most if reached and stage.rounds[-1].passing else None,
     )
     answer = assemble(search, task.train, task.test, held)
+    if answer.noise_source == "unknown" and task.most:
+        task.progress("looking for what the residual depends on")
+        answer = doubted(answer, stage.evidence, _decided(stage), path)
     if task.switches == "all":
         task.progress("switching effects on and off")
         answer = replace(answer, switches=switches_of(stage.evidence, held, path))
@@ -373,36 +379,10 @@ def _asks_for_laws(answer: Diagnosis, task: DiagnosisTask) -> bool:
     """Whether laws are sought for what is left."""
     if task.propose == "never" or answer.impossible or not task.most:
         return False
-    left = answer.verdict == "unexplained" and answer.noise_source != "unknown"
+    known = answer.noise_source != "unknown" or answer.following_motion
+    left = answer.verdict == "unexplained" and known
     # Where its limit ended the search, what the catalogue leaves is not known yet.
-    return (left and answer.limit is None) or task.propose == "always"
-
-
-def _with_dependence(found: Diagnosis, stage: Stage, path: Path, task: DiagnosisTask) -> Diagnosis:
-    """Return a diagnosis that says what its residual depends on.
-
-    Parameters
-    ----------
-    found : the diagnosis so far.
-    stage, path : the model that was reached, and how.
-    task : what is asked.
-
-    Returns
-    -------
-    With `residual_dependence`.
-    """
-    task.progress("looking for what the residual depends on")
-    held, judged = _decided(stage), path.judged[-1]
-    records = residual_records(judged, (held or stage.evidence).runs)
-    if held is not None:
-        # Of the training recordings blocks of time that the model was not fitted to.
-        of_training = on_blocks(stage.evidence, path.final)
-        records = (*records, *residual_records(of_training, stage.evidence.runs))
-    names = path.final.model.robot.names
-    criteria = stage.evidence.criteria.verdict
-    return replace(
-        found, residual_dependence=residual_dependence(judged, joined(records), names, criteria)
-    )
+    return (bool(left) and answer.limit is None) or task.propose == "always"
 
 
 def _decided(stage: Stage) -> Evidence | None:

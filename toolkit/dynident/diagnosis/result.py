@@ -81,6 +81,8 @@ class Diagnosis(Shown):
         residual depends on, before any proposal, at each joint at which something is left.
     reversals_left_out : share of the rows, for joints whose dry friction may follow another law at
         its reversals: these rows count neither in the fit nor in the errors.
+    following_motion : joints without a noise floor at which what is left is no noise, as functions
+        of the motion predict it; empty elsewhere.
     switches : every choice among the effects added, fitted and judged, where that was asked for.
     drives : gains by which currents became torques, and loads that were identified; None where
         nothing had to be found.
@@ -109,6 +111,7 @@ class Diagnosis(Shown):
     rows: RowCount = field(default_factory=RowCount)
     residual_dependence: tuple[JointDependence, ...] = ()
     reversals_left_out: Mapping[str, float] = field(default_factory=dict)
+    following_motion: tuple[str, ...] = ()
     switches: Switches | None = None
     drives: DriveGains | None = None
 
@@ -172,6 +175,13 @@ class Diagnosis(Shown):
             )
         if self.limit is not None and self.verdict == "unexplained":
             return self._stopped(effects)
+        if self.following_motion:
+            added = f"Added: {effects}." if effects else "No effect in the catalogue is of use."
+            return (
+                f"{added} What is left at {' and '.join(self.following_motion)} is not all noise: "
+                "it follows the motion, on blocks of time that nothing was fitted to. How much of "
+                "it is noise is unknown."
+            )
         if self.noise_source == "unknown" and self.verdict == "unexplained" and not effects:
             return "Effects are significant and relevant, and none was added; the noise is unknown."
         if self.noise_source == "unknown":

@@ -70,6 +70,9 @@ def _of_verdict(diagnosis: Diagnosis) -> Headline:
     if not diagnosis.steps:
         return _nothing_added(diagnosis, known)
     title, stopped = _title(diagnosis), diagnosis.limit is not None
+    if diagnosis.following_motion:
+        said = f"{added} {fall}, and what is left {_followed(diagnosis)}."
+        return Headline("!", f"{title}, a residual remains", said)
     if not known:
         more = diagnosis.verdict == "unexplained" and not stopped
         more = " More effects are significant." if more else ""
@@ -97,7 +100,15 @@ def _rest(diagnosis: Diagnosis) -> str:
     return _WITHIN if left <= diagnosis.criteria.verdict.not_nothing else _SMALLER
 
 
+def _followed(diagnosis: Diagnosis) -> str:
+    joints = " and ".join(diagnosis.following_motion)
+    return f"at {joints} follows the motion: it is not all noise"
+
+
 def _nothing_added(diagnosis: Diagnosis, known: bool) -> Headline:
+    if diagnosis.following_motion:
+        said = f"No effect of the catalogue is of use, and what is left {_followed(diagnosis)}."
+        return Headline("!", "a residual remains", said)
     if diagnosis.verdict == "unexplained":
         if known:
             none = ", and no effect of the catalogue explains it"

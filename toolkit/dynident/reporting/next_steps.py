@@ -37,7 +37,9 @@ def next_steps(diagnosis: Diagnosis) -> tuple[Advice, ...]:
     if diagnosis.limit is not None:
         what = "Allow the search more additions (--most)."
         found.append(Advice(what, f"{diagnosis.limit_in_words}."))
-    elif diagnosis.verdict == "unexplained" and diagnosis.noise_source != "unknown":
+    elif diagnosis.verdict == "unexplained" and (
+        diagnosis.noise_source != "unknown" or diagnosis.following_motion
+    ):
         found.append(_unexplained(diagnosis))
     if diagnosis.noise_source == "unknown":
         found.append(_to_repeat(diagnosis))
@@ -137,8 +139,9 @@ def _experiments(step: Step) -> str:
 
 
 def _unexplained(diagnosis: Diagnosis) -> Advice:
-    worst = [one for one in states(diagnosis) if one.state == "failing"]
-    where = _listed([one.joint.name for one in worst[:3]]) or "the joints"
+    worst = [one.joint.name for one in states(diagnosis) if one.state == "failing"]
+    worst = worst or list(diagnosis.following_motion)
+    where = _listed(worst[:3]) or "the joints"
     return Advice(
         f"Look at the pictures of {where} below: something is left there that no effect of the "
         "catalogue explains.",

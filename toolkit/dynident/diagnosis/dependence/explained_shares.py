@@ -103,7 +103,11 @@ class _KernelFit:
 
 
 def explained_shares(
-    x: JointInputs, residual: np.ndarray, noise: np.ndarray, units: Sequence[HeldOutUnit]
+    x: JointInputs,
+    residual: np.ndarray,
+    noise: np.ndarray,
+    units: Sequence[HeldOutUnit],
+    order: Sequence[tuple[str, ...]] = ORDER,
 ) -> ExplainedShares | None:
     """Return how much of a residual each set of inputs explains, beside those before it.
 
@@ -114,6 +118,7 @@ def explained_shares(
     noise : (T,) mean square of the noise in it, which nothing explains; zeros where it is unknown:
         shares are then of everything.
     units : which rows are held out together.
+    order : which sets may be added in each turn.
 
     Returns
     -------
@@ -127,14 +132,15 @@ def explained_shares(
     could = squares - _per_unit(noise / scale**2, units)
     if not could.sum() > 0:
         return None
-    made = {name: kernel_of(x) for name, kernel_of in INPUTS.items()}
+    asked = {name for turn in order for name in turn}
+    made = {name: kernel_of(x) for name, kernel_of in INPUTS.items() if name in asked}
     kernels = {name: one for name, one in made.items() if one.any()}
     fitted, by, explained = (
         _KernelFit(np.zeros((len(y), len(y))), squares),
         {},
         np.zeros(len(units)),
     )
-    for turn in ORDER:
+    for turn in order:
         names = [name for name in turn if name in kernels and name not in by]
         if not names:
             continue

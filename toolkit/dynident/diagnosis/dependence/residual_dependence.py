@@ -11,6 +11,7 @@ import numpy as np
 from dynident.criteria import VerdictCriteria
 from dynident.diagnosis.dependence.explained_shares import (
     INPUTS,
+    ORDER,
     ExplainedShares,
     Share,
     explained_shares,
@@ -30,6 +31,9 @@ FEWEST_UNITS = 8
 
 Whole = Literal["systematic", "all"]
 """What shares are of: the systematic residual, or all of it, noise included."""
+
+MOTION = (("position and velocity",), ("other joints",))
+"""The sets of inputs that are no torque, and no past."""
 
 _WORDS = {
     "position and velocity": "position and velocity of this joint",
@@ -61,6 +65,16 @@ class JointDependence:
     def told(self) -> dict[str, Share]:
         """Shares that can be told from nothing."""
         return {} if self.shares is None else {k: s for k, s in self.shares.by.items() if s.told}
+
+    def of_the_motion(self, c: VerdictCriteria) -> dict[str, Share]:
+        """Shares that the motion of this joint and of others explains, so large that no noise has.
+
+        At least so large that, were the rest noise that is known, something would be missing. The
+        past is none of them: a controller makes torque of past noise.
+        """
+        least = c.within_noise**2 / (1.0 + c.within_noise**2)
+        found = {name: self.told[name] for turn in MOTION for name in turn if name in self.told}
+        return {k: one for k, one in found.items() if one.value - one.needed * one.error > least}
 
     @property
     def sentence(self) -> str:
@@ -105,7 +119,11 @@ class JointDependence:
 
 
 def residual_dependence(
-    judged: HeldOut, records: Sequence[ResidualRecord], names: Sequence[str], c: VerdictCriteria
+    judged: HeldOut,
+    records: Sequence[ResidualRecord],
+    names: Sequence[str],
+    c: VerdictCriteria,
+    order: Sequence[tuple[str, ...]] = ORDER,
 ) -> tuple[JointDependence, ...]:
     """Ask what is left at each joint what it depends on.
 
@@ -115,6 +133,7 @@ def residual_dependence(
     records : that residual in each recording; with more recordings more can be learnt.
     names : of the joints.
     c : when something is left.
+    order : which sets of inputs may be added in each turn.
 
     Returns
     -------
@@ -136,7 +155,7 @@ def residual_dependence(
             x = joint_inputs(records, j).rows(rows)
             residual = np.concatenate([one.residual[:, j] for one in records])[rows]
             noise = power[rows] if known else np.zeros(len(rows))
-            shares = explained_shares(x, residual, noise, units)
+            shares = explained_shares(x, residual, noise, units, order)
             if shares is None:
                 continue  # over all recordings there is no more than noise
         whole: Whole = "systematic" if known else "all"
