@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import dynident as di
+from dynident.diagnosis.result import Diagnosis
 from dynident.recording import Dataset, Recording
 from dynident.reporting.headline import headline
 from study_files import true_model
@@ -33,7 +34,7 @@ def once(seed: int, hidden: float) -> Recording:
     return replace(made, tau=made.tau + push)
 
 
-def diagnosed(hidden: float) -> di.Diagnosis:
+def diagnosed(hidden: float) -> Diagnosis:
     train = Dataset(tuple(once(seed, hidden) for seed in (0, 1, 2)))
     test = Dataset((once(3, hidden),))
     return di.diagnose(true_model(), train, test)
