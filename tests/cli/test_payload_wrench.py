@@ -40,6 +40,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_the_sensor_weighs_without_any_torque(run, folder: Path) -> None:
     done = run("payload", folder / "study.toml", "--json")
     assert done.status == 0

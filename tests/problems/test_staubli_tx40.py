@@ -55,6 +55,7 @@ def _draft(columns: dict[str, str]) -> StudyDraft:
     return draft_study(STUDY.with_name("tx40.urdf"), [data], facts=facts)
 
 
+@pytest.mark.slow
 def test_ratios_alone_leave_the_wrist_an_open_question(study: Study) -> None:
     """The torques do not tell of the coupling, and limits of speed alone change nothing."""
     draft = _draft({})
@@ -66,6 +67,7 @@ def test_ratios_alone_leave_the_wrist_an_open_question(study: Study) -> None:
     assert draft.columns["tau.joint5"].name == "45*motor_torque[4]"
 
 
+@pytest.mark.slow
 def test_a_draft_of_the_raw_columns_has_those_of_the_study_by_hand(
     study: Study, drafted: tuple[StudyDraft, Study]
 ) -> None:

@@ -77,6 +77,7 @@ def assert_same(study: di.Study, arm: Arm) -> None:
     np.testing.assert_allclose(found.v, arm.recording.v, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_what_is_said_of_a_position_holds_for_speed_and_torque(tmp_path: Path) -> None:
     """Power is the same on either side of the gears, and the friction of motors is no fault."""
     arm = written(tmp_path, chain_text(N, 1), -1.0, zero=-0.25)
