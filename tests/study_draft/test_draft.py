@@ -264,3 +264,17 @@ def test_a_broken_cell_is_told_for_what_it_is(arm: Path) -> None:
 def test_a_file_that_is_named_twice_is_read_once(arm: Path) -> None:
     data = written(arm.parent / "run.csv", as_logged(recording(1)))
     assert len(draft_study(arm, [data, str(data)]).recordings) == 1
+
+
+def test_folders_say_what_is_held_out_where_files_do_not(arm: Path) -> None:
+    """As bags lie that are each a folder of their own, and recordings of train/ and test/."""
+    files = []
+    for seed, folder in enumerate(("test_a", "train_a", "train_b"), start=1):
+        (arm.parent / folder / "run").mkdir(parents=True)
+        files.append(written(arm.parent / folder / "run" / "run.csv", as_logged(recording(seed))))
+    draft = draft_study(arm, files)
+    (use,) = (one for one in draft.decisions if one.subject == "use")
+    assert use.reason == "as the names of the folders say"
+    study = di.load(draft.write(arm.parent / "study.toml"))
+    assert len(study.train.recordings) == 2
+    np.testing.assert_allclose(study.test.recordings[0].q, recording(1).q, atol=1e-9)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -34,7 +35,11 @@ def drafted_recordings(
     pairs = [(log.file, log.record) for log in logs]
     loads = facts.carried(pairs)
     carried = [carried_by(pair, loads) for pair in pairs]
-    uses, why = uses_of([log.record or log.file.stem for log in logs])
+    above = os.path.commonpath([log.file.parent for log in logs])
+    uses, why = uses_of(
+        [log.record or log.file.stem for log in logs],
+        [os.path.relpath(log.file.parent, above) for log in logs],
+    )
     uses = _with_each_load(uses, carried)
     for name in loads:
         files = ", ".join(

@@ -111,20 +111,23 @@ def period_of(recording: Recording) -> float | None:
     return next((x for x in round_ones if abs(x - period) * recording.rate_hz < _WHOLE), period)
 
 
-def uses_of(names: Sequence[str]) -> tuple[tuple[str, ...], str]:
+def uses_of(names: Sequence[str], folders: Sequence[str]) -> tuple[tuple[str, ...], str]:
     """Which recordings are to fit and which to judge by, and why.
 
     Parameters
     ----------
     names : of files or records.
+    folders : of the files, from the folder that holds all of them.
 
     Returns
     -------
     "train" or "test" for each; at least one is "train".
     """
-    told = [_told(name) for name in names]
-    if "train" in told and "test" in told:
-        return tuple(one or "train" for one in told), "as the names of the files say"
+    by_folders = [_told(name) or _told(folder) for name, folder in zip(names, folders, strict=True)]
+    ways = (([_told(name) for name in names], "files"), (by_folders, "folders"))
+    for told, what in ways:
+        if "train" in told and "test" in told:
+            return tuple(one or "train" for one in told), f"as the names of the {what} say"
     count = len(names)
     if count == 1:
         return ("train",), "there is one: blocks of its time are held out to judge by"
