@@ -19,6 +19,7 @@ from dynident.diagnosis.details import Candidate, JointResult, Status, Step, Tes
 from dynident.diagnosis.detection_limits import detection_limits
 from dynident.diagnosis.nuisances.contacts import Disturbance, contact_candidates
 from dynident.diagnosis.nuisances.quantisation import rounding_notes, with_rounding
+from dynident.diagnosis.nuisances.stated_noise import stated_noise_notes
 from dynident.diagnosis.nuisances.sticking import shares_left_out
 from dynident.diagnosis.nuisances.unlike_recordings import unlike_notes
 from dynident.diagnosis.result import Diagnosis
@@ -139,6 +140,7 @@ def assemble(
         notes=(
             *notes_on(evidence, held, stages[-1], source, search.doubtful),
             *unlike_notes(evidence, held, stages[-1]),
+            *_noise_doubts(evidence, source, rounded, after),
             *rounding_notes(after, given.robot.names, evidence.criteria.verdict),
             *notes_on_steps(steps, held),
             *path.notes,
@@ -153,6 +155,16 @@ def assemble(
         detection_limits=limits,
         reversals_left_out={joint: left[joint] for joint in search.doubtful},
     )
+
+
+def _noise_doubts(
+    evidence: Evidence, source: NoiseSource, recordings: Dataset, after: HeldOut
+) -> tuple[str, ...]:
+    """Hold a stated noise, where it is the floor, against the recordings that were judged."""
+    if source != "given":
+        return ()
+    units = evidence.model.robot.torque_units
+    return stated_noise_notes(after, recordings, units, evidence.criteria.verdict.most_left)
 
 
 def _advised(steps: tuple[Step, ...], adviser: Adviser) -> tuple[Step, ...]:

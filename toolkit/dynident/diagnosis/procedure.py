@@ -31,6 +31,7 @@ import numpy as np
 from dynident.arguments import checked
 from dynident.closed_loop import Controller
 from dynident.criteria import DEFAULTS, Criteria
+from dynident.diagnosis.advice.geometry_doubt import with_geometry_doubt
 from dynident.diagnosis.assembly import Search, assemble
 from dynident.diagnosis.dependence.what_is_left import doubted, with_dependence
 from dynident.diagnosis.details import Withdrawn
@@ -151,10 +152,10 @@ def diagnose(
     settled, path = _settle(_search_globally(start, extended, task), task)
     found = answered_by(faults, _judge(settled, path, task))
     asked = found.verdict == "unexplained" or propose == "always"
-    if not asked or faults:
-        return found
-    progress("looking for what the residual depends on")
-    return with_dependence(found, settled.evidence, _decided(settled), path)
+    if asked and not faults:
+        progress("looking for what the residual depends on")
+        found = with_dependence(found, settled.evidence, _decided(settled), path)
+    return with_geometry_doubt(found)
 
 
 def _compare(

@@ -1,0 +1,48 @@
+"""When a lack of fit may be one of geometry: of what the catalogue of torques cannot mend."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from dynident.diagnosis.result import Diagnosis
+
+_OTHER_JOINTS = "other joints"
+
+
+def with_geometry_doubt(found: Diagnosis) -> Diagnosis:
+    """Return a diagnosis that says where positions or the description may be wrong.
+
+    The evidence is that the torque at a joint goes with the motion of another one, beyond what the
+    bodies as described make of it, while a residual remains: a coupling that was added, or what a
+    flexible regression explains by the other joints.
+
+    Parameters
+    ----------
+    found : the diagnosis without it.
+
+    Returns
+    -------
+    With one note more where there is such evidence.
+    """
+    complete = found.verdict != "unexplained" and found.noise_source != "unknown"
+    if found.wiring or complete:
+        return found
+    pairs = [
+        f"{step.effect.joint} goes with {step.effect.source}"
+        for step in found.steps
+        if step.effect.source is not None
+    ]
+    pairs += [
+        f"{one.joint} goes with the other joints"
+        for one in found.residual_dependence
+        if _OTHER_JOINTS in one.told
+    ]
+    if not pairs:
+        return found
+    note = (
+        "Torque that goes with the motion of another joint, beyond what the bodies as described "
+        f"make ({', '.join(pairs)}), may come from geometry: positions may be those of motors that "
+        "turn two joints (docs/howto/coupled_motors.md), or axes and lengths of the description "
+        "may differ from the robot's."
+    )
+    return replace(found, notes=(*found.notes, note))
