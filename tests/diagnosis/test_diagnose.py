@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -297,3 +298,16 @@ def test_the_gain_of_a_candidate_is_the_fall_of_the_step_that_adds_it_alone() ->
         for c in found.candidates
         if c.test_gain is None
     )
+
+
+def test_a_joint_without_any_torque_is_fitted_to_no_more_than_rounding() -> None:
+    """Its noise was the square of itself with every fit, until products overflowed."""
+    model = Model(arm()) + "viscous_friction" + "coulomb_friction@elbow"
+    values = true_values(model, Fv__shoulder=2.0, Fv__elbow=1.0, Fc__elbow=1.5)
+
+    def idle(seed: int) -> Dataset:
+        made = synthetic(model, values, seed, rate_hz=100.0, torque_std=0.01, period=None)
+        return Dataset((replace(made, tau=made.tau * np.array([1.0, 0.0])),))
+
+    found = find(model, idle(102), idle(103))
+    assert found.verdict == "nothing_missing" and np.isfinite(found.after.values).all()

@@ -193,7 +193,7 @@ def test_two_signals_of_one_joint_are_a_choice_never_a_mixture() -> None:
 
 def test_columns_that_no_name_tells_are_those_that_were_said_to_be() -> None:
     """A clock is told by its steps, and a torque may be an expression of its column."""
-    log = log_of("k1", "k2", "m1", "m2", zeit=CLOCK, zyklus=np.arange(50.0))
+    log = log_of("k1", "k2", "m1", "m2", zyklus=np.arange(50.0), zeit=CLOCK)
     told = {"q.shoulder": "k2", "q.elbow": "k1", "tau.shoulder": "-m1", "tau.elbow": "0.5*m2"}
     matched = match(log, two_links(), told=told)
     found = {ours: theirs.name for ours, theirs in matched.columns(two_links(), {}).items()}
@@ -204,6 +204,36 @@ def test_columns_that_no_name_tells_are_those_that_were_said_to_be() -> None:
         "tau.shoulder": "m1",
         "tau.elbow": "m2",
     }
+
+
+def test_of_a_sum_that_was_said_each_motor_is_taken_once() -> None:
+    log = log_of("k1", "k2", "m1", "m2", zeit=CLOCK)
+    told = {"q.shoulder": "k1/32 - k2/45", "q.elbow": "k1", "tau.shoulder": "m1", "tau.elbow": "m2"}
+    found = match(log, two_links(), told=told).columns(two_links(), {})
+    assert [found[f"q.{joint}"].name for joint in JOINTS] == ["k2", "k1"]
+
+
+def test_a_column_that_was_said_and_is_not_there_is_named() -> None:
+    log = log_of("k1", "k2", "m1", "m2", zeit=CLOCK)
+    told = {"q.shoulder": "k1", "q.elbow": "k3", "tau.shoulder": "m1", "tau.elbow": "m2"}
+    with pytest.raises(RecordingError, match="'k3' is no column of the files"):
+        match(log, two_links(), told=told)
+
+
+def test_the_number_of_the_sample_is_no_clock() -> None:
+    assert match(log_of("q1", "q2", "tau1", "tau2", nr=np.arange(50.0)), two_links()).time is None
+
+
+@pytest.mark.parametrize("name", ["J1_degC", "temp1 [deg C]", "k1 [Nm/rad]", "damping_1_Nm_s"])
+def test_other_units_are_no_positions_and_no_torques(name: str) -> None:
+    role = role_of(name, JOINTS)
+    assert role is None or role.signal == "temperature"
+
+
+@pytest.mark.parametrize("name", ["pos_degrees2", "p_radians2", "axis2_rad"])
+def test_a_number_behind_a_unit_counts_joints(name: str) -> None:
+    role = role_of(name, JOINTS)
+    assert role is not None and role.number == 2
 
 
 @pytest.mark.parametrize("missing", ["q.elbow", "tau.shoulder"])

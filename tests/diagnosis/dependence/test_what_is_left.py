@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import dynident as di
 from dynident.diagnosis.result import Diagnosis
@@ -45,10 +47,35 @@ def test_a_law_that_no_catalogue_has_is_found_without_a_noise_floor() -> None:
     assert found.noise_source == "unknown"
     assert (found.verdict, found.following_motion) == ("unexplained", ("elbow",))
     assert "What is left at elbow is not all noise" in found.sentence
-    assert "elbow follows the motion" in headline(found).sentence
+    assert "elbow follows position and velocity" in headline(found).sentence
     first = found.proposals[0]
     assert first.effect.joint == "elbow"
     assert first.test_error_after < 0.5 * found.test_error.before
+
+
+def test_slow_noise_that_spoils_the_parameters_follows_no_motion() -> None:
+    """What errors of the parameters make of a test recording is a function of the motion."""
+
+    def slow(seed: int, duration: float) -> Recording:
+        model = true_model()
+        made = synthetic(
+            model,
+            true_values(model, **FRICTION),
+            seed,
+            rate_hz=100.0,
+            duration=duration,
+            position_std=1e-5,
+            period=None,
+        )
+        stays = np.exp(-0.01 / 0.2)
+        white = np.random.default_rng([seed, 7]).normal(size=(len(made.t) + 2000, 2))
+        coloured: Any = lfilter([np.sqrt(1 - stays**2)], [1.0, -stays], white, axis=0)[2000:]
+        return replace(made, tau=made.tau + 3.0 * coloured)
+
+    for seed in range(100, 180, 10):
+        test = Dataset((slow(seed + 1, 16.0), slow(seed + 2, 16.0)))
+        found = di.diagnose(true_model(), Dataset((slow(seed, 6.0),)), test, propose="never")
+        assert found.following_motion == ()
 
 
 @pytest.mark.parametrize("hidden", [0.0, 0.002])

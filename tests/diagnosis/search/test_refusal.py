@@ -112,10 +112,10 @@ def test_friction_that_no_torque_has_overcome_is_impossible() -> None:
     assert not impossible(replace(blank, values=(0.9 * peak,), sigma=(0.1,)), fitted)
     assert not impossible(replace(blank, values=(1.1 * peak,), sigma=(peak,)), fitted)
     beyond = impossible(replace(blank, values=(3.0 * peak,), sigma=(0.1,)), fitted)
-    assert beyond.startswith("would need Fs = ") and "elbow, which moved with" in beyond
+    assert beyond.startswith("would need Fs = ") and "elbow, where drive and bodies make" in beyond
     assert not newly_impossible(evidence, fitted, wider)
     values = np.array(wider.values)
     values[model.slices[law.label]] = 3.0 * peak
-    assert "elbow, which moved with" in newly_impossible(
+    assert "elbow, where drive and bodies make" in newly_impossible(
         evidence, fitted, replace(wider, values=values)
     )

@@ -191,12 +191,17 @@ class Trace:
     after: np.ndarray
 
 
-def named_together(steps: Sequence[Step]) -> list[str]:
+def named_together(steps: Sequence[Step], every: Sequence[Step] = ()) -> list[str]:
     """Name each step with everything that is indistinguishable from it: never one alone.
 
     What every joint has is named once, with its joints.
+
+    Parameters
+    ----------
+    steps : that are named.
+    every : all steps of the path, which are nobody's alternatives; by default the same.
     """
-    added = {one.effect.label for one in steps}
+    added = {one.effect.label for one in (every or steps)}
     found = []
     for group in together(steps):
         first, joints = group[0].effect, [str(one.effect.joint) for one in group]

@@ -55,7 +55,9 @@ class LeadingEffects:
         if not self.smaller:
             return named
         count = len(self.smaller)
-        others = ", ".join(named_together([step for group in self.smaller for step in group]))
+        others = ", ".join(
+            named_together(_steps(self.smaller), _steps(self.leading + self.smaller))
+        )
         return (
             f"{named} ({self.carried} by which the held-out error falls) and {in_words(count)} "
             f"smaller {'one' if count == 1 else 'ones'} "
@@ -65,7 +67,11 @@ class LeadingEffects:
     @property
     def names(self) -> list[str]:
         """Each of the leading ones with what cannot be told from it."""
-        return named_together([step for group in self.leading for step in group])
+        return named_together(_steps(self.leading), _steps(self.leading + self.smaller))
+
+
+def _steps(groups: Sequence[Sequence[Step]]) -> list[Step]:
+    return [step for group in groups for step in group]
 
 
 def _fall(group: Sequence[Step]) -> float:

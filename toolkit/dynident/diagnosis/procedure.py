@@ -245,10 +245,15 @@ def _tried(stage: Stage, best: AddedEffect, task: DiagnosisTask) -> tuple[Stage,
         return added, why
     wider = _seen_anew(stage, added)
     why = newly_impossible(wider.evidence, stage.fitted, wider.fitted)
-    gone = left_out_at(wider.evidence)
-    narrow = tuple(without_reversals(one, gone, stage.doubtful) for one in stage.narrow)
+    narrow = _behind_lower_filters(stage, wider.evidence)
     why = why or follows_the_filter(wider.evidence, narrow, wider.fitted, best.score.effect)
     return wider, why
+
+
+def _behind_lower_filters(stage: Stage, evidence: Evidence) -> tuple[Evidence, ...]:
+    """Recordings behind lower cut-offs, without the reversals that the evidence leaves out."""
+    gone = left_out_at(evidence)
+    return tuple(without_reversals(one, gone, stage.doubtful) for one in stage.narrow)
 
 
 def _add_and_refit(stage: Stage, best: AddedEffect, task: DiagnosisTask) -> Stage:
@@ -366,7 +371,8 @@ def _judge(stage: Stage, path: Path, task: DiagnosisTask) -> Diagnosis:
     answer = assemble(search, task.train, task.test, held)
     if answer.noise_source == "unknown" and task.most:
         task.progress("looking for what the residual depends on")
-        answer = doubted(answer, stage.evidence, _decided(stage), path)
+        narrow = _behind_lower_filters(stage, stage.evidence)
+        answer = doubted(answer, stage.evidence, narrow, path)
     if task.switches == "all":
         task.progress("switching effects on and off")
         answer = replace(answer, switches=switches_of(stage.evidence, held, path))

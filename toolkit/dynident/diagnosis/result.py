@@ -82,7 +82,7 @@ class Diagnosis(Shown):
     reversals_left_out : share of the rows, for joints whose dry friction may follow another law at
         its reversals: these rows count neither in the fit nor in the errors.
     following_motion : joints without a noise floor at which what is left is no noise, as functions
-        of the motion predict it; empty elsewhere.
+        of position and velocity predict it; empty elsewhere.
     switches : every choice among the effects added, fitted and judged, where that was asked for.
     drives : gains by which currents became torques, and loads that were identified; None where
         nothing had to be found.
@@ -179,8 +179,8 @@ class Diagnosis(Shown):
             added = f"Added: {effects}." if effects else "No effect in the catalogue is of use."
             return (
                 f"{added} What is left at {' and '.join(self.following_motion)} is not all noise: "
-                "it follows the motion, on blocks of time that nothing was fitted to. How much of "
-                "it is noise is unknown."
+                "functions of the joint's position and velocity predict it on blocks of time that "
+                "they were not fitted to. How much of it is noise is unknown."
             )
         if self.noise_source == "unknown" and self.verdict == "unexplained" and not effects:
             return "Effects are significant and relevant, and none was added; the noise is unknown."
@@ -254,6 +254,7 @@ class Diagnosis(Shown):
         return {
             "verdict": self.verdict,
             "noise": {"source": self.noise_source},
+            "following_motion": list(self.following_motion),
             "joints": [
                 {
                     "name": j.name,

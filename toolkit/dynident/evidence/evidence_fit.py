@@ -22,6 +22,9 @@ from dynident.moments.replicates import time_varying_products
 from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import MomentSolution, regress, regression_values
 
+_LEAST = 1e-9
+"""Noise over the largest joint's torque: one without torque would be fitted ever more closely."""
+
 White = tuple[tuple[WhiteColumns, ...], ...]
 """Whitened columns of each run, of each joint."""
 
@@ -44,7 +47,8 @@ class EvidenceFit:
     error_signal : squared systematic residual, whitened: what no noise explains, in this metric.
     squares : (n,) mean systematic square of the residual, (N m)^2 or N^2.
     variances : (n,) of the noise; of the torque, where the noise is unknown or zero.
-    torque_peaks : (n,) largest torque that was measured, N m or N.
+    torque_peaks : (n,) largest torque that friction can have balanced, N m or N: what was measured
+        and what the bodies make.
     """
 
     criteria: Criteria
@@ -141,7 +145,10 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
         if round == 0 and near is None:
             # Along a robot without bodies their columns are rounding errors, and any value fits.
             values = _keeping_dependent(model, at, values)
-        noise = tuple(JointResidual.of(evidence, columns, values, j).noise for j in range(n))
+        noise = tuple(
+            _no_less(JointResidual.of(evidence, columns, values, j).noise, _LEAST * max(torque_std))
+            for j in range(n)
+        )
         change = float(np.linalg.norm(_held(model, values) - at))
         small = change <= criteria.value_tolerance * np.linalg.norm(values)
         if round >= criteria.noise_rounds - (near is not None) and small:
@@ -167,8 +174,25 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
         variances=np.array(
             [one.variance or s**2 or 1.0 for one, s in zip(left, torque_std, strict=True)]
         ),
-        torque_peaks=evidence.torque_peaks,
+        torque_peaks=evidence.torque_peaks + _bodies_peaks(evidence, values),
     )
+
+
+def _no_less(noise: NoiseModel, least: float) -> NoiseModel:
+    """Noise without colour that is at least of some size (N m or N)."""
+    return flat_noise(least) if noise.is_flat and noise.std < least else noise
+
+
+def _bodies_peaks(evidence: Evidence, values: np.ndarray) -> np.ndarray:
+    """Largest torque of the fitted bodies at each joint, (n,)."""
+    found = [
+        [
+            np.abs(values[at] @ x).max(initial=0.0)
+            for at, x in zip(one.places, one.rows, strict=True)
+        ]
+        for one in (evidence.rigid(r)[0] for r in range(len(evidence.runs)))
+    ]
+    return np.max(found, axis=0)
 
 
 def in_metric_of(evidence: Evidence, fitted: EvidenceFit, other: EvidenceFit) -> EvidenceFit:

@@ -24,14 +24,15 @@ def levels_not_met(
     peaks: np.ndarray,
     criteria: GateCriteria,
 ) -> Iterator[Impossible]:
-    """Levels of dry friction above the largest torque with which the joint nevertheless moved.
+    """Levels of dry friction above the largest torque that the joint can have overcome.
 
     A law may rise to such a level only where nothing was recorded: what fits is its foot.
 
     Parameters
     ----------
     model, values, covariance, criteria : as in `impossible_at`.
-    peaks : (n,) largest torque that was measured at each joint, N m or N.
+    peaks : (n,) largest torque that was measured at each joint and that its bodies make, N m or N:
+        friction balances no more than both.
 
     Yields
     ------
@@ -55,18 +56,18 @@ def levels_not_met(
 
 
 def not_met(parameter: Parameter, value: float, joint: str, peak: float) -> str:
-    """Say of a level of friction that the joint has moved with less.
+    """Say of a level of friction that the joint has overcome less.
 
     Parameters
     ----------
     parameter, value, joint : the level, and where.
-    peak : largest torque measured there, N m or N.
+    peak : largest torque measured there and of its bodies, N m or N.
 
     Returns
     -------
     A clause with both.
     """
     return (
-        f"{parameter.name} = {number(value, 3)} {parameter.unit} at {joint}, which moved with "
-        f"{number(peak, 3)} {parameter.unit} at most"
+        f"{parameter.name} = {number(value, 3)} {parameter.unit} at {joint}, where drive and "
+        f"bodies make {number(peak, 3)} {parameter.unit} at most"
     )

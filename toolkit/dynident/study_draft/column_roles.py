@@ -60,7 +60,11 @@ _SIGNAL_OF_UNIT: dict[str, Signal] = {
     **dict.fromkeys(_set("ampere amperes"), "current"),
 }
 """What a unit alone tells, where no word of a name says more; angles go by the seconds behind."""
-_SQUARED = re.compile(r"((?:deg|rad)[a-z]*\W?_?s)(?:\^|\*\*)?2(?!\d)", re.IGNORECASE)
+_SQUARED = re.compile(
+    r"((?:deg(?:rees?)?|rad(?:ians?)?)(?:\W|_|p)s)(?:\^|\*\*)?2(?!\d)", re.IGNORECASE
+)
+_NO_ANGLE = _set("c f celsius fahrenheit")
+"""What behind degrees makes a temperature of them."""
 _ANGULAR: tuple[Signal, ...] = ("q", "v", "a")
 _WORDS = re.compile(r"mNm|Nmm|Nm|[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 
@@ -169,9 +173,13 @@ def _by_unit(words: Sequence[str]) -> tuple[Signal, str] | None:
     """Return the signal that a unit among the words tells, and the unit: `axis1_deg`, `J1 [Nm]`."""
     for k, word in enumerate(words):
         if word in _ANGLES:
+            if _NO_ANGLE & set(words[k + 1 : k + 2]):
+                return None
             behind = [one for one in words[k + 1 : k + 4] if one in _SECONDS]
             return _ANGULAR[min(len(behind), 2)], word
         if word in _SIGNAL_OF_UNIT:
+            if (_ANGLES | _SECONDS) & set(words[k + 1 : k + 2]):
+                return None  # Nm/rad, Nm s: a stiffness, a damping
             return _SIGNAL_OF_UNIT[word], word
     return None
 

@@ -10,9 +10,10 @@ import numpy as np
 
 from dynident.errors import RecordingError
 from dynident.recording import Column
-from dynident.recording.formats.column_expressions import parse, quoted
+from dynident.recording.formats.column_expressions import quoted
 from dynident.robot import Robot
 from dynident.study_draft.column_roles import ColumnRole, Origin, Signal, role_of
+from dynident.study_draft.guesses.stated_columns import terms_of
 from dynident.study_draft.log import Log
 from dynident.study_draft.timing import is_clock
 
@@ -142,26 +143,30 @@ def match(
 def _stated(
     told: Mapping[str, str], signal: Signal, robot: Robot, names: Collection[str]
 ) -> list[Group]:
-    """The group of columns that were stated of every joint, each an expression of one column."""
-    roles = []
-    for number, joint in enumerate(robot.names):
-        text = told.get(f"{signal}.{joint}", "")
-        if not text:
+    """The group of columns that were stated of every joint: of a sum one that no other has."""
+    stated = [f"{signal}.{joint}" for joint in robot.names]
+    if not all(ours in told for ours in stated):
+        return []
+    terms = {k: terms_of(ours, told[ours], robot, names) for k, ours in enumerate(stated)}
+    taken: dict[int, str] = {}
+    for k in sorted(terms, key=lambda k: len(terms[k])):
+        free = [name for name in terms[k] if name not in taken.values()]
+        if not free:
             return []
-        terms = [text] if text in names else [*parse(text).terms]
-        if len(terms) != 1 or terms[0] not in names:
-            return []
-        role = ColumnRole(
-            column=terms[0],
+        taken[k] = free[0]
+    roles = tuple(
+        ColumnRole(
+            column=taken[k],
             signal=signal,
             word=signal,
             origin="plain",
-            joint=number,
+            joint=k,
             number=None,
             stem=(),
         )
-        roles.append(role)
-    return [Group(roles=tuple(roles), reason="so it was said")]
+        for k in range(robot.n)
+    )
+    return [Group(roles=roles, reason="so it was said")]
 
 
 def _groups(
@@ -222,10 +227,11 @@ def _clock(log: Log, roles: Sequence[ColumnRole]) -> tuple[Column, str] | None:
         if _goes_forward(log.columns[role.column]):
             return Column(role.column, role.scale), "it goes forward"
     named = {role.column for role in roles}
-    steady = [name for name, x in log.columns.items() if name not in named and is_clock(x)]
-    # Beside a clock, what goes up by one is the number of the sample.
-    steady.sort(key=lambda name: bool(np.all(np.diff(log.columns[name]) == 1.0)))
-    return (Column(steady[0]), "it alone goes forward, step by step") if steady else None
+    for name, x in log.columns.items():
+        # What goes up by one may be the number of the sample: no clock, unless it is called so.
+        if name not in named and is_clock(x) and not np.all(np.diff(x) == 1.0):
+            return Column(name), "it goes forward step by step, and nothing else is called a clock"
+    return None
 
 
 def _goes_forward(x: np.ndarray) -> bool:

@@ -32,8 +32,9 @@ FEWEST_UNITS = 8
 Whole = Literal["systematic", "all"]
 """What shares are of: the systematic residual, or all of it, noise included."""
 
-MOTION = (("position and velocity",), ("other joints",))
-"""The sets of inputs that are no torque, and no past."""
+MOTION = (("position and velocity",),)
+"""What noise does not come again at. Accelerations hold noise of encoders, which columns have too,
+and a controller makes torque of past noise."""
 
 _WORDS = {
     "position and velocity": "position and velocity of this joint",
@@ -67,10 +68,9 @@ class JointDependence:
         return {} if self.shares is None else {k: s for k, s in self.shares.by.items() if s.told}
 
     def of_the_motion(self, c: VerdictCriteria) -> dict[str, Share]:
-        """Shares that the motion of this joint and of others explains, so large that no noise has.
+        """Shares that its position and velocity explain, so large that no noise has them.
 
-        At least so large that, were the rest noise that is known, something would be missing. The
-        past is none of them: a controller makes torque of past noise.
+        At least so large that, were the rest noise that is known, something would be missing.
         """
         least = c.within_noise**2 / (1.0 + c.within_noise**2)
         found = {name: self.told[name] for turn in MOTION for name in turn if name in self.told}

@@ -1,8 +1,10 @@
 """A diagnosis with what its residual depends on, and its verdict where noise alone cannot be left.
 
-Where nothing repeats, nothing tells the noise of what is left. But noise does not come again at the
-same position and velocity: a residual that a function of the motion predicts on blocks of time that
-it was not fitted to is no noise, whatever its size.
+Where nothing repeats, nothing tells the noise of what is left. But noise of the torque does not
+come again at the same position and velocity: a residual that a function of both predicts, on
+blocks of time that it was not fitted to, is no noise, whatever its size. Asked is the residual of
+the fit itself, of which its own columns leave nothing: what errors of the parameters make of a test
+recording is a function of the motion too.
 """
 
 from __future__ import annotations
@@ -10,13 +12,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from dynident.diagnosis.dependence.explained_shares import ORDER
 from dynident.diagnosis.dependence.residual_dependence import MOTION, residual_dependence
 from dynident.diagnosis.dependence.residual_record import joined, residual_records
 from dynident.diagnosis.result import Diagnosis
+from dynident.diagnosis.search.payload_recordings import marked
 from dynident.diagnosis.search.withdrawal import Path
 from dynident.evidence.columns import Evidence
-from dynident.evidence.held_out import on_blocks
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
+from dynident.evidence.held_out import on_blocks, on_recordings
 
 
 def with_dependence(
@@ -24,7 +27,6 @@ def with_dependence(
     evidence: Evidence,
     held: Evidence | None,
     path: Path,
-    order: Sequence[tuple[str, ...]] = ORDER,
 ) -> Diagnosis:
     """Return a diagnosis that says what its residual depends on.
 
@@ -33,7 +35,6 @@ def with_dependence(
     found : the diagnosis so far.
     evidence, held : of the training and of the test recordings; `held` may be None.
     path : to the model that was reached.
-    order : which sets of inputs are asked in each turn.
 
     Returns
     -------
@@ -45,25 +46,46 @@ def with_dependence(
         # Of the training recordings blocks of time that the model was not fitted to.
         records = (*records, *residual_records(on_blocks(evidence, path.final), evidence.runs))
     names, criteria = path.final.model.robot.names, evidence.criteria.verdict
-    shares = residual_dependence(judged, joined(records), names, criteria, order)
+    shares = residual_dependence(judged, joined(records), names, criteria)
     return replace(found, residual_dependence=shares)
 
 
-def doubted(found: Diagnosis, evidence: Evidence, held: Evidence | None, path: Path) -> Diagnosis:
+def doubted(
+    found: Diagnosis, evidence: Evidence, narrow: Sequence[Evidence], path: Path
+) -> Diagnosis:
     """Return a diagnosis that explains nothing where what it took for noise follows the motion.
 
     Parameters
     ----------
     found : the diagnosis so far, without a noise floor.
-    evidence, held : of the training and of the test recordings; `held` may be None.
+    evidence : of the training recordings, marked with those that carry a payload.
+    narrow : the same behind lower cut-offs, where noise in the columns is unknown: with biased
+        parameters the residual follows the motion too, but not behind every filter.
     path : to the model that was reached.
 
     Returns
     -------
-    As it is, unless the verdict is another.
+    As it is, unless the verdict is another; one that explains nothing stays, with its reason.
     """
-    told = with_dependence(found, evidence, held, path, MOTION).residual_dependence
-    follow = tuple(one.joint for one in told if one.of_the_motion(evidence.criteria.verdict))
+    if found.verdict == "unexplained":
+        return found
+    follow, payloads = (
+        _following(evidence, path.final),
+        [r.recording.payload for r in evidence.runs],
+    )
+    for one in narrow:
+        if follow:
+            lower = marked(one, payloads)
+            again = _following(lower, fit_evidence(lower, path.final.model))
+            follow = tuple(joint for joint in follow if joint in again)
     if not follow:
         return found
     return replace(found, verdict="unexplained", following_motion=follow, detection_limits=())
+
+
+def _following(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
+    """Joints at which functions of position and velocity predict what a fit leaves."""
+    judged, criteria = on_recordings(evidence, fitted), evidence.criteria.verdict
+    records, names = joined(residual_records(judged, evidence.runs)), fitted.model.robot.names
+    told = residual_dependence(judged, records, names, criteria, MOTION)
+    return tuple(one.joint for one in told if one.of_the_motion(criteria))

@@ -24,7 +24,7 @@ _MOVES = 0.5
 """Share of a joint's rms speed from which it moves in a block."""
 _IF = (
     "If the stated noise was measured at a standstill, it is no floor of a moving robot, and the "
-    "ratios to it are too large."
+    "ratios to it may be too large."
 )
 
 
@@ -59,15 +59,15 @@ def stated_noise_notes(
         for name, unit, noise, least, ratio in zip(
             names, units, stated.torque_std, seen, judged.ratio, strict=True
         )
-        if least > _FAR * noise and ratio > most_left
+        if noise > 0 and least > _FAR * noise and ratio > most_left
     ]
     if not wrong:
         return (_IF,)
     return (
         "The stated noise of the torque is less than what the recordings hold from sample to "
-        f"sample in motion: {'; '.join(wrong)}. So it is no floor of a moving robot (a standstill "
-        "hides most of the noise), and the ratios to it are too large. Record a repeated motion, "
-        "which tells the noise in motion.",
+        f"sample in motion: {'; '.join(wrong)}. It may be no floor of a moving robot (a standstill "
+        "hides most of the noise), and the ratios to it may be too large. Record a repeated "
+        "motion, which tells the noise in motion.",
     )
 
 

@@ -36,7 +36,7 @@ def unlike_notes(evidence: Evidence, held: Evidence | None, fitted: EvidenceFit)
         return ()
     trained, judged = on_recordings(evidence, fitted), on_recordings(held, fitted)
     model, names = fitted.model, fitted.model.robot.names
-    most = evidence.criteria.verdict.unlike
+    criteria = evidence.criteria.verdict
     # As large as the parameters' error is at worst, not in the mean.
     largest = float(chdtri(1, 1.0 - evidence.criteria.noise.confidence))
     found = []
@@ -46,8 +46,9 @@ def unlike_notes(evidence: Evidence, held: Evidence | None, fitted: EvidenceFit)
         alone = judged.of(run)
         expected = np.sqrt(trained.residual_rms**2 + largest * doubt)
         over = alone.residual_rms / np.where(expected > 0, expected, np.inf)
+        over[alone.residual_rms <= criteria.resolution * alone.torque_rms] = 0.0
         worst = int(np.argmax(over))
-        if over[worst] >= most:
+        if over[worst] >= criteria.unlike:
             here, there = (percent(one.joint_errors[worst]) for one in (alone, trained))
             found.append(f"{run.name} ({names[worst]}: {here} of its torque, {there} in training)")
     if not found:
@@ -55,7 +56,7 @@ def unlike_notes(evidence: Evidence, held: Evidence | None, fitted: EvidenceFit)
     shown = found[:_SHOWN] + ([f"{len(found) - _SHOWN} more"] if len(found) > _SHOWN else [])
     return (
         f"Predicted far worse than the training recordings are fitted: {', '.join(shown)}. "
-        "Something is not as there (a load, the mounting, a temperature, a calibration), or the "
-        "motion shows what theirs do not. A load is said by payload = true in the entry of the "
+        "Something is not as there (a load, the mounting, a temperature, a calibration), or it "
+        "moves as they do not. A load is said by payload = true in the entry of the "
         "recording, and known only if a training recording has it too.",
     )

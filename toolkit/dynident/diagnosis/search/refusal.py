@@ -63,7 +63,7 @@ def impossible_in(
     found = fitted.model, fitted.values, fitted.covariance
     return (
         *impossible_at(*found, recorded_states(evidence, fitted.model), gates),
-        *levels_not_met(*found, evidence.torque_peaks, gates),
+        *levels_not_met(*found, fitted.torque_peaks, gates),
     )
 
 

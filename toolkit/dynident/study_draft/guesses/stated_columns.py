@@ -153,6 +153,23 @@ def _read(ours: str, text: str, robot: Robot, names: Collection[str]) -> Column:
     return MadeColumn(text)
 
 
+def terms_of(ours: str, text: str, robot: Robot, names: Collection[str]) -> tuple[str, ...]:
+    """Return the columns of the files that one of ours is made of.
+
+    Parameters
+    ----------
+    ours, text : one of our columns and what was stated of it.
+    robot : for the joints' names.
+    names : of the files' columns.
+
+    Raises
+    ------
+    RecordingError
+        If what is stated is no column of a joint, cannot be read, or names no column of the files.
+    """
+    return tuple(expression_of(_read(ours, text, robot, names)).terms)
+
+
 def _ratio(joint: str, motors: Mapping[str, Column], columns: Mapping[str, Column]) -> float:
     """The ratio that was given of a joint's gear."""
     theirs = motors[f"q.{joint}"]
