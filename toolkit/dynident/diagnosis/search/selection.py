@@ -73,12 +73,12 @@ def choose(evidence: Evidence, fitted: EvidenceFit, ranking: Ranking) -> AddedEf
     if simpler:
         # The column that they share is the same whoever it belongs to: both are named.
         return AddedEffect(simpler[0], ranking.corrected(simpler[0]), (best.effect,))
-    rivals = alternatives(evidence, fitted, best, as_likely(evidence, fitted, ranking))
-    as_good = [s for s in (best, *rivals) if s.drop >= criteria.simpler_share * best.drop]
+    # Of what is as likely the simplest comes first, whether it does the same or something else:
+    # what is left for the others is seen when it is there.
+    likely = (best, *as_likely(evidence, fitted, ranking))
+    as_good = [s for s in likely if s.drop >= criteria.simpler_share * best.drop]
     chosen = min(as_good, key=_size)  # the first of the simplest: they stand in order
-    if chosen is not best:
-        others = [s for s in (best, *rivals) if s is not chosen]
-        rivals = alternatives(evidence, fitted, chosen, others)
+    rivals = alternatives(evidence, fitted, chosen, [s for s in likely if s is not chosen])
     return AddedEffect(chosen, ranking.corrected(chosen), tuple(s.effect for s in rivals))
 
 
