@@ -254,7 +254,7 @@ class Diagnosis(Shown):
         return {
             "verdict": self.verdict,
             "noise": {"source": self.noise_source},
-            "following_motion": list(self.following_motion),
+            **({"following_motion": list(self.following_motion)} if self.following_motion else {}),
             "joints": [
                 {
                     "name": j.name,
