@@ -481,9 +481,10 @@ OTHERS: dict[str, tuple[Content, str]] = {
         r"train\.csv: no column has this name, and the expression 'q\.elbow \* q\.elbo",
     ),
     "an expression of brackets": (
-        columns("(" * 200 + "q.elbow" + ")" * 200),
+        columns("(" * 1000 + "q.elbow" + ")" * 1000),
         r"train\.csv: no column has this name, and the expression '",
     ),
+    "an expression of 200 brackets": (columns("(" * 200 + "q.elbow" + ")" * 200), ANSWER),
     "an expression of signs": (columns("-" * 250 + "q.elbow"), ANSWER),
     "an expression of 1 MB": (
         columns("q.elbow" + " + q.elbow" * 100_000),
