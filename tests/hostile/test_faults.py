@@ -27,6 +27,9 @@ def run_with(fault: Callable[[], object], writer: Writer, folder: Path) -> tuple
     child = os.fork()
     if not child:
         status = 3
+        # Python would cut its own bytecode short, and other tests would read that.
+        sys.dont_write_bytecode = True
+        os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
         try:
             fault()
             with said.open("wb") as stream:

@@ -281,6 +281,8 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(run, tmp_path, in_small_part
     resource = pytest.importorskip("resource")
     signal = pytest.importorskip("signal")
     path = file_of(run, tmp_path / "run.csv")
+    # Python would cut its own bytecode short, and other tests would read that.
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
     limit, most = resource.getrlimit(resource.RLIMIT_FSIZE)
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     try:

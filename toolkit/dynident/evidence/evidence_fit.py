@@ -22,7 +22,7 @@ from dynident.moments.replicates import time_varying_products
 from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import MomentSolution, regress, regression_values
 
-_LEAST = 1e-9
+_LEAST = 1e-13
 """Noise over the largest joint's torque: one without torque would be fitted ever more closely."""
 
 White = tuple[tuple[WhiteColumns, ...], ...]
@@ -174,17 +174,23 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
         variances=np.array(
             [one.variance or s**2 or 1.0 for one, s in zip(left, torque_std, strict=True)]
         ),
-        torque_peaks=evidence.torque_peaks + _bodies_peaks(evidence, values),
+        torque_peaks=friction_reach(evidence, values),
     )
 
 
 def _no_less(noise: NoiseModel, least: float) -> NoiseModel:
-    """Noise without colour that is at least of some size (N m or N)."""
-    return flat_noise(least) if noise.is_flat and noise.std < least else noise
+    """Noise that is at least of some size (N m or N)."""
+    return replace(noise, std=least) if noise.std < least else noise
 
 
-def _bodies_peaks(evidence: Evidence, values: np.ndarray) -> np.ndarray:
-    """Largest torque of the fitted bodies at each joint, (n,)."""
+def friction_reach(evidence: Evidence, values: np.ndarray) -> np.ndarray:
+    """Return the largest torque that friction can have balanced at each joint, (n,) N m or N.
+
+    Parameters
+    ----------
+    evidence : the recordings: what was measured.
+    values : of a fitted model, the base parameters first: what its bodies make.
+    """
     found = [
         [
             np.abs(values[at] @ x).max(initial=0.0)
@@ -192,7 +198,7 @@ def _bodies_peaks(evidence: Evidence, values: np.ndarray) -> np.ndarray:
         ]
         for one in (evidence.rigid(r)[0] for r in range(len(evidence.runs)))
     ]
-    return np.max(found, axis=0)
+    return evidence.torque_peaks + np.max(found, axis=0)
 
 
 def in_metric_of(evidence: Evidence, fitted: EvidenceFit, other: EvidenceFit) -> EvidenceFit:

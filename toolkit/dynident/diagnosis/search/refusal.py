@@ -16,7 +16,7 @@ from dynident.diagnosis.search.payload_recordings import marked
 from dynident.effects import Block, Effect
 from dynident.errors import RecordingError
 from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, friction_reach
 from dynident.evidence.runs import gather
 from dynident.model import (
     Impossible,
@@ -63,7 +63,7 @@ def impossible_in(
     found = fitted.model, fitted.values, fitted.covariance
     return (
         *impossible_at(*found, recorded_states(evidence, fitted.model), gates),
-        *levels_not_met(*found, fitted.torque_peaks, gates),
+        *levels_not_met(*found, friction_reach(evidence, fitted.values), gates),
     )
 
 
