@@ -19,18 +19,16 @@ from synthetic import synthetic, true_values
 FRICTION = {"Fv__shoulder": 2.0, "Fv__elbow": 1.0, "Fc__elbow": 1.5}
 
 
-def once(seed: int, hidden: float) -> Recording:
-    """A motion that never repeats, with a viscosity at the elbow that depends on its position."""
+def unrepeated(seed: int, **recorded: Any) -> Recording:
+    """A motion that never repeats, of the arm as its model has it."""
     model = true_model()
-    made = synthetic(
-        model,
-        true_values(model, **FRICTION),
-        seed,
-        rate_hz=200.0,
-        position_std=1e-5,
-        torque_std=0.1,
-        period=None,
-    )
+    values = true_values(model, **FRICTION)
+    return synthetic(model, values, seed, position_std=1e-5, period=None, **recorded)
+
+
+def once(seed: int, hidden: float) -> Recording:
+    """The same with a viscosity at the elbow that depends on its position."""
+    made = unrepeated(seed, rate_hz=200.0, torque_std=0.1)
     v = np.gradient(made.q[:, 1], made.t)
     push = np.column_stack([np.zeros_like(v), hidden * v * np.sin(3.0 * made.q[:, 1])])
     return replace(made, tau=made.tau + push)
@@ -57,16 +55,7 @@ def test_slow_noise_that_spoils_the_parameters_follows_no_motion() -> None:
     """What errors of the parameters make of a test recording is a function of the motion."""
 
     def slow(seed: int, duration: float) -> Recording:
-        model = true_model()
-        made = synthetic(
-            model,
-            true_values(model, **FRICTION),
-            seed,
-            rate_hz=100.0,
-            duration=duration,
-            position_std=1e-5,
-            period=None,
-        )
+        made = unrepeated(seed, rate_hz=100.0, duration=duration)
         stays = np.exp(-0.01 / 0.2)
         white = np.random.default_rng([seed, 7]).normal(size=(len(made.t) + 2000, 2))
         coloured: Any = lfilter([np.sqrt(1 - stays**2)], [1.0, -stays], white, axis=0)[2000:]
