@@ -1,4 +1,4 @@
-"""Bags of ROS made in the tests, of joint states and of what comes between them."""
+"""Bags of ROS 1 and 2, of joint states and of what comes between them; used by the tests, too."""
 
 from __future__ import annotations
 
