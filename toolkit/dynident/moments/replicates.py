@@ -55,8 +55,13 @@ def replicate_moments(
 def _block_products(left: np.ndarray, right: np.ndarray, blocks: list[slice]) -> np.ndarray:
     """Products of columns over instants and replicates, block by block, (B, ..., a, b)."""
     turned = np.swapaxes(left, -1, -2)
-    each = ((turned[..., some] @ right[..., some, :]).sum(axis=0) for some in blocks)
-    return np.array(list(each))
+    found = np.empty((len(blocks), *left.shape[1:-2], left.shape[-1], right.shape[-1]))
+    for one, some in zip(found, blocks, strict=True):
+        if len(left) == 1:
+            np.matmul(turned[0, ..., some], right[0, ..., some, :], out=one)
+        else:
+            np.add.reduce(turned[..., some] @ right[..., some, :], axis=0, out=one)
+    return found
 
 
 @dataclass(frozen=True)

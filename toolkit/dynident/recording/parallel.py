@@ -265,10 +265,12 @@ def _width(x: np.ndarray) -> int:
 def _narrow_together(xs: Sequence[np.ndarray]) -> Iterator[list[np.ndarray]]:
     """Arrays in their order, in groups of no more columns than are filtered at a time."""
     group: list[np.ndarray] = []
+    width = 0
     for x in xs:
-        if group and sum(map(_width, group)) + _width(x) > _AT_ONCE:
+        width += _width(x)
+        if group and width > _AT_ONCE:
             yield group
-            group = []
+            group, width = [], _width(x)
         group.append(x)
     if group:
         yield group

@@ -6,10 +6,10 @@ quite the low-passed term, and near enough to choose which few are then evaluate
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from functools import reduce
-from operator import mul
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -19,10 +19,11 @@ from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.model_columns import model_columns
 from dynident.evidence.runs import Run
-from dynident.formulas import Signal, evaluate, parse_formula
+from dynident.formulas import Formula, Signal, evaluate, parse_formula
 from dynident.moments.second_moments import SecondMoments
 
 _AT_ONCE = 48  # terms; the products of two of them are not needed, and grow with the square
+_MOST_FACTORS = 3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,31 +65,101 @@ def screen(
     With C the columns of a term, X the model's and y the torque: B solves the regression of C on X,
     G = C'C - (C'X) B, m = C'y - B'X'y, and the drop is m' G^-1 m.
     """
-    rows = [_TermRows.of(evidence, fitted, r, joint) for r in range(len(evidence.runs))]
-    found = []
-    for start in range(0, len(terms), _AT_ONCE):
-        found += _screened(evidence, fitted, joint, rows, terms[start : start + _AT_ONCE])
-    count = {size: sum(t.size == size for t in terms) for size in {t.size for t in terms}}
+    products = _Products(terms)
+    rows = [
+        [one.factors(products) for one in _TermRows.of(evidence, fitted, r, joint)]
+        for r in range(len(evidence.runs))
+    ]
+    drops = np.concatenate(
+        [
+            _drops(evidence, fitted, joint, rows, products.some(start, start + _AT_ONCE))
+            for start in range(0, len(terms), _AT_ONCE)
+        ]
+    )
+    count = Counter(products.sizes.tolist())
     criteria = evidence.criteria.proposals
     priced = []
-    for term, drop in found:
-        price = term.size * np.log(fitted.rows) + 2.0 * np.log(beside + count[term.size])
+    for term, size, drop in zip(terms, products.sizes.tolist(), drops.tolist(), strict=True):
+        price = size * np.log(fitted.rows) + 2.0 * np.log(beside + count[size])
         price += criteria.factor_price * term.price
         priced.append(Screened(term=term, drop=drop, penalised=drop - float(price)))
     priced.sort(key=lambda one: -one.penalised)
     return tuple(one for one in priced if one.penalised > 0)
 
 
-def _screened(
+class _Products:
+    """Terms as products of rows: of the columns of their factors, which many have in common.
+
+    Parameters
+    ----------
+    terms : of up to three factors each.
+
+    Attributes
+    ----------
+    factors : each once.
+    sizes : (m,) number of columns of each term.
+    starts : (m + 1,) where its columns begin among those of all terms.
+    rows : (3, K) which rows are multiplied for each column; row 0 is for ones.
+    """
+
+    def __init__(self, terms: Sequence[LibraryTerm]) -> None:
+        self.factors: dict[Factor, int] = {}
+        places: list[tuple[int, ...]] = []
+        sizes, free = [], 1
+        for term in terms:
+            sizes.append(term.size)
+            for one in term.factors:
+                if one not in self.factors:
+                    self.factors[one] = free
+                    free += len(one.texts)
+            for k in range(term.size):
+                at = [self.factors[one] + (k if len(one.texts) > 1 else 0) for one in term.factors]
+                places.append((*at, *(0,) * (_MOST_FACTORS - len(at))))
+        self.sizes = np.array(sizes, dtype=int)
+        self.starts = np.concatenate([[0], np.cumsum(self.sizes)])
+        self.rows = np.array(places, dtype=int).reshape(-1, _MOST_FACTORS).T
+
+    def some(self, first: int, last: int) -> _SomeProducts:
+        """Return those of some terms."""
+        sizes = self.sizes[first:last]
+        start = self.starts[first]
+        return _SomeProducts(sizes=sizes, rows=self.rows[:, start : start + sizes.sum()])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _SomeProducts:
+    """Some of the terms of `_Products`.
+
+    Attributes
+    ----------
+    sizes : (m,) number of columns of each.
+    rows : (3, K) which rows are multiplied for each column.
+    """
+
+    sizes: np.ndarray
+    rows: np.ndarray
+
+    def columns(self, factors: np.ndarray) -> np.ndarray:
+        """Columns of the terms, (T, K), of the rows of their factors (R, T)."""
+        first, *others = self.rows
+        found = factors[first]
+        for places in others:
+            if places.any():
+                found *= factors[places]
+        return found.T
+
+
+def _drops(
     evidence: Evidence,
     fitted: EvidenceFit,
     joint: int,
-    rows: Sequence[list[_TermRows]],
-    terms: Sequence[LibraryTerm],
-) -> list[tuple[LibraryTerm, float]]:
+    rows: Sequence[Sequence[np.ndarray]],
+    terms: _SomeProducts,
+) -> np.ndarray:
+    """What each of some terms takes off, (m,)."""
     with_model, with_self = [], []
     for r, (run, replicates) in enumerate(zip(evidence.runs, rows, strict=True)):
-        signals = [[one.columns(term) for term in terms] for one in replicates]
+        signals = [[terms.columns(one)] for one in replicates]
         white = run.whitened_parts(signals, joint, fitted.noise[joint])
         with_model.append(fitted.white[r][joint].moments_with(white))
         with_self.append(run.moments(white, white))
@@ -98,23 +169,45 @@ def _screened(
     back = fitted.solution.project(beside[:p])
     left = own - beside[:p].T @ back
     moment = beside[p] - back.T @ fitted.pooled.signal[:p, p]
-    least, found, start = evidence.criteria.proposals.least_left, [], 0
-    for term in terms:
-        part = slice(start, start + term.size)
-        start = part.stop
-        found.append((term, _drop(own[part, part], left[part, part], moment[part], least)))
+    found, starts = np.zeros(len(terms.sizes)), np.cumsum(terms.sizes) - terms.sizes
+    for size in set(terms.sizes.tolist()):
+        which = np.flatnonzero(terms.sizes == size)
+        at = starts[which][:, None] + np.arange(size)
+        each = at[:, :, None], at[:, None, :]
+        least = evidence.criteria.proposals.least_left
+        found[which] = _taken_off(own[each], left[each], moment[at], least)
     return found
 
 
-def _drop(own: np.ndarray, left: np.ndarray, moment: np.ndarray, least: float) -> float:
-    """What columns take off, of which at least a share must be left beside the model."""
-    scale = np.sqrt(np.clip(np.diag(own), 0.0, None))
-    if not np.all(np.isfinite(own)) or not np.all(scale > 0):
-        return 0.0
-    size, turn = np.linalg.eigh(left / np.outer(scale, scale))
-    along = turn.T @ (moment / scale)
-    kept = size > least
-    return float(np.sum(along[kept] ** 2 / size[kept]))
+def _taken_off(own: np.ndarray, left: np.ndarray, moment: np.ndarray, least: float) -> np.ndarray:
+    """What columns take off, of which at least a share must be left beside the model.
+
+    Parameters
+    ----------
+    own, left : (m, k, k) products of the columns of each term, and of what is left of them.
+    moment : (m, k) of what is left of them with the residual.
+    least : share.
+
+    Returns
+    -------
+    (m,); zero where columns are zero or no numbers.
+    """
+    scale = np.sqrt(np.clip(np.diagonal(own, axis1=1, axis2=2), 0.0, None))
+    sound = np.isfinite(own).all(axis=(1, 2)) & (scale > 0).all(axis=1)
+    scale = scale[sound]
+    size, turn = np.linalg.eigh(left[sound] / (scale[:, :, None] * scale[:, None, :]))
+    along = np.einsum("mij,mi->mj", turn, moment[sound] / scale)
+    found = np.zeros(len(own))
+    found[sound] = np.divide(along**2, size, out=np.zeros_like(size), where=size > least).sum(
+        axis=1
+    )
+    return found
+
+
+@lru_cache(maxsize=4096)
+def _formulas(factor: Factor) -> tuple[Formula, ...]:
+    """The columns of a factor, read; each recording asks for them."""
+    return tuple(parse_formula(text) for text in factor.columns())
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,8 +229,6 @@ class _TermRows:
     joint: int
     widths: np.ndarray
     load: np.ndarray
-    known: dict[str, np.ndarray] = field(default_factory=dict)
-    factors: dict[Factor, np.ndarray] = field(default_factory=dict)
 
     @classmethod
     def of(cls, evidence: Evidence, fitted: EvidenceFit, run: int, joint: int) -> list[_TermRows]:
@@ -155,22 +246,13 @@ class _TermRows:
             for place, one in enumerate(columns)
         ]
 
-    def columns(self, term: LibraryTerm) -> np.ndarray:
-        """Columns of a term, (T, k)."""
-        return reduce(mul, (self._columns_of(factor) for factor in term.factors))
-
-    def _columns_of(self, factor: Factor) -> np.ndarray:
-        """Columns of a factor, (T, k), which many terms have in common."""
-        if factor not in self.factors:
-            values = [self._value(text) for text in factor.columns()]
-            size = len(self.load)
-            self.factors[factor] = np.stack([np.broadcast_to(v, size) for v in values], axis=1)
-        return self.factors[factor]
-
-    def _value(self, text: str) -> np.ndarray:
-        if text not in self.known:
-            self.known[text] = np.asarray(evaluate(parse_formula(text), self), dtype=float)
-        return self.known[text]
+    def factors(self, products: _Products) -> np.ndarray:
+        """Columns of all factors, (R, T), after one of ones."""
+        found = np.ones((1 + sum(len(one.texts) for one in products.factors), len(self.load)))
+        for factor, first in products.factors.items():
+            for row, formula in enumerate(_formulas(factor), first):
+                found[row] = evaluate(formula, self)
+        return found
 
     def signal(self, signal: Signal) -> Any:
         sampled = self.run.replicates[self.place]

@@ -26,6 +26,7 @@ from dynident.effects import Block, Effect, Needs, Parameter, ShapeParameter
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.fitting.shape_search import ShapeProblem
+from dynident.robot import Robot
 
 _LEAST_VALUE = 1e-300
 _ROUNDING = 1e-12  # of the largest curvature, to which others are rounding errors
@@ -36,16 +37,23 @@ class Tangent(Effect):
     """An effect's columns, then their derivatives by the coordinate of each shape parameter.
 
     Last comes the derivative by the value at which a column is taken, where there is one.
+
+    Attributes
+    ----------
+    of : the effect.
+    joints : columns of those at which it acts: whitening zeros at the others would cost as much.
     """
 
     of: Effect | None = None
+    joints: tuple[int, ...] = ()
     name: ClassVar[str] = "tangent"
     in_catalogue: ClassVar[bool] = False
 
     @classmethod
-    def to(cls, effect: Effect) -> Tangent:
+    def to(cls, effect: Effect, robot: Robot) -> Tangent:
         """Return the columns and derivatives of an effect."""
-        return cls(effect.joint, effect.source, effect.shape, effect.point, effect)
+        joints = effect.acting_at(robot)
+        return cls(effect.joint, effect.source, effect.shape, effect.point, effect, joints)
 
     @property
     def needs(self) -> Needs:  # type: ignore[override]
@@ -58,15 +66,27 @@ class Tangent(Effect):
         assert self.of is not None
         return self.of.parameters(robot)
 
-    def columns(self, block: Block) -> np.ndarray:
-        """Columns (T, n, k), then derivatives one after the other, (T, n, k + s k)."""
+    def acting_at(self, robot: Robot) -> tuple[int, ...]:
+        """As the effect."""
+        return self.joints
+
+    def acting_columns(self, block: Block) -> np.ndarray:
+        """Columns (T, J, k), then derivatives one after the other, (T, J, k + s k)."""
         assert self.of is not None
-        plain, slopes = self.of.columns(block), self.of.sensitivities(block)
+        here = list(self.joints)
+        plain, slopes = self.of.acting_columns(block), self.of.sensitivities(block)
         assert slopes is not None
-        turned = np.moveaxis(slopes, 3, 2).reshape(*slopes.shape[:2], -1)
+        turned = np.moveaxis(slopes[:, here], 3, 2).reshape(*plain.shape[:2], -1)
         at_point = self.of.point_slope(block) if self.of.point else None
-        parts = (plain, turned) if at_point is None else (plain, turned, at_point)
+        parts = (plain, turned) if at_point is None else (plain, turned, at_point[:, here])
         return np.concatenate(parts, axis=2)
+
+    def columns(self, block: Block) -> np.ndarray:
+        """The same at all joints, (T, n, k + s k)."""
+        here = self.acting_columns(block)
+        full = np.zeros((len(here), len(block.names), here.shape[2]))
+        full[:, list(self.joints)] = here
+        return full
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -179,7 +199,7 @@ class MomentObjective:
 
     def _differentiated(self, effect: Effect) -> ScoreTrial:
         """The trial of an effect with its square root and derivatives."""
-        tangent = Tangent.to(effect)
+        tangent = Tangent.to(effect, self.fitted.model.robot)
         ((with_model, with_self),) = candidate_moments(
             self.evidence, self.fitted, [tangent], self.columns_of
         )
