@@ -33,6 +33,12 @@ class ContactCriteria(CriteriaGroup):
         over=0,
         most=1,
     )
+    looks: int = criterion(
+        4,
+        "1",
+        "closer looks at it at most, each by noise measured without it",
+        least=1,
+    )
     widest_share: float = criterion(
         1 / 12,
         "1",

@@ -197,15 +197,15 @@ def changes_of(
     certain = [np.tile(s.certain, len(s.t)) for s in series]
     every = np.concatenate(certain)
     kept = [~np.tile(out, len(s.t)) for s, out in zip(series, left_out, strict=True)]
+    witnesses = np.concatenate(kept)[every]
     changes = [_changes(s, ~out, own_criteria) for s, out in zip(series, left_out, strict=True)]
     still = [np.ones(len(change)) for change in changes]
     # Noise follows the speed itself, or, once filtered, the least speed near by.
     for measure in (np.abs, _slowness):
         speeds = [measure(one.speed).ravel() for one in series]
         sizes = [np.abs(c * i) for c, i in zip(changes, still, strict=True)]
-        # All that count: those left out may be the only ones that turn round, say.
         at, scales = _scales(
-            np.concatenate(sizes)[every], np.concatenate(speeds)[every], own_criteria
+            np.concatenate(sizes)[every], np.concatenate(speeds)[every], witnesses, own_criteria
         )
         still = [i / np.interp(s, at, scales) for i, s in zip(still, speeds, strict=True)]
     stretches = []
@@ -270,9 +270,22 @@ def _slowness(speed: np.ndarray) -> np.ndarray:
 
 
 def _scales(
-    sizes: np.ndarray, slowness: np.ndarray, criteria: ContactCriteria
+    sizes: np.ndarray, slowness: np.ndarray, witnesses: np.ndarray, criteria: ContactCriteria
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Speeds and the noise's standard deviation there, from the 90 % quantile of its size."""
+    """Speeds and the noise's standard deviation there, from the 90 % quantile of its size.
+
+    Parameters
+    ----------
+    sizes : (T,) of the changes.
+    slowness : (T,) their speeds.
+    witnesses : (T,) which of them a burst has no part in. They alone are asked at speeds at which
+        there are enough of them; elsewhere all are, which may be the only ones that turn round.
+    criteria : of contacts.
+
+    Returns
+    -------
+    Speeds (K,), ascending, and standard deviations (K,).
+    """
     order = np.argsort(slowness, kind="stable")
     edges = np.unique((np.array(criteria.speed_quantiles) * len(order)).astype(int))
     # Turning points are a kind of their own, be they many or few.
@@ -284,6 +297,8 @@ def _scales(
             continue
         rows = order[start:stop]
         at.append(float(slowness[rows].mean()))
+        apart = rows[witnesses[rows]]
+        rows = apart if len(apart) >= criteria.samples_per_scale else rows
         scales.append(float(np.quantile(sizes[rows], 0.9)) / 1.645)
         start = stop
     least = 1e-3 * max(max(scales), 1e-300)

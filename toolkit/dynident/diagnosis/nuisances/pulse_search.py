@@ -141,18 +141,29 @@ def _best(data: Sequence[Repeated], criteria: Criteria) -> DisturbancePulse | No
             continue
         peak = min(places)
         positions += sum(place.tried for place in places)
-        # A burst hides behind itself at first: in the slow changes and in the noise's scale.
-        if peak.chance > criteria.contacts.worth_a_look:
-            found.append(peak)
-            continue
-        # Once more, by noise measured without what stands out most.
-        about = [_about(peak, k, s, criteria.contacts) for k, s in enumerate(series)]
-        places = _places(changes_of(series, about, criteria), criteria.contacts)
-        found += places
+        found.append(_looked_at(peak, series, criteria))
     if not found:
         return None
     best = min(found)
     return _refined(best, min(1.0, best.chance * positions), criteria.contacts)
+
+
+def _looked_at(peak: _PulsePlace, series: Sequence[Repeated], criteria: Criteria) -> _PulsePlace:
+    """What stands out most, by noise measured without it.
+
+    A burst hides behind itself at first: in the slow changes, and in the noise's scale and tails.
+    The first closer look is believed whatever it shows; others, while they raise it, find its
+    place and width better.
+    """
+    for look in range(criteria.contacts.looks):
+        if peak.chance > criteria.contacts.worth_a_look:
+            break
+        about = [_about(peak, k, s, criteria.contacts) for k, s in enumerate(series)]
+        places = _places(changes_of(series, about, criteria), criteria.contacts)
+        if not places or (look and min(places) >= peak):
+            break
+        peak = min(places)
+    return peak
 
 
 @dataclass(frozen=True, order=True)
@@ -183,17 +194,22 @@ def _widths(criteria: ContactCriteria) -> list[float]:
 
 def _places(prepared: Sequence[Changes], criteria: ContactCriteria) -> list[_PulsePlace]:
     """The best place of each width, for the series of one joint."""
-    found, degrees = [], 0.0
+    found, narrowest = [], None
     for width in _widths(criteria):
         tried = _tried(prepared, width, criteria)
         if tried is None:
             continue
-        # Single samples, of which there are most, show how heavy the tails are.
-        degrees = degrees or degrees_of_freedom(tried.z[tried.witnesses(width, criteria)], criteria)
         best = int(np.argmax(tried.z))
         k = int(tried.series[best])
         rows = width / prepared[k].of.step
         row = float(tried.rows[best])
+        # Single samples, of which there are most, show how heavy the tails are: but not those
+        # that this pulse covers, which would speak against itself.
+        narrowest = narrowest or (tried, tried.witnesses(width, criteria))
+        single, witnesses = narrowest
+        apart = np.abs(single.instants - tried.instants[best]) > criteria.reach * width
+        away = witnesses & (apart | (single.series != k))
+        degrees = degrees_of_freedom(single.own[away if away.any() else witnesses], criteria)
         z = float(tried.z[best]) * prepared[k].certainty(row, rows)
         chance = chance_of(z, degrees, rows)
         found.append(_PulsePlace(chance, k, row, rows, len(tried.z), prepared[k]))
@@ -214,12 +230,14 @@ class _Tried:
     Attributes
     ----------
     z : (M,) absolute z values.
+    own : (M,) the same, each over what is usual in its repetition.
     series : (M,) whose they are.
     rows : (M,) where they are in it.
     instants : (M,) s, where they are in the period.
     """
 
     z: np.ndarray
+    own: np.ndarray
     series: np.ndarray
     rows: np.ndarray
     instants: np.ndarray
@@ -253,8 +271,9 @@ def _tried(prepared: Sequence[Changes], width: float, criteria: ContactCriteria)
         # Where a whole repetition is unlike the others, no place in it stands out.
         of, reach = rows // instants, criteria.peak_reach
         usual = [_usual(z[of == p], rows[of == p], reach * rows_wide) for p in range(repetitions)]
+        own = z / np.maximum(usual, 1e-300)[of]
         z = z / np.maximum(usual, 1.0)[of]
-        parts.append((z, np.full(len(rows), k), rows, rows % instants * one.of.step))
+        parts.append((z, own, np.full(len(rows), k), rows, rows % instants * one.of.step))
     return _Tried(*(np.concatenate(part) for part in zip(*parts, strict=True))) if parts else None
 
 
