@@ -27,7 +27,7 @@ class ContactCriteria(CriteriaGroup):
         8, "pulses", "pulses in one diagnosis: more are noise of another kind", least=1
     )
     worth_a_look: float = criterion(
-        2e-3,
+        0.05,
         "1",
         "probability at the one place that stands out most, to look closer",
         over=0,
