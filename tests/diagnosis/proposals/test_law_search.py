@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from dynident.diagnosis.proposals.proposals_of import proposals_of
@@ -39,6 +41,16 @@ def test_shapes_of_a_law_of_another_joint_have_a_sigma() -> None:
     # Least squares with the derivative as a column: 0.11, of a motion of 0.3 rad.
     assert 0.05 < sigma < 0.4
     assert found.named_values["k"] == pytest.approx(2.4, abs=4 * sigma)
+
+
+def test_the_metric_of_a_law_is_not_made_again_where_its_shapes_hardly_move() -> None:
+    made = recordings({"c*v*sin(2.4*q[shoulder])": 0.4})
+    search, fitted = searched(made)
+    said: list[str] = []
+    found = next(replace(search, progress=said.append).found(fitted)).proposal
+    assert found.torque == "v*(c1*sin(k*q[shoulder]) + c2*cos(k*q[shoulder]))"
+    # Once in the metric of the model as given, once in that with the law.
+    assert said.count("laws at elbow") == 2
 
 
 @pytest.mark.slow

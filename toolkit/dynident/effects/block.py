@@ -94,8 +94,15 @@ class Block:
 
         Of several joints, whose speeds were added, the largest width counts.
         """
+        return np.tanh(speed / self._width(*joints))
+
+    def sign_slope(self, sign: np.ndarray, *joints: str | None) -> np.ndarray:
+        """Return the derivative of `sign` by the speed, where that is `sign`; s/rad or s/m."""
+        return (1.0 - sign * sign) / self._width(*joints)
+
+    def _width(self, *joints: str | None) -> float:
         widths = np.broadcast_to(self.friction_width, len(self.names))
-        return np.tanh(speed / max(float(widths[self.index(joint)]) for joint in joints))
+        return max(float(widths[self.index(joint)]) for joint in joints)
 
     def direction(self, joint: str | None) -> np.ndarray:
         """Smoothed sign of a joint's own speed, (T, 1); made once, for all that ask."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
 
 from dynident.formulas.formula_tree import Formula, Number, Operation, Signal, Unknown, nodes
 
-_FUNCTIONS = {
+FUNCTIONS: dict[str, Callable[..., Any]] = {
     "sin": np.sin,
     "cos": np.cos,
     "tanh": np.tanh,
@@ -21,6 +22,7 @@ _FUNCTIONS = {
     "*": np.multiply,
     "/": np.divide,
 }
+"""What operations other than powers and `sign` are on arrays."""
 
 
 class Values(Protocol):
@@ -51,6 +53,11 @@ def evaluate(formula: Formula, values: Values) -> Any:
         return _value(formula, values)
 
 
+def sign_joints(speed: Formula) -> tuple[str | None, ...]:
+    """Return the joints whose motion is in the argument of `sign`, each once."""
+    return tuple(dict.fromkeys(s.joint for s in nodes(speed) if isinstance(s, Signal)))
+
+
 def _value(formula: Formula, values: Values) -> Any:
     match formula:
         case Number(value):
@@ -66,6 +73,5 @@ def _value(formula: Formula, values: Values) -> Any:
                 result = result * found
             return result
         case Operation("sign", (speed,)):
-            joints = dict.fromkeys(s.joint for s in nodes(speed) if isinstance(s, Signal))
-            return values.sign(_value(speed, values), tuple(joints))
-    return _FUNCTIONS[formula.name](*(_value(one, values) for one in formula.of))
+            return values.sign(_value(speed, values), sign_joints(speed))
+    return FUNCTIONS[formula.name](*(_value(one, values) for one in formula.of))

@@ -1,4 +1,4 @@
-"""In which parameters a formula is linear, and whether it vanishes with them."""
+"""In which parameters a formula is linear, what they multiply, and that it vanishes with them."""
 
 from __future__ import annotations
 
@@ -35,6 +35,43 @@ def linear_parameters(formula: Formula, shapes: Collection[str]) -> tuple[str, .
     if _degree(formula, frozenset(shapes)) != 1:
         raise _not_vanishing(formula)
     return names
+
+
+def multiplied_by(formula: Formula, name: str, shapes: Collection[str]) -> Formula:
+    """Return what a linear parameter multiplies: the formula where it is one, and others zero.
+
+    Parameters
+    ----------
+    formula : linear in all parameters but the shapes, see `linear_parameters`.
+    name : of the parameter.
+    shapes : names of those that may stand anywhere.
+    """
+    match formula:
+        case Unknown(own) if own not in shapes:
+            return _ONE if own == name else _ZERO
+        case Operation(kind, of):
+            return _simplified(kind, [multiplied_by(one, name, shapes) for one in of])
+    return formula
+
+
+_ZERO, _ONE = Number(0.0), Number(1.0)
+
+
+def _simplified(kind: str, of: list[Formula]) -> Formula:
+    """An operation without terms that are zero and factors that are one."""
+    zeros = [one == _ZERO for one in of]
+    match kind:
+        case "+" if any(zeros):
+            return of[0] if zeros[1] else of[1]
+        case "-" if any(zeros):
+            return of[0] if zeros[1] else _simplified("neg", of[1:])
+        case "*" if any(zeros):
+            return _ZERO
+        case "*" if _ONE in of:
+            return of[0] if of[1] == _ONE else of[1]
+        case "/" | "neg" if zeros[0]:
+            return _ZERO
+    return Operation(kind, tuple(of))
 
 
 _RANGE = "name in `shape` what the formula holds"

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import get_lapack_funcs, solve
+from scipy.linalg import get_blas_funcs, get_lapack_funcs, solve
 from scipy.spatial.distance import pdist, squareform
 
 from dynident.diagnosis.dependence.joint_inputs import JointInputs
@@ -116,10 +116,11 @@ def left_of_each_unit(
         inverse, status = inverted(inverse, lower=1, overwrite_c=1)
     if status != 0:
         raise FitError("a kernel regression on the residual is singular")
-    inverse = np.tril(inverse) + np.tril(inverse, -1).T
-    weights, left = inverse @ residual, np.empty_like(residual)
+    # Only the lower triangle is one, of the whole and of its blocks.
+    (product,) = get_blas_funcs(("symv",), (inverse,))
+    weights, left = product(1.0, inverse, residual, lower=1), np.empty_like(residual)
     for unit in units:
         out = unit.left_out
-        predicted = solve(inverse[np.ix_(out, out)], weights[out], assume_a="pos")
+        predicted = solve(inverse[np.ix_(out, out)], weights[out], lower=True, assume_a="pos")
         left[unit.rows] = predicted[np.searchsorted(out, unit.rows)]
     return left

@@ -73,7 +73,8 @@ class LawSearch:
         criteria = self.evidence.criteria.proposals
         joints = self._joints(fitted, before)
         terms = {j: self._terms(fitted, before, j) for j in joints}
-        metric, best, seen = fitted, None, None
+        metric, best = fitted, None
+        seen: Effect | None = None
         for _ in range(criteria.rounds):
             looked_at, tried = self._looked_at(metric, terms)
             passing = self._confirmed(metric, looked_at, tried, name)
@@ -81,7 +82,8 @@ class LawSearch:
                 break
             best = _BestLaws(scores=tuple(passing), tried=tried)
             first = passing[0].effect
-            if first == seen:
+            # The refit seeks its shapes anew: from near ones it makes the same metric again.
+            if seen is not None and _alike(first, seen):
                 break
             seen = first
             wider = refitted(self.evidence, fitted.model + first, fitted)
@@ -291,8 +293,9 @@ def _each_once(scores: Sequence[Score]) -> list[Score]:
     return kept
 
 
-def _alike(one: LawEffect, other: Effect) -> bool:
-    """Whether two effects are one law at one joint, with shapes that hardly differ."""
+def _alike(one: Effect, other: Effect) -> bool:
+    """Whether two laws are one at one joint, with shapes that hardly differ."""
+    assert isinstance(one, LawEffect)
     assert isinstance(other, LawEffect)
     same = one.joint == other.joint and one.made_of.torque == other.made_of.torque
     return same and bool(np.allclose(one.shape, other.shape, rtol=_SAME_SHAPE))

@@ -8,7 +8,14 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from dynident.errors import EffectError
-from dynident.formulas import Formula, Signal, linear_parameters, nodes, parse_formula
+from dynident.formulas import (
+    Formula,
+    Signal,
+    linear_parameters,
+    multiplied_by,
+    nodes,
+    parse_formula,
+)
 
 PREFIX = "law:"
 """What the name of an effect begins with that is a law."""
@@ -76,6 +83,12 @@ class Law:
     def linear(self) -> tuple[str, ...]:
         """Parameters in which it is linear, in their order in the formula."""
         return linear_parameters(self.formula, [name for name, _, _ in self.shape])
+
+    @cached_property
+    def columns(self) -> tuple[Formula, ...]:
+        """The torque of each linear parameter, per unit of it."""
+        shapes = [name for name, _, _ in self.shape]
+        return tuple(multiplied_by(self.formula, name, shapes) for name in self.linear)
 
     @cached_property
     def signals(self) -> tuple[Signal, ...]:

@@ -15,7 +15,16 @@ from dynident.effects.laws.shape_grid import shape_grid
 from dynident.effects.parameter import Parameter, ShapeParameter
 from dynident.effects.traits import Needs
 from dynident.errors import EffectError
-from dynident.formulas import Operation, Signal, Unit, evaluate, nodes, units_of
+from dynident.formulas import (
+    Formula,
+    Operation,
+    Signal,
+    Unit,
+    evaluate,
+    evaluate_slopes,
+    nodes,
+    units_of,
+)
 from dynident.robot import Robot
 
 _UNITS = {
@@ -115,7 +124,7 @@ class LawEffect(JointEffect):
 
     def at_joint(self, block: Block) -> np.ndarray:
         found = _BlockValues(self, block)
-        columns = [found.column(name) for name in self.made_of.linear]
+        columns = [found.column(one) for one in self.made_of.columns]
         return np.stack(columns, axis=1)
 
     def require_finite(self, columns: np.ndarray, block: Block) -> None:
@@ -129,22 +138,17 @@ class LawEffect(JointEffect):
             raise EffectError(what, self.label, remedy)
 
     def sensitivities(self, block: Block) -> np.ndarray:
-        """See `Effect.sensitivities`: exact, by CasADi."""
+        """See `Effect.sensitivities`: exact."""
         law = self.made_of
         found = _BlockValues(self, block)
         full = np.zeros((*block.q.shape, len(law.linear), len(law.shape)))
-        if law.shape:
-            rows = [np.broadcast_to(found.signal(one), len(block.t)) for one in law.signals]
-            inputs = np.stack([np.asarray(row, dtype=float) for row in rows])
-            widths = [found.width(one) for one in _sign_joints(law)]
-            slopes = np.array(_slopes(law)(inputs, widths, list(self.shape)))
-            slopes = slopes.reshape(len(law.shape), len(law.linear), -1)
-            # A root has no slope at zero, where its column may have a value all the same.
-            slopes = np.where(np.isfinite(slopes), slopes, 0.0)
-            full[:, block.index(self.joint)] = np.moveaxis(slopes, 2, 0).swapaxes(1, 2)
-            for k, (value, (_, lower, upper)) in enumerate(zip(self.shape, law.shape, strict=True)):
-                one = ShapeParameter("", "", (), lower=lower, upper=upper)
-                full[..., k] *= one.slope(value)
+        at_joint = full[:, block.index(self.joint)]
+        for i, column in enumerate(law.columns if law.shape else ()):
+            for k, slope in enumerate(found.slopes(column)):
+                # A root has no slope at zero, where its column may have a value all the same.
+                at_joint[:, i, k] = np.where(np.isfinite(slope), slope, 0.0)
+        for k, (value, (_, lower, upper)) in enumerate(zip(self.shape, law.shape, strict=True)):
+            at_joint[..., k] *= ShapeParameter("", "", (), lower=lower, upper=upper).slope(value)
         return full
 
     # --- its simulation ------------------------------------------------------------------------
@@ -188,7 +192,7 @@ def law_effect(law: Law) -> type[LawEffect]:
         "shown_by": shown,
         "needs": needs,
         "time_varying": bool({"t", "temperature"} & held),
-        "reverses": bool(_sign_joints(law)),
+        "reverses": any(isinstance(n, Operation) and n.name == "sign" for n in nodes(law.formula)),
     }
     return type(f"Law_{law.name}", (LawEffect,), content)
 
@@ -198,21 +202,23 @@ def _made(law: Law, *place: Any) -> LawEffect:
 
 
 class _BlockValues:
-    """What a formula takes from a block, for one of its linear parameters at a time."""
+    """What the columns of a law take from a block."""
 
     def __init__(self, effect: LawEffect, block: Block) -> None:
         self._effect, self._block = effect, block
         names = [name for name, _, _ in effect.made_of.shape]
         self._shape = dict(zip(names, effect.shape, strict=True))
-        self._one = ""
 
-    def column(self, name: str) -> np.ndarray:
+    def column(self, formula: Formula) -> np.ndarray:
         """Return the torque of one linear parameter, (T,) per unit of it."""
-        self._one = name
-        found = evaluate(self._effect.made_of.formula, self)
+        found = evaluate(formula, self)
         found = found if np.ndim(found) else np.full(len(self._block.t), found)
         # Of numbers, or of symbols where the block has them.
         return found if found.dtype == object else found.astype(float)
+
+    def slopes(self, formula: Formula) -> list[Any]:
+        """Return the derivatives of a column by each shape, (T,) or a number."""
+        return evaluate_slopes(formula, self, list(self._shape))
 
     def signal(self, signal: Signal) -> Any:
         block, joint = self._block, signal.joint or self._effect.joint
@@ -234,78 +240,13 @@ class _BlockValues:
         return here
 
     def parameter(self, name: str) -> float:
-        return self._shape[name] if name in self._shape else float(name == self._one)
+        return self._shape[name]
 
     def sign(self, speed: Any, joints: tuple[str | None, ...]) -> Any:
         return self._block.sign(speed, *(one or self._effect.joint for one in joints))
 
-    def width(self, joints: tuple[str | None, ...]) -> float:
-        """Friction width of a speed that is made of joints' speeds."""
-        widths = np.broadcast_to(self._block.friction_width, len(self._block.names))
-        each = (widths[self._block.index(one or self._effect.joint)] for one in joints)
-        return float(max(each))
-
-
-class _Symbols:
-    """Symbols of a formula, for its derivatives."""
-
-    def __init__(self, law: Law) -> None:
-        import casadi
-
-        def row(size: int, name: str) -> np.ndarray:
-            symbols = casadi.SX.sym(name, size)
-            return np.array([symbols[k] for k in range(size)], dtype=object)
-
-        self.signals = row(len(law.signals), "x")
-        self.widths = row(len(_sign_joints(law)), "w")
-        self.shape = row(len(law.shape), "p")
-        self._law = law
-        self.one = ""
-
-    def signal(self, signal: Signal) -> Any:
-        k = self._law.signals.index(signal)
-        return self.signals[k : k + 1]
-
-    def parameter(self, name: str) -> Any:
-        names = [one for one, _, _ in self._law.shape]
-        if name not in names:
-            return float(name == self.one)
-        k = names.index(name)
-        return self.shape[k : k + 1]
-
-    def sign(self, speed: Any, joints: tuple[str | None, ...]) -> Any:
-        k = _sign_joints(self._law).index(joints)
-        return np.tanh(speed / self.widths[k : k + 1])
-
-
-@cache
-def _slopes(law: Law) -> Any:
-    """Function of signals (m, T), widths and shapes: the columns by the shapes, (s k, T)."""
-    import casadi
-
-    symbols, columns = _Symbols(law), []
-    for name in law.linear:
-        symbols.one = name
-        found = np.ravel(evaluate(law.formula, symbols))[0]
-        columns.append(casadi.SX(found))
-    signals, widths, shape = (
-        casadi.vertcat(*one) if len(one) else casadi.SX(0, 1)
-        for one in (symbols.signals, symbols.widths, symbols.shape)
-    )
-    by_shape = casadi.jacobian(casadi.vertcat(*columns), shape)
-    slopes = casadi.densify(casadi.vec(by_shape))
-    return casadi.Function("slopes", [signals, widths, shape], [slopes])
-
-
-@cache
-def _sign_joints(law: Law) -> tuple[tuple[str | None, ...], ...]:
-    """Joints of each `sign` in the formula, see `evaluate`."""
-    found = []
-    for node in nodes(law.formula):
-        if isinstance(node, Operation) and node.name == "sign":
-            inner = (one.joint for one in nodes(node.of[0]) if isinstance(one, Signal))
-            found.append(tuple(dict.fromkeys(inner)))
-    return tuple(dict.fromkeys(found))
+    def sign_slope(self, sign: Any, joints: tuple[str | None, ...]) -> Any:
+        return self._block.sign_slope(sign, *(one or self._effect.joint for one in joints))
 
 
 @lru_cache(maxsize=4096)
