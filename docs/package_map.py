@@ -18,7 +18,7 @@ FACADES = ("__init__.py", "__init__.pyi")
 FLOORS = (
     ("errors", "words"),
     ("files", "tables"),
-    ("arguments", "late_modules", "progress", "settings", "data_files", "threads"),
+    ("arguments", "late_modules", "progress", "settings", "data_files", "file_groups", "threads"),
     ("criteria", "clusters"),
     ("inertia", "moments", "batch"),
     ("recording",),

@@ -32,6 +32,10 @@ def names(folder: Path) -> set[str]:
     return {one.name for one in folder.iterdir()}
 
 
+def content(folder: Path) -> dict[str, bytes]:
+    return {one.name: one.read_bytes() for one in folder.iterdir()}
+
+
 def test_what_an_earlier_design_left_goes(designed, tmp_path) -> None:
     written = write_design(designed, tmp_path, 100.0, CONTROLLER, motion=FIRST)
     assert written[-1].name == DESIGN and {one.name for one in written} == names(tmp_path)
@@ -45,9 +49,12 @@ def test_what_an_earlier_design_left_goes(designed, tmp_path) -> None:
 
 
 @pytest.mark.parametrize("written", range(5))
-def test_a_design_that_is_cut_short_is_none(designed, tmp_path, monkeypatch, written) -> None:
+def test_a_design_that_is_cut_short_leaves_the_older(
+    designed, tmp_path, monkeypatch, written
+) -> None:
     """Whichever file is the one that the disk has no room for."""
     write_design(designed, tmp_path, 100.0, CONTROLLER, motion=FIRST)
+    older = content(tmp_path)
     left, whole = [written], files.write_bytes
 
     def write_bytes(path, *rest):
@@ -59,13 +66,14 @@ def test_a_design_that_is_cut_short_is_none(designed, tmp_path, monkeypatch, wri
     monkeypatch.setattr(files, "write_bytes", write_bytes)
     with pytest.raises(FileError, match="cannot be written"):
         write_design(designed, tmp_path, 100.0, CONTROLLER, motion=SECOND)
-    assert not (tmp_path / DESIGN).exists() and motion_page(tmp_path) is None
-    page = tmp_path / MOTION_PAGE
-    assert not page.exists() or page.read_text() == SECOND
+    assert content(tmp_path) == older
+    monkeypatch.undo()
+    write_design(designed, tmp_path, 100.0, CONTROLLER, motion=SECOND)
+    assert motion_page(tmp_path) == SECOND.encode() and set(content(tmp_path)) == set(older)
 
 
-def test_what_cannot_be_removed_is_told_before_anything_is_written(designed, tmp_path) -> None:
+def test_what_cannot_be_replaced_is_told_before_anything_is_written(designed, tmp_path) -> None:
     (tmp_path / MOTION_PAGE).mkdir()
-    with pytest.raises(FileError, match=r"motion.html: cannot be removed"):
+    with pytest.raises(FileError, match=r"motion.html: is a folder, not a file"):
         write_design(designed, tmp_path, 100.0, CONTROLLER, motion=FIRST)
     assert names(tmp_path) == {MOTION_PAGE}

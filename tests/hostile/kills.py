@@ -37,7 +37,11 @@ from loop_studies import LOOP_STUDY, write_loop_study
 from study_files import CONTROLLER, STUDY, edited, write_study
 from synthetic import ARM
 
-WRITING = "dynident/files.py"
+WRITING = {
+    "dynident/files.py": ("write_bytes", "write_text"),
+    "dynident/file_groups.py": ("_finish",),
+}
+"""Code that writes: functions of a file, within which a command is killed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -187,6 +191,9 @@ def prepare(folder: Path) -> None:
     place(folder / "old.png", b"\x89PNG older IEND\xae\x42\x60\x82")
     for name, text in zip(("before.json", "after.json"), _estimates(), strict=True):
         place(folder / name, text)
+    (folder / "next").mkdir()
+    for name, text in _older_design().items():
+        place(folder / "next" / name, text)
     (folder / "law").mkdir()
     (folder / "law" / "arm.urdf").write_text(ARM)
     for one, text in zip(("train.csv", "test.csv"), _with_a_law(), strict=True):
@@ -217,6 +224,17 @@ def _with_a_law() -> tuple[bytes, bytes]:
         made = hidden_recordings({"c*q*load": 0.2})[:2]
         first, second = (write(one, Path(name) / "one.csv").read_bytes() for one in made)
     return first, second
+
+
+def _older_design() -> dict[str, str]:
+    """Files as an earlier design left them."""
+    return {
+        "reference.csv": "t,q_ref.shoulder,v_ref.shoulder,q_ref.elbow,v_ref.elbow\n0,0,0,0,0\n",
+        "robot.urdf": ARM,
+        "experiment.toml": EXPERIMENT,
+        "motion.html": "<html>\nan older page</html>",
+        "design.toml": 'sentence = "older"\n',
+    }
 
 
 def _click(self: LocalServer) -> None:
@@ -285,8 +303,9 @@ def _killer(lines: int) -> Callable:
         return within
 
     def enter(frame, _event, _argument):
-        here = frame.f_code.co_filename.endswith(WRITING)
-        return within if here and frame.f_code.co_name in ("write_bytes", "write_text") else None
+        code = frame.f_code
+        here = (names for file, names in WRITING.items() if code.co_filename.endswith(file))
+        return within if code.co_name in next(here, ()) else None
 
     return enter
 
@@ -336,7 +355,8 @@ def damage(writer: Writer, kill: Callable[[Path], int]) -> tuple[bool, list[str]
         for file, data in after.items():
             if before.get(file) == data:
                 continue
-            hidden = Path(file).name.startswith(".")  # the neighbour that was to take a place
+            # The neighbour that was to take a place, or the folder of several.
+            hidden = any(part.startswith(".") for part in Path(file).parts)
             if file in writer.results:
                 try:
                     writer.results[file](folder / file)

@@ -34,18 +34,18 @@ from dynident.evidence.held_out import HeldOut, on_recordings
 from dynident.evidence.maps import residual_maps
 from dynident.evidence.model_columns import rows_of_run
 from dynident.evidence.paired_falls import fall_standard_error
-from dynident.fitting.estimate import Estimate
+from dynident.fitting.estimate import Estimate, nearly_hidden
 from dynident.fitting.least_squares import rows_of_recordings, sources_of
 from dynident.fitting.uncertainty.row_errors import row_covariance
 from dynident.fitting.uncertainty.shape_errors import with_shape_errors
 from dynident.model import Model
+from dynident.moments.factors import RANK_TOLERANCE
 from dynident.recording import Dataset
 from dynident.recording.dataset import NoiseSource
 from dynident.robot import base_parameters
 
 _SHOWN = 10
 """Candidates in a table."""
-_RANK_TOLERANCE = 1e-6  # of what comes from squares, in which half of the digits are gone
 
 _METHODS: dict[NoiseSource, str] = {
     "replicates": "instrumental variables from the repeated periods, noise whitened",
@@ -143,6 +143,7 @@ def assemble(
             *_noise_doubts(evidence, source, rounded, after),
             *rounding_notes(after, given.robot.names, evidence.criteria.verdict),
             *notes_on_steps(steps, held),
+            *nearly_hidden(given.base),
             *path.notes,
             *search.notes,
         ),
@@ -257,7 +258,7 @@ def _estimate(evidence: Evidence, fitted: EvidenceFit, train: Dataset) -> Estima
     model = fitted.model
     # Rows that span what the data show: not the directions in which the columns are noise.
     shown = fitted.solution.basis.T @ fitted.pooled.gram
-    basis = base_parameters(shown, model.names, _RANK_TOLERANCE)
+    basis = base_parameters(shown, model.names, RANK_TOLERANCE)
     kept, combination = list(basis.independent), basis.combination
     covariance = np.zeros((model.size, model.size))
     whole, words = fitted.covariance, ""

@@ -12,12 +12,14 @@ from dynident import files
 from dynident.closed_loop import Controller
 from dynident.closed_loop.experiments.virtual_study import controller_table
 from dynident.effects import LawEffect, laws_table
-from dynident.errors import FileError
 from dynident.experiment_design.recording_design import RecordingDesign
 from dynident.experiment_design.written_design import DESIGN, MOTION_PAGE, design_file
+from dynident.file_groups import replaced_together
 from dynident.robot.patching import write
 
 REFERENCE, EXPERIMENT = "reference.csv", "experiment.toml"
+FILES = (REFERENCE, EXPERIMENT, MOTION_PAGE, DESIGN)
+"""Names that are a design's, beside that of the robot's description."""
 
 
 def write_design(
@@ -30,7 +32,8 @@ def write_design(
 ) -> tuple[Path, ...]:
     """Write the reference of a designed recording, its motion, and what simulates it.
 
-    What an earlier design left in the folder goes first, and `design.toml` comes last: whenever it
+    All of it takes the place of what an earlier design left in the folder when it is complete:
+    whatever ends this earlier leaves that design as it was. `design.toml` comes last: whenever it
     is there, what lies beside it is of the same design.
 
     `reference.csv` has the time and, for each joint, `q_ref` and `v_ref`, of all repetitions, from
@@ -54,34 +57,29 @@ def write_design(
     Raises
     ------
     FileError
-        If a file cannot be written, or an old one not be removed.
+        If a file cannot be written; the earlier design is then untouched. If an old one cannot be
+        removed.
     """
     folder = Path(folder)
     task, series, names = design.task, design.trajectory, design.model.robot.names
     per_period = max(round(task.duration * rate_hz), 2)
-    files.require_folder(folder)
     t = np.arange(task.repeat * per_period + 1) * (task.duration / per_period)
     q, v, _ = series.at(t)
     table = {"t": t}
     for j, name in enumerate(names):
         table |= {f"q_ref.{name}": q[:, j], f"v_ref.{name}": v[:, j]}
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(f"cannot be made ({error.strerror or error})", str(folder)) from None
     text = pd.DataFrame(table).to_csv(index=False, float_format="%.9g", lineterminator="\n")
-    for old in (DESIGN, MOTION_PAGE, EXPERIMENT):
-        files.remove(folder / old)
-    written = [files.write_text(folder / REFERENCE, text)]
-    if controller is not None:
-        robot = write(design.estimate.robot, folder / _name(design))
-        document = tomlkit.dumps(_experiment(design, robot.name, controller))
-        written += [robot, files.write_text(folder / EXPERIMENT, document)]
-    if motion:
-        written.append(files.write_text(folder / MOTION_PAGE, motion))
-    summary = tomlkit.dumps(design_file(design, study, motion).model_dump())
-    written.append(files.write_text(folder / DESIGN, summary))
-    return tuple(written)
+    with replaced_together(folder, (*FILES, _name(design)), last=DESIGN) as beside:
+        written = [files.write_text(beside / REFERENCE, text)]
+        if controller is not None:
+            robot = write(design.estimate.robot, beside / _name(design))
+            document = tomlkit.dumps(_experiment(design, robot.name, controller))
+            written += [robot, files.write_text(beside / EXPERIMENT, document)]
+        if motion:
+            written.append(files.write_text(beside / MOTION_PAGE, motion))
+        summary = tomlkit.dumps(design_file(design, study, motion).model_dump())
+        written.append(files.write_text(beside / DESIGN, summary))
+    return tuple(folder / one.name for one in written)
 
 
 def _name(design: RecordingDesign) -> str:

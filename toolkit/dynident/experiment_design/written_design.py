@@ -11,6 +11,7 @@ from dynident import files
 from dynident.closed_loop import Fourier
 from dynident.errors import DynidentError, StudyError
 from dynident.experiment_design.recording_design import RecordingDesign
+from dynident.file_groups import folder_of, groups_below, in_group
 from dynident.settings import Duration, SettingsTable, read_toml
 
 DESIGN, MOTION_PAGE = "design.toml", "motion.html"
@@ -79,7 +80,8 @@ def motion_page(folder: Path) -> bytes | None:
     folder : that `dynident.experiment_design.design_files.write_design` wrote.
     """
     try:
-        page, told = files.read_bytes(folder / MOTION_PAGE), read_toml(folder / DESIGN, DesignFile)
+        page = files.read_bytes(in_group(folder, MOTION_PAGE))
+        told = read_toml(in_group(folder, DESIGN), DesignFile)
     except DynidentError:
         return None
     return page if _digest(page) == told.motion else None
@@ -88,7 +90,7 @@ def motion_page(folder: Path) -> bytes | None:
 def folders_with_designs(folder: Path) -> tuple[Path, ...]:
     """Return the folders in a folder that hold a designed recording, the newest first."""
     try:
-        found = {one.parent: one.stat().st_mtime for one in folder.glob(f"*/{DESIGN}")}
+        found = {folder_of(one): one.stat().st_mtime for one in groups_below(folder, DESIGN)}
     except OSError:  # one that goes meanwhile, or may not be looked at
         return ()
     return tuple(sorted(found, key=lambda one: (-found[one], one.name)))
@@ -107,7 +109,7 @@ def read_design(folder: Path, joints: tuple[str, ...]) -> DesignFile:
     DynidentError
         If the file cannot be read, is none of a design, or one of another robot.
     """
-    path = folder / DESIGN
+    path = in_group(folder, DESIGN)
     found = read_toml(path, DesignFile)
     if tuple(found.joints) != joints:
         raise StudyError("is the design of another robot", str(path), "design one for this study")

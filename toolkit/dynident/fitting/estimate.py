@@ -27,6 +27,8 @@ _MUCH_LEFT = 0.2
 _INDEPENDENT = "sigma takes the errors of the equations as independent"
 """How the words of such a sigma begin, in files, too."""
 
+_LISTED = 6  # names in a sentence
+
 
 @dataclass(frozen=True)
 class DataSource:
@@ -348,6 +350,25 @@ def unidentified(basis: BaseParameters) -> tuple[str, ...]:
     return (
         f"The data do not excite every parameter: rank {basis.rank} of {len(basis.names)}. Not "
         f"identified on their own, only in combination: {lost}.",
+    )
+
+
+def nearly_hidden(base: BaseParameters) -> tuple[str, ...]:
+    """Return what the digits of a description would show alone; empty where nothing is.
+
+    Parameters
+    ----------
+    base : of the structure, `Model.base`.
+    """
+    names = base.nearly_hidden
+    if not names:
+        return ()
+    listed = ", ".join(names[:_LISTED])
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    return (
+        f"Left as described, for next to nothing shows them: {listed}{more}. They would vanish but "
+        f"for angles or distances of the description of less than {base.tolerance:.0e}, as where "
+        "pi/2 is written 1.5708.",
     )
 
 

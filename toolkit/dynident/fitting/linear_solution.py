@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from dynident.errors import FitError
-from dynident.fitting.estimate import unidentified
+from dynident.fitting.estimate import nearly_hidden, unidentified
 from dynident.model import Model
 from dynident.moments.factors import RANK_TOLERANCE, TriangularFactors
 from dynident.robot import BaseParameters, base_parameters
@@ -145,7 +145,7 @@ def solve_weighted(model: Model, factors: TriangularFactors, weights: np.ndarray
         condition_number=float(np.linalg.cond(found.triangle)),
         weights=weights,
         inverse=found.inverse,
-        notes=unidentified(basis),
+        notes=(*unidentified(basis), *nearly_hidden(model.base)),
     )
 
 

@@ -22,8 +22,14 @@ from scipy.linalg import get_lapack_funcs
 
 from dynident.moments.second_moments import SecondMoments
 
-RANK_TOLERANCE = 1e-8
-"""Share of the largest diagonal of R (unit columns) below which data do not excite a direction."""
+RANK_TOLERANCE = 3e-5
+"""Share of the largest diagonal of R (unit columns) below which a direction is not shown.
+
+The same number for structures, for fits and for the diagnosis, whose products of columns hold no
+more than its square. What is seen by less of itself than this, no measured torque tells: it is
+below what the digits of a description (pi / 2 as 1.5708 is off by 4e-6), the mounting of a joint
+and the linearity of a torque sensor do, by a factor of 10 or more.
+"""
 
 _ROWS = 1024  # factorised at a time: few enough to stay in the cache
 _PANEL = 8  # columns of a step of the factorisation; 4 to 16 take the same time

@@ -8,9 +8,10 @@ import numpy as np
 from scipy.linalg import get_lapack_funcs
 
 from dynident.errors import FitError
+from dynident.moments.factors import RANK_TOLERANCE
 from dynident.moments.second_moments import SecondMoments
 
-EXACT = 1e-9
+EXACT = RANK_TOLERANCE**2
 """Directions below this share of the largest (of columns scaled to norm 1) are dependent; in terms
 of squares, in which half of the digits are gone."""
 _SOUND = 100.0 * EXACT

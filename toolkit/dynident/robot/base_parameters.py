@@ -1,7 +1,8 @@
 """Base parameters: the combinations of parameters that data can tell apart.
 
 Pivoted QR of the stacked regressor (Gautier, "Numerical calculation of the base inertial
-parameters of robots", 1991), on columns of unit norm so that units do not decide.
+parameters of robots", 1991), on columns of unit norm so that units do not decide. One number says
+what counts as shown, for structures as for data: `RANK_TOLERANCE`.
 """
 
 from __future__ import annotations
@@ -15,11 +16,14 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import qr, solve_triangular
 
 from dynident.errors import FitError
+from dynident.moments.factors import RANK_TOLERANCE
 from dynident.robot.robot import Robot
 from dynident.robot.tree import Array
 
 # A column this much smaller than the largest is rounding around zero, not a measurement.
 _ZERO = 1e-13
+# A diagonal entry this small (of the largest) is rounding in double precision, not geometry.
+_ROUNDING = 1e-9
 # A coefficient of a combination this small (in units of column norms) is rounding.
 _NEGLIGIBLE = 1e-8
 # How much the first of two equal columns is preferred as a pivot.
@@ -54,6 +58,9 @@ class BaseParameters:
         Magnitudes of the diagonal of R for unit columns: what the rank was decided on.
     tolerance : float
         A diagonal entry below tolerance times the largest counts as zero.
+    nearly_hidden : tuple of str
+        Parameters that count as not shown, or not shown apart from others, although more than
+        rounding of double precision shows them.
     """
 
     names: tuple[str, ...]
@@ -64,6 +71,7 @@ class BaseParameters:
     scale: Array
     diagonal: Array
     tolerance: float
+    nearly_hidden: tuple[str, ...] = ()
 
     @property
     def rank(self) -> int:
@@ -151,7 +159,10 @@ class BaseParameters:
 
 
 def base_parameters(
-    matrix: ArrayLike, names: Sequence[str], tolerance: float = 1e-9
+    matrix: ArrayLike,
+    names: Sequence[str],
+    tolerance: float = _ROUNDING,
+    borne: ArrayLike = 0.0,
 ) -> BaseParameters:
     """Return the base parameters of a stacked regressor, or of its R factor.
 
@@ -163,8 +174,11 @@ def base_parameters(
         One name per column.
     tolerance : float
         Relative threshold on the diagonal of R, for columns of unit norm. The default separates
-        structural dependence from rounding; raise it (say to 1e-6) for an R that came from
-        normal equations.
+        dependence from rounding in double precision.
+    borne : float or (p,) array_like
+        Norm of a column whose parameter an axis bears in full, at least. A shorter column is
+        scaled by this instead of its own norm, so that it counts as little as it shows, and below
+        tolerance times this it counts as zero.
 
     Raises
     ------
@@ -180,10 +194,14 @@ def base_parameters(
         raise FitError("the regressor is not finite", f"column '{names[column]}'")
     scale = np.linalg.norm(X, axis=0)
     scale[scale <= _ZERO * np.max(scale, initial=0.0)] = 0.0
+    full_norm = np.maximum(scale, borne)
+    hidden = (scale > 0.0) & (scale <= tolerance * full_norm)
+    near = hidden & (scale > _ROUNDING * full_norm)
+    scale[hidden] = 0.0
     shown = np.flatnonzero(scale)
     # Columns that say the same tie; the first in order wins, not the last bit of their norms.
     favour = 1.0 - _FAVOUR * np.arange(len(shown)) / max(len(shown), 1)
-    norms = scale[shown] / favour
+    norms = full_norm[shown] / favour
     R, pivots = _pivoted_r(X[:, shown] / norms)
     diagonal = np.abs(np.diag(R))
     rank = int(np.count_nonzero(diagonal > tolerance * np.max(diagonal, initial=0.0)))
@@ -191,6 +209,8 @@ def base_parameters(
     unit = solve_triangular(R[:rank, :rank], R[:rank, rank:]) if rank else np.zeros((0, len(shown)))
     unit[np.abs(unit) < _NEGLIGIBLE] = 0.0
     kept, rest = shown[pivots[:rank]], shown[pivots[rank:]]
+    dropped = shown[pivots[rank : len(diagonal)]]
+    near[dropped] = diagonal[rank:] > _ROUNDING * np.max(diagonal, initial=0.0)
     full = np.zeros((len(names), len(names)))
     full[np.ix_(kept, rest)] = unit * norms[pivots[rank:]] / norms[pivots[:rank]][:, None]
     independent = np.sort(kept)
@@ -210,6 +230,7 @@ def base_parameters(
         scale=scale,
         diagonal=diagonal,
         tolerance=tolerance,
+        nearly_hidden=tuple(name for name, is_near in zip(names, near, strict=True) if is_near),
     )
 
 
@@ -226,11 +247,35 @@ def structural_base(robot: Robot, seed: int = 0) -> BaseParameters:
     """Return the base parameters of a robot's inertial parameters, whatever the motion.
 
     Computed on random motion within the limits (`Robot.random_motion`): what it cannot show, no
-    recording can.
+    recording can. That an angle of a right angle is written with some digits (1.5707963, 1.5708)
+    would show parameters by a hundred-thousandth of themselves; `RANK_TOLERANCE` leaves these out.
     """
-    motion = robot.random_motion(seed, 20 * robot.n + 20)
-    regressor = robot.regressor(*motion)
-    return base_parameters(regressor.reshape(-1, 10 * robot.n), robot.parameter_names)
+    samples = 20 * robot.n + 20
+    q, v, a = robot.random_motion(seed, samples)
+    regressor = robot.regressor(q, v, a).reshape(-1, 10 * robot.n)
+    borne = np.tile(_borne(robot, a), robot.n)
+    return base_parameters(regressor, robot.parameter_names, RANK_TOLERANCE, borne)
+
+
+def _borne(robot: Robot, a: Array) -> Array:
+    """Norm of the columns of a body's parameters where an axis bears them in full, (10,).
+
+    A mass a typical distance away from an axis that it weighs on, a first moment that gravity
+    turns, an inertia that the joint's own acceleration turns: at least that is seen of what is not
+    hidden by the geometry. Without gravity nothing is known of the first two.
+
+    Parameters
+    ----------
+    robot : Robot
+    a : (T, n) ndarray
+        Accelerations of the motion, rad/s^2 or m/s^2.
+    """
+    distances = np.array([np.linalg.norm(joint.p) for joint in robot.joints])
+    distance = float(np.median(distances[distances > 0])) if np.any(distances > 0) else 0.0
+    weight = float(np.linalg.norm(robot.gravity))
+    turned = float(np.sqrt(np.mean(a**2)))
+    each = np.array([weight * distance, *(3 * [weight]), *(6 * [turned])])
+    return np.sqrt(len(a)) * each
 
 
 def _expression(name: str, coefficients: Array, others: list[str]) -> str:

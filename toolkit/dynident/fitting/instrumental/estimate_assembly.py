@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dynident.fitting.estimate import Estimate, unidentified
+from dynident.fitting.estimate import Estimate, nearly_hidden, unidentified
 from dynident.fitting.history import Convergence
 from dynident.fitting.instrumental.bias import ExpectedBias, expected_bias
 from dynident.fitting.instrumental.covariance import (
@@ -141,7 +141,7 @@ def _doubted(noise: NoiseLevel) -> tuple[str, ...]:
 def _notes(
     model: Model, solution: InstrumentalSolution, history: Convergence, bias: ExpectedBias
 ) -> tuple[str, ...]:
-    notes = [*unidentified(solution.basis)]
+    notes = [*unidentified(solution.basis), *nearly_hidden(model.base)]
     if history.message:
         notes.append(f"{history.ending.value.capitalize()}: {history.message}.".replace("?.", "?"))
     if any(one.way.projected for one in history.rounds):
