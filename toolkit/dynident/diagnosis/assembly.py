@@ -34,7 +34,7 @@ from dynident.evidence.held_out import HeldOut, on_recordings
 from dynident.evidence.maps import residual_maps
 from dynident.evidence.model_columns import rows_of_run
 from dynident.evidence.paired_falls import fall_standard_error
-from dynident.fitting.estimate import Estimate, nearly_hidden
+from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import rows_of_recordings, sources_of
 from dynident.fitting.uncertainty.row_errors import row_covariance
 from dynident.fitting.uncertainty.shape_errors import with_shape_errors
@@ -143,7 +143,6 @@ def assemble(
             *_noise_doubts(evidence, source, rounded, after),
             *rounding_notes(after, given.robot.names, evidence.criteria.verdict),
             *notes_on_steps(steps, held),
-            *nearly_hidden(given.base),
             *path.notes,
             *search.notes,
         ),

@@ -15,6 +15,7 @@ from dynident.diagnosis.search.ranking import Ranking
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut
+from dynident.fitting.estimate import nearly_hidden
 from dynident.recording.dataset import NoiseSource
 
 
@@ -128,4 +129,5 @@ def notes_on(
             "it into the study, set payload = true in the [[recordings]] of these, and false in "
             "the others."
         )
-    return (*notes, *sticking_notes(evidence, doubtful), *friction_width_notes(evidence, fitted))
+    notes += [*sticking_notes(evidence, doubtful), *friction_width_notes(evidence, fitted)]
+    return (*notes, *nearly_hidden(fitted.model.base))
