@@ -24,7 +24,7 @@ from dynident.recording import (
 )
 from dynident.recording.formats import file_source, text_pieces
 
-SUFFIXES = (".csv", ".npz", ".parquet", ".h5")
+SUFFIXES = (".csv", ".npy", ".npz", ".parquet", ".h5")
 SIGNALS = ("t", "q", "tau", "v", "q_ref")
 SAMPLES = 1001
 
@@ -56,7 +56,9 @@ def read_at_once(monkeypatch, size: int) -> None:
 
 def file_of(run: Recording, path: Path) -> Path:
     """Write a recording in any format."""
-    return file_with(columns_of(run), path) if path.suffix == ".h5" else write(run, path)
+    if path.suffix in (".h5", ".npy"):
+        return file_with(columns_of(run), path)
+    return write(run, path)
 
 
 def file_with(columns: dict[str, np.ndarray], path: Path) -> Path:
@@ -65,6 +67,12 @@ def file_with(columns: dict[str, np.ndarray], path: Path) -> Path:
         rows = zip(*(x.tolist() for x in columns.values()), strict=True)
         lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
         path.write_text("\n".join(lines))
+    if path.suffix == ".npy":
+        kinds = [(name, x.dtype, x.shape[1:]) for name, x in columns.items()]
+        rows = np.empty(len(next(iter(columns.values()))), kinds)
+        for name, x in columns.items():
+            rows[name] = x
+        np.save(path, rows)
     if path.suffix == ".npz":
         np.savez(path, **columns)  # pyright: ignore[reportArgumentType]
     if path.suffix == ".parquet":

@@ -1,1 +1,1 @@
-"""Files of recordings: CSV, NPZ, MAT, Parquet, HDF5 and bags of ROS, as far as they are bounded."""
+"""Files of recordings: CSV, NPY, NPZ, MAT, Parquet, HDF5, bags of ROS, as far as bounded."""

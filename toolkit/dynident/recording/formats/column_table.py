@@ -25,7 +25,7 @@ class FileLayout:
 
     Attributes
     ----------
-    names : of the columns of a text file without a header line, by position; "" or "-" skips one.
+    names : of the columns of a file that does not name them, by position; "" or "-" skips one.
         "numbered" calls them column1, column2, ...; where there is a header line, it counts.
     rate_hz : sampling rate of a file without a column of time: sample k is at k/rate_hz.
     topic : which one of a bag that holds the joints on several.
@@ -54,6 +54,54 @@ class FileLayout:
             if not (known and SLOWEST_HZ <= rate <= FASTEST_HZ):
                 remedy = f"give samples a second, from {SLOWEST_HZ:g} to {FASTEST_HZ:g}"
                 raise RecordingError(f"rate_hz = {rate!r}", "rate_hz", remedy)
+
+    def by_name(self, names: Sequence[str], where: str, said: str) -> tuple[str, ...]:
+        """Names of columns that a file names.
+
+        Parameters
+        ----------
+        names : those in the file.
+        where, said : for the message: in what, and that it names them.
+
+        Raises
+        ------
+        RecordingError
+            If they are named by position, too.
+        """
+        if self.names and self.names != "numbered":
+            what = f"{said}, and the study names them by position"
+            remedy = "leave out one of them; [columns] says which of the file's names is ours"
+            raise RecordingError(what, where, remedy)
+        return tuple(names)
+
+    def by_position(
+        self, count: int, where: str, unnamed: str, remedy: str = ""
+    ) -> tuple[str, ...]:
+        """Names of columns that a file does not name.
+
+        Parameters
+        ----------
+        count : how many columns there are.
+        where, unnamed, remedy : for the message: in what, that it does not name them, and what
+            else than naming them by position helps.
+
+        Raises
+        ------
+        RecordingError
+            If nothing names them, or another number of them.
+        """
+        if self.names == "numbered":
+            return tuple(f"column{k}" for k in range(1, count + 1))
+        if not self.names:
+            by_position = (
+                'name them by position (columns = ["t", "q.<joint>", ...] beside the file in the '
+                "study)"
+            )
+            raise RecordingError(unnamed, where, f"{remedy}{', or ' * bool(remedy)}{by_position}")
+        if len(self.names) != count:
+            what = f"{len(self.names)} columns are named by position, and there are {count}"
+            raise RecordingError(what, where, 'write "-" for each that is to be skipped')
+        return tuple("" if name in UNWANTED else name for name in self.names)
 
 
 def _nothing_more(_: Sequence[str]) -> tuple[str, ...]:

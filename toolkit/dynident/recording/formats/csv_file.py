@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from dynident.errors import RecordingError
-from dynident.recording.formats.column_table import UNWANTED, ColumnTable, FileLayout, joined
+from dynident.recording.formats.column_table import ColumnTable, FileLayout, joined
 from dynident.recording.formats.file_source import FileSource
 from dynident.recording.formats.limits import (
     TEXT,
@@ -30,6 +30,7 @@ from dynident.recording.formats.text_pieces import text_pieces
 
 _NUMPY_HEADER = b"# "
 """How NumPy marks the line of a header."""
+_HEADER = "write a header line: t, q.<joint>, tau.<joint> ..."
 _SMALL = 1 << 18
 """Bytes that NumPy has read sooner than pandas is loaded, which takes a third of a second."""
 
@@ -67,7 +68,12 @@ def open_csv(source: FileSource, file: str, layout: FileLayout) -> ColumnTable:
     require_few(1 + first.count(separator), "columns", file)
     cells = _cells(first, separator, file)
     is_header = not all(is_number(cell) for cell in cells)
-    names = _names(cells, layout, file) if is_header else _named(len(cells), layout, file)
+    where = f"{file}, line 1"
+    if is_header:
+        names = layout.by_name(cells, where, "the first line names the columns")
+    else:
+        what = "the first line holds numbers, not the names of columns"
+        names = layout.by_position(len(cells), where, what, _HEADER)
     require_distinct([name for name in names if name], "column", f"{file}, line 1")
     places = {name: place for place, name in reversed([*enumerate(names)])}
 
@@ -138,32 +144,6 @@ def _cells(line: str, separator: str, file: str) -> list[str]:
     except (csv.Error, StopIteration) as error:
         raise RecordingError(f"the header cannot be read ({error})", f"{file}, line 1") from None
     return [cell.strip() for cell in cells]
-
-
-def _names(cells: list[str], layout: FileLayout, file: str) -> tuple[str, ...]:
-    """Names that a header line gives."""
-    if layout.names and layout.names != "numbered":
-        what = "the first line names the columns, and the study names them by position"
-        remedy = "leave out one of them; [columns] says which of the file's names is ours"
-        raise RecordingError(what, f"{file}, line 1", remedy)
-    return tuple(cells)
-
-
-def _named(count: int, layout: FileLayout, file: str) -> tuple[str, ...]:
-    """Names of the columns of a file without a header line."""
-    if layout.names == "numbered":
-        return tuple(f"column{k}" for k in range(1, count + 1))
-    if not layout.names:
-        raise RecordingError(
-            "the first line holds numbers, not the names of columns",
-            f"{file}, line 1",
-            "write a header line: t, q.<joint>, tau.<joint> ..., or name them by position "
-            '(columns = ["t", "q.<joint>", ...] beside the file in the study)',
-        )
-    if len(layout.names) != count:
-        what = f"{len(layout.names)} columns are named by position, and there are {count}"
-        raise RecordingError(what, f"{file}, line 1", 'write "-" for each that is to be skipped')
-    return tuple("" if name in UNWANTED else name for name in layout.names)
 
 
 def _fast(data: bytes, separator: str, width: int, places: list[int]) -> list[np.ndarray] | None:

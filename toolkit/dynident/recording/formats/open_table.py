@@ -11,6 +11,7 @@ import numpy as np
 from dynident.errors import FileError, RecordingError
 from dynident.recording.formats.arrays.hdf5_file import open_hdf5
 from dynident.recording.formats.arrays.mat_file import open_mat
+from dynident.recording.formats.arrays.npy_file import open_npy
 from dynident.recording.formats.arrays.npz_file import open_npz
 from dynident.recording.formats.arrays.parquet_file import open_parquet
 from dynident.recording.formats.arrays.records import pick
@@ -35,6 +36,7 @@ _FORMATS: dict[str, _Open] = {
     ".parquet": lambda source, file, _: open_parquet(source, file),
     ".h5": lambda source, file, _: open_hdf5(source, file),
     ".hdf5": lambda source, file, _: open_hdf5(source, file),
+    ".npy": open_npy,
 }
 READABLE = (*_FORMATS, *BAGS)
 """Suffixes of the files that are read."""
@@ -85,8 +87,9 @@ def _opened(path: Path, layout: FileLayout) -> ColumnTable:
         raise unknown_suffix(path, READABLE)
     if layout.topic:
         raise RecordingError(f"topic = {layout.topic!r} is of a bag", where, "leave it out")
-    if suffix not in TEXTS and layout.names not in ((), "numbered"):
-        what, remedy = "columns are named by position", "only text files without a header need that"
+    if suffix not in (*TEXTS, ".npy") and layout.names not in ((), "numbered"):
+        what = "columns are named by position"
+        remedy = "only text files without a header, and NPY files, need that"
         raise RecordingError(what, where, remedy)
     source = open_source(path, STREAMED.stored, CUT)
     if not source.size:

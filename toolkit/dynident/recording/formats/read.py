@@ -62,9 +62,9 @@ def read(
     -------
     Recording
         Named after the record, else the file; period, use and so on are set with
-        `Recording.replace`. CSV, NPZ, Parquet and HDF5 files are read some rows at a time, and what
-        is larger than `spooled.IN_MEMORY` never is in memory as a whole: it is mapped from files
-        that are there for as long as the recording is. The provenance then says so.
+        `Recording.replace`. CSV, NPY, NPZ, Parquet and HDF5 files are read some rows at a time, and
+        what is larger than `spooled.IN_MEMORY` never is in memory as a whole: it is mapped from
+        files that are there for as long as the recording is. The provenance then says so.
 
     Raises
     ------

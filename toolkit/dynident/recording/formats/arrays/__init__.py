@@ -1,1 +1,1 @@
-"""Files of named arrays and tables: NPZ, MAT, Parquet, HDF5, also of several records."""
+"""Files of named arrays and tables: NPY, NPZ, MAT, Parquet, HDF5, also of several records."""

@@ -11,6 +11,11 @@ from typing import IO, Any
 import numpy as np
 
 from dynident.errors import RecordingError
+from dynident.recording.formats.arrays.array_header import (
+    NUMBERS,
+    ArrayHeader,
+    read_array_header,
+)
 from dynident.recording.formats.column_table import (
     ColumnTable,
     RowReader,
@@ -100,15 +105,6 @@ def _array(archive: Any, name: str, file: str) -> np.ndarray:
     return found
 
 
-@dataclass(frozen=True)
-class _Header:
-    """Shape of an array in a file, whether its columns lie one after the other, and its type."""
-
-    shape: tuple[int, ...]
-    by_columns: bool
-    dtype: np.dtype
-
-
 def _readers(archive: Any, names: Sequence[str], members: ExitStack) -> dict[str, RowReader] | None:
     """Readers of the rows of arrays; None where one is no table of numbers with as many rows."""
     found: dict[str, RowReader] = {}
@@ -140,19 +136,12 @@ def _skip(stream: IO[bytes], size: int) -> None:
         size -= len(stream.read(min(size, _BLOCK))) or size
 
 
-def _header(stream: IO[bytes]) -> _Header | None:
+def _header(stream: IO[bytes]) -> ArrayHeader | None:
     """What an array says of itself; None where it is none of rows of numbers."""
-    version = np.lib.format.read_magic(stream)
-    read = {
-        (1, 0): np.lib.format.read_array_header_1_0,
-        (2, 0): np.lib.format.read_array_header_2_0,
-    }.get(version)
-    if read is None:
+    header = read_array_header(stream)
+    if header is None or header.dtype.kind not in NUMBERS or len(header.shape) not in (1, 2):
         return None
-    shape, by_columns, dtype = read(stream)
-    if dtype.kind not in "fiub" or len(shape) not in (1, 2):
-        return None
-    return _Header(shape, by_columns, dtype)
+    return header
 
 
 @dataclass(frozen=True, eq=False)
