@@ -63,6 +63,10 @@ class FileLayout:
         names : those in the file.
         where, said : for the message: in what, and that it names them.
 
+        Returns
+        -------
+        The names.
+
         Raises
         ------
         RecordingError
@@ -84,6 +88,10 @@ class FileLayout:
         count : how many columns there are.
         where, unnamed, remedy : for the message: in what, that it does not name them, and what
             else than naming them by position helps.
+
+        Returns
+        -------
+        One for each column; "" for one that is skipped.
 
         Raises
         ------
