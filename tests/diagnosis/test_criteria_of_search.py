@@ -24,7 +24,7 @@ def found(criteria: Criteria) -> Diagnosis:
         synthetic(full, truth, seed, rate_hz=250.0, position_std=2e-5, torque_std=0.3)
         for seed in range(2)
     )
-    return diagnose(PLAIN, Dataset(made), criteria=criteria)
+    return diagnose(PLAIN, Dataset(made), criteria=criteria, propose="never")
 
 
 @pytest.mark.slow

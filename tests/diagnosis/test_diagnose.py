@@ -128,7 +128,8 @@ def test_an_effect_outside_the_catalogue_is_called_unknown(model: Model) -> None
         extra[:, 1] = 0.8 * v[:, 1] * np.sin(3 * recording.q[:, 0]) * np.sin(5 * recording.q[:, 1])
         return recording.replace(tau=recording.tau + extra)
 
-    found = find(model, Dataset(tuple(map(strange, train))), Dataset(tuple(map(strange, test))))
+    train, test = (Dataset(tuple(map(strange, part))) for part in (train, test))
+    found = find(model, train, test, propose="never")
     assert found.verdict == "unexplained"
     assert "beyond the noise" in found.sentence
 

@@ -42,7 +42,7 @@ def with_contact(recording: Recording, size: float) -> Recording:
 def test_a_short_disturbance_that_returns_is_not_called_noise(model: Model, size: float) -> None:
     """However short: it is in every period, and no noise is."""
     runs = tuple(with_contact(one, size) for one in recordings(model))
-    found = find(model, Dataset(runs[:3]), Dataset(runs[3:]))
+    found = find(model, Dataset(runs[:3]), Dataset(runs[3:]), propose="never")
     assert found.verdict == "unexplained"
     assert "beyond the noise" in found.sentence
 
@@ -123,7 +123,8 @@ def test_test_recordings_that_do_not_repeat_are_judged_all_the_same(model: Model
     lacking = model + "quadratic_drag@elbow"
     truth = true_values(lacking, **FRICTION, Fq__elbow=0.5)
     other = synthetic(lacking, truth, 7, rate_hz=250.0, position_std=2e-5, torque_std=0.3)
-    found = find(model, Dataset(healthy), Dataset((other.replace(period=None),)))
+    test = Dataset((other.replace(period=None),))
+    found = find(model, Dataset(healthy), test, propose="never")
     assert found.test_error.noise_floor is not None
     assert found.test_error.before > 1.5 * found.test_error.noise_floor
     assert found.verdict == "unexplained"

@@ -71,7 +71,7 @@ def test_asymmetric_friction_is_reproduced_to_a_hundredth_of_a_percent() -> None
 def test_the_rigid_body_alone_leads_to_asymmetric_friction_and_a_ripple_and_no_further() -> None:
     study = load(PROBLEM / "study.toml")
     assert study.model.effects == ()
-    found = diagnose(study.model, study.train, study.test)
+    found = diagnose(study.model, study.train, study.test, propose="never")
     names = [step.effect.name for step in found.steps]
     assert set(names[:2]) == {"coulomb_friction", "viscous_friction"}
     assert names[2:] == ["torque_offset", "asymmetric_friction", "torque_ripple"]

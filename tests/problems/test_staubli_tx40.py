@@ -97,7 +97,7 @@ def test_every_fourth_half_second_is_to_judge_by(study: Study) -> None:
 
 @pytest.fixture(scope="module")
 def found(study: Study) -> Diagnosis:
-    return diagnose(study.model, study.train, study.test)
+    return diagnose(study.model, study.train, study.test, propose="never")
 
 
 @pytest.mark.slow

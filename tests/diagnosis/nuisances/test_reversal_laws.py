@@ -110,7 +110,8 @@ def test_a_robot_whose_friction_leads_lacks_what_it_lacks_beside(
 @pytest.mark.slow
 def test_friction_that_lags_is_never_nothing() -> None:
     """It has a memory: neither a rival's name nor rows left out make that go away."""
-    said = di.diagnose(given(), dataset(0, 1, lead=-6e-3), dataset(7, lead=-6e-3))
+    train, test = dataset(0, 1, lead=-6e-3), dataset(7, lead=-6e-3)
+    said = di.diagnose(given(), train, test, propose="never")
     assert said.verdict == "unexplained" or said.steps
     assert not said.reversals_left_out
 
@@ -119,5 +120,5 @@ def test_friction_that_lags_is_never_nothing() -> None:
 def test_a_study_that_asks_for_every_row_keeps_it() -> None:
     every = di.Filter(position_cutoff_hz=40.0, ends="keep")
     train = replace(dataset(0, 1, lead=6e-3), filter=every)
-    said = di.diagnose(given(), train, most=1)
+    said = di.diagnose(given(), train, most=1, propose="never")
     assert not said.reversals_left_out
