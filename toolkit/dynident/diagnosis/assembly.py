@@ -122,9 +122,8 @@ def assemble(
     complete, left = verdict == "nothing_missing", shares_left_out(evidence)
     limits = detection_limits(evidence, held, stages[-1], rounds[-1]) if complete else ()
     pushed = contact_candidates(given, evidence, search.disturbances)
-    gains = candidate_gains(rounds[0], evidence, held, start, before.error, _SHOWN)
+    gains, last_gains = _gains(search, held, before.error, after.error)
     first = _merged(_candidates(rounds[0], gains), pushed)
-    gains = candidate_gains(rounds[-1], evidence, held, stages[-1], after.error, 0)
     return Diagnosis(
         verdict=verdict,
         noise_source=source,
@@ -132,7 +131,7 @@ def assemble(
         test_error=TestError(before=first_error, after=after.error, noise_floor=after.floor),
         steps=steps,
         candidates=_revealed(first, evidence, start),
-        remaining=_candidates(rounds[-1], gains),
+        remaining=_candidates(rounds[-1], last_gains),
         before=_with_shapes(evidence, start, train),
         after=final,
         maps=residual_maps(given, before, after, evidence.criteria),
@@ -155,6 +154,17 @@ def assemble(
         detection_limits=limits,
         reversals_left_out={joint: left[joint] for joint in search.doubtful},
     )
+
+
+def _gains(
+    search: Search, held: Evidence | None, before: float, after: float
+) -> tuple[dict[str, float], dict[str, float]]:
+    """What candidates take off the errors of the model as given, and of the final one."""
+    evidence, rounds, stages = search.evidence, search.rounds, search.path.stages
+    first = candidate_gains(rounds[0], evidence, held, stages[0], before, _SHOWN)
+    known = first if len(rounds) == len(stages) == 1 else {}  # asked of the same fit
+    last = candidate_gains(rounds[-1], evidence, held, stages[-1], after, 0, known=known)
+    return first, last
 
 
 def _noise_doubts(

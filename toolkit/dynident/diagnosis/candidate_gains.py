@@ -6,7 +6,9 @@ so that its own figures are shares of another sum.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
+from types import MappingProxyType
 
 from dynident.diagnosis.search.payload_recordings import with_payload, with_payload_decided
 from dynident.diagnosis.search.ranking import Ranking
@@ -24,6 +26,8 @@ def candidate_gains(
     fitted: EvidenceFit,
     error: float,
     first: int,
+    *,
+    known: Mapping[str, float] = MappingProxyType({}),
 ) -> dict[str, float]:
     """Return by how much the held-out error falls with each of the best candidates.
 
@@ -38,6 +42,7 @@ def candidate_gains(
     error : its held-out torque error, relative.
     first : so many of the ranking are tried at any rate, beside those that were cross-validated:
         each is a fit more.
+    known : falls that were found before, of the same ranking and fit.
 
     Returns
     -------
@@ -50,6 +55,9 @@ def candidate_gains(
     found = {}
     for label, one in asked.items():
         if one.effect.is_dynamic_response and one.gains is None:
+            continue
+        if label in known:
+            found[label] = known[label]
             continue
         with suppress(FitError):  # it cannot be fitted with the model: nothing is known of it
             found[label] = error - _error_with(one, evidence, held, fitted)
