@@ -69,13 +69,16 @@ def check_diagnosis(said: dict[str, Any], source: str) -> None:
         for other in step["indistinguishable"]:
             assert set(other) == {"effect", "joint", "source"} and is_place(other)
     assert said["candidates"]
+    # What was not tried has no gain: zero would be a finding.
+    tried = [one["test_gain"] for one in said["candidates"] if one["test_gain"] is not None]
+    assert tried and 0.0 not in tried and len(tried) < len(said["candidates"])
     for candidate in said["candidates"]:
         assert set(candidate) == {"effect", "joint", "source", "status", "p_value", "test_gain"}
         assert is_place(candidate)
         assert candidate["status"] in {"material", "not_material", "absorbed"}
         assert (candidate["p_value"] is None) == (candidate["status"] == "absorbed")
         assert candidate["p_value"] is None or number(candidate["p_value"], 0, 1)
-        assert number(candidate["test_gain"], -1, 1)
+        assert candidate["test_gain"] is None or number(candidate["test_gain"], -1, 1)
     errors = said["test_error"]
     assert set(errors) == {"before", "after", "noise_floor"}
     assert number(errors["before"], 0) and number(errors["after"], 0)

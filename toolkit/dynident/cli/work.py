@@ -200,7 +200,7 @@ def diagnosis_of(
             criteria=study.criteria,
             progress=show_progress,
         )
-    return in_recorded_units(with_gains(found, study.drives), study.drives)
+    return in_recorded_units(with_gains(found, study.drives, study.gain_problem), study.drives)
 
 
 def proposed_laws(diagnosis: Diagnosis, number: int, study: Path) -> tuple[Law, ...]:

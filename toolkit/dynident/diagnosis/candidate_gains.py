@@ -46,8 +46,8 @@ def candidate_gains(
 
     Returns
     -------
-    Falls of that error by label; of none that this data cannot tell, or whose response would cost
-    a search of its own.
+    Falls of that error by label; of none that this data cannot tell, whose fit does not settle, or
+    whose response would cost a search of its own.
     """
     told = [one for one in ranking.scores if one.rank and not one.not_identifiable]
     asked = {one.effect.label: one for one in told[:first]}
@@ -67,7 +67,10 @@ def candidate_gains(
 def _error_with(
     one: Score, evidence: Evidence, held: Evidence | None, fitted: EvidenceFit
 ) -> float:
+    """The held-out error with a candidate; FitError where it cannot be fitted with the model."""
     carrying = with_payload(evidence, one)
     wider = fit_evidence(carrying, fitted.model + one.effect, fitted)
+    if not wider.settled:
+        raise FitError("columns and values do not agree", one.effect.label)
     decided = None if held is None else with_payload_decided(held, wider)
     return judged_on(carrying, decided, wider).error

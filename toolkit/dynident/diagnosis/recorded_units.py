@@ -12,24 +12,58 @@ import numpy as np
 from dynident.diagnosis.details import JointResult, Trace
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.switches import Switches
+from dynident.errors import FitError, StudyError
 from dynident.evidence.maps import ResidualMap
-from dynident.fitting.drive_gains import DriveGains, with_gain_errors
+from dynident.fitting.drive_gains import (
+    DriveGains,
+    GainProblem,
+    fit_drive_gains,
+    with_gain_errors,
+)
 
 
-def with_gains(diagnosis: Diagnosis, drives: DriveGains | None) -> Diagnosis:
+def with_gains(
+    diagnosis: Diagnosis, drives: DriveGains | None, problem: GainProblem | None
+) -> Diagnosis:
     """Return a diagnosis with the gains and loads that it rests on, and with their errors.
+
+    Gains that were found with the model as given carry what it lacks: with the effects added they
+    are fitted anew, beside those that the diagnosis rests on.
 
     Parameters
     ----------
     diagnosis : of recordings that `in_newton_metres` made.
     drives : by which it did; None where nothing had to be found.
+    problem : what `drives` solves.
     """
-    if drives is None:
+    if drives is None or problem is None:
         return diagnosis
     before = with_gain_errors(diagnosis.before, drives)
     same = diagnosis.after is diagnosis.before
     after = before if same else with_gain_errors(diagnosis.after, drives)
-    return replace(diagnosis, drives=drives, before=before, after=after)
+    return replace(
+        diagnosis,
+        drives=drives,
+        drives_anew=_anew(diagnosis, drives, problem),
+        before=before,
+        after=after,
+    )
+
+
+def _anew(diagnosis: Diagnosis, drives: DriveGains, problem: GainProblem) -> DriveGains | None:
+    """Gains and loads with the effects added; None where nothing was, or they cannot be told.
+
+    A drive gain that was added makes up for gains that were found without the other effects: it is
+    in those that are found with them.
+    """
+    after = diagnosis.after.model
+    wider = replace(after, effects=tuple(one for one in after.effects if one.name != "drive_gain"))
+    if wider.names == problem.model.names:
+        return None
+    try:
+        return fit_drive_gains(replace(problem, model=wider), drives.unit)
+    except (FitError, StudyError):  # such as a gain of its own that the search added
+        return None
 
 
 def in_recorded_units(diagnosis: Diagnosis, drives: DriveGains | None) -> Diagnosis:

@@ -26,7 +26,7 @@ from dynident.diagnosis.proposals.proposal import Proposal
 from dynident.diagnosis.switches import Switches
 from dynident.diagnosis.track_record import JOINTS, TrackRecord, track_record
 from dynident.evidence.maps import ResidualMap
-from dynident.fitting.drive_gains import DriveGains
+from dynident.fitting.drive_gains import DriveGains, anew_tables
 from dynident.fitting.estimate import DataSource, Estimate
 from dynident.recording import RowCount
 from dynident.recording.dataset import NoiseSource
@@ -86,6 +86,7 @@ class Diagnosis(Shown):
     switches : every choice among the effects added, fitted and judged, where that was asked for.
     drives : gains by which currents became torques, and loads that were identified; None where
         nothing had to be found.
+    drives_anew : the same, fitted with the effects added; None where none was.
     """
 
     verdict: Verdict
@@ -114,6 +115,7 @@ class Diagnosis(Shown):
     following_motion: tuple[str, ...] = ()
     switches: Switches | None = None
     drives: DriveGains | None = None
+    drives_anew: DriveGains | None = None
 
     @property
     def best(self) -> Step | None:
@@ -281,8 +283,7 @@ class Diagnosis(Shown):
                     **place(c.effect),
                     "status": c.status,
                     "p_value": c.p_value,
-                    # A number always, as others rely on: none was shown where none was tried.
-                    "test_gain": c.test_gain or 0.0,
+                    "test_gain": c.test_gain,
                 }
                 for c in self.candidates
             ],
@@ -296,6 +297,7 @@ class Diagnosis(Shown):
             "rows": self.rows.to_dict(),
             "withdrawn": [one.to_dict() for one in self.withdrawn],
             **self._limits(),
+            **({"drives_anew": self.drives_anew.to_dict()} if self.drives_anew else {}),
             **self._dependence(),
             "proposals": [one.to_dict() for one in self.proposals],
             "notes": list(self.caveats),
@@ -322,6 +324,7 @@ class Diagnosis(Shown):
             self.map_table(),
             self.candidate_table(),
             self.step_table(),
+            *anew_tables(self.drives, self.drives_anew),
             self.sentence,
             *((limit_table(self.detection_limits),) if self.detection_limits else ()),
             *(one.sentence for one in self.residual_dependence),

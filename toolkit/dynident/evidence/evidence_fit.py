@@ -49,6 +49,7 @@ class EvidenceFit:
     variances : (n,) of the noise; of the torque, where the noise is unknown or zero.
     torque_peaks : (n,) largest torque that friction can have balanced, N m or N: what was measured
         and what the bodies make.
+    settled : whether columns that depend on the values agree with them.
     """
 
     criteria: Criteria
@@ -64,6 +65,7 @@ class EvidenceFit:
     squares: np.ndarray
     variances: np.ndarray
     torque_peaks: np.ndarray
+    settled: bool = True
 
     def misfit(self, over: EvidenceFit) -> float:
         """Systematic square over the variances of another fit, summed over joints.
@@ -120,18 +122,11 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
     """
     n, criteria = model.robot.n, evidence.criteria.fit
     at = _held(model, _beginning(model, near))
-    torque_std = [
-        float(
-            np.sqrt(
-                np.mean(np.concatenate([r.replicates[0].tau[:, j] for r in evidence.runs]) ** 2)
-            )
-        )
-        for j in range(n)
-    ]
+    torque_std = _torque_rms(evidence)
     noise = tuple(flat_noise(std or 1.0) for std in torque_std) if near is None else near.noise
     known = any(run.kind != "single" for run in evidence.runs)
     reliable = evidence.criteria.noise.reliable
-    columns, values, fixed_point = [], at, FixedPoint()
+    columns, values, settled, fixed_point = [], at, True, FixedPoint()
     white = None if near is None else near.white
     for round in range(criteria.value_rounds if model.needs_values else criteria.noise_rounds):
         if not columns or model.needs_values:
@@ -151,6 +146,7 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
         )
         change = float(np.linalg.norm(_held(model, values) - at))
         small = change <= criteria.value_tolerance * np.linalg.norm(values)
+        settled = bool(small) or not model.needs_values
         if round >= criteria.noise_rounds - (near is not None) and small:
             break
         at = _held(model, fixed_point.following(model, at, values))
@@ -175,7 +171,14 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
             [one.variance or s**2 or 1.0 for one, s in zip(left, torque_std, strict=True)]
         ),
         torque_peaks=friction_reach(evidence, values),
+        settled=settled,
     )
+
+
+def _torque_rms(evidence: Evidence) -> list[float]:
+    """Root mean square of the torque of each joint, in the first replicate of each run."""
+    tau = np.concatenate([run.replicates[0].tau for run in evidence.runs])
+    return [float(np.sqrt(np.mean(tau[:, j] ** 2))) for j in range(tau.shape[1])]
 
 
 def _no_less(noise: NoiseModel, least: float) -> NoiseModel:

@@ -14,6 +14,7 @@ from dynident.diagnosis.dependence.residual_dependence import dependence_table
 from dynident.diagnosis.detection_limits import limit_table
 from dynident.diagnosis.result import Diagnosis
 from dynident.evidence.maps import ResidualMap
+from dynident.fitting.drive_gains import anew_tables
 from dynident.reporting.content import after_name, left, ranked, seen
 from dynident.reporting.diagnosis_tables import (
     candidate_table,
@@ -188,7 +189,10 @@ def _diagnosis_page(
         remaining=remaining_table(diagnosis),
         limits=limit_table(diagnosis.detection_limits) if diagnosis.detection_limits else None,
         not_identifiable=not_identifiable_table(diagnosis),
-        drives=() if diagnosis.drives is None else diagnosis.drives.tables(),
+        drives=(
+            *(diagnosis.drives.tables() if diagnosis.drives else ()),
+            *anew_tables(diagnosis.drives, diagnosis.drives_anew),
+        ),
         of_effects=replace(parameters, rows=parameters.rows[bodies:]),
         of_bodies=replace(parameters, rows=parameters.rows[:bodies], notes=()),
         fit_error=diagnosis.after.error_table(),

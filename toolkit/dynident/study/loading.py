@@ -48,6 +48,7 @@ class Study:
         those of the robot alone where loads have names.
     drives : gains by which torques were converted, and loads that were identified; None where the
         recordings are in N m and no load has a name.
+    gain_problem : what they solve; None where they are None.
     controller : of the closed loop, where the study states one.
     criteria : the numbers that decide a diagnosis, with those that the study wants otherwise: a
         table for each group, as `[criteria.gates] level = 0.005`; see `dynident.criteria`.
@@ -60,6 +61,7 @@ class Study:
     train: Dataset
     test: Dataset
     drives: DriveGains | None = None
+    gain_problem: GainProblem | None = None
     controller: Controller | None = None
     criteria: Criteria = DEFAULTS
     digest: str = ""
@@ -130,14 +132,13 @@ def load(path: str | Path, *, modules: Permission = "trusted") -> Study:
     controller = None
     if said.controller:
         controller = said.controller.controller(robot, f"{path}: controller")
-    drives = None
+    drives = problem = None
     if said.torque_unit != "N m" or said.drive_gains or said.trusted or loads:
         known = said.drive_gains
         if said.torque_unit == "N m":
             known = dict.fromkeys(robot.names, 1.0)
-        drives = _drives(
-            said, path, GainProblem(model, sets["train"], known, loads, trusted=tuple(said.trusted))
-        )
+        problem = GainProblem(model, sets["train"], known, loads, trusted=tuple(said.trusted))
+        drives = _drives(said, path, problem)
         sets = {use: in_newton_metres(one, drives, robot) for use, one in sets.items()}
     return Study(
         path=path,
@@ -145,6 +146,7 @@ def load(path: str | Path, *, modules: Permission = "trusted") -> Study:
         train=sets["train"],
         test=sets["test"],
         drives=drives,
+        gain_problem=problem,
         controller=controller,
         criteria=criteria,
         digest=digest,

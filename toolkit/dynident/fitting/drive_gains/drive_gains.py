@@ -176,7 +176,7 @@ class DriveGains(Shown):
             )
         )
         notes = [self.sentence, *filter(None, [self.remedy])]
-        notes.append(f"What is said in N m of torques is {self.unit} times these gains.")
+        notes.append(self.conversion)
         if any(len(group) > 1 for group in self.groups):
             notes.append("sigma of such a gain is that of its ratio to the mean of its group.")
         notes += self.doubts
@@ -187,7 +187,12 @@ class DriveGains(Shown):
         columns = ("joint", "gain", "sigma", "95 % interval", "unit", "found", "left (std)")
         return Table("Gains of the drives", columns, rows, tuple(notes))
 
-    def tables(self) -> tuple[Table | str, ...]:
+    @property
+    def conversion(self) -> str:
+        """What torques in N m are, where these gains made them."""
+        return f"What is said in N m of torques is {self.unit} times these gains."
+
+    def tables(self) -> tuple[Table, ...]:
         """The gains, then the loads of which anything was identified."""
         gains = () if self.unit == "N m" else (self.table(),)
         return (*gains, *(load.table() for load in self.loads if not load.load.is_known))
