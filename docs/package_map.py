@@ -152,6 +152,26 @@ def first_line(tree: ast.AST) -> str:
 _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 
+def blocks(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield what stands in the blocks of a statement: statements, and handlers and cases of them.
+
+    No expressions, of which most of a tree is made.
+    """
+    for field in ("body", "handlers", "cases", "orelse", "finalbody"):
+        found = getattr(node, field, None)
+        if isinstance(found, list):
+            yield from found
+
+
+def statements(tree: ast.AST) -> Iterator[ast.AST]:
+    """Yield all statements of a tree, those inside of others too."""
+    left = [tree]
+    while left:
+        node = left.pop()
+        yield node
+        left += blocks(node)
+
+
 def _name(path: Path) -> str:
     parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
     return ".".join(parts[:-1] if path.name in FACADES else parts)
@@ -159,7 +179,7 @@ def _name(path: Path) -> str:
 
 def _imported(tree: ast.Module, name: str) -> Iterator[str]:
     """Yield every name that a module imports, relative ones (as stubs have them) made absolute."""
-    for node in ast.walk(tree):
+    for node in statements(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import takewhile
 
-from package_map import Module, modules
+from package_map import Module, blocks, modules, statements
 
 FILES_IN_A_ROOM = 15
 LINES_OF_A_FUNCTION = 80
@@ -82,7 +82,7 @@ def functions() -> list[Function]:
     found: list[Function] = []
 
     def visit(module: Module, node: ast.AST, owners: tuple[ast.AST, ...]) -> None:
-        for child in ast.iter_child_nodes(node):
+        for child in blocks(node):
             if isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef):
                 found.append(Function(module, child, owners))
             inner = isinstance(child, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
@@ -97,7 +97,7 @@ def functions() -> list[Function]:
 def classes() -> dict[str, list[tuple[Module, ast.ClassDef]]]:
     found = defaultdict(list)
     for module in modules().values():
-        for node in ast.walk(module.tree):
+        for node in statements(module.tree):
             if isinstance(node, ast.ClassDef):
                 found[node.name].append((module, node))
     return found

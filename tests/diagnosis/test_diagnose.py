@@ -301,6 +301,7 @@ def test_the_gain_of_a_candidate_is_the_fall_of_the_step_that_adds_it_alone() ->
     )
 
 
+@pytest.mark.slow
 def test_a_joint_without_any_torque_is_fitted_to_no_more_than_rounding() -> None:
     """Its noise was the square of itself with every fit, until products overflowed."""
     model = Model(arm()) + "viscous_friction" + "coulomb_friction@elbow"

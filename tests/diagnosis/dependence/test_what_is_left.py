@@ -40,6 +40,7 @@ def diagnosed(hidden: float) -> Diagnosis:
     return di.diagnose(true_model(), train, test)
 
 
+@pytest.mark.slow
 def test_a_law_that_no_catalogue_has_is_found_without_a_noise_floor() -> None:
     found = diagnosed(0.8)
     assert found.noise_source == "unknown"
@@ -51,6 +52,7 @@ def test_a_law_that_no_catalogue_has_is_found_without_a_noise_floor() -> None:
     assert first.test_error_after < 0.5 * found.test_error.before
 
 
+@pytest.mark.slow
 def test_slow_noise_that_spoils_the_parameters_follows_no_motion() -> None:
     """What errors of the parameters make of a test recording is a function of the motion."""
 
