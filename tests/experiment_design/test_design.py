@@ -14,6 +14,7 @@ from dynident.experiment_design import DesignTask, MotionLimits, design
 from dynident.experiment_design.column_function import ColumnFunction
 from dynident.experiment_design.information import Information, Objective
 from dynident.experiment_design.motion_program import FINER, MotionProgram, instants_of
+from dynident.experiment_design.motion_solver import MotionSolver
 from dynident.experiment_design.periodic import PeriodicMotions
 from dynident.model import Model
 from dynident.recording import Dataset
@@ -267,6 +268,47 @@ def test_torque_limits_hold() -> None:
     torque = found.program.information.columns.torque_along(t, *found.trajectory.at(t))
     assert np.all(np.abs(torque).max(axis=0) <= limits.torque * 1.001)
     assert np.abs(torque).max() > 10.0
+
+
+def written(monkeypatch: pytest.MonkeyPatch) -> list[frozenset[int]]:
+    """Joints whose torques are limited in each program that is written from now on."""
+    found, of = [], MotionSolver.of
+
+    def noted(motions, informations, instants, limited, iterations, torques, cuts=()):
+        found.append(frozenset(torques))
+        return of(motions, informations, instants, limited, iterations, torques, cuts)
+
+    monkeypatch.setattr(MotionSolver, "of", noted)
+    return found
+
+
+def test_torques_far_from_their_limits_cost_the_search_no_rows(monkeypatch) -> None:
+    programs = written(monkeypatch)
+    limits = replace(MotionLimits.of(ROBOT), torque=np.array([1e3, 1e3]))
+    design(MODEL, recorded(), DesignTask(starts=1, harmonics=2), limits=limits)
+    assert programs == [frozenset()]
+
+
+def test_torques_that_turn_out_too_large_are_limited_then() -> None:
+    task, free = (
+        DesignTask(starts=1, harmonics=2),
+        replace(MotionLimits.of(ROBOT), torque=np.full(2, np.inf)),
+    )
+    found = design(MODEL, recorded(), task, limits=free)
+    t = found.program.motions.times(2000)
+
+    def elbow(variables: np.ndarray) -> float:
+        motion = found.program.motions.fourier(variables).at(t)
+        return float(np.abs(found.program.information.columns.torque_along(t, *motion)[:, 1]).max())
+
+    limits = replace(free, torque=np.array([np.inf, 0.95 * elbow(found.motion.variables)]))
+    program = replace(found.program, motions=replace(found.program.motions, limits=limits))
+    lazy = program.lazily(program.informations, program.instants, 60, ())
+    (ended,) = program.ends(lazy, found.motion.variables)
+    assert lazy.joints == {1}
+    assert elbow(ended.variables) <= 1.001 * limits.torque[1]
+    # Only made smaller, the motion without limits would not be within them.
+    assert program.within(found.motion.variables) is None
 
 
 def test_the_next_recording_complements_those_so_far() -> None:

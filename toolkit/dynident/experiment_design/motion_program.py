@@ -7,17 +7,17 @@ on ten times as many, and made smaller about its centre until none is exceeded t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 
 import numpy as np
 
 from dynident.errors import DesignError
-from dynident.experiment_design.geometry.workspace import Workspace
+from dynident.experiment_design.geometry.workspace import RoomCut, Workspace
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.motion_limits import MotionLimits
-from dynident.experiment_design.motion_solver import DesignedMotion, MotionSolver
+from dynident.experiment_design.motion_solver import DesignedMotion, LazySolver, MotionSolver
 from dynident.experiment_design.periodic import PeriodicMotions
 
 _PER_HARMONIC = 22  # instants
@@ -29,6 +29,8 @@ _ITERATIONS, _ITERATIONS_SOFT = 150, 60
 _SHRINKS = 100
 _SHRINKS_CLEAR, _SHRINK_CLEAR = 20, 0.85
 _CUTS = 6  # rounds of bounds that keep a motion in the workspace
+_NEAR = 0.5
+"""Share of a limit of torque from which on the search imposes it from the beginning."""
 _ROUNDING = 1e-9
 
 
@@ -169,12 +171,12 @@ class MotionProgram:
             If no start ends at a motion within the limits.
         """
         begins = self._begins(starts, seed)
-        motions, fewer = self.motions, instants_of(self.motions)
+        near = {j for one in begins for j in self._torques_beyond(one.variables, _NEAR)}
         stages = [
-            MotionSolver.of(motions, one, fewer, fewer, _ITERATIONS_SOFT)
+            self.lazily(one, instants_of(self.motions), _ITERATIONS_SOFT, near)
             for one in self._softened()
         ]
-        solver = MotionSolver.of(motions, self.informations, self.instants, fewer, _ITERATIONS)
+        solver = self.lazily(self.informations, self.instants, _ITERATIONS, near)
         found = list(begins)
         for number, begin in enumerate(begins, 1):
             progress(f"start {number} of {len(begins)}")
@@ -184,7 +186,7 @@ class MotionProgram:
             progress(f"start {number} of {len(begins)}, narrow laws widened first")
             variables = begin.variables
             for stage in stages:
-                for one in self._from(stage, variables):
+                for one in self.ends(stage, variables):
                     variables = one.variables
             found += self._cleared(solver, variables)
         if not found:
@@ -196,6 +198,39 @@ class MotionProgram:
         # the program does not see count here.
         fine = [replace(one, loss=self.loss(one.variables, FINER)) for one in found]
         return min(fine, key=lambda one: one.loss)
+
+    def lazily(
+        self,
+        informations: tuple[Information, ...],
+        instants: int,
+        iterations: int,
+        torques: Collection[int],
+    ) -> LazySolver:
+        """Return the program for some of what is asked.
+
+        Parameters
+        ----------
+        informations, instants, iterations : as for `MotionSolver.of`.
+        torques : joints whose torque is limited from the beginning.
+
+        Returns
+        -------
+        It limits the torques of further joints when it is told to.
+        """
+
+        def write(joints: frozenset[int], cuts: Sequence[RoomCut]) -> MotionSolver:
+            fewer = instants_of(self.motions)
+            return MotionSolver.of(
+                self.motions, informations, instants, fewer, iterations, joints, cuts
+            )
+
+        return LazySolver(write, torques)
+
+    def _torques_beyond(self, variables: np.ndarray, share: float) -> list[int]:
+        """Joints whose torque exceeds a share of its limit, at the instants of the program."""
+        t = self.motions.times(instants_of(self.motions))
+        torque = self.information.columns.torque_along(t, *self.motions.fourier(variables).at(t))
+        return np.flatnonzero(np.abs(torque).max(axis=0) > share * self.limits.torque).tolist()
 
     def _softened(self) -> list[tuple[Information, ...]]:
         """What is asked, with narrow laws made wider, the widest first."""
@@ -226,12 +261,12 @@ class MotionProgram:
         clear = (one for begin in found for one in self._within(begin))
         return list(islice(clear, starts))
 
-    def _cleared(self, solver: MotionSolver, start: np.ndarray) -> list[DesignedMotion]:
-        """As `_from`, in the workspace: what leaves it is moved back and solved again.
+    def _cleared(self, solver: LazySolver, start: np.ndarray) -> list[DesignedMotion]:
+        """As `ends`, in the workspace: what leaves it is moved back and solved again.
 
         What still leaves it then is made smaller.
         """
-        found = self._from(solver, start)
+        found = self.ends(solver, start)
         if self.workspace.is_free:
             return found
         t, cuts = self.motions.times(FINER * self.instants), []
@@ -243,15 +278,7 @@ class MotionProgram:
             if not new:
                 break
             cuts += new
-            again = MotionSolver.of(
-                self.motions,
-                self.informations,
-                self.instants,
-                instants_of(self.motions),
-                _ITERATIONS,
-                cuts,
-            )
-            found = self._from(again, variables)
+            found = self.ends(solver.cut(cuts), variables)
         return [clear for one in found for clear in self._within(one)]
 
     def _within(self, motion: DesignedMotion) -> list[DesignedMotion]:
@@ -261,21 +288,18 @@ class MotionProgram:
         best = self.within(motion.variables)
         return [] if best is None else [replace(motion, variables=best, loss=self.loss(best))]
 
-    def _from(self, solver: MotionSolver, start: np.ndarray) -> list[DesignedMotion]:
-        """The motion at which the search from a start ends; none where none is within limits."""
-        from dynident.nlp.ipopt import interruptible
+    def ends(self, lazy: LazySolver, start: np.ndarray) -> list[DesignedMotion]:
+        """Return the motion at which the search from a start ends; none if none is within limits.
 
-        bound = np.full(start.shape, np.inf)
-        bound[:, 0] = 0.999
-        bounds, begin = bound.ravel(), start.ravel()
-        if len(self.informations) > 1:
-            bounds, begin = np.append(bounds, np.inf), np.append(begin, self.loss(start))
-        with interruptible():
-            result = solver.function(
-                x0=begin, lbx=-bounds, ubx=bounds, lbg=solver.rows.lower, ubg=solver.rows.upper
-            )
+        Parameters
+        ----------
+        lazy : the program; the torques that turn out too large are limited in it from then on.
+        start : (n, 2 H - 1).
+        """
+        solver, variables = self._end_of(lazy, start)
+        while np.all(np.isfinite(variables)) and lazy.limit(self._torques_beyond(variables, 1.0)):
+            solver, variables = self._end_of(lazy, variables)
         stats = solver.function.stats()
-        variables = result["x"].full().ravel()[: start.size].reshape(start.shape)
         best = self._limited(variables) if np.all(np.isfinite(variables)) else None
         if best is None:
             return []
@@ -286,3 +310,19 @@ class MotionProgram:
             iterations=int(stats["iter_count"]),
         )
         return [motion]
+
+    def _end_of(self, lazy: LazySolver, start: np.ndarray) -> tuple[MotionSolver, np.ndarray]:
+        """Where a program as it stands ends, within the limits or not."""
+        from dynident.nlp.ipopt import interruptible
+
+        solver = lazy.solver
+        bound = np.full(start.shape, np.inf)
+        bound[:, 0] = 0.999
+        bounds, begin = bound.ravel(), start.ravel()
+        if len(self.informations) > 1:
+            bounds, begin = np.append(bounds, np.inf), np.append(begin, self.loss(start))
+        with interruptible():
+            result = solver.function(
+                x0=begin, lbx=-bounds, ubx=bounds, lbg=solver.rows.lower, ubg=solver.rows.upper
+            )
+        return solver, result["x"].full().ravel()[: start.size].reshape(start.shape)

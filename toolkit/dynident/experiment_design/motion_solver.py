@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -56,6 +56,7 @@ class MotionSolver:
         instants: int,
         limit_instants: int,
         iterations: int,
+        torques: Collection[int],
         cuts: Sequence[RoomCut] = (),
     ) -> MotionSolver:
         """Write the program out.
@@ -67,6 +68,7 @@ class MotionSolver:
             is limited is what the model of the first predicts.
         instants, limit_instants : at which columns are evaluated, and limits imposed.
         iterations : at most.
+        torques : joints whose torque is limited.
         cuts : bounds on the position at single instants.
 
         Returns
@@ -100,9 +102,9 @@ class MotionSolver:
         ones = np.ones(n)
         rows.add(v / ca.repmat(ca.DM(limits.speed).T, count, 1), -ones, ones)
         rows.add(a / ca.repmat(ca.DM(limits.acceleration).T, count, 1), -ones, ones)
-        limited = np.flatnonzero(np.isfinite(limits.torque))
-        if len(limited):
-            torque = columns.torque.map(count)(inputs).T[:, limited.tolist()]
+        limited = sorted(torques)
+        if limited:
+            torque = columns.torque.map(count)(inputs).T[:, limited]
             torque = torque / ca.repmat(ca.DM(limits.torque[limited]).T, count, 1)
             rows.add(torque, -np.ones(len(limited)), np.ones(len(limited)))
         if cuts:
@@ -121,6 +123,48 @@ class MotionSolver:
             rows.add(over, np.full(len(losses), -np.inf), np.zeros(len(losses)))
         program = {"x": unknown, "f": loss, "g": ca.vertcat(*rows.parts)}
         return cls(ca.nlpsol("design", "ipopt", program, _options(iterations)), rows)
+
+
+class LazySolver:
+    """A program that limits the torques of those joints alone that come near to what they may.
+
+    Rows of torques are dense, and most of a program's time; most robots' speeds and accelerations
+    keep their torques far from their limits.
+
+    Parameters
+    ----------
+    write : the program that limits the torques of some joints, with some cuts.
+    joints : whose torques are limited so far.
+    cuts : see `MotionSolver.of`.
+    """
+
+    def __init__(
+        self,
+        write: Callable[[frozenset[int], Sequence[RoomCut]], MotionSolver],
+        joints: Collection[int],
+        cuts: Sequence[RoomCut] = (),
+    ) -> None:
+        self._write, self._cuts = write, tuple(cuts)
+        self.joints = frozenset(joints)
+        self._written: MotionSolver | None = None
+
+    @property
+    def solver(self) -> MotionSolver:
+        """The program as it stands."""
+        if self._written is None:
+            self._written = self._write(self.joints, self._cuts)
+        return self._written
+
+    def limit(self, joints: Collection[int]) -> bool:
+        """Limit the torques of further joints, from now on; whether there are any."""
+        if self.joints.issuperset(joints):
+            return False
+        self.joints, self._written = self.joints.union(joints), None
+        return True
+
+    def cut(self, cuts: Sequence[RoomCut]) -> LazySolver:
+        """Return the program with other cuts."""
+        return LazySolver(self._write, self.joints, cuts)
 
 
 def _options(iterations: int) -> dict[str, Any]:
