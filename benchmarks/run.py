@@ -55,6 +55,8 @@ def main(arguments: list[str] | None = None) -> None:
         in_this_process(said.here, said.size)
         return
     folder = said.out or (ROOT / "docs" if said.size == "full" else None)
+    if folder:
+        folder.mkdir(parents=True, exist_ok=True)
     kept = folder and folder / "benchmarks.json"
     found = json.loads(kept.read_text()) if kept and kept.exists() else {}
     for name in [] if said.page else said.names or NAMES:

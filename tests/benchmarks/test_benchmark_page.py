@@ -58,6 +58,20 @@ def test_a_run_of_the_least_size_becomes_a_page_with_a_picture(tmp_path: Path) -
     ]
 
 
+def test_a_page_goes_into_a_folder_that_is_not_there_yet(tmp_path: Path, monkeypatch) -> None:
+    """Before anything is run: no work is lost at its end."""
+    folder = tmp_path / "new" / "folder"
+
+    def ran(name: str, size: str) -> dict:
+        assert folder.is_dir()
+        line = Line(case="a", who="dynident", figures={"CPU, s": 1.0})
+        return sections(line)["sections"]["some_work"]
+
+    monkeypatch.setattr(run, "section", ran)
+    run.main(["csv_reading", "--size", "tiny", "--out", str(folder)])
+    assert "## Some work" in (folder / "benchmarks.md").read_text()
+
+
 def test_all_that_is_listed_can_be_run() -> None:
     for name in run.NAMES:
         posed = running.benchmark(name)
