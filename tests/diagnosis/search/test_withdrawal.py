@@ -84,7 +84,7 @@ def test_an_end_at_the_limit_is_said_in_the_verdict() -> None:
     found = from_the_rigid_body(1)
     assert len({one.effect.name for one in found.steps}) == 1
     assert found.limit == 1
-    assert "ended at its limit of 1 additions" in found.sentence
+    assert "ended at its limit of 1 addition," in found.sentence
     assert from_the_rigid_body(2).limit is None
 
 

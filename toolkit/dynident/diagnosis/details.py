@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from dynident.effects import Effect
-from dynident.tables import number, points
+from dynident.tables import points
 
 Status = Literal["material", "not_material", "absorbed"]
 
@@ -91,7 +91,10 @@ class Step:
         if self.fall_standard_error is None:
             return points(self.fall)
         doubt = ", uncertain" if self.uncertain else ""
-        return f"{points(self.fall)} \u00b1 {number(100 * self.fall_standard_error, 2)}{doubt}"
+        error = 100.0 * self.fall_standard_error
+        # Two digits of the error, and of the fall as many decimals.
+        decimals = 2 if error <= 0.0 else int(np.clip(1 - np.floor(np.log10(error)), 2, 4))
+        return f"{100.0 * self.fall:.{decimals}f} \u00b1 {error:.{decimals}f}{doubt}"
 
     def doubt(self) -> dict[str, float]:
         """The standard error of the fall as JSON has it; empty where it is not known."""

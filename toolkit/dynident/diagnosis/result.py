@@ -148,9 +148,15 @@ class Diagnosis(Shown):
         """That the search was stopped, without a full stop; empty where it ended by itself."""
         if self.limit is None:
             return ""
+        if self.limit == 0:
+            return (
+                "Nothing was to be added, and more effects are significant and relevant than the "
+                "model has"
+            )
+        additions = "1 addition" if self.limit == 1 else f"{self.limit} additions"
         return (
-            f"The search ended at its limit of {self.limit} additions, and more effects are "
-            "significant and relevant"
+            f"The search ended at its limit of {additions}, and more effects are significant and "
+            "relevant"
         )
 
     @property
@@ -225,10 +231,16 @@ class Diagnosis(Shown):
         """How often answers like this one were right; None where that is not known.
 
         It holds for noise that was measured on repetitions, for robots of as many joints as those
-        that were counted, and for the default criteria.
+        that were counted, for the default criteria, and for searches that ended by themselves.
         """
         floor = self.test_error.noise_floor
-        if self.wiring or self.impossible or not JOINTS[0] <= len(self.joints) <= JOINTS[1]:
+        stopped = self.limit is not None and self.verdict == "unexplained"
+        if (
+            self.wiring
+            or self.impossible
+            or stopped
+            or not JOINTS[0] <= len(self.joints) <= JOINTS[1]
+        ):
             return None
         if self.noise_source != "replicates" or not floor or self.criteria.changed:
             return None

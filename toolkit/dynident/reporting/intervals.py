@@ -73,7 +73,7 @@ def parameter_table(estimate: Estimate, widening: Widening | None, noise: NoiseS
     Returns
     -------
     A row for each parameter, in the order of the model: those of the rigid body come first. Those
-    inside effects (widths, frequencies, ...), without intervals, come last.
+    inside effects (widths, frequencies, ...) come last, without intervals where sigma is not known.
     """
     model = estimate.model
     values = np.array(estimate.values)
@@ -100,7 +100,7 @@ def parameter_table(estimate: Estimate, widening: Widening | None, noise: NoiseS
         )
         for i, name in enumerate(model.names)
     )
-    rows = (*rows, *_shape_rows(estimate))
+    rows = (*rows, *_shape_rows(estimate, widening))
     columns = (
         "parameter",
         "what it is",
@@ -136,26 +136,18 @@ def _placed(means: str, effect: Effect) -> str:
     return words if effect.joint is None else f"{words}, {effect.title.partition(' at ')[2]}"
 
 
-def _shape_rows(estimate: Estimate) -> list[tuple[str, ...]]:
-    model = estimate.model
-    return [
-        (
-            name,
-            _placed(one.means, effect),
-            number(x, 4),
-            "-",
-            "-",
-            one.unit,
-            "",
-        )
-        for effect in model.effects
-        for name, one, x in zip(
-            model.shape_names[effect.label],
-            effect.shape_parameters(model.robot),
-            effect.shape,
-            strict=False,
-        )
-    ]
+def _shape_rows(estimate: Estimate, widening: Widening | None) -> list[tuple[str, ...]]:
+    model, found = estimate.model, {one.name: one.sigma for one in estimate.shapes}
+    rows = []
+    for effect in model.effects:
+        factor = 1.0 if widening is None else widening.of(effect.joint)
+        names, parameters = model.shape_names[effect.label], effect.shape_parameters(model.robot)
+        for name, one, x in zip(names, parameters, effect.shape, strict=False):
+            half = _QUANTILE * factor * found.get(name, float("nan"))
+            relative = percent(float(half / abs(x)) if x and np.isfinite(half) else None, 1)
+            words, between = _placed(one.means, effect), _interval(x, half)
+            rows.append((name, words, number(x, 4), between, relative, one.unit, ""))
+    return rows
 
 
 def _interval(value: float, half: float) -> str:

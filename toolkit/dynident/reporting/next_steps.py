@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from dynident.diagnosis.details import Step
-from dynident.diagnosis.effect_groups import in_words
+from dynident.diagnosis.effect_groups import grouped_title, in_words
+from dynident.diagnosis.leading_effects import LeadingEffects
 from dynident.diagnosis.result import Diagnosis
 from dynident.effects import Effect
-from dynident.reporting.content import step_groups
 from dynident.reporting.joint_states import states
-from dynident.tables import percent
+from dynident.tables import percent, points
 from dynident.wiring import Fault
 
 _MOST_NAMED = 3
@@ -43,7 +44,7 @@ def next_steps(diagnosis: Diagnosis) -> tuple[Advice, ...]:
         found.append(_unexplained(diagnosis))
     if diagnosis.noise_source == "unknown":
         found.append(_to_repeat(diagnosis))
-    found += [*_to_separate(diagnosis), *_to_try(diagnosis)]
+    found += [*_to_separate(diagnosis), *_to_try(diagnosis), *_to_add_after(diagnosis)]
     if diagnosis.noise_source == "given":
         found.append(_to_repeat(diagnosis))
     not_identifiable = [c for c in diagnosis.candidates if c.status == "absorbed"]
@@ -73,29 +74,46 @@ def _to_mend(fault: Fault) -> Advice:
 
 
 def _to_add(diagnosis: Diagnosis) -> list[Advice]:
+    """What carries the fall first, by how much it does; what is small beside it after that."""
     if not diagnosis.steps:
         return []
     error = diagnosis.test_error
-    labels = [step.effect.label for step in diagnosis.steps]
-    groups = [group.title for group in step_groups(diagnosis)]
-    many = len(groups) > _MOST_NAMED
-    names = f"these {in_words(len(labels))} effects" if many else _listed(groups)
-    brings = f"That brings the error from {percent(error.before)} to {percent(error.after)}"
+    found = LeadingEffects.of(diagnosis.steps)
+    first = sorted(found.leading, key=lambda group: -sum(step.fall for step in group))
+    names, labels = _added(first, len(diagnosis.joints))
+    share, all_of_it = "", "That"
+    if found.smaller:
+        share = f"By this the error falls {found.carried}. "
+        all_of_it = "All that was added"
+    brings = f"{all_of_it} brings the error from {percent(error.before)}"
     floor = (
         ""
         if error.noise_floor is None
         else f"; noise alone would make {percent(error.noise_floor)}"
     )
-    return [
-        Advice(
-            f"Add {names} to the model, and fit it.",
-            f"{brings}{floor}.",
-            (
-                f"dynident add STUDY {shlex.join(labels)}",
-                "dynident fit STUDY",
-            ),
-        )
-    ]
+    why = f"{share}{brings} to {percent(error.after)}{floor}."
+    commands = (f"dynident add STUDY {shlex.join(labels)}", "dynident fit STUDY")
+    return [Advice(f"Add {names} to the model, and fit it.", why, commands)]
+
+
+def _to_add_after(diagnosis: Diagnosis) -> list[Advice]:
+    """What is small beside the effects that carry the fall."""
+    smaller = LeadingEffects.of(diagnosis.steps).smaller if diagnosis.steps else ()
+    if not smaller:
+        return []
+    names, labels = _added(smaller, len(diagnosis.joints))
+    fall = points(sum(step.fall for group in smaller for step in group))
+    why = f"Small beside what comes first: {fall} points of the fall."
+    return [Advice(f"Then add {names}.", why, (f"dynident add STUDY {shlex.join(labels)}",))]
+
+
+def _added(groups: Sequence[Sequence[Step]], joints: int) -> tuple[str, list[str]]:
+    """Effects in words, no more of them than a sentence lists, and the labels of all."""
+    labels = [step.effect.label for group in groups for step in group]
+    titles = [grouped_title([step.effect for step in group], joints) for group in groups]
+    more = len(titles) - _MOST_NAMED
+    named = titles[:_MOST_NAMED] + ([f"{in_words(more)} more"] if more > 0 else [])
+    return _listed(named), labels
 
 
 def _to_separate(diagnosis: Diagnosis) -> list[Advice]:

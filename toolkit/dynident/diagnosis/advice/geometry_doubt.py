@@ -32,10 +32,17 @@ def with_geometry_doubt(found: Diagnosis) -> Diagnosis:
         for step in found.steps
         if step.effect.source is not None
     ]
+    # Where a study states that motors turn two joints, what is left there says nothing new of it.
+    stated = {
+        name
+        for effect in found.before.model.effects
+        if effect.source is not None
+        for name in (effect.joint, effect.source)
+    }
     pairs += [
         f"{one.joint} goes with the other joints"
         for one in found.residual_dependence
-        if _OTHER_JOINTS in one.told
+        if _OTHER_JOINTS in one.told and one.joint not in stated
     ]
     if not pairs:
         return found
