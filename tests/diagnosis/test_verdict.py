@@ -47,6 +47,19 @@ def test_a_short_disturbance_that_returns_is_not_called_noise(model: Model, size
     assert "beyond the noise" in found.sentence
 
 
+def test_what_only_a_training_recording_shows_is_not_called_noise(model: Model) -> None:
+    """It returns in its every period, and the motions that judge are elsewhere."""
+    runs = recordings(model)
+    train = Dataset((with_contact(runs[0], 8.0), *runs[1:3]))
+    found = find(model, train, Dataset(runs[3:]), propose="never")
+    assert found.verdict == "unexplained"
+    assert all((joint.ratio_after or 0.0) < 1.0 for joint in found.joints)
+    (note,) = [one for one in found.notes if "test recordings do not" in one]
+    assert f"largest in {runs[0].name} at t = " in note and "elbow (" in note
+    assert "shoulder" not in note
+    assert float(note.partition("at t = ")[2].split()[0]) % 8.0 == pytest.approx(3.0, abs=0.2)
+
+
 def test_the_shape_of_an_effect_in_the_given_model_is_sought_too(model: Model) -> None:
     """A study names Stribeck friction, but not its speed: a wrong one would look like more."""
     given = model + "stribeck_friction@elbow"

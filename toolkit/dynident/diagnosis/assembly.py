@@ -21,7 +21,7 @@ from dynident.diagnosis.nuisances.contacts import Disturbance, contact_candidate
 from dynident.diagnosis.nuisances.quantisation import rounding_notes, with_rounding
 from dynident.diagnosis.nuisances.stated_noise import stated_noise_notes
 from dynident.diagnosis.nuisances.sticking import shares_left_out
-from dynident.diagnosis.nuisances.unlike_recordings import unlike_notes
+from dynident.diagnosis.nuisances.unlike_recordings import training_notes, unlike_notes
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.search.refusal import impossible_joints_of
@@ -113,7 +113,8 @@ def assemble(
     first_error = contacts[0].test_error_before if contacts else before.error
     steps = (*contacts, *_advised(steps, Adviser.of(evidence, stages[-1])))
     source = noise_source(evidence, held)
-    verdict = verdict_of(before, after, steps, rounds[-1], evidence.criteria.verdict)
+    trained = with_rounding(on_recordings(evidence, stages[-1]), stages[-1], train)
+    verdict = verdict_of(before, after, trained, steps, rounds[-1], evidence.criteria.verdict)
     final = _with_shapes(evidence, stages[-1], train)
     impossible = ()
     if verdict != "unexplained":
@@ -139,6 +140,7 @@ def assemble(
         notes=(
             *notes_on(evidence, held, stages[-1], source, search.doubtful),
             *unlike_notes(evidence, held, stages[-1]),
+            *_training_notes(trained, after, evidence, held),
             *_noise_doubts(evidence, source, rounded, after),
             *rounding_notes(after, given.robot.names, evidence.criteria.verdict),
             *notes_on_steps(steps, held),
@@ -165,6 +167,16 @@ def _gains(
     known = first if len(rounds) == len(stages) == 1 else {}  # asked of the same fit
     last = candidate_gains(rounds[-1], evidence, held, stages[-1], after, 0, known=known)
     return first, last
+
+
+def _training_notes(
+    trained: HeldOut, after: HeldOut, evidence: Evidence, held: Evidence | None
+) -> tuple[str, ...]:
+    """Say what only the recordings show that were fitted, where others judge."""
+    if held is None:
+        return ()
+    names = evidence.model.robot.names
+    return training_notes(trained, after, names, evidence.criteria.verdict)
 
 
 def _noise_doubts(

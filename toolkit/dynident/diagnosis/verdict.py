@@ -20,13 +20,20 @@ from dynident.recording.dataset import NoiseSource
 
 
 def verdict_of(
-    before: HeldOut, after: HeldOut, steps, last: Ranking, criteria: VerdictCriteria
+    before: HeldOut,
+    after: HeldOut,
+    trained: HeldOut,
+    steps: Sequence[Step],
+    last: Ranking,
+    criteria: VerdictCriteria,
 ) -> Verdict:
-    """Return the verdict on a search, from held-out data before and after and its last ranking.
+    """Return the verdict on a search, from what it leaves and its last ranking.
 
     Parameters
     ----------
     before, after : what the given and the final model miss on held-out data.
+    trained : what the final model leaves of the recordings that it was fitted to. What is larger
+        than their noise there is missing, whether or not the held-out motion shows it.
     steps : the effects added.
     last : the last ranking.
     criteria : of the verdict.
@@ -35,6 +42,8 @@ def verdict_of(
         if last.passing:
             return "unexplained"
         return "explained" if steps else "nothing_missing"
+    if beyond_noise(trained, criteria).any():
+        return "unexplained"
     if within_noise(after, criteria):
         return "explained" if steps else "nothing_missing"
     explained = 1.0 - float(np.sum(after.ratio**2) / np.sum(before.ratio**2))
@@ -46,13 +55,30 @@ def verdict_of(
 
 def within_noise(judged: HeldOut, criteria: VerdictCriteria) -> bool:
     """Whether nothing remains at any joint but noise, and what nothing can resolve."""
+    return not np.any(_over_noise(judged, criteria) > criteria.within_noise)
+
+
+def beyond_noise(judged: HeldOut, criteria: VerdictCriteria) -> np.ndarray:
+    """Joints (n,) at which more remains than may be left where most is explained."""
+    if judged.least_ratio is None:
+        return np.zeros(len(judged.torque_rms), dtype=bool)
+    return _over_noise(judged, criteria) > criteria.most_left
+
+
+def _over_noise(judged: HeldOut, criteria: VerdictCriteria) -> np.ndarray:
+    """What is systematic at least, over the noise, (n,); zero of what nothing can resolve."""
     assert judged.least_ratio is not None and judged.noise_std is not None
     power = (judged.least_ratio * judged.noise_std) ** 2
     if judged.rounding is not None:
         power = power - judged.rounding
     systematic = np.sqrt(np.clip(power, 0.0, None))
     matters = systematic > criteria.resolution * judged.torque_rms
-    return not np.any(matters & (systematic > criteria.within_noise * judged.noise_std))
+    return np.divide(
+        systematic,
+        judged.noise_std,
+        out=np.zeros(len(power)),
+        where=matters & (judged.noise_std > 0),
+    )
 
 
 def noise_source(evidence: Evidence, held: Evidence | None) -> NoiseSource:
