@@ -139,8 +139,7 @@ def assemble(
         traces=_traces(given, before, after),
         notes=(
             *notes_on(evidence, held, stages[-1], source, search.doubtful),
-            *unlike_notes(evidence, held, stages[-1]),
-            *_training_notes(trained, after, evidence, held),
+            *_differing_recordings(trained, after, evidence, held, stages[-1]),
             *_noise_doubts(evidence, source, rounded, after),
             *rounding_notes(after, given.robot.names, evidence.criteria.verdict),
             *notes_on_steps(steps, held),
@@ -169,14 +168,15 @@ def _gains(
     return first, last
 
 
-def _training_notes(
-    trained: HeldOut, after: HeldOut, evidence: Evidence, held: Evidence | None
+def _differing_recordings(
+    trained: HeldOut, after: HeldOut, evidence: Evidence, held: Evidence | None, final: EvidenceFit
 ) -> tuple[str, ...]:
-    """Say what only the recordings show that were fitted, where others judge."""
+    """Say what only the test recordings show, and what only those do that were fitted."""
     if held is None:
         return ()
-    names = evidence.model.robot.names
-    return training_notes(trained, after, names, evidence.criteria.verdict)
+    names, criteria = evidence.model.robot.names, evidence.criteria.verdict
+    unlike = unlike_notes(evidence, held, final)
+    return (*unlike, *training_notes(trained, after, names, criteria))
 
 
 def _noise_doubts(

@@ -88,7 +88,7 @@ def training_notes(
     if not there.any() or trained.ratio is None or after.ratio is None:
         return ()
     found = []
-    for j in np.flatnonzero(there):
+    for j in (int(place) for place in np.flatnonzero(there)):
         run = max(trained.runs, key=lambda one: float(np.max(np.abs(_judged_rows(one, j)))))
         t = float(run.t[np.argmax(np.abs(_judged_rows(run, j)))])
         found.append(
