@@ -44,3 +44,9 @@ def test_names_never_command_a_terminal(capsys) -> None:
     said = capsys.readouterr().out
     assert "a\\u001b[31m" in said and "c\\u0007" in said
     assert not {"\x1b", "\u202e", "\x07", "\x9b"} & set(said)
+
+
+def test_a_table_without_rows_says_none_instead_of_showing_its_headings() -> None:
+    empty = Table("Effects added", ("effect added", "after"), (), ("A note.",))
+    assert str(empty).split("\n")[:2] == ["Effects added: none", "  A note."]
+    assert empty._repr_html_() == "<p>Effects added: none</p><p>A note.</p>"

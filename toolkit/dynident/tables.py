@@ -21,7 +21,7 @@ class Table:
     ----------
     title : above the table.
     columns : headings; columns whose cells are numbers are set flush right.
-    rows : cells as they are to be read.
+    rows : cells as they are to be read; where there are none, "none" stands in their place.
     notes : sentences that belong to the table.
     """
 
@@ -42,6 +42,8 @@ class Table:
         )
         notes = "".join(f"<p>{escape(note)}</p>" for note in self.notes)
         title = escape(self.title)
+        if not self.rows:
+            return f"<p>{title}: none</p>{notes}"
         return f"<table><caption>{title}</caption><tr>{head}</tr>{body}</table>{notes}"
 
     def __str__(self) -> str:
@@ -180,10 +182,13 @@ def _print(console, table: Table) -> None:
         )
     for row in table.rows:
         shown.add_row(*(Text(printable(cell)) for cell in row))
-    console.print(shown)
+    if table.rows:
+        console.print(shown)
+    else:
+        console.print(Text.assemble((printable(table.title), "bold"), ": none"))
     for note in table.notes:
         console.print(Text(printable(f"  {note}")))
-    if table.notes:
+    if table.notes or not table.rows:
         console.print()
 
 
