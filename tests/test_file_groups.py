@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -109,3 +110,22 @@ def test_two_writers_leave_one_group(tmp_path: Path) -> None:
         os.mkdir(tmp_path / ".complete")
         (tmp_path / ".complete" / "a.txt").write_text("first")
     assert seen(tmp_path) == dict.fromkeys(NAMES, "second") and left(tmp_path) == set(NAMES)
+
+
+def test_who_changes_places_is_alone(tmp_path: Path, monkeypatch) -> None:
+    """Another writer that ends while older files go waits, and its files are not among them."""
+    put(tmp_path, OLD)
+    third = dict.fromkeys(NAMES, "third")
+    other = threading.Thread(target=put, args=(tmp_path, third))
+    remove = files.remove
+
+    def meanwhile(path: Path) -> None:
+        if not other.ident:
+            other.start()
+            other.join(0.5)
+        remove(path)
+
+    monkeypatch.setattr(file_groups.files, "remove", meanwhile)
+    put(tmp_path, NEW)
+    other.join()
+    assert seen(tmp_path) == third and left(tmp_path) == set(NAMES)

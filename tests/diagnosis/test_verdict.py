@@ -53,6 +53,8 @@ def test_what_only_a_training_recording_shows_is_not_called_noise(model: Model) 
     train = Dataset((with_contact(runs[0], 8.0), *runs[1:3]))
     found = find(model, train, Dataset(runs[3:]), propose="never")
     assert found.verdict == "unexplained"
+    assert found.training_only == ("elbow",) and "held-out recordings do not show" in found.sentence
+    assert found.to_dict()["training_only"] == ["elbow"] and not found.confidence
     assert all((joint.ratio_after or 0.0) < 1.0 for joint in found.joints)
     (note,) = [one for one in found.notes if "test recordings do not" in one]
     assert f"largest in {runs[0].name} at t = " in note and "elbow (" in note

@@ -10,7 +10,7 @@ import pytest
 from chains import chain
 from dynident.effects import Law, effects_of, law_effect
 from dynident.errors import DesignError
-from dynident.experiment_design import DesignTask, MotionLimits, design
+from dynident.experiment_design import DesignTask, MotionLimits, design, motion_program
 from dynident.experiment_design.column_function import ColumnFunction
 from dynident.experiment_design.information import Information, Objective
 from dynident.experiment_design.motion_program import FINER, MotionProgram, instants_of
@@ -282,9 +282,13 @@ def written(monkeypatch: pytest.MonkeyPatch) -> list[frozenset[int]]:
     return found
 
 
-def test_torques_far_from_their_limits_cost_the_search_no_rows(monkeypatch) -> None:
+def test_torques_far_from_their_limits_cost_a_large_search_no_rows(monkeypatch) -> None:
     programs = written(monkeypatch)
     limits = replace(MotionLimits.of(ROBOT), torque=np.array([1e3, 1e3]))
+    design(MODEL, recorded(), DesignTask(starts=1, harmonics=2), limits=limits)
+    assert programs == [frozenset({0, 1})]
+    programs.clear()
+    monkeypatch.setattr(motion_program, "_FEW", 0)
     design(MODEL, recorded(), DesignTask(starts=1, harmonics=2), limits=limits)
     assert programs == [frozenset()]
 

@@ -22,6 +22,8 @@ from dynident.tables import printable
 from hostile.corpus import KINDS, corpus
 
 TESTS = Path(__file__).parents[1]
+BAGS = TESTS.parent / "benchmarks"
+"""Where `ros_bags` is, which writes bags for tests and benchmarks alike."""
 SHARE = 6
 """Of so many cases `make test-fast` tries one."""
 MOST_SECONDS = 120.0
@@ -36,6 +38,8 @@ class Tried:
     def __init__(self, command: Sequence[str] = WORKER, most_seconds: float = MOST_SECONDS) -> None:
         self.command, self.most_seconds = command, most_seconds
         self.around = {key: value for key, value in os.environ.items() if key != "DYNIDENT_DATA"}
+        own = os.environ.get("PYTHONPATH", "")
+        self.around["PYTHONPATH"] = os.pathsep.join(filter(None, (str(BAGS), own)))
         self.process = self.begun()
 
     def begun(self) -> subprocess.Popen[str]:

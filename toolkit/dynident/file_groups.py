@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -48,13 +49,15 @@ def replaced_together(folder: str | Path, names: Sequence[str], last: str) -> It
         folder.mkdir(parents=True, exist_ok=True)
         for name in names:
             files.require_place(folder / name)
-        _finish(folder, last)
+        with _alone(folder):
+            _finish(folder, last)
         new = Path(tempfile.mkdtemp(dir=folder, prefix=".new."))
         yield new
         files.write_text(new / _OBSOLETE, "\n".join(names))
-        while not _is_complete(new, folder):
-            _finish(folder, last)  # what another writer has completed meanwhile
-        _finish(folder, last)
+        with _alone(folder):
+            while not _is_complete(new, folder):
+                _finish(folder, last)  # what another writer has completed meanwhile
+            _finish(folder, last)
     except OSError as error:
         raise FileError(f"cannot be written ({error.strerror or error})", str(folder)) from None
     finally:
@@ -80,6 +83,23 @@ def folder_of(file: Path) -> Path:
     return file.parent.parent if file.parent.name == _COMPLETE else file.parent
 
 
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Change places in a folder while nobody else does; without locks, as on Windows, at once."""
+    try:
+        import fcntl
+    except ImportError:
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        with contextlib.suppress(OSError):  # some network drives have no locks
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
+
+
 def _is_complete(new: Path, folder: Path) -> bool:
     """Say that all new files are written; False where those of another writer wait."""
     try:
@@ -103,7 +123,5 @@ def _finish(folder: Path, last: str) -> None:
             files.remove(folder / name)
         files.remove(obsolete)
     for one in sorted(beside.iterdir(), key=lambda one: one.name == last):
-        with contextlib.suppress(FileNotFoundError):  # another writer was faster
-            one.replace(folder / one.name)
-    with contextlib.suppress(FileNotFoundError):
-        beside.rmdir()
+        one.replace(folder / one.name)
+    beside.rmdir()

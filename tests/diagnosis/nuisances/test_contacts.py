@@ -14,10 +14,16 @@ from dynident.criteria import DEFAULTS
 from dynident.diagnosis.nuisances.changes import Repeated, changes_of, scanned
 from dynident.diagnosis.nuisances.pulse_search import (
     DisturbancePulse,
+    find_contacts,
     pulses_in,
     without,
 )
-from dynident.evidence.runs import Run
+from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence_fit import fit_evidence
+from dynident.evidence.runs import Run, gather
+from dynident.recording import Dataset
+from study_files import true_model
+from synthetic import synthetic, true_values
 
 STEP = 0.02
 INSTANTS = 250
@@ -196,3 +202,15 @@ def test_instants_of_a_bump_are_left_out_of_all_repetitions() -> None:
     assert min(gone) == pytest.approx(30, abs=1) and max(gone) == pytest.approx(70, abs=1)
     np.testing.assert_array_equal(short.index[1] - short.index[0], 250)
     np.testing.assert_array_equal(short.edges, [0, 125 - len(gone), 250 - len(gone)])
+
+
+def test_repetitions_that_are_alike_to_rounding_hold_no_contact() -> None:
+    """What a filter leaves of equal numbers is no noise that a burst could stand out of."""
+    model = true_model()
+    one = synthetic(model, true_values(model, Fv__shoulder=2.0), 0, rate_hz=250.0)
+    count = round(8.0 * 250.0)
+    alike = {name: np.tile(getattr(one, name)[:count], (2, 1)) for name in ("q", "tau")}
+    evidence = Evidence(model, gather(Dataset((one.replace(t=one.t[: 2 * count], **alike),))))
+    fitted = fit_evidence(evidence, model)
+    assert evidence.runs[0].kind == "repeated"
+    assert find_contacts(evidence, fitted) == ()

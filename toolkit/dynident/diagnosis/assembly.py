@@ -22,11 +22,18 @@ from dynident.diagnosis.nuisances.quantisation import rounding_notes, with_round
 from dynident.diagnosis.nuisances.stated_noise import stated_noise_notes
 from dynident.diagnosis.nuisances.sticking import shares_left_out
 from dynident.diagnosis.nuisances.unlike_recordings import training_notes, unlike_notes
-from dynident.diagnosis.result import Diagnosis
+from dynident.diagnosis.result import Diagnosis, Verdict
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.search.refusal import impossible_joints_of
 from dynident.diagnosis.search.withdrawal import Path
-from dynident.diagnosis.verdict import noise_source, notes_on, notes_on_steps, verdict_of
+from dynident.diagnosis.verdict import (
+    beyond_noise,
+    noise_source,
+    notes_on,
+    notes_on_steps,
+    verdict_of,
+    within_noise,
+)
 from dynident.errors import FitError
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
@@ -92,22 +99,11 @@ def assemble(
     """
     evidence, rounds, path = search.evidence, search.rounds, search.path
     stages, judged, start = path.stages, path.judged, path.stages[0]
-    given, by_label = start.model, {e.label: e for e in path.final.model.effects}
+    given = start.model
     rounded = test if test is not None and held is not None else train
     before = with_rounding(judged[0], start, rounded)
     after = with_rounding(judged[-1], stages[-1], rounded) if path.found else before
-    steps = tuple(
-        Step(
-            effect=by_label[one.score.effect.label],
-            values=tuple(stage.values[stage.model.slices[one.score.effect.label]]),
-            test_error_before=old.error,
-            test_error_after=new.error,
-            indistinguishable=one.indistinguishable,
-            p_value=one.p_value,
-            fall_standard_error=fall_standard_error(old, new, evidence.criteria.search.set_block),
-        )
-        for one, stage, (old, new) in zip(path.found, stages[1:], pairwise(judged), strict=True)
-    )
+    steps = _steps_of(path, evidence)
     helping = [one for one in search.disturbances if one.error_after <= one.error_before]
     contacts = tuple(one.step(given) for one in helping)
     first_error = contacts[0].test_error_before if contacts else before.error
@@ -153,7 +149,27 @@ def assemble(
         rows=rows_of_recordings(train if test is None else train + test),
         limit=search.limit,
         detection_limits=limits,
+        training_only=_training_only(verdict, trained, after, evidence),
         reversals_left_out={joint: left[joint] for joint in search.doubtful},
+    )
+
+
+def _steps_of(path: Path, evidence: Evidence) -> tuple[Step, ...]:
+    """The effects of a path, each with the fall of the error that it brings."""
+    by_label = {e.label: e for e in path.final.model.effects}
+    return tuple(
+        Step(
+            effect=by_label[one.score.effect.label],
+            values=tuple(stage.values[stage.model.slices[one.score.effect.label]]),
+            test_error_before=old.error,
+            test_error_after=new.error,
+            indistinguishable=one.indistinguishable,
+            p_value=one.p_value,
+            fall_standard_error=fall_standard_error(old, new, evidence.criteria.search.set_block),
+        )
+        for one, stage, (old, new) in zip(
+            path.found, path.stages[1:], pairwise(path.judged), strict=True
+        )
     )
 
 
@@ -177,6 +193,19 @@ def _differing_recordings(
     names, criteria = evidence.model.robot.names, evidence.criteria.verdict
     unlike = unlike_notes(evidence, held, final)
     return (*unlike, *training_notes(trained, after, names, criteria))
+
+
+def _training_only(
+    verdict: Verdict, trained: HeldOut, after: HeldOut, evidence: Evidence
+) -> tuple[str, ...]:
+    """Joints for which alone the verdict is that something is left; none for other verdicts."""
+    criteria = evidence.criteria.verdict
+    if verdict != "unexplained" or after.least_ratio is None or not within_noise(after, criteria):
+        return ()
+    there = beyond_noise(trained, criteria)
+    return tuple(
+        name for name, is_there in zip(evidence.model.robot.names, there, strict=True) if is_there
+    )
 
 
 def _noise_doubts(

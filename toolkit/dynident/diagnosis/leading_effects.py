@@ -45,8 +45,13 @@ class LeadingEffects:
     @property
     def carried(self) -> str:
         """How much of the fall the leading ones make, as "7.06 of the 7.60 points"."""
-        own = sum(map(_fall, self.leading))
-        return f"{points(own)} of the {points(own + sum(map(_fall, self.smaller)))} points"
+        own, rest = (sum(map(_fall, groups)) for groups in (self.leading, self.smaller))
+        # What was kept although the error rose a little is no part of a whole.
+        return (
+            f"{points(own)} of the {points(own + rest)} points"
+            if rest > 0
+            else f"{points(own)} points"
+        )
 
     @property
     def in_words(self) -> str:

@@ -151,7 +151,9 @@ def diagnose(
     extended = _extend(_rank(start, task), task)
     settled, path = _settle(_search_globally(start, extended, task), task)
     found = answered_by(faults, _judge(settled, path, task))
-    asked = found.verdict == "unexplained" or propose == "always"
+    # The data that judge a regression, or a law, show nothing of what only training leaves.
+    left = found.verdict == "unexplained" and not found.training_only
+    asked = left or propose == "always"
     if asked and not faults:
         progress("looking for what the residual depends on")
         found = with_dependence(found, settled.evidence, _decided(settled), path)
@@ -387,7 +389,7 @@ def _asks_for_laws(answer: Diagnosis, task: DiagnosisTask) -> bool:
     if task.propose == "never" or answer.impossible or not task.most:
         return False
     known = answer.noise_source != "unknown" or answer.following_motion
-    left = answer.verdict == "unexplained" and known
+    left = answer.verdict == "unexplained" and known and not answer.training_only
     # Where its limit ended the search, what the catalogue leaves is not known yet.
     return (bool(left) and answer.limit is None) or task.propose == "always"
 

@@ -81,6 +81,8 @@ class Diagnosis(Shown):
         residual depends on, before any proposal, at each joint at which something is left.
     reversals_left_out : share of the rows, for joints whose dry friction may follow another law at
         its reversals: these rows count neither in the fit nor in the errors.
+    training_only : joints at which the training recordings leave more than their noise, where the
+        held-out recordings leave none: the verdict is "unexplained" for that alone.
     following_motion : joints without a noise floor at which what is left is no noise, as functions
         of position and velocity predict it; empty elsewhere.
     switches : every choice among the effects added, fitted and judged, where that was asked for.
@@ -112,6 +114,7 @@ class Diagnosis(Shown):
     rows: RowCount = field(default_factory=RowCount)
     residual_dependence: tuple[JointDependence, ...] = ()
     reversals_left_out: Mapping[str, float] = field(default_factory=dict)
+    training_only: tuple[str, ...] = ()
     following_motion: tuple[str, ...] = ()
     switches: Switches | None = None
     drives: DriveGains | None = None
@@ -190,6 +193,13 @@ class Diagnosis(Shown):
                 "functions of the joint's position and velocity predict it on blocks of time that "
                 "they were not fitted to. How much of it is noise is unknown."
             )
+        if self.training_only:
+            added = f"Added: {effects}." if effects else "No effect in the catalogue explains it:"
+            return (
+                f"{added} {'T' if effects else 't'}he training recordings leave more than their "
+                f"noise at {' and '.join(self.training_only)}, and the held-out recordings do not "
+                "show it."
+            )
         if self.noise_source == "unknown" and self.verdict == "unexplained" and not effects:
             return "Effects are significant and relevant, and none was added; the noise is unknown."
         if self.noise_source == "unknown":
@@ -239,6 +249,7 @@ class Diagnosis(Shown):
             self.wiring
             or self.impossible
             or stopped
+            or self.training_only  # no answer that was counted is of this kind
             or not JOINTS[0] <= len(self.joints) <= JOINTS[1]
         ):
             return None
@@ -268,6 +279,7 @@ class Diagnosis(Shown):
         return {
             "verdict": self.verdict,
             "noise": {"source": self.noise_source},
+            **({"training_only": list(self.training_only)} if self.training_only else {}),
             **({"following_motion": list(self.following_motion)} if self.following_motion else {}),
             "joints": [
                 {

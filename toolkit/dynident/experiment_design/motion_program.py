@@ -31,6 +31,8 @@ _SHRINKS_CLEAR, _SHRINK_CLEAR = 20, 0.85
 _CUTS = 6  # rounds of bounds that keep a motion in the workspace
 _NEAR = 0.5
 """Share of a limit of torque from which on the search imposes it from the beginning."""
+_FEW = 1000
+"""Rows of torques that a program may have without its time going into them: all are imposed."""
 _ROUNDING = 1e-9
 
 
@@ -171,7 +173,7 @@ class MotionProgram:
             If no start ends at a motion within the limits.
         """
         begins = self._begins(starts, seed)
-        near = {j for one in begins for j in self._torques_beyond(one.variables, _NEAR)}
+        near = self._limited_at_once(begins)
         stages = [
             self.lazily(one, instants_of(self.motions), _ITERATIONS_SOFT, near)
             for one in self._softened()
@@ -225,6 +227,13 @@ class MotionProgram:
             )
 
         return LazySolver(write, torques)
+
+    def _limited_at_once(self, begins: Sequence[DesignedMotion]) -> set[int]:
+        """Joints whose torque is limited from the beginning."""
+        limited = np.flatnonzero(np.isfinite(self.limits.torque)).tolist()
+        if len(limited) * instants_of(self.motions) <= _FEW:
+            return set(limited)
+        return {j for one in begins for j in self._torques_beyond(one.variables, _NEAR)}
 
     def _torques_beyond(self, variables: np.ndarray, share: float) -> list[int]:
         """Joints whose torque exceeds a share of its limit, at the instants of the program."""

@@ -27,8 +27,9 @@ RANK_TOLERANCE = 3e-5
 
 The same number for structures, for fits and for the diagnosis, whose products of columns hold no
 more than its square. What is seen by less of itself than this, no measured torque tells: it is
-below what the digits of a description (pi / 2 as 1.5708 is off by 4e-6), the mounting of a joint
-and the linearity of a torque sensor do, by a factor of 10 or more.
+below what the linearity of a torque sensor does by a factor of 10 or more. Angles of a description
+that are off by less than this, as pi / 2 written 1.5708 (by 4e-6), show nothing either; written
+1.571 (by 2e-4) they do, with sigma to match.
 """
 
 _ROWS = 1024  # factorised at a time: few enough to stay in the cache

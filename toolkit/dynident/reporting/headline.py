@@ -73,6 +73,9 @@ def _of_verdict(diagnosis: Diagnosis) -> Headline:
     if diagnosis.following_motion:
         said = f"{added} {fall}, and what is left {_followed(diagnosis)}."
         return Headline("!", f"{title}, a residual remains", said)
+    if diagnosis.training_only:
+        said = f"{added} {fall}, and {_in_training(diagnosis)}."
+        return Headline("!", f"{title}, a residual in training", said)
     if not known:
         more = diagnosis.verdict == "unexplained" and not stopped
         more = " More effects are significant." if more else ""
@@ -105,10 +108,21 @@ def _followed(diagnosis: Diagnosis) -> str:
     return f"at {joints} follows position and velocity: it is not all noise"
 
 
+def _in_training(diagnosis: Diagnosis) -> str:
+    joints = " and ".join(diagnosis.training_only)
+    return (
+        f"the training recordings leave more than their noise at {joints}, which the held-out "
+        "recordings do not show"
+    )
+
+
 def _nothing_added(diagnosis: Diagnosis, known: bool) -> Headline:
     if diagnosis.following_motion:
         said = f"No effect of the catalogue is of use, and what is left {_followed(diagnosis)}."
         return Headline("!", "a residual remains", said)
+    if diagnosis.training_only:
+        said = f"No effect of the catalogue is of use, and {_in_training(diagnosis)}."
+        return Headline("!", "a residual in training", said)
     if diagnosis.verdict == "unexplained":
         if known:
             none = ", and no effect of the catalogue explains it"

@@ -75,10 +75,11 @@ def _to_mend(fault: Fault) -> Advice:
 
 def _to_add(diagnosis: Diagnosis) -> list[Advice]:
     """What carries the fall first, by how much it does; what is small beside it after that."""
-    if not diagnosis.steps:
+    steps = _addable(diagnosis)
+    if not steps:
         return []
     error = diagnosis.test_error
-    found = LeadingEffects.of(diagnosis.steps)
+    found = LeadingEffects.of(steps)
     first = sorted(found.leading, key=lambda group: -sum(step.fall for step in group))
     names, labels = _added(first, len(diagnosis.joints))
     share, all_of_it = "", "That"
@@ -96,9 +97,22 @@ def _to_add(diagnosis: Diagnosis) -> list[Advice]:
     return [Advice(f"Add {names} to the model, and fit it.", why, commands)]
 
 
+def _addable(diagnosis: Diagnosis) -> list[Step]:
+    """What the study can take up: no event of one recording, and no gain that is fitted anyway."""
+    fitted = set() if diagnosis.drives is None else set(diagnosis.drives.joints)
+    return [
+        step
+        for step in diagnosis.steps
+        if step.effect.found_by != "repetition"
+        and not (step.effect.name == "drive_gain" and step.effect.joint in fitted)
+    ]
+
+
 def _to_add_after(diagnosis: Diagnosis) -> list[Advice]:
     """What is small beside the effects that carry the fall."""
-    smaller = LeadingEffects.of(diagnosis.steps).smaller if diagnosis.steps else ()
+    steps = _addable(diagnosis)
+    smaller = LeadingEffects.of(steps).smaller if steps else ()
+    smaller = [group for group in smaller if sum(step.fall for step in group) > 0.0]
     if not smaller:
         return []
     names, labels = _added(smaller, len(diagnosis.joints))
@@ -157,6 +171,13 @@ def _experiments(step: Step) -> str:
 
 
 def _unexplained(diagnosis: Diagnosis) -> Advice:
+    if diagnosis.training_only:
+        where = _listed(list(diagnosis.training_only))
+        return Advice(
+            f"Hold out a recording with the motion that shows what is left at {where}.",
+            "The pictures are of the held-out recordings, which do not show it. The notes say in "
+            "which training recording it is largest, and when.",
+        )
     worst = [one.joint.name for one in states(diagnosis) if one.state == "failing"]
     worst = worst or list(diagnosis.following_motion)
     where = _listed(worst[:3]) or "the joints"

@@ -73,7 +73,7 @@ def find_contacts(evidence: Evidence, fitted: EvidenceFit) -> tuple[DisturbanceP
             continue
         first, recording = run.replicates[0], run.recording
         for j, joint in enumerate(recording.joints):
-            if not run.certain(j).any():
+            if not run.certain(j).any() or _is_rounding(evidence, run, residual[:, :, j], j):
                 continue
             found.append(
                 Repeated(
@@ -87,6 +87,14 @@ def find_contacts(evidence: Evidence, fitted: EvidenceFit) -> tuple[DisturbanceP
                 )
             )
     return pulses_in(found, evidence.criteria)
+
+
+def _is_rounding(evidence: Evidence, run: Run, residual: np.ndarray, joint: int) -> bool:
+    """Whether repetitions, (P, S), differ by no more than nothing can resolve."""
+    differences = residual - residual.mean(axis=0)
+    torque = run.replicates[0].tau[run.index, joint]
+    size, all_of_it = (float(np.sqrt(np.mean(x**2))) for x in (differences, torque))
+    return size <= evidence.criteria.verdict.resolution * all_of_it
 
 
 def pulses_in(data: Sequence[Repeated], criteria: Criteria) -> tuple[DisturbancePulse, ...]:

@@ -26,11 +26,16 @@ def read_array_header(stream: IO[bytes]) -> ArrayHeader | None:
     Raises
     ------
     ValueError
-        If no array begins here.
+        If no array begins here, or one of no possible shape.
     """
     version = np.lib.format.read_magic(stream)
     read = {
         (1, 0): np.lib.format.read_array_header_1_0,
         (2, 0): np.lib.format.read_array_header_2_0,
     }.get(version)
-    return ArrayHeader(*read(stream)) if read else None
+    if read is None:
+        return None
+    header = ArrayHeader(*read(stream))
+    if any(count < 0 for count in header.shape):
+        raise ValueError(f"an array has no shape {header.shape}")
+    return header
