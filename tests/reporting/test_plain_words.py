@@ -53,6 +53,24 @@ def test_what_to_do_names_commands_and_the_experiment_that_separates(found):
     assert "cannot show" in not_identifiable.what
 
 
+@pytest.mark.parametrize("fall", [0.0005, -0.0005])
+def test_what_a_study_cannot_take_up_or_what_brings_nothing_is_no_command(found, fall):
+    (step,) = found.steps
+    push = replace(step, effect=catalogue()["contact"]("elbow"))
+    small = replace(
+        step,
+        effect=effect("torque_offset", "elbow"),
+        test_error_before=step.test_error_after,
+        test_error_after=step.test_error_after - fall,
+        indistinguishable=(),
+    )
+    advice = next_steps(replace(found, steps=(push, step, small)))
+    commands = [one for each in advice for one in each.commands]
+    assert not any("contact" in one for one in commands)
+    assert any("torque_offset@elbow" in one for one in commands) == (fall > 0)
+    assert ("of the" in advice[0].why) == (fall > 0)
+
+
 def test_without_noise_the_first_thing_is_a_motion_that_repeats():
     unknown = diagnosis(("slide",), noise=False, steps=False, samples=200)
     assert "Record a motion that repeats" in next_steps(unknown)[0].what
