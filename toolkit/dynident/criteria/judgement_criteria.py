@@ -15,8 +15,9 @@ class ContactCriteria(CriteriaGroup):
         1e-6,
         "1",
         "p value below which a disturbance pulse is a contact",
-        "measured: healthy simulated robots, whose p values come out up to a hundred times too "
-        "small, as the noise is measured without the place that stands out most",
+        "measured: p values come out up to some hundred times too small in noise that is "
+        "correlated over 0.2 s, as it is measured without the place that stands out most; of 600 "
+        "searches in Gaussian noise none falls below this, of 1200 in noise of heavy tails 3",
         over=0,
         most=1,
     )
