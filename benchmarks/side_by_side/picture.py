@@ -34,7 +34,7 @@ def draw(found: Mapping[str, Any], to: Path) -> None:
         _plain_marks(axis)
         axis.set_xlabel(one["axis"])
         axis.set_ylabel(one["compared"])
-        axis.set_title(one["title"], loc="left", fontsize=9, weight="bold")
+        axis.set_title(one["title"], loc="left", fontsize=8, weight="bold")
         axis.grid(alpha=0.3, which="both", lw=0.4)
         if axis.lines:
             axis.legend(frameon=False, fontsize=7)
