@@ -55,30 +55,25 @@ def verdict_of(
 
 def within_noise(judged: HeldOut, criteria: VerdictCriteria) -> bool:
     """Whether nothing remains at any joint but noise, and what nothing can resolve."""
-    return not np.any(_over_noise(judged, criteria) > criteria.within_noise)
+    return not np.any(_more_than(criteria.within_noise, judged, criteria))
 
 
 def beyond_noise(judged: HeldOut, criteria: VerdictCriteria) -> np.ndarray:
     """Joints (n,) at which more remains than may be left where most is explained."""
     if judged.least_ratio is None:
         return np.zeros(len(judged.torque_rms), dtype=bool)
-    return _over_noise(judged, criteria) > criteria.most_left
+    return _more_than(criteria.most_left, judged, criteria)
 
 
-def _over_noise(judged: HeldOut, criteria: VerdictCriteria) -> np.ndarray:
-    """What is systematic at least, over the noise, (n,); zero of what nothing can resolve."""
+def _more_than(share: float, judged: HeldOut, criteria: VerdictCriteria) -> np.ndarray:
+    """Joints (n,) at which more than a share of the noise remains, and than nothing can resolve."""
     assert judged.least_ratio is not None and judged.noise_std is not None
     power = (judged.least_ratio * judged.noise_std) ** 2
     if judged.rounding is not None:
         power = power - judged.rounding
     systematic = np.sqrt(np.clip(power, 0.0, None))
     matters = systematic > criteria.resolution * judged.torque_rms
-    return np.divide(
-        systematic,
-        judged.noise_std,
-        out=np.zeros(len(power)),
-        where=matters & (judged.noise_std > 0),
-    )
+    return matters & (systematic > share * judged.noise_std)
 
 
 def noise_source(evidence: Evidence, held: Evidence | None) -> NoiseSource:
