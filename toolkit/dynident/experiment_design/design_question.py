@@ -13,6 +13,7 @@ from dynident.experiment_design.column_function import ColumnFunction
 from dynident.experiment_design.design_task import DesignTask
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.periodic import PeriodicMotions
+from dynident.experiment_design.predicted_torque import PredictedTorque
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.fit_model import fit
 from dynident.fitting.sampling import sample
@@ -57,6 +58,7 @@ class DesignQuestion:
     shown : effects that are to be shown.
     bare : the model without these.
     estimate : of the recordings so far, with the first of those that are to be told apart.
+    torque : that motions will take, as far as the recordings and the description tell.
     """
 
     task: DesignTask
@@ -64,10 +66,16 @@ class DesignQuestion:
     shown: tuple[Effect, ...]
     bare: Model
     estimate: Estimate
+    torque: PredictedTorque
 
     @classmethod
     def of(
-        cls, model: Model, recorded: Dataset, task: DesignTask, told: Sequence[Effect] = ()
+        cls,
+        model: Model,
+        recorded: Dataset,
+        task: DesignTask,
+        motions: PeriodicMotions,
+        told: Sequence[Effect] = (),
     ) -> DesignQuestion:
         """Fit what was recorded.
 
@@ -76,6 +84,7 @@ class DesignQuestion:
         model : the robot and its effects.
         recorded : recordings so far.
         task : what for.
+        motions : among which one is sought.
         told : one of its groups of effects.
 
         Returns
@@ -95,19 +104,19 @@ class DesignQuestion:
             shown=shown,
             bare=bare,
             estimate=estimate,
+            torque=_torque(estimate, recorded, motions),
         )
 
     @property
     def values(self) -> np.ndarray:
-        """Of the bare model, (p,)."""
-        known = dict(zip(self.estimate.names, self.estimate.values, strict=True))
+        """Of the bare model, (p,); not those of the fit alone, which small motions leave open."""
+        known = dict(zip(self.estimate.names, self.torque.values, strict=True))
         return np.array([known[name] for name in self.bare.names])
 
     @property
     def std(self) -> np.ndarray:
         """Size of the torque's residual, (n,); infinite where there is no torque."""
-        found = self.estimate.torque_std
-        return np.where(found > 0, found, np.inf)
+        return _std(self.estimate)
 
     def asked(self, recorded: Dataset, motions: PeriodicMotions) -> Asked:
         """Return what a motion is judged by, and the names of what it tells.
@@ -197,6 +206,19 @@ class DesignQuestion:
         mix[: count - own, : count - own] = np.eye(count - own)
         mix[count - own :, -1] = values
         return mix, 1, (*columns.labels[: count - own], f"torque of {label}")
+
+
+def _std(estimate: Estimate) -> np.ndarray:
+    found = estimate.torque_std
+    return np.where(found > 0, found, np.inf)
+
+
+def _torque(estimate: Estimate, recorded: Dataset, motions: PeriodicMotions) -> PredictedTorque:
+    """The torque that motions will take; usual ones say how large a column is."""
+    model, values, std = estimate.model, estimate.values, _std(estimate)
+    columns, every = ColumnFunction.of(model, values), np.eye(model.size)
+    known, _ = _recorded(columns, every, recorded, std)
+    return PredictedTorque.of(model, values, known, _sizes(every, columns, motions, std))
 
 
 def _recorded(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -17,6 +18,7 @@ from dynident.experiment_design.information import Information
 from dynident.experiment_design.motion_limits import MotionLimits
 from dynident.experiment_design.motion_program import MotionProgram
 from dynident.experiment_design.periodic import PeriodicMotions
+from dynident.experiment_design.predicted_torque import PredictedTorque
 from dynident.experiment_design.recording_design import DECIDES, RecordingDesign, Separation
 from dynident.model import Model
 from dynident.progress import logged
@@ -70,10 +72,12 @@ def design(
     workspace = _workspace(model.robot, task, limits)
     motions = PeriodicMotions(limits=limits, period=task.duration, harmonics=task.harmonics)
     progress("fitting what was recorded")
-    questions = [DesignQuestion.of(model, recorded, task, told) for told in task.tell or ((),)]
+    questions = [
+        DesignQuestion.of(model, recorded, task, motions, told) for told in task.tell or ((),)
+    ]
     progress("writing the columns out")
     asked = [one.asked(recorded, motions) for one in questions]
-    program = _program(asked, motions, workspace)
+    program = _program(asked, motions, questions[0].torque, workspace)
     progress("comparing with usual motions")
     usual = _usual(program)
     found = program.solved(task.starts, task.seed, progress)
@@ -112,11 +116,14 @@ def _workspace(robot: Robot, task: DesignTask, limits: MotionLimits) -> Workspac
     return Workspace(None, limits.boxes)
 
 
-def _program(asked: list[Asked], motions: PeriodicMotions, workspace: Workspace) -> MotionProgram:
+def _program(
+    asked: list[Asked], motions: PeriodicMotions, torque: PredictedTorque, workspace: Workspace
+) -> MotionProgram:
     """The search; what no usual motion tells at all would hide what others are."""
     program = MotionProgram(
         informations=tuple(one.information for one in asked),
         motions=motions,
+        torque=torque,
         softer=tuple(one.softer for one in asked),
         workspace=workspace,
     )
@@ -129,11 +136,10 @@ def _program(asked: list[Asked], motions: PeriodicMotions, workspace: Workspace)
         if max(_sigma(one.information, program.told(one.information, x)) for x in usual) > _HOPELESS
     ]
     kept = kept or asked[:1]
-    return MotionProgram(
+    return replace(
+        program,
         informations=tuple(one.information for one in kept),
-        motions=motions,
         softer=tuple(one.softer for one in kept),
-        workspace=workspace,
     )
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import islice
 
 import numpy as np
@@ -17,8 +18,14 @@ from dynident.errors import DesignError
 from dynident.experiment_design.geometry.workspace import RoomCut, Workspace
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.motion_limits import MotionLimits
-from dynident.experiment_design.motion_solver import DesignedMotion, LazySolver, MotionSolver
+from dynident.experiment_design.motion_solver import (
+    DesignedMotion,
+    LazySolver,
+    LimitedTorque,
+    MotionSolver,
+)
 from dynident.experiment_design.periodic import PeriodicMotions
+from dynident.experiment_design.predicted_torque import PredictedTorque
 
 _PER_HARMONIC = 22  # instants
 _LEAST, _LEAST_NARROW = 100, 300
@@ -29,6 +36,7 @@ _ITERATIONS, _ITERATIONS_SOFT = 150, 60
 _SHRINKS = 100
 _SHRINKS_CLEAR, _SHRINK_CLEAR = 20, 0.85
 _CUTS = 6  # rounds of bounds that keep a motion in the workspace
+_USUAL = 0.3  # of a random motion's size
 _NEAR = 0.5
 """Share of a limit of torque from which on the search imposes it from the beginning."""
 _FEW = 1000
@@ -55,6 +63,7 @@ class MotionProgram:
     ----------
     informations : what is asked; of several, the one that is told least counts.
     motions : among which it is sought.
+    torque : that is limited.
     softer : of each of these, the same with dry friction over wider ranges of speed, the widest
         first, through which the search goes; none where that makes no difference.
     workspace : that the robot stays in.
@@ -62,12 +71,13 @@ class MotionProgram:
 
     informations: tuple[Information, ...]
     motions: PeriodicMotions
+    torque: PredictedTorque
     softer: tuple[tuple[Information, ...], ...] = ()
     workspace: Workspace = field(default_factory=Workspace)
 
     @property
     def information(self) -> Information:
-        """The first of what is asked; its model predicts the torque that is limited."""
+        """The first of what is asked."""
         return self.informations[0]
 
     @property
@@ -135,11 +145,23 @@ class MotionProgram:
         t = self.motions.times(FINER * self.instants)
         found = np.array(variables)
         found[:, 0] = np.clip(found[:, 0], -0.999, 0.999)
+        still = np.array(found)
+        still[:, 1:] = 0.0
+        # What its own weight takes of a drive where the robot stands, no smaller motion gives back.
+        at_rest = self._shares(still, t[:1])
+        if at_rest.max() >= 1.0:
+            return None
         for _ in range(_SHRINKS):
-            over = self.excess(found, t)
-            if over <= 1.0:
+            used = self._shares(found, t)
+            if used.max() <= 1.0:
                 return found
-            found[:, 1:] *= (1.0 - _ROUNDING) / over if np.isfinite(over) else 0.5
+            if np.all(np.isfinite(used)):
+                # As if shares grew evenly from those at rest; those of torques grow faster.
+                more = used > 1.0
+                left = (1.0 - at_rest[more]) / (used[more] - at_rest[more])
+                found[:, 1:] *= (1.0 - _ROUNDING) * left.min()
+            else:
+                found[:, 1:] *= 0.5
         return None
 
     def excess(self, variables: np.ndarray, t: np.ndarray) -> float:
@@ -148,11 +170,15 @@ class MotionProgram:
         Parameters
         ----------
         variables : (n, 2 H - 1).
-        t : (T,) s, at which it is looked at.
+        t : (T,) s, at which it is looked at, evenly spaced over a period.
         """
+        return float(self._shares(variables, t).max())
+
+    def _shares(self, variables: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """The largest share of each limit that a motion uses, (4 n,)."""
         q, v, a = self.motions.fourier(variables).at(t)
-        torque = self.information.columns.torque_along(t, q, v, a)
-        return self.limits.share(q, (v, a, torque), self.motions.centre(variables))
+        torque = self.torque.farthest(t, q, v, a)
+        return self.limits.shares(q, (v, a, torque), self.motions.centre(variables))
 
     # --- the program --------------------------------------------------------------------------
 
@@ -219,14 +245,21 @@ class MotionProgram:
         -------
         It limits the torques of further joints when it is told to.
         """
+        counts = instants, min(instants, instants_of(self.motions))
 
-        def write(joints: frozenset[int], cuts: Sequence[RoomCut]) -> MotionSolver:
-            fewer = instants_of(self.motions)
-            return MotionSolver.of(
-                self.motions, informations, instants, fewer, iterations, joints, cuts
-            )
+        def write(torque: LimitedTorque, cuts: Sequence[RoomCut]) -> MotionSolver:
+            return MotionSolver.of(self.motions, informations, counts, iterations, torque, cuts)
 
-        return LazySolver(write, torques)
+        function = self.torque.columns.torque
+        torque = LimitedTorque(function=function, most=self._torque_left, joints=torques)
+        return LazySolver(write, torque)
+
+    @cached_property
+    def _torque_left(self) -> np.ndarray:
+        """Limits of the torque that is predicted, so that what is not known of it has room."""
+        motions, t = self.motions, self.motions.times(instants_of(self.motions))
+        usual = motions.fourier(motions.random(0) * _USUAL).at(t)
+        return self.limits.torque * self.torque.certain(self.limits, t, *usual)
 
     def _limited_at_once(self, begins: Sequence[DesignedMotion]) -> set[int]:
         """Joints whose torque is limited from the beginning."""
@@ -238,8 +271,8 @@ class MotionProgram:
     def _torques_beyond(self, variables: np.ndarray, share: float) -> list[int]:
         """Joints whose torque exceeds a share of its limit, at the instants of the program."""
         t = self.motions.times(instants_of(self.motions))
-        torque = self.information.columns.torque_along(t, *self.motions.fourier(variables).at(t))
-        return np.flatnonzero(np.abs(torque).max(axis=0) > share * self.limits.torque).tolist()
+        torque = np.abs(self.torque.along(t, *self.motions.fourier(variables).at(t))).max(axis=0)
+        return np.flatnonzero(torque > share * self._torque_left).tolist()
 
     def _softened(self) -> list[tuple[Information, ...]]:
         """What is asked, with narrow laws made wider, the widest first."""
@@ -308,8 +341,8 @@ class MotionProgram:
         solver, variables = self._end_of(lazy, start)
         while np.all(np.isfinite(variables)) and lazy.limit(self._torques_beyond(variables, 1.0)):
             solver, variables = self._end_of(lazy, variables)
-        stats = solver.function.stats()
         best = self._limited(variables) if np.all(np.isfinite(variables)) else None
+        stats = solver.function.stats()
         if best is None:
             return []
         motion = DesignedMotion(

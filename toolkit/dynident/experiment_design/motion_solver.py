@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,22 @@ class DesignedMotion:
     iterations: int
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LimitedTorque:
+    """Which torques a program limits, and to what.
+
+    Attributes
+    ----------
+    function : casadi.Function of an instant, the torque (n,).
+    most : (n,) N m or N.
+    joints : those that are limited.
+    """
+
+    function: Any
+    most: np.ndarray
+    joints: Collection[int]
+
+
 @dataclass(frozen=True, eq=False)
 class MotionSolver:
     """Ipopt's function, and the rows that it keeps within bounds.
@@ -53,10 +69,9 @@ class MotionSolver:
         cls,
         motions: PeriodicMotions,
         informations: tuple[Information, ...],
-        instants: int,
-        limit_instants: int,
+        instants: tuple[int, int],
         iterations: int,
-        torques: Collection[int],
+        torque: LimitedTorque,
         cuts: Sequence[RoomCut] = (),
     ) -> MotionSolver:
         """Write the program out.
@@ -64,11 +79,10 @@ class MotionSolver:
         Parameters
         ----------
         motions : among which one is sought.
-        informations : what is asked; of several, the largest loss is made small. The torque that
-            is limited is what the model of the first predicts.
-        instants, limit_instants : at which columns are evaluated, and limits imposed.
+        informations : what is asked; of several, the largest loss is made small.
+        instants : at which columns are evaluated, and at which limits are imposed.
         iterations : at most.
-        torques : joints whose torque is limited.
+        torque : what is limited of it.
         cuts : bounds on the position at single instants.
 
         Returns
@@ -89,24 +103,23 @@ class MotionSolver:
             q = ca.repmat(centre, len(t), 1) + moved
             return q, v, a, ca.vertcat(q.T, v.T, a.T, ca.DM(t).T)
 
-        *_, every = along(motions.times(instants))
+        evaluated, count = instants
+        *_, every = along(motions.times(evaluated))
         losses = [
-            one.symbolic_loss(one.columns.function.map(instants)(every), instants)
+            one.symbolic_loss(one.columns.function.map(evaluated)(every), evaluated)
             for one in informations
         ]
-        count = min(instants, limit_instants)
         q, v, a, inputs = along(motions.times(count))
-        columns = informations[0].columns
         rows = LimitRows()
         rows.add(q / ca.repmat(ca.DM(half).T, count, 1), limits.lower / half, limits.upper / half)
         ones = np.ones(n)
         rows.add(v / ca.repmat(ca.DM(limits.speed).T, count, 1), -ones, ones)
         rows.add(a / ca.repmat(ca.DM(limits.acceleration).T, count, 1), -ones, ones)
-        limited = sorted(torques)
+        limited = sorted(torque.joints)
         if limited:
-            torque = columns.torque.map(count)(inputs).T[:, limited]
-            torque = torque / ca.repmat(ca.DM(limits.torque[limited]).T, count, 1)
-            rows.add(torque, -np.ones(len(limited)), np.ones(len(limited)))
+            needed = torque.function.map(count)(inputs).T[:, limited]
+            needed = needed / ca.repmat(ca.DM(torque.most[limited]).T, count, 1)
+            rows.add(needed, -np.ones(len(limited)), np.ones(len(limited)))
         if cuts:
             held, *_ = along(np.array([one.t for one in cuts]))
             slopes = np.array([one.slope for one in cuts])
@@ -133,38 +146,40 @@ class LazySolver:
 
     Parameters
     ----------
-    write : the program that limits the torques of some joints, with some cuts.
-    joints : whose torques are limited so far.
+    write : the program that limits some torques, with some cuts.
+    torque : what is limited of it so far.
     cuts : see `MotionSolver.of`.
     """
 
     def __init__(
         self,
-        write: Callable[[frozenset[int], Sequence[RoomCut]], MotionSolver],
-        joints: Collection[int],
+        write: Callable[[LimitedTorque, Sequence[RoomCut]], MotionSolver],
+        torque: LimitedTorque,
         cuts: Sequence[RoomCut] = (),
     ) -> None:
         self._write, self._cuts = write, tuple(cuts)
-        self.joints = frozenset(joints)
+        self.torque = torque
         self._written: MotionSolver | None = None
 
     @property
     def solver(self) -> MotionSolver:
         """The program as it stands."""
         if self._written is None:
-            self._written = self._write(self.joints, self._cuts)
+            self._written = self._write(self.torque, self._cuts)
         return self._written
 
     def limit(self, joints: Collection[int]) -> bool:
         """Limit the torques of further joints, from now on; whether there are any."""
-        if self.joints.issuperset(joints):
+        known = frozenset(self.torque.joints)
+        if known.issuperset(joints):
             return False
-        self.joints, self._written = self.joints.union(joints), None
+        self.torque = replace(self.torque, joints=known.union(joints))
+        self._written = None
         return True
 
     def cut(self, cuts: Sequence[RoomCut]) -> LazySolver:
         """Return the program with other cuts."""
-        return LazySolver(self._write, self.joints, cuts)
+        return LazySolver(self._write, self.torque, cuts)
 
 
 def _options(iterations: int) -> dict[str, Any]:

@@ -175,7 +175,7 @@ class RecordingDesign(Shown):
         program, limits = self.program, self.limits
         t = program.motions.times(FINER * program.instants)
         q, v, a = self.trajectory.at(t)
-        torque = program.information.columns.torque_along(t, q, v, a)
+        torque = program.torque.farthest(t, q, v, a)
         rows = []
         for j, (name, unit) in enumerate(
             zip(self.model.robot.names, self.model.robot.units, strict=True)

@@ -8,6 +8,7 @@ import numpy as np
 
 from dynident.experiment_design.geometry.clearance import Clearance
 from dynident.experiment_design.geometry.surroundings import StayBox
+from dynident.experiment_design.motion_limits import above_instants
 
 _STEP = 1e-5  # rad or m, of a slope
 
@@ -59,10 +60,17 @@ class Workspace:
         return np.stack(found, axis=1) if found else np.full((len(q), 1), np.inf)
 
     def admits(self, q: np.ndarray) -> bool:
-        """Whether no boundary is crossed along a motion (T, n)."""
-        if not all(np.all(box.room(q) >= 0) for box in self.boxes):
-            return False  # before distances, which are costly
-        return self.clearance is None or bool(np.all(self.rooms(q)[:, -1] >= 0))
+        """Whether no boundary is crossed along a motion (T, n), between its instants neither.
+
+        Parameters
+        ----------
+        q : (T, n) rad or m, at instants that are evenly spaced over a period.
+        """
+        for box in self.boxes:  # before distances, which are costly
+            if not _is_kept(box.room(q)):
+                return False
+        clearance = self.clearance
+        return clearance is None or _is_kept(clearance.along(q) - clearance.margin)
 
     def cuts(self, t: np.ndarray, q: np.ndarray) -> list[RoomCut]:
         """Return bounds that move a motion away from where it crosses a boundary.
@@ -93,3 +101,7 @@ class Workspace:
         found = [] if self.clearance is None else [f"stays {self.clearance.margin:g} m clear"]
         found += ["stays in its boxes"] if self.boxes else []
         return " and ".join(found)
+
+
+def _is_kept(room: np.ndarray) -> bool:
+    return bool(np.all(room - above_instants(room) >= 0))

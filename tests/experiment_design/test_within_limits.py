@@ -1,0 +1,61 @@
+"""Limits hold between instants, and for the robot as it is where its description is wrong."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from designs_within_limits import Drawn, seen
+from dynident.experiment_design.design_question import DesignQuestion
+from dynident.experiment_design.motion_limits import above_instants
+from dynident.experiment_design.periodic import PeriodicMotions
+from dynident.experiment_design.predicted_torque import SIGMAS
+from dynident.model import Model
+
+
+@pytest.mark.parametrize("harmonics", [1, 4, 9])
+def test_peaks_between_instants_are_seen(harmonics: int) -> None:
+    rng = np.random.default_rng(harmonics)
+    for _ in range(20):
+        amplitudes, phases = rng.normal(size=harmonics), rng.uniform(0, 7, harmonics)
+
+        def wave(count: int, amplitudes=amplitudes, phases=phases) -> np.ndarray:
+            angle = np.outer(np.arange(count) * (2 * np.pi / count), 1 + np.arange(harmonics))
+            return np.sin(angle + phases) @ amplitudes
+
+        few, many = wave(60 * harmonics)[:, None], wave(6000 * harmonics)
+        highest = (few + above_instants(few)).max()
+        assert few.max() < many.max() <= highest + 1e-5 * np.ptp(many)
+        assert highest < many.max() + 2e-3 * np.ptp(many)
+
+
+@pytest.mark.parametrize("seed", [3, 11])
+def test_torques_are_predicted_where_small_motions_say_little(seed: int) -> None:
+    """Where a fit alone is wrong by more than there is, the description closes what is open."""
+    drawn = Drawn.of(seed)
+    model, recorded = Model(drawn.described), drawn.recorded
+    motions = PeriodicMotions(limits=drawn.limits, period=5.0, harmonics=4)
+    question = DesignQuestion.of(model, recorded, drawn.task, motions)
+    torque, t = question.torque, motions.times(300)
+    motion = motions.fourier(motions.random(5) * 0.3).at(t)
+    true = drawn.robot.inverse_dynamics(*motion)
+
+    def wrong(found: np.ndarray) -> float:
+        return float(np.sqrt(np.mean((found - true) ** 2)))
+
+    fitted = model.torque(model.block(t, *motion), question.estimate.values)
+    ours, described = torque.along(t, *motion), drawn.described.inverse_dynamics(*motion)
+    assert wrong(ours) < min(wrong(fitted), wrong(described))
+    sigma = np.abs(torque.farthest(t, *motion) - ours) / SIGMAS
+    rounding = 1e-4 * np.abs(true).max()  # and what the filter does to the recording
+    assert np.all(np.abs(true - ours) <= SIGMAS * sigma + rounding)
+    # Nor is that bought by saying that nothing is known.
+    assert np.mean(sigma) < 0.2 * np.sqrt(np.mean(true**2))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 3])
+def test_random_robots_keep_their_limits(seed: int) -> None:
+    """A sample of the benchmark: by Pinocchio and Drake, on a hundred times as many instants."""
+    drawn = Drawn.of(seed)
+    assert seen(drawn, drawn.designed()).beyond == []
