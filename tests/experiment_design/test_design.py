@@ -189,7 +189,7 @@ def test_of_several_pairs_the_one_told_least_counts() -> None:
     pairs = tuple(tuple(effects_of(one, ROBOT)[0] for one in pair) for pair in labels)
     data = recorded(base + pairs[0][0] + pairs[1][0])
     whole = base + pairs[0][0] + pairs[1][0]
-    task = DesignTask(duration=6.0, repeat=1, harmonics=4, tell=pairs, starts=1)
+    task = DesignTask(duration=6.0, repeat=1, harmonics=4, tell=pairs)
     both = design(whole, data, task)
     assert [one.first for one in both.separations] == [first.title for first, _ in pairs]
     program = both.program
