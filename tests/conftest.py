@@ -1,5 +1,6 @@
 """For all tests: no test of times, a browser, and each leaves the catalogue alone."""
 
+import gc
 import os
 from collections.abc import Iterator
 
@@ -12,6 +13,15 @@ from dynident.effects import known_effects
 # What a first example loads takes seconds, and machines differ: a deadline would test both.
 settings.register_profile("without deadlines", deadline=None)
 settings.load_profile("without deadlines")
+
+
+# Searches for cycles took a fifteenth of the suite: they go through all modules that are loaded.
+gc.set_threshold(20_000, *gc.get_threshold()[1:])
+
+
+def pytest_collection_finish() -> None:
+    """Leave what is loaded by now out of every later search for cycles: it stays."""
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True)

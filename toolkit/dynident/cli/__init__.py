@@ -7,11 +7,12 @@ else. Exit status: 0 done, 1 a check failed, 2 unusable input.
 from __future__ import annotations
 
 import contextlib
+import gc
 import io
 import os
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NoReturn
 
 import click
@@ -50,6 +51,9 @@ __all__ = [
 
 TRACEBACK = "DYNIDENT_TRACEBACK"
 """Environment variable: what nobody has foreseen ends in Python's traceback, not in one line."""
+_SELDOM = 50_000
+"""Objects made anew after which the collector looks for cycles. Modules, being loaded, make many
+and leave none; a tenth of a short command was spent on looking."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -60,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     arguments : by default those of the process.
     """
     _open_streams()
-    with warnings.catch_warnings():
+    with _cycles_seldom_sought(), warnings.catch_warnings():
         warnings.showwarning = _Warnings().show
         warnings.simplefilter("always", DynidentWarning)
         try:
@@ -98,6 +102,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 _fail(f"{said}. correct the class; dynident.check_effect tells more")
             where = f"{TRACEBACK}=1 shows where; please report it with the input"
             _fail(f"unexpected {type(error).__name__}: {error}. {where}")
+
+
+@contextlib.contextmanager
+def _cycles_seldom_sought() -> Iterator[None]:
+    before = gc.get_threshold()
+    gc.set_threshold(_SELDOM, *before[1:])
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
 
 
 def _open_streams() -> None:

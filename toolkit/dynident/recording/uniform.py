@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from dynident.errors import DynidentWarning, RecordingError
 from dynident.recording.recording import SIGNALS, Recording
@@ -137,6 +136,8 @@ def _resampled(recording: Recording, step: float | None) -> _Even:
 
 def _interpolated(t: np.ndarray, x: np.ndarray, fresh: np.ndarray, grid: np.ndarray) -> np.ndarray:
     """Splines of the fresh rows of x (T, n) at other times; columns not recorded stay so."""
+    from scipy.interpolate import CubicSpline
+
     found = np.full((len(grid), x.shape[1]), np.nan)
     for k in range(x.shape[1]):  # one by one: a spline takes many times its samples' memory
         column = x[fresh, k]
