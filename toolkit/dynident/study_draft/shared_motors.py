@@ -87,7 +87,8 @@ def _suggested(reading: Reading, guess: CouplingGuess) -> OtherReading:
     one = guess.found[0]
     question = (
         f"Does the motor of {one.by} turn {one.joint} too, as its limit of speed suggests? "
-        f"If so, draft again with{' one of' if len(stated) > 1 else ''}:"
+        "If so, remove this draft, or give --out, and draft again with"
+        f"{' one of' if len(stated) > 1 else ''}:"
     )
     return replace(found, words=f"If {one.words}", question=question, answers=tuple(stated))
 
