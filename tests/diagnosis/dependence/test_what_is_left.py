@@ -10,6 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 import dynident as di
+from dynident.criteria import DEFAULTS
 from dynident.diagnosis.result import Diagnosis
 from dynident.recording import Dataset, Recording
 from dynident.reporting.headline import headline
@@ -47,6 +48,9 @@ def test_a_law_that_no_catalogue_has_is_found_without_a_noise_floor() -> None:
     assert (found.verdict, found.following_motion) == ("unexplained", ("elbow",))
     assert "What is left at elbow is not all noise" in found.sentence
     assert "elbow follows position and velocity" in headline(found).sentence
+    # What is printed is the regression that the verdict goes by.
+    (printed,) = [one for one in found.residual_dependence if one.joint == "elbow"]
+    assert "position and velocity" in printed.of_the_motion(DEFAULTS.verdict)
     first = found.proposals[0]
     assert first.effect.joint == "elbow"
     assert first.test_error_after < 0.5 * found.test_error.before

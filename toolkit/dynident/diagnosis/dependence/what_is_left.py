@@ -12,7 +12,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from dynident.diagnosis.dependence.residual_dependence import MOTION, residual_dependence
+from dynident.diagnosis.dependence.explained_shares import ORDER
+from dynident.diagnosis.dependence.residual_dependence import (
+    MOTION,
+    JointDependence,
+    residual_dependence,
+)
 from dynident.diagnosis.dependence.residual_record import joined, residual_records
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.payload_recordings import marked
@@ -30,6 +35,8 @@ def with_dependence(
 ) -> Diagnosis:
     """Return a diagnosis that says what its residual depends on.
 
+    Without a noise floor that is the residual, and the regression, by which `doubted` judges.
+
     Parameters
     ----------
     found : the diagnosis so far.
@@ -40,6 +47,8 @@ def with_dependence(
     -------
     With `residual_dependence`.
     """
+    if found.noise_source == "unknown":
+        return replace(found, residual_dependence=_of_fit(evidence, path.final, ORDER))
     judged = path.judged[-1]
     records = residual_records(judged, (held or evidence).runs)
     if held is not None:
@@ -85,7 +94,14 @@ def doubted(
 
 def _following(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
     """Joints at which functions of position and velocity predict what a fit leaves."""
+    told, criteria = _of_fit(evidence, fitted, MOTION), evidence.criteria.verdict
+    return tuple(one.joint for one in told if one.of_the_motion(criteria))
+
+
+def _of_fit(
+    evidence: Evidence, fitted: EvidenceFit, order: Sequence[tuple[str, ...]]
+) -> tuple[JointDependence, ...]:
+    """What a fit leaves of the data that it was fitted to, by what it depends on."""
     judged, criteria = on_recordings(evidence, fitted), evidence.criteria.verdict
     records, names = joined(residual_records(judged, evidence.runs)), fitted.model.robot.names
-    told = residual_dependence(judged, records, names, criteria, MOTION)
-    return tuple(one.joint for one in told if one.of_the_motion(criteria))
+    return residual_dependence(judged, records, names, criteria, order)
