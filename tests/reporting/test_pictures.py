@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from dynident.diagnosis.details import Step
 from dynident.errors import DynidentError
-from dynident.reporting.content import bars, seen, thinned
+from dynident.reporting.content import LABEL, bars, seen, thinned
 from dynident.reporting.pictures import diagnosis_pictures as pictures
 from dynident.reporting.pictures import plots
 from reporting.fabricated import RECORDINGS, diagnosis, effect
@@ -47,6 +47,26 @@ def test_the_waterfall_goes_from_the_given_error_to_the_final_one(found):
     assert rows[2].start == rows[-1].stop == pytest.approx(0.9)
     (bar,) = traces(pictures.waterfall(more))
     assert np.asarray(bar.base) + np.asarray(bar.x) == pytest.approx([row.stop for row in rows])
+
+
+@pytest.mark.parametrize("after", [0.9, 0.999, 1.001, 1.1])
+def test_no_number_lies_on_the_line_of_the_floor(found, after):
+    """Numbers stand where their bars end, or behind the line; inside a bar, clear of it."""
+    floor = found.test_error.noise_floor
+    error = replace(found.test_error, before=1.2 * floor, after=after * floor)
+    step = replace(found.steps[0], test_error_before=error.before, test_error_after=error.after)
+    one = replace(found, test_error=error, steps=(step,))
+    figure = pictures.waterfall(one)
+    (bar,), line = traces(figure), 100 * floor
+    room = LABEL * figure.layout.xaxis.range[1]
+    behind = {a.y: a.x for a in figure.layout.annotations if a.yref != "paper"}
+    for i, row in enumerate(bars(one)):
+        place, end = bar.textposition[i], max(row.start, row.stop)
+        begin = {"inside": end - room, "outside": end, "none": behind.get(i)}[place]
+        assert begin is not None and not begin < line < begin + room
+        assert (place == "none") == (i in behind)
+    drawn = {text.get_text(): text.xy[0] for text in plots.waterfall(one).axes[0].texts}
+    assert all(not begin < line < begin + room for begin in drawn.values())
 
 
 def test_the_waterfall_names_the_whole_set(found):

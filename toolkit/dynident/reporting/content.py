@@ -18,6 +18,8 @@ from dynident.evidence.maps import ResidualMap
 
 GIVEN = "model as given"
 BAND = "noise band"
+LABEL = 0.25
+"""Share of the width of the waterfall that the text of a row takes on a phone."""
 BEFORE_COLOUR = "#d9660a"
 AFTER_COLOUR = "#1f7fc4"
 GREY = "#808080"
@@ -40,6 +42,17 @@ class Bar:
     stop: float
     kind: Literal["given", "added", "final"]
     text: str
+
+    def text_from(self, floor: float, width: float) -> float:
+        """Where its text begins, in %: at its end, or behind the line of the floor that it crosses.
+
+        Parameters
+        ----------
+        floor : of the noise, in %; zero where it is unknown.
+        width : of the picture, in %.
+        """
+        end = max(self.start, self.stop)
+        return floor if end < floor < end + LABEL * width else end
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from dynident.reporting.content import (
     BEFORE_COLOUR,
     GIVEN,
     GREY,
+    LABEL,
     Bar,
     after_name,
     bars,
@@ -30,14 +31,17 @@ from dynident.reporting.content import (
 )
 from dynident.reporting.pictures.look import FAINT, dressed, mark, plain, single_precision
 
-_LONG = 0.75
-"""Share of the longest bar from which on a bar has its number inside."""
+_LONG = 0.58
+"""Share of the width from which on a bar has its number inside."""
 
 
 def waterfall(diagnosis: Diagnosis) -> go.Figure:
     """Held-out torque error as effects are added, down to the noise floor."""
     rows = bars(diagnosis)
-    widest = max(*(row.stop for row in rows), 1e-9)
+    floor = diagnosis.test_error.noise_floor
+    line_at = 100 * (floor or 0.0)
+    top = max(*(max(row.start, row.stop) for row in rows), line_at, 1e-9)
+    width = 1.3 * top
     colours = {"given": BEFORE_COLOUR, "added": "rgba(31,127,196,0.45)", "final": AFTER_COLOUR}
     figure = go.Figure(
         go.Bar(
@@ -51,7 +55,7 @@ def waterfall(diagnosis: Diagnosis) -> go.Figure:
                 "pattern": {"shape": ["/" if row.kind == "added" else "" for row in rows]},
             },
             text=[f"\u2002{row.text}\u2002" for row in rows],
-            textposition=[_text_place(row, widest) for row in rows],
+            textposition=[_text_place(row, line_at, width) for row in rows],
             insidetextanchor="end",
             insidetextfont={"color": "#000"},
             textangle=0,
@@ -65,7 +69,10 @@ def waterfall(diagnosis: Diagnosis) -> go.Figure:
         level = rows[i].stop if rows[i].kind == "given" else rows[i].start
         line = {"color": GREY, "width": 1, "dash": "dot"}
         figure.add_shape(type="line", x0=level, x1=level, y0=i, y1=i + 1, line=line, layer="below")
-    floor = diagnosis.test_error.noise_floor
+    for i, row in enumerate(rows):
+        if row.text_from(line_at, width) == line_at:
+            place = {"x": line_at, "xanchor": "left", "xshift": 6}
+            figure.add_annotation(text=row.text, y=i, showarrow=False, **place)
     if floor is None:
         head = "noise floor unknown"
         place = {"x": 0, "xanchor": "left"}
@@ -73,14 +80,13 @@ def waterfall(diagnosis: Diagnosis) -> go.Figure:
         head = f"noise floor {100 * floor:.2f} %"
         # Where there is room beside the line.
         side, shift = ("right", -4) if 2 * floor > diagnosis.test_error.before else ("left", 4)
-        place = {"x": 100 * floor, "xanchor": side, "xshift": shift}
-        figure.add_vrect(
-            x0=0, x1=100 * floor, fillcolor=FAINT, line_width=0, layer="below"
-        ).add_vline(x=100 * floor, line={"color": GREY, "width": 2, "dash": "dash"})
+        place = {"x": line_at, "xanchor": side, "xshift": shift}
+        figure.add_vrect(x0=0, x1=line_at, fillcolor=FAINT, line_width=0, layer="below").add_vline(
+            x=line_at, line={"color": GREY, "width": 2, "dash": "dash"}
+        )
     figure.add_annotation(text=head, y=1, yref="paper", yanchor="bottom", showarrow=False, **place)
-    top = max(*(max(row.start, row.stop) for row in rows), 100 * (floor or 0.0), 1e-9)
     ticks = ["<br>".join(plain(line) for line in row.lines) for row in rows]
-    figure.update_xaxes(title="held-out torque error (%)", range=[0, 1.3 * top], fixedrange=True)
+    figure.update_xaxes(title="held-out torque error (%)", range=[0, width], fixedrange=True)
     figure.update_yaxes(
         tickvals=list(range(len(rows))),
         ticktext=ticks,
@@ -95,9 +101,12 @@ def waterfall(diagnosis: Diagnosis) -> go.Figure:
     return dressed(figure, height, top=28)
 
 
-def _text_place(row: Bar, widest: float) -> str:
-    """Inside a bar that is long: on a phone there is no room beside it."""
-    return "inside" if row.kind != "added" and row.stop > _LONG * widest else "outside"
+def _text_place(row: Bar, floor: float, width: float) -> str:
+    """Inside a bar that is long, where no line of the floor crosses it there: a phone is narrow."""
+    if row.text_from(floor, width) == floor:
+        return "none"  # written behind the line
+    inside = row.kind != "added" and row.stop > _LONG * width
+    return "inside" if inside and not row.stop - LABEL * width < floor else "outside"
 
 
 def ranking(diagnosis: Diagnosis, most: int = 10) -> go.Figure:

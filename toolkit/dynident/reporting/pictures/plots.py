@@ -48,6 +48,9 @@ def waterfall(diagnosis: Diagnosis) -> Figure:
 def draw_waterfall(axes: Axes, diagnosis: Diagnosis) -> None:
     """`waterfall` on given axes."""
     rows = bars(diagnosis)
+    floor = diagnosis.test_error.noise_floor
+    line_at = 100 * (floor or 0.0)
+    width = 1.24 * max(*(max(row.start, row.stop) for row in rows), line_at, 1e-9)
     for i, row in enumerate(rows):
         added = row.kind == "added"
         axes.barh(
@@ -59,19 +62,18 @@ def draw_waterfall(axes: Axes, diagnosis: Diagnosis) -> None:
             edgecolor=AFTER_COLOUR if added else "none",
             hatch="//" if added else None,
         )
-        end = max(row.start, row.stop)
-        axes.annotate(row.text, (end, i), (4, 0), textcoords="offset points", va="center")
-    floor = diagnosis.test_error.noise_floor
+        begin = row.text_from(line_at, width)
+        axes.annotate(row.text, (begin, i), (4, 0), textcoords="offset points", va="center")
     if floor is None:
         axes.set_title("noise floor unknown", fontsize="medium", loc="left")
     else:
-        axes.axvspan(0.0, 100 * floor, color=GREY, alpha=0.25, zorder=0)
-        axes.axvline(100 * floor, color=GREY, linestyle="--")
+        axes.axvspan(0.0, line_at, color=GREY, alpha=0.25, zorder=0)
+        axes.axvline(line_at, color=GREY, linestyle="--")
         axes.set_title(f"noise floor {100 * floor:.2f} %", fontsize="medium", loc="left")
     axes.set_yticks(range(len(rows)), ["\n".join(map(plain, row.lines)) for row in rows])
     axes.invert_yaxis()
     axes.set_xlabel("held-out torque error (%)")
-    axes.set_xlim(0.0, 1.18 * max(axes.get_xlim()[1], 1e-9))
+    axes.set_xlim(0.0, width)
     axes.spines[["top", "right"]].set_visible(False)
 
 
