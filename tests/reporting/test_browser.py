@@ -190,6 +190,27 @@ def test_it_prints_on_less_than_ten_pages(visit, seven_joints):
 
 
 @pytest.mark.slow
+def test_pictures_are_lower_on_paper_and_as_before_afterwards(browser, two_joints):
+    page = _visited(browser, two_joints, DESK).page
+    before = page.evaluate(_DRAWN)
+    page.emulate_media(media="print")
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    page.set_viewport_size({"width": 688, "height": HEIGHT})  # A4, less its margins
+    page.wait_for_timeout(1000)
+    both = zip(page.evaluate(_DRAWN), before, strict=True)
+    printed = {was["name"]: one["height"] / was["height"] for one, was in both}
+    assert printed.pop("waterfall") == printed.pop("ranking") == pytest.approx(1.0, abs=0.02)
+    assert max(one for name, one in printed.items() if name.startswith(("map", "loop"))) < 0.75
+    page.emulate_media(media="screen")
+    page.set_viewport_size({"width": DESK, "height": HEIGHT})
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    page.wait_for_timeout(1000)
+    assert [one["height"] for one in page.evaluate(_DRAWN)] == pytest.approx(
+        [one["height"] for one in before], abs=2
+    )
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("which", ["two_joints", "seven_joints"])
 def test_who_cannot_see_or_point_can_read_it(which, browser, request):
     one = _visited(browser, request.getfixturevalue(which), DESK)
