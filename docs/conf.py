@@ -98,8 +98,10 @@ def _with_links(text: str, folder: Path, made: Path) -> str:
 
 
 def _for_everybody(app: Any, page: str, template: str, context: dict[str, Any], tree: Any) -> None:
-    """Let code that is wider than the screen be scrolled by keys, and headings have their level."""
-    context["body"] = context.get("body", "").replace("<pre>", '<pre tabindex="0">')
+    """Let what is wider than the screen be scrolled by keys, and headings have their level."""
+    context["body"] = re.sub(
+        r'<(pre(?=>)|div(?= class="table-wrapper))', r'<\1 tabindex="0"', context.get("body", "")
+    )
     heading = 'role="heading"'
     for name in ("furo_navigation_tree", "toctree"):
         if isinstance(context.get(name), str):

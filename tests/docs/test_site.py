@@ -21,7 +21,7 @@ WIDE = (
     *("effects", "symbols", "reference/study", "accuracy", "api"),
     *(f"_made/notebooks/{path.stem}" for path in STORIES),
 )
-TRIED = ("index", "first_robot", "reference/experiment", "notebooks", WIDE[-2])
+TRIED = ("index", "first_robot", "reference/experiment", "benchmarks", "notebooks", WIDE[-2])
 """Pages with all that pages have, and short: axe-core takes its time by their length."""
 pytestmark = pytest.mark.slow
 
