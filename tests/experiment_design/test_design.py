@@ -15,7 +15,7 @@ from dynident.experiment_design.column_function import ColumnFunction
 from dynident.experiment_design.information import Information, Objective
 from dynident.experiment_design.motion_program import FINER, MotionProgram, instants_of
 from dynident.experiment_design.motion_solver import MotionSolver
-from dynident.experiment_design.periodic import PeriodicMotions
+from dynident.experiment_design.motions.fourier_motions import FourierMotions
 from dynident.experiment_design.predicted_torque import PredictedTorque
 from dynident.model import Model
 from dynident.recording import Dataset
@@ -46,20 +46,20 @@ def recorded(model: Model = MODEL) -> Dataset:
     return Dataset((synthetic(model, values, 1, torque_std=0.05),))
 
 
-def motions(harmonics: int = 5) -> PeriodicMotions:
+def motions(harmonics: int = 5) -> FourierMotions:
     limits = MotionLimits.of(ROBOT)
-    return PeriodicMotions(limits=limits, period=10.0, harmonics=harmonics)
+    return FourierMotions(limits=limits, period=10.0, harmonics=harmonics)
 
 
 @pytest.mark.parametrize("harmonics", [2, 5, 12])
 def test_motions_begin_and_end_at_rest(harmonics: int) -> None:
     some = motions(harmonics)
     variables = some.random(3)
-    q, v, a = some.fourier(variables).at(np.array([0.0, 10.0, 20.0]))
+    q, v, a = some.trajectory(variables).at(np.array([0.0, 10.0, 20.0]))
     assert np.ptp(q, axis=0).max() < 1e-12
     assert np.abs(v).max() < 1e-12 and np.abs(a).max() < 1e-10
     t = some.times(300)
-    for basis, found in zip(some.bases(t), some.fourier(variables).at(t), strict=True):
+    for basis, found in zip(some.bases(t), some.trajectory(variables).at(t), strict=True):
         linear = some.limits.speed * (basis @ variables.T)
         found = found - (some.centre(variables) if basis is some.bases(t)[0] else 0.0)
         moved = found - found[0] + linear[0]
@@ -103,7 +103,7 @@ def test_the_symbolic_loss_is_the_loss() -> None:
             objective=objective,
         )
         t = some.times(40)
-        q, v, a = some.fourier(some.random(1) * 0.2).at(t)
+        q, v, a = some.trajectory(some.random(1) * 0.2).at(t)
         wide = columns.function(np.hstack([q, v, a, t[:, None]]).T)
         given = casadi.MX.sym("columns", *wide.shape)
         function = casadi.Function("loss", [given], [information.symbolic_loss(given, 40)])
@@ -303,7 +303,7 @@ def test_torques_that_turn_out_too_large_are_limited_then() -> None:
     t = found.program.motions.times(2000)
 
     def elbow(variables: np.ndarray) -> float:
-        motion = found.program.motions.fourier(variables).at(t)
+        motion = found.program.motions.trajectory(variables).at(t)
         return float(np.abs(found.program.torque.along(t, *motion)[:, 1]).max())
 
     limits = replace(free, torque=np.array([np.inf, 0.97 * elbow(found.motion.variables)]))

@@ -11,7 +11,7 @@ from dynident.effects import effects_of
 from dynident.experiment_design import DesignTask, MotionLimits, design
 from dynident.experiment_design.column_function import ColumnFunction
 from dynident.experiment_design.design_question import DesignQuestion
-from dynident.experiment_design.periodic import PeriodicMotions
+from dynident.experiment_design.motions.fourier_motions import FourierMotions
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
 from synthetic import arm, true_values
@@ -56,7 +56,7 @@ def test_a_rival_whose_shape_is_not_known_has_several_columns() -> None:
     truth = Model(ROBOT) + DRAG
     data = small_motion(truth, true_values(truth, **{"Fq__elbow": 1.0}))
     task = DesignTask(duration=6.0, harmonics=4, tell=((DRAG, STRIBECK),))
-    motions = PeriodicMotions(limits=MotionLimits.of(ROBOT), period=6.0, harmonics=4)
+    motions = FourierMotions(limits=MotionLimits.of(ROBOT), period=6.0, harmonics=4)
     question = DesignQuestion.of(Model(ROBOT), data, task, motions, task.tell[0])
     asked = question.asked(data, motions).information
     name = STRIBECK.parameter_name(STRIBECK.parameters(ROBOT)[0].name)
@@ -64,7 +64,7 @@ def test_a_rival_whose_shape_is_not_known_has_several_columns() -> None:
     assert len(shapes) > 2
     # Other shapes imitate what one alone does not.
     t = motions.times(200)
-    whole = asked.matrix(t, motions.fourier(motions.random(1) * 0.3).at(t))
+    whole = asked.matrix(t, motions.trajectory(motions.random(1) * 0.3).at(t))
     kept = np.delete(np.arange(len(whole)), shapes[1:])
     one = replace(
         asked,

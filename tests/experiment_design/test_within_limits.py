@@ -8,7 +8,7 @@ import pytest
 from designs_within_limits import Drawn, seen
 from dynident.experiment_design.design_question import DesignQuestion
 from dynident.experiment_design.motion_limits import above_instants
-from dynident.experiment_design.periodic import PeriodicMotions
+from dynident.experiment_design.motions.fourier_motions import FourierMotions
 from dynident.experiment_design.predicted_torque import SIGMAS
 from dynident.model import Model
 
@@ -34,10 +34,10 @@ def test_torques_are_predicted_where_small_motions_say_little(seed: int) -> None
     """Where a fit alone is wrong by more than there is, the description closes what is open."""
     drawn = Drawn.of(seed)
     model, recorded = Model(drawn.described), drawn.recorded
-    motions = PeriodicMotions(limits=drawn.limits, period=5.0, harmonics=4)
+    motions = FourierMotions(limits=drawn.limits, period=5.0, harmonics=4)
     question = DesignQuestion.of(model, recorded, drawn.task, motions)
     torque, t = question.torque, motions.times(300)
-    motion = motions.fourier(motions.random(5) * 0.3).at(t)
+    motion = motions.trajectory(motions.random(5) * 0.3).at(t)
     true = drawn.robot.inverse_dynamics(*motion)
 
     def wrong(found: np.ndarray) -> float:

@@ -19,10 +19,12 @@ from dynident.closed_loop.references import Reference, SampledReference
 from dynident.closed_loop.retrace import EncoderNoise, Retraced, retrace
 from dynident.closed_loop.rollout import Rollout, Task
 from dynident.closed_loop.sensors import Sensors
+from dynident.closed_loop.splines import BSpline, Trajectory
 from dynident.closed_loop.trajectories import Fourier
 from dynident.closed_loop.true_effects import TrueEffect
 
 __all__ = [
+    "BSpline",
     "ClosedLoop",
     "Controller",
     "ControllerFile",
@@ -37,6 +39,7 @@ __all__ = [
     "SampledReference",
     "Sensors",
     "Task",
+    "Trajectory",
     "TrueEffect",
     "load_experiment",
     "loop_evaluations",

@@ -67,6 +67,11 @@ class Fourier:
         a = -((s * k**2) @ self.sine.T + (c * k**2) @ self.cosine.T)
         return q, v, a
 
+    @property
+    def coefficients(self) -> dict[str, list]:
+        """What a file has of it, by the names of its keys."""
+        return {name: getattr(self, name).tolist() for name in ("centre", "sine", "cosine")}
+
     @classmethod
     def random(
         cls,

@@ -89,7 +89,7 @@ def _name(design: RecordingDesign) -> str:
 
 
 def _experiment(design: RecordingDesign, robot: str, controller: Controller):
-    estimate, task, series = design.estimate, design.task, design.trajectory
+    estimate, task = design.estimate, design.task
     model = estimate.model
     document = tomlkit.document()
     document["robot"] = robot
@@ -119,11 +119,7 @@ def _experiment(design: RecordingDesign, robot: str, controller: Controller):
     entry["file"] = "designed.csv"
     entry["duration"] = task.duration * task.repeat
     entry["period"] = task.duration
-    entry["trajectory"] = {
-        "centre": series.centre.tolist(),
-        "sine": series.sine.tolist(),
-        "cosine": series.cosine.tolist(),
-    }
+    entry["trajectory"] = design.trajectory.coefficients
     recordings = tomlkit.aot()
     recordings.append(entry)
     document["recordings"] = recordings

@@ -12,7 +12,7 @@ from dynident.errors import DesignError
 from dynident.experiment_design.column_function import ColumnFunction
 from dynident.experiment_design.design_task import DesignTask
 from dynident.experiment_design.information import Information
-from dynident.experiment_design.periodic import PeriodicMotions
+from dynident.experiment_design.motions.motion_family import MotionFamily
 from dynident.experiment_design.predicted_torque import PredictedTorque
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.fit_model import fit
@@ -74,7 +74,7 @@ class DesignQuestion:
         model: Model,
         recorded: Dataset,
         task: DesignTask,
-        motions: PeriodicMotions,
+        motions: MotionFamily,
         told: Sequence[Effect] = (),
     ) -> DesignQuestion:
         """Fit what was recorded.
@@ -118,7 +118,7 @@ class DesignQuestion:
         """Size of the torque's residual, (n,); infinite where there is no torque."""
         return _std(self.estimate)
 
-    def asked(self, recorded: Dataset, motions: PeriodicMotions) -> Asked:
+    def asked(self, recorded: Dataset, motions: MotionFamily) -> Asked:
         """Return what a motion is judged by, and the names of what it tells.
 
         Raises
@@ -156,14 +156,14 @@ class DesignQuestion:
         )
 
     def _softer(
-        self, columns: ColumnFunction, extra: Sequence[Effect], motions: PeriodicMotions
+        self, columns: ColumnFunction, extra: Sequence[Effect], motions: MotionFamily
     ) -> list[ColumnFunction]:
         """The columns with wider dry friction, if that changes those that are asked for."""
         if not self.told:
             return []
         found = []
         t = motions.times(_COMPARED)
-        motion = motions.fourier(motions.random(0) * 0.3).at(t)
+        motion = motions.trajectory(motions.random(0) * 0.3).at(t)
         own = slice(self.bare.size, None)
         sharp = columns.along(t, *motion)[:, :, own]
         for wider in WIDER:
@@ -213,7 +213,7 @@ def _std(estimate: Estimate) -> np.ndarray:
     return np.where(found > 0, found, np.inf)
 
 
-def _torque(estimate: Estimate, recorded: Dataset, motions: PeriodicMotions) -> PredictedTorque:
+def _torque(estimate: Estimate, recorded: Dataset, motions: MotionFamily) -> PredictedTorque:
     """The torque that motions will take; usual ones say how large a column is."""
     model, values, std = estimate.model, estimate.values, _std(estimate)
     columns, every = ColumnFunction.of(model, values), np.eye(model.size)
@@ -236,13 +236,13 @@ def _recorded(
 
 
 def _sizes(
-    mix: np.ndarray, columns: ColumnFunction, motions: PeriodicMotions, std: np.ndarray
+    mix: np.ndarray, columns: ColumnFunction, motions: MotionFamily, std: np.ndarray
 ) -> np.ndarray:
     """Whitened size of each combination on random motions, (k,)."""
     t = motions.times(100)
     sizes = []
     for k in range(_SIZES):
-        motion = motions.fourier(motions.random(k) * 0.3).at(t)
+        motion = motions.trajectory(motions.random(k) * 0.3).at(t)
         found = _numbers(columns, columns.along(t, *motion)) @ mix
         sizes.append(np.sqrt(np.mean((found / std[None, :, None]) ** 2, axis=(0, 1))))
     return np.mean(sizes, axis=0)

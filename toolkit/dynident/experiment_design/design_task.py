@@ -18,6 +18,7 @@ class DesignTask:
     duration : s, of one repetition.
     repeat : how many repetitions: two or more measure the noise.
     harmonics : of the series of each joint.
+    intervals : of B-splines, in the place of series; None for series.
     objective : "D", the volume of the confidence region, or "A", the sum of the variances.
     tell : groups of effects, of each of which the recording is to tell which one it is; the first
         of a group is taken for true. Of several groups, the one that is told least counts.
@@ -29,6 +30,7 @@ class DesignTask:
     duration: float = 10.0
     repeat: int = 3
     harmonics: int = 8
+    intervals: int | None = None
     objective: Objective = "D"
     tell: tuple[tuple[Effect, ...], ...] = ()
     show: tuple[Effect, ...] = ()

@@ -17,7 +17,9 @@ from dynident.experiment_design.geometry.workspace import Workspace
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.motion_limits import MotionLimits
 from dynident.experiment_design.motion_program import MotionProgram
-from dynident.experiment_design.periodic import PeriodicMotions
+from dynident.experiment_design.motions.fourier_motions import FourierMotions
+from dynident.experiment_design.motions.motion_family import MotionFamily
+from dynident.experiment_design.motions.spline_motions import SplineMotions
 from dynident.experiment_design.predicted_torque import PredictedTorque
 from dynident.experiment_design.recording_design import DECIDES, RecordingDesign, Separation
 from dynident.model import Model
@@ -70,7 +72,7 @@ def design(
     limits = limits or MotionLimits.of(model.robot)
     limits.require_ranges(model.robot)
     workspace = _workspace(model.robot, task, limits)
-    motions = PeriodicMotions(limits=limits, period=task.duration, harmonics=task.harmonics)
+    motions = _motions(task, limits)
     progress("fitting what was recorded")
     questions = [
         DesignQuestion.of(model, recorded, task, motions, told) for told in task.tell or ((),)
@@ -106,6 +108,13 @@ def design(
     )
 
 
+def _motions(task: DesignTask, limits: MotionLimits) -> MotionFamily:
+    """Among which one is sought, by the task."""
+    if task.intervals is None:
+        return FourierMotions(limits=limits, period=task.duration, harmonics=task.harmonics)
+    return SplineMotions(limits=limits, period=task.duration, intervals=task.intervals)
+
+
 def _workspace(robot: Robot, task: DesignTask, limits: MotionLimits) -> Workspace:
     """Where the robot may be, by its task and the limits."""
     if task.clearance is not None:
@@ -117,7 +126,7 @@ def _workspace(robot: Robot, task: DesignTask, limits: MotionLimits) -> Workspac
 
 
 def _program(
-    asked: list[Asked], motions: PeriodicMotions, torque: PredictedTorque, workspace: Workspace
+    asked: list[Asked], motions: MotionFamily, torque: PredictedTorque, workspace: Workspace
 ) -> MotionProgram:
     """The search; what no usual motion tells at all would hide what others are."""
     program = MotionProgram(

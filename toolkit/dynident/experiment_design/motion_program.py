@@ -24,10 +24,10 @@ from dynident.experiment_design.motion_solver import (
     LimitedTorque,
     MotionSolver,
 )
-from dynident.experiment_design.periodic import PeriodicMotions
+from dynident.experiment_design.motions.motion_family import MotionFamily
 from dynident.experiment_design.predicted_torque import PredictedTorque
 
-_PER_HARMONIC = 22  # instants
+_PER_WAVE = 22  # instants
 _LEAST, _LEAST_NARROW = 100, 300
 FINER = 10
 """Instants at which limits are checked, over those at which they were imposed."""
@@ -44,7 +44,7 @@ _FEW = 1000
 _ROUNDING = 1e-9
 
 
-def instants_of(motions: PeriodicMotions, *, narrow: int = 0) -> int:
+def instants_of(motions: MotionFamily, *, narrow: int = 0) -> int:
     """Return at how many instants limits are imposed, and columns evaluated.
 
     Parameters
@@ -52,7 +52,7 @@ def instants_of(motions: PeriodicMotions, *, narrow: int = 0) -> int:
     motions : of which one is sought.
     narrow : how many softer forms its columns have; with any there are more instants.
     """
-    return max(_LEAST_NARROW if narrow else _LEAST, _PER_HARMONIC * motions.harmonics)
+    return max(_LEAST_NARROW if narrow else _LEAST, _PER_WAVE * motions.waves)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -70,7 +70,7 @@ class MotionProgram:
     """
 
     informations: tuple[Information, ...]
-    motions: PeriodicMotions
+    motions: MotionFamily
     torque: PredictedTorque
     softer: tuple[tuple[Information, ...], ...] = ()
     workspace: Workspace = field(default_factory=Workspace)
@@ -98,7 +98,7 @@ class MotionProgram:
         Parameters
         ----------
         information : what is asked.
-        variables : (n, 2 H - 1).
+        variables : (n, 1 + k).
         """
         return self._matrix(information, variables, FINER * self.instants)
 
@@ -107,7 +107,7 @@ class MotionProgram:
 
         Parameters
         ----------
-        variables : (n, 2 H - 1).
+        variables : (n, 1 + k).
         finer : instants, over those of the program.
         """
         count = finer * self.instants
@@ -115,14 +115,14 @@ class MotionProgram:
 
     def _matrix(self, information: Information, variables: np.ndarray, count: int) -> np.ndarray:
         t = self.motions.times(count)
-        return information.matrix(t, self.motions.fourier(variables).at(t))
+        return information.matrix(t, self.motions.trajectory(variables).at(t))
 
     def within(self, variables: np.ndarray) -> np.ndarray | None:
         """Return the motion, made smaller until no limit is exceeded; None where that fails.
 
         Parameters
         ----------
-        variables : (n, 2 H - 1).
+        variables : (n, 1 + k).
         """
         found = self._limited(variables)
         if found is None or self.workspace.is_free:
@@ -138,7 +138,7 @@ class MotionProgram:
         return None
 
     def _is_inside(self, variables: np.ndarray, t: np.ndarray) -> bool:
-        return self.workspace.admits(self.motions.fourier(variables).at(t)[0])
+        return self.workspace.admits(self.motions.trajectory(variables).at(t)[0])
 
     def _limited(self, variables: np.ndarray) -> np.ndarray | None:
         """The motion within the limits, in the workspace or not."""
@@ -169,14 +169,14 @@ class MotionProgram:
 
         Parameters
         ----------
-        variables : (n, 2 H - 1).
+        variables : (n, 1 + k).
         t : (T,) s, at which it is looked at, evenly spaced over a period.
         """
         return float(self._shares(variables, t).max())
 
     def _shares(self, variables: np.ndarray, t: np.ndarray) -> np.ndarray:
         """The largest share of each limit that a motion uses, (4 n,)."""
-        q, v, a = self.motions.fourier(variables).at(t)
+        q, v, a = self.motions.trajectory(variables).at(t)
         torque = self.torque.farthest(t, q, v, a)
         return self.limits.shares(q, (v, a, torque), self.motions.centre(variables))
 
@@ -258,7 +258,7 @@ class MotionProgram:
     def _torque_left(self) -> np.ndarray:
         """Limits of the torque that is predicted, so that what is not known of it has room."""
         motions, t = self.motions, self.motions.times(instants_of(self.motions))
-        usual = motions.fourier(motions.random(0) * _USUAL).at(t)
+        usual = motions.trajectory(motions.random(0) * _USUAL).at(t)
         return self.limits.torque * self.torque.certain(self.limits, t, *usual)
 
     def _limited_at_once(self, begins: Sequence[DesignedMotion]) -> set[int]:
@@ -271,7 +271,7 @@ class MotionProgram:
     def _torques_beyond(self, variables: np.ndarray, share: float) -> list[int]:
         """Joints whose torque exceeds a share of its limit, at the instants of the program."""
         t = self.motions.times(instants_of(self.motions))
-        torque = np.abs(self.torque.along(t, *self.motions.fourier(variables).at(t))).max(axis=0)
+        torque = np.abs(self.torque.along(t, *self.motions.trajectory(variables).at(t))).max(axis=0)
         return np.flatnonzero(torque > share * self._torque_left).tolist()
 
     def _softened(self) -> list[tuple[Information, ...]]:
@@ -316,7 +316,7 @@ class MotionProgram:
             if not found:
                 return []
             variables = found[0].variables
-            new = self.workspace.cuts(t, self.motions.fourier(variables).at(t)[0])
+            new = self.workspace.cuts(t, self.motions.trajectory(variables).at(t)[0])
             if not new:
                 break
             cuts += new
@@ -336,7 +336,7 @@ class MotionProgram:
         Parameters
         ----------
         lazy : the program; the torques that turn out too large are limited in it from then on.
-        start : (n, 2 H - 1).
+        start : (n, 1 + k).
         """
         solver, variables = self._end_of(lazy, start)
         while np.all(np.isfinite(variables)) and lazy.limit(self._torques_beyond(variables, 1.0)):

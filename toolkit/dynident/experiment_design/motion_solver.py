@@ -10,7 +10,7 @@ import numpy as np
 
 from dynident.experiment_design.geometry.workspace import RoomCut
 from dynident.experiment_design.information import Information
-from dynident.experiment_design.periodic import PeriodicMotions
+from dynident.experiment_design.motions.motion_family import MotionFamily
 from dynident.late_modules import LateModule
 
 ca: Any = LateModule("casadi")
@@ -22,7 +22,7 @@ class DesignedMotion:
 
     Attributes
     ----------
-    variables : (n, 2 H - 1).
+    variables : (n, 1 + k).
     loss : of its information.
     status : of Ipopt, in words.
     iterations : of Ipopt.
@@ -67,7 +67,7 @@ class MotionSolver:
     @classmethod
     def of(
         cls,
-        motions: PeriodicMotions,
+        motions: MotionFamily,
         informations: tuple[Information, ...],
         instants: tuple[int, int],
         iterations: int,

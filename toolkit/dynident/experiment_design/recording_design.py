@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dynident.closed_loop import Fourier
+from dynident.closed_loop import Trajectory
 from dynident.experiment_design.design_task import DesignTask
 from dynident.experiment_design.motion_limits import MotionLimits
 from dynident.experiment_design.motion_program import FINER, MotionProgram
@@ -116,9 +116,9 @@ class RecordingDesign(Shown):
     separations: tuple[Separation, ...] = ()
 
     @property
-    def trajectory(self) -> Fourier:
+    def trajectory(self) -> Trajectory:
         """One repetition."""
-        return self.program.motions.fourier(self.motion.variables)
+        return self.program.motions.trajectory(self.motion.variables)
 
     def sigma(self, variables: np.ndarray | None) -> np.ndarray:
         """Standard deviations of what is of interest, with those of the recordings so far.
@@ -230,15 +230,12 @@ class RecordingDesign(Shown):
 
     def to_dict(self) -> dict[str, Any]:
         """The design as JSON has it."""
-        series = self.trajectory
         return {
             "sentence": self.sentence,
             "duration": self.task.duration,
             "repeat": self.task.repeat,
             "joints": list(self.model.robot.names),
-            "centre": series.centre.tolist(),
-            "sine": series.sine.tolist(),
-            "cosine": series.cosine.tolist(),
+            **self.trajectory.coefficients,
             "separations": [one.to_dict() for one in self.separations],
             "least_distance": self.least_distance,
             "status": self.motion.status,

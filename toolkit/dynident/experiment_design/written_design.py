@@ -8,7 +8,7 @@ from pathlib import Path
 from pydantic import Field
 
 from dynident import files
-from dynident.closed_loop import Fourier
+from dynident.closed_loop import BSpline, Fourier, Trajectory
 from dynident.errors import DynidentError, StudyError
 from dynident.experiment_design.recording_design import RecordingDesign
 from dynident.file_groups import folder_of, groups_below, in_group
@@ -32,16 +32,20 @@ class DesignFile(SettingsTable):
     """Of one repetition."""
     joints: list[str]
     """Their names, in the order of the coefficients."""
-    centre: list[float]
-    """Of each joint, rad or m."""
-    sine: list[list[float]]
+    centre: list[float] = Field(default_factory=list)
+    """Of a Fourier series: of each joint, rad or m."""
+    sine: list[list[float]] = Field(default_factory=list)
     """Coefficients of each joint, rad or m."""
-    cosine: list[list[float]]
+    cosine: list[list[float]] = Field(default_factory=list)
     """Likewise."""
+    points: list[list[float]] = Field(default_factory=list)
+    """Of a B-spline, in the place of a series: a row for each joint, rad or m."""
 
     @property
-    def trajectory(self) -> Fourier:
+    def trajectory(self) -> Trajectory:
         """One repetition."""
+        if self.points:
+            return BSpline(self.duration, self.points)  # type: ignore[arg-type]
         return Fourier(self.duration, self.centre, self.sine, self.cosine)  # type: ignore[arg-type]
 
 
@@ -54,7 +58,6 @@ def design_file(design: RecordingDesign, study: str, motion: str = "") -> Design
     study : digest of the study that it is for; empty where there is none.
     motion : page that shows it; likewise.
     """
-    series = design.trajectory
     return DesignFile(
         sentence=design.sentence,
         study=study,
@@ -62,9 +65,7 @@ def design_file(design: RecordingDesign, study: str, motion: str = "") -> Design
         repeat=design.task.repeat,
         duration=design.task.duration,
         joints=list(design.model.robot.names),
-        centre=series.centre.tolist(),
-        sine=series.sine.tolist(),
-        cosine=series.cosine.tolist(),
+        **design.trajectory.coefficients,
     )
 
 

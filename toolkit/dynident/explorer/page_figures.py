@@ -8,7 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from dynident.closed_loop import Fourier
+from dynident.closed_loop import Trajectory
 from dynident.evidence import ResidualMap
 from dynident.evidence.held_out import HeldOut, HeldOutRun
 from dynident.explorer.switched_fit import SwitchedFit
@@ -169,7 +169,7 @@ def map_picture(one: ResidualMap) -> go.Figure:
     return figure.update_layout(legend={"y": -0.2, "yanchor": "top"})
 
 
-def motion_picture(motion: Fourier, joints: Sequence[str], units: Sequence[str]) -> go.Figure:
+def motion_picture(motion: Trajectory, joints: Sequence[str], units: Sequence[str]) -> go.Figure:
     """Positions of all joints over one repetition of a motion.
 
     Parameters

@@ -14,7 +14,7 @@ from dynident.closed_loop.loop import simulate
 from dynident.closed_loop.mechanism import Mechanism
 from dynident.closed_loop.rollout import LEAD_IN, Rollout, Task
 from dynident.closed_loop.sensors import Sensors, delayed, rounded
-from dynident.closed_loop.trajectories import Fourier
+from dynident.closed_loop.splines import Trajectory
 from dynident.closed_loop.true_effects import TrueEffect
 from dynident.effects import FRICTION_WIDTH
 from dynident.effects.friction.thermal_friction import ThermalFriction
@@ -34,7 +34,7 @@ class ExperimentRun:
 
     Attributes
     ----------
-    trajectory : Fourier
+    trajectory : Trajectory
     duration : s.
     file : name of the recording, in the folder of the study; its suffix is its format.
     use : "train" or "test".
@@ -42,7 +42,7 @@ class ExperimentRun:
     payload : whether the payload is on board.
     """
 
-    trajectory: Fourier
+    trajectory: Trajectory
     duration: float
     file: str = "run.csv"
     use: Literal["train", "test"] = "train"

@@ -12,6 +12,7 @@ from dynident.closed_loop.controllers import ControllerFile
 from dynident.closed_loop.experiments.experiment import Experiment, ExperimentRun
 from dynident.closed_loop.rollout import LEAD_IN
 from dynident.closed_loop.sensors import Sensors
+from dynident.closed_loop.splines import BSpline, Trajectory
 from dynident.closed_loop.trajectories import MOST_HARMONICS, Fourier
 from dynident.closed_loop.true_effects import TrueEffect
 from dynident.effect_modules import Permission, import_effects, require_sound
@@ -62,9 +63,10 @@ class SensorsEntry(SettingsTable):
 
 
 class TrajectoryEntry(SettingsTable):
-    """A random Fourier series, as large as the robot's limits allow; or one by its coefficients.
+    """A random Fourier series, as large as the robot's limits allow; or a motion by coefficients.
 
-    q(t) = centre + sum over k of sine_k sin(k w t) + cosine_k cos(k w t), w = 2 pi/period.
+    A series is q(t) = centre + sum over k of sine_k sin(k w t) + cosine_k cos(k w t),
+    w = 2 pi/period.
     """
 
     harmonics: int = Field(default=5, ge=1, le=MOST_HARMONICS)
@@ -85,9 +87,12 @@ class TrajectoryEntry(SettingsTable):
     series."""
     cosine: list[list[float]] | None = _per_joint("rad or m")
     """The same of the cosines."""
+    points: list[list[float]] | None = _per_joint("rad or m")
+    """A row of points for each joint, alone: a B-spline of degree five with evenly spaced knots.
+    The first three and the last three of a row are equal, at rest."""
 
-    def trajectory(self, robot: Robot, period: float, seed: object) -> Fourier:
-        """Return the series that is stated, or a random one.
+    def trajectory(self, robot: Robot, period: float, seed: object) -> Trajectory:
+        """Return the motion that is stated, or a random series.
 
         Parameters
         ----------
@@ -98,9 +103,11 @@ class TrajectoryEntry(SettingsTable):
         Raises
         ------
         SimulationError
-            If the series is stated in part only, or does not fit the robot.
+            If the motion is stated in part only, twice, or does not fit the robot.
         """
-        settings = self.model_dump(exclude={"seed", "sine", "cosine"})
+        if self.points is not None:
+            return self._spline(robot, period, self.points)
+        settings = self.model_dump(exclude={"seed", "sine", "cosine", "points"})
         if self.sine is None and self.cosine is None:
             return Fourier.random(robot, period, seed, **settings)  # type: ignore[arg-type]
         if self.sine is None or self.cosine is None or not isinstance(self.centre, list):
@@ -112,6 +119,16 @@ class TrajectoryEntry(SettingsTable):
             raise SimulationError("its series do not fit the robot", "trajectory", remedy)
         arrays = (np.array(one) for one in (self.centre, self.sine, self.cosine))
         return Fourier(period, *arrays)
+
+    def _spline(self, robot: Robot, period: float, points: list[list[float]]) -> BSpline:
+        if self.model_fields_set != {"points"}:
+            others = ", ".join(sorted(self.model_fields_set - {"points"}))
+            remedy = f"leave out points, or {others}"
+            raise SimulationError("two motions at once", "trajectory", remedy)
+        if len(points) != robot.n or len({len(row) for row in points}) != 1:
+            remedy = f"give {robot.n} rows of as many points"
+            raise SimulationError("its points do not fit the robot", "trajectory", remedy)
+        return BSpline(period, np.array(points))
 
 
 class ExperimentRecordingEntry(SettingsTable):

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dynident.closed_loop import Fourier
+from dynident.closed_loop import Trajectory
 from dynident.errors import DesignError, DynidentError
 from dynident.experiment_design import RecordingDesign
 from dynident.experiment_design.geometry.robot_shapes import RobotShapes
@@ -61,7 +61,7 @@ def design_page(design: RecordingDesign) -> MotionPage:
 
 
 def motion_page(
-    robot: Robot, motion: Fourier, caption: str, obstacles: tuple[Obstacle, ...] = ()
+    robot: Robot, motion: Trajectory, caption: str, obstacles: tuple[Obstacle, ...] = ()
 ) -> MotionPage:
     """Return a page on which a robot repeats a period of a motion.
 
@@ -92,7 +92,7 @@ def motion_page(
     return MotionPage(_framed(text, robot.name, f"{caption} Links are drawn as {shows}."), shows)
 
 
-def _recorded(robot: Robot, motion: Fourier, obstacles: tuple[Obstacle, ...]) -> tuple[str, str]:
+def _recorded(robot: Robot, motion: Trajectory, obstacles: tuple[Obstacle, ...]) -> tuple[str, str]:
     """Return the viewer's page with a period of a motion, and what the links are drawn as."""
     from pydrake.geometry import Meshcat, MeshcatAnimation, MeshcatParams, Rgba
     from pydrake.math import RigidTransform
