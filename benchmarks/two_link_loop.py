@@ -52,6 +52,11 @@ class Lab:
     position_std : of the encoders' white noise, rad; it is fed back.
     torque_std : (2,) of the white noise on the recorded torque, N m.
     stribeck : share of the Coulomb level that friction rises by at rest.
+    offset : N m, of the elbow's torque.
+    spring : N m/rad, at the elbow about its zero.
+    drag : N m s^2/rad^2, of the elbow, with the square of its speed.
+    asymmetry : N m s/rad, half of what the elbow's viscous friction differs between its directions.
+    rotor : kg m^2, of the elbow's drive.
     seconds : of each recording.
     period : whether the motion repeats with `PERIOD` and the recording says so.
     """
@@ -59,6 +64,11 @@ class Lab:
     position_std: float = 0.0
     torque_std: tuple[float, float] = (0.0, 0.0)
     stribeck: float = 0.0
+    offset: float = 0.0
+    spring: float = 0.0
+    drag: float = 0.0
+    asymmetry: float = 0.0
+    rotor: float = 0.0
     seconds: float = 12.0
     period: bool = False
 
@@ -95,10 +105,11 @@ class Lab:
         """Measured positions and commanded torques, (S, T, 2) each."""
         S, T, _ = q_ref.shape
         loop, found = _loop(T), np.empty((S, T, 4))
-        share = np.full((T, 1), self.stribeck)
+        laws = (self.stribeck, self.offset, self.spring, self.drag, self.asymmetry, self.rotor)
+        hidden = np.tile(laws, (T, 1))
         for i in range(S):
             start = [*q_ref[i, 0], *v_ref[i, 0], *(q_ref[i, 0] - v_ref[i, 0] / RATE)]
-            _, out = loop(start, np.hstack([q_ref[i], v_ref[i], noise[i], share]).T)
+            _, out = loop(start, np.hstack([q_ref[i], v_ref[i], noise[i], hidden]).T)
             found[i] = np.asarray(out).T
         return found[..., :2], found[..., 2:]
 
@@ -108,39 +119,41 @@ def _loop(samples: int) -> casadi.Function:
     """The sampled loop, replayed without Python between its samples.
 
     From positions, velocities and the positions measured before, and, a column a sample,
-    references, noise and the Stribeck share; to what is measured and commanded. A command is held
-    for a step of the classical Runge-Kutta method.
+    references, noise and what is hidden (as in `Lab`); to what is measured and commanded. A command
+    is held for a step of the classical Runge-Kutta method.
     """
     x, before = casadi.SX.sym("x", 4), casadi.SX.sym("before", 2)
     q_ref, v_ref, noise = (casadi.SX.sym(name, 2) for name in ("q_ref", "v_ref", "noise"))
-    share, h = casadi.SX.sym("share"), 1.0 / RATE
+    hidden, h = casadi.SX.sym("hidden", 6), 1.0 / RATE
     y = x[:2] + noise
     tau = casadi.DM(KP) * (q_ref - y) + casadi.DM(KD) * (v_ref - (y - before) * RATE)
-    k1 = _rate(x, tau, share)
-    k2 = _rate(x + h / 2 * k1, tau, share)
-    k3 = _rate(x + h / 2 * k2, tau, share)
-    k4 = _rate(x + h * k3, tau, share)
+    k1 = _rate(x, tau, hidden)
+    k2 = _rate(x + h / 2 * k1, tau, hidden)
+    k3 = _rate(x + h / 2 * k2, tau, hidden)
+    k4 = _rate(x + h * k3, tau, hidden)
     after = casadi.vertcat(x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4), y)
-    given = casadi.vertcat(q_ref, v_ref, noise, share)
+    given = casadi.vertcat(q_ref, v_ref, noise, hidden)
     states, told = casadi.vertcat(x, before), casadi.vertcat(y, tau)
     return casadi.Function("sample", [states, given], [after, told]).mapaccum(samples)
 
 
-def _rate(x: casadi.SX, tau: casadi.SX, share: casadi.SX) -> casadi.SX:
+def _rate(x: casadi.SX, tau: casadi.SX, hidden: casadi.SX) -> casadi.SX:
     """Derivative of positions and velocities, (4,)."""
     q1, q2, v1, v2 = casadi.vertsplit(x)
+    share, offset, spring, drag, asymmetry, rotor = casadi.vertsplit(hidden)
     s2, c2 = casadi.sin(q2), casadi.cos(q2)
     across = _LENGTH * (_X2 * c2 - _Y2 * s2)
     slope = -_LENGTH * (_X2 * s2 + _Y2 * c2)
     m11 = _J1 + _M2 * _LENGTH**2 + _J2 + 2 * across
-    m12, m22 = _J2 + across, _J2
+    m12, m22 = _J2 + across, _J2 + rotor
     fore = _G * (_X2 * casadi.cos(q1 + q2) - _Y2 * casadi.sin(q1 + q2))
     upper = _G * ((_X1 + _M2 * _LENGTH) * casadi.cos(q1) - _Y1 * casadi.sin(q1))
     v = x[2:]
     dry = casadi.tanh(v / WIDTH) * (1.0 + share * casadi.exp(-((v / (4 * WIDTH)) ** 2)))
     left = tau - casadi.DM(VISCOUS) * v - casadi.DM(COULOMB) * dry
     b1 = left[0] - slope * (2 * v1 * v2 + v2**2) - upper - fore
-    b2 = left[1] + slope * v1**2 - fore
+    elbow = offset + spring * q2 + (drag * v2 + asymmetry) * casadi.fabs(v2)
+    b2 = left[1] + slope * v1**2 - fore - elbow
     det = m11 * m22 - m12**2
     return casadi.vertcat(v1, v2, (m22 * b1 - m12 * b2) / det, (m11 * b2 - m12 * b1) / det)
 

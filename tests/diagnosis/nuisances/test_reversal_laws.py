@@ -74,6 +74,20 @@ def test_the_law_that_made_the_data_explains_more_than_an_effect_that_stands_in(
     assert ("before the joint" if lead > 0 else "after the joint") in law.words
 
 
+@pytest.mark.parametrize(("shares", "named"), [(0.5, False), (2.0, True)])
+def test_what_an_effect_explains_more_than_the_law_must_be_worth_an_effect(
+    shares: float, named: bool
+) -> None:
+    evidence = Evidence(given(), gather(dataset(0, 1, lead=6e-3)))
+    fitted = fit_evidence(evidence, evidence.model)
+    stands_in = StribeckFriction("elbow").on(evidence.model.robot)
+    (one,) = rank(evidence, fitted, 0, only=(stands_in,)).scores
+    (law,) = laws_that_do_as_well(evidence, fitted, one, 0)
+    least = evidence.criteria.gates.first_share * fitted.error_total
+    better = replace(one, penalised=law.drop + shares * least)
+    assert (laws_that_do_as_well(evidence, fitted, better, 0) == ()) == named
+
+
 @pytest.mark.parametrize(("lead", "excused"), [(6e-3, ["elbow"]), (0.0, ["elbow"]), (-6e-3, [])])
 def test_what_no_effect_explains_is_excused_unless_friction_lags(
     lead: float, excused: list[str]

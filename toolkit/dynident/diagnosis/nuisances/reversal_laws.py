@@ -122,7 +122,8 @@ def laws_that_do_as_well(
     Returns
     -------
     At joints where the effect acts and the model has dry friction, those that explain something;
-    empty where they explain less than the effect, or it passes the gates beside them too.
+    empty where the effect explains more, by the share that an effect has to, or passes the gates
+    beside them too.
     """
     model = fitted.model
     joints = [model.robot.names[j] for j in one.effect.acting_at(model.robot)]
@@ -130,7 +131,10 @@ def laws_that_do_as_well(
     found = [_best_law(evidence, fitted, joint) for joint in dry]
     worth = 2.0 * np.log(fitted.rows)
     found = [law for law in found if law.drop > worth and abs(law.lead_s) < _LATEST]
-    if sum(law.drop for law in found) < one.penalised:
+    gates = evidence.criteria.gates
+    # What it explains more than they do must itself be worth an effect.
+    least = (gates.later_share if added else gates.first_share) * fitted.error_total
+    if sum(law.drop for law in found) < one.penalised - least:
         return ()
     beside = fit_evidence(evidence, fitted.model + tuple(law.column for law in found), fitted)
     if rank(evidence, beside, added, only=(one.effect,)).passing:
