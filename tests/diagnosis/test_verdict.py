@@ -47,6 +47,7 @@ def test_a_short_disturbance_that_returns_is_not_called_noise(model: Model, size
     assert "beyond the noise" in found.sentence
 
 
+@pytest.mark.slow
 def test_what_only_a_training_recording_shows_is_not_called_noise(model: Model) -> None:
     """It returns in its every period, and the motions that judge are elsewhere."""
     runs = recordings(model)
@@ -62,6 +63,7 @@ def test_what_only_a_training_recording_shows_is_not_called_noise(model: Model) 
     assert float(note.partition("at t = ")[2].split()[0]) % 8.0 == pytest.approx(3.0, abs=0.2)
 
 
+@pytest.mark.slow
 def test_the_shape_of_an_effect_in_the_given_model_is_sought_too(model: Model) -> None:
     """A study names Stribeck friction, but not its speed: a wrong one would look like more."""
     given = model + "stribeck_friction@elbow"

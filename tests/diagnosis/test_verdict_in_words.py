@@ -98,6 +98,7 @@ def test_where_the_search_was_stopped_nothing_is_said_of_the_rest_of_the_catalog
     assert "in the catalogue" in ended.sentence
 
 
+@pytest.mark.slow
 def test_no_law_is_proposed_while_the_catalogue_has_more() -> None:
     """A law "that no catalogue has" is for what the whole catalogue leaves."""
     given = Model(arm()) + "viscous_friction"

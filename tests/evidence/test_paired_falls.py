@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from dynident.criteria import DEFAULTS
 from dynident.evidence.held_out import HeldOut, HeldOutRun
@@ -37,10 +38,8 @@ def slow(stream: np.random.Generator, memory: float) -> np.ndarray:
     """First-order noise (T, 2) of unit variance, which forgets within `memory` rows."""
     kept = np.exp(-1.0 / memory) if memory else 0.0
     white = stream.standard_normal((BLOCKS * ROWS, 2))
-    found = white.copy()
-    for k in range(1, len(found)):
-        found[k] = kept * found[k - 1] + np.sqrt(1.0 - kept**2) * white[k]
-    return found
+    white[1:] *= np.sqrt(1.0 - kept**2)
+    return lfilter([1.0], [1.0, -kept], white, axis=0)
 
 
 def pair(seed: int, memory: float, missing: float) -> tuple[HeldOut, HeldOut]:

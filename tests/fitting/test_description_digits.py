@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -53,24 +55,27 @@ def test_the_digits_of_a_right_angle_add_no_parameters(digits: str) -> None:
     np.testing.assert_allclose(tau, Y @ robot.theta, atol=1e-4 * np.abs(Y @ robot.theta).max())
 
 
+@cache
+def fitted_and_told(right_angle: str) -> tuple[di.Estimate, di.Diagnosis]:
+    """What is said of the arm by a description with these digits."""
+    train, test = recordings(arm(EXACT))
+    fitted = di.fit(di.Model(arm(right_angle)), train)
+    return fitted, di.diagnose(fitted, train, test)
+
+
 @pytest.mark.parametrize("digits", ["1.5707963", "1.5708"])
 def test_fit_and_diagnosis_say_the_same_whatever_the_digits(digits: str) -> None:
-    train, test = recordings(arm(EXACT))
-    of = {text: di.fit(di.Model(arm(text)), train) for text in (EXACT, digits)}
-    told = {text: di.diagnose(one, train, test) for text, one in of.items()}
-    for exact, written in (
-        (of[EXACT], of[digits]),
-        (told[EXACT].after, told[digits].after),
-    ):
+    (of_exact, told_exact), (of_written, told_written) = map(fitted_and_told, (EXACT, digits))
+    for exact, written in ((of_exact, of_written), (told_exact.after, told_written.after)):
         assert written.basis.rank == exact.basis.rank
         assert written.model.names == exact.model.names
         sigma = np.sqrt(np.diag(exact.covariance))
         np.testing.assert_allclose(np.sqrt(np.diag(written.covariance)), sigma, rtol=1e-2)
         assert np.all(np.abs(written.values - exact.values) < 0.1 * sigma)
-    for notes in (of[digits].notes, told[digits].notes):
+    for notes in (of_written.notes, told_written.notes):
         (said,) = [note for note in notes if note.startswith("Left as described")]
         assert "mx.l1" in said
-    assert not any(note.startswith("Left as") for note in of[EXACT].notes)
+    assert not any(note.startswith("Left as") for note in of_exact.notes)
 
 
 def test_an_axis_that_truly_leans_is_no_rounding() -> None:
@@ -81,8 +86,6 @@ def test_an_axis_that_truly_leans_is_no_rounding() -> None:
 
 
 def test_one_number_decides_for_structure_fit_and_diagnosis() -> None:
-    train, test = recordings(arm(EXACT))
-    fitted = di.fit(di.Model(arm(EXACT)), train)
-    told = di.diagnose(fitted, train, test)
+    fitted, told = fitted_and_told(EXACT)
     tolerances = {fitted.model.base.tolerance, fitted.basis.tolerance, told.after.basis.tolerance}
     assert len(tolerances) == 1

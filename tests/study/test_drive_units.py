@@ -133,6 +133,7 @@ def test_a_fit_prints_the_gains_first_and_has_their_errors(tmp_path: Path) -> No
     assert np.all(wide >= plain * (1 - 1e-9)) and np.any(wide > 1.1 * plain)
 
 
+@pytest.mark.slow
 def test_an_explanation_and_its_report_have_the_gains_with_their_intervals(tmp_path: Path) -> None:
     """The gains are the answer, and what rests on them holds their errors."""
     path = written(tmp_path)

@@ -277,6 +277,7 @@ def test_values_beyond_their_bounds_are_impossible() -> None:
 
 
 @pytest.mark.parametrize("gain", [-0.4, -0.48])
+@pytest.mark.slow
 def test_the_gain_of_one_drive_is_named_with_the_other_that_it_cannot_be_told_from(
     gain: float,
 ) -> None:
