@@ -45,13 +45,6 @@ def test_what_is_hidden_is_not_told(simulated: Path) -> None:
 
 
 @pytest.mark.slow
-def test_without_the_law_nothing_explains_it(simulated: Path, run) -> None:
-    done = run("explain", simulated / "study.toml", "--json")
-    assert done.status == 0
-    assert done.json["verdict"] == "unexplained"
-
-
-@pytest.mark.slow
 def test_a_law_is_proposed_and_written(simulated: Path, tmp_path: Path, run) -> None:
     """The hidden c v sin(k q + p), as its expansion; the verdict stays."""
     study, shared = simulated / "proposed.toml", tmp_path / "lab.toml"
