@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import ampere_logs
 from dynident.study import load
 from dynident.study_draft import CarriedLoad, LogFacts, draft_study
 from dynident.study_draft.guesses.drive_unit import drive_sizes
+from dynident.wiring.assignment import DEGREE
 from study_files import recording
 from synthetic import arm
 
@@ -57,6 +59,47 @@ def test_files_carry_the_loads_that_are_said(logs: Path) -> None:
     ]
     assert draft.loads == {"load1": None, "load2": None}
     assert "[loads.load1]" in draft.text(logs)
+
+
+POSITIONS, CURRENTS = slice(7, 13), slice(19, 25)
+"""Columns of the logs."""
+
+
+def without_speeds(logs: Path, folder: Path, order: Sequence[int]) -> list[Path]:
+    """The logs with clock, positions in degrees and currents alone, these in some order."""
+    found = []
+    for log in ampere_logs.LOGS:
+        x = np.loadtxt(logs / f"{log.name}.txt")
+        rows = np.hstack([x[:, POSITIONS] / DEGREE, x[:, CURRENTS]])[:, list(order)]
+        found.append(folder / f"{log.name}.txt")
+        np.savetxt(found[-1], np.hstack([x[:, :1], rows]), fmt="%.9g")
+    return found
+
+
+SIDE_BY_SIDE = tuple(k for j in range(6) for k in (j, 6 + j))
+STATED = {
+    f"{signal}.{joint}": f"column{2 * j + at}"
+    for at, signal in ((2, "q"), (3, "tau"))
+    for j, joint in enumerate(ampere_logs.JOINTS)
+}
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:.*jittered")
+@pytest.mark.parametrize(
+    ("order", "columns"), [(range(12), {}), (SIDE_BY_SIDE, STATED)], ids=["found", "said"]
+)
+def test_columns_without_names_and_speeds_and_in_degrees(
+    logs: Path, tmp_path: Path, order: Sequence[int], columns: dict[str, str]
+) -> None:
+    files = without_speeds(logs, tmp_path, order)
+    loads = (CarriedLoad(pattern="run_load_*", mass=ampere_logs.MASS),)
+    if columns:
+        columns = {ours: f"{x}*pi/180" if ours[0] == "q" else x for ours, x in columns.items()}
+    draft = draft_study(logs / "arm.urdf", files, facts=LogFacts(loads=loads, columns=columns))
+    drafted = load(draft.write(tmp_path / "drafted.toml"))
+    assert drafted.drives is not None
+    np.testing.assert_allclose(drafted.drives.gains, ampere_logs.GAINS, rtol=0.05)
 
 
 def test_sizes_tell_amperes_from_newton_metres() -> None:

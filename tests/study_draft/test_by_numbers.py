@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 
 from dynident.errors import RecordingError
+from dynident.model import Model
+from dynident.robot import Robot
 from dynident.study_draft.by_numbers import UNUSED, named_by_numbers
 from study_files import recording
-from synthetic import arm
+from synthetic import ARM, arm, synthetic, true_values
 
 NAMES = ("t", "q.shoulder", "q.elbow", "v.shoulder", "v.elbow", "tau.shoulder", "tau.elbow")
+
+
+SIGNALS = ("q", "v", "tau")
 
 
 def table(seed: int = 3) -> dict[str, np.ndarray]:
@@ -21,6 +26,7 @@ def table(seed: int = 3) -> dict[str, np.ndarray]:
         "t": one.t[:, None] + 1.7e9,
         "q_ref": one.q,
         "v_ref": v,
+        "a_ref": np.gradient(v, one.t, axis=0),
         "q": one.q + 1e-5 * rng.normal(size=one.q.shape),
         "v": v + 1e-4 * rng.normal(size=v.shape),
         "noise": rng.normal(size=one.q.shape),
@@ -35,6 +41,11 @@ ORDERS = (
     ("tau", "t", "q", "v"),
     ("t", "q_ref", "v_ref", "q", "v", "noise", "tau", "flag"),
     ("flag", "t", "v", "q", "tau", "noise"),
+    ("t", "q_ref", "v_ref", "a_ref", "q", "v", "tau"),
+    ("t", "q", "tau"),
+    ("tau", "noise", "t", "q"),
+    ("t", "q_ref", "q", "tau", "flag"),
+    ("flag", "tau", "q", "q_ref", "t"),
 )
 
 
@@ -44,7 +55,7 @@ def test_blocks_are_told_in_whatever_order(order: tuple[str, ...]) -> None:
     x = np.hstack([blocks[name] for name in order])
     found = named_by_numbers(x, arm(), None, "log.csv")
     wanted = [
-        f"{name}.{joint}" if name in ("q", "v", "tau") else "t" if name == "t" else UNUSED
+        f"{name}.{joint}" if name in SIGNALS else "t" if name == "t" else UNUSED
         for name in order
         for joint in (("shoulder", "elbow") if blocks[name].shape[1] == 2 else ("",))
     ]
@@ -60,9 +71,26 @@ def test_a_rate_stands_in_for_a_clock() -> None:
         named_by_numbers(x, arm(), None, "log.csv")
 
 
+def test_one_joint_has_one_column_of_each() -> None:
+    text = ARM.replace('"shoulder" type="revolute"', '"shoulder" type="fixed"')
+    model = Model(Robot.from_text(text)) + "viscous_friction"
+    one = synthetic(model, true_values(model, Fv__elbow=1.0), rate_hz=100.0, torque_std=0.01)
+    x = np.hstack([one.t[:, None], one.tau, one.q])
+    found = named_by_numbers(x, model.robot, None, "log.csv")
+    assert found.choices[0] == "positions in column 3, torques in column 2"
+    assert found.named(0, model.robot.names) == ("t", "tau.elbow", "q.elbow")
+
+
 def test_what_is_no_motion_or_has_no_torque_is_refused() -> None:
     blocks = table()
-    with pytest.raises(RecordingError, match="are the speeds"):
-        named_by_numbers(np.hstack([blocks["t"], blocks["q"], blocks["tau"]]), arm(), None, "x")
-    with pytest.raises(RecordingError, match="may be torques"):
-        named_by_numbers(np.hstack([blocks["t"], blocks["q"], blocks["v"]]), arm(), None, "x")
+    for orders in (
+        ("t", "q", "noise"),
+        ("t", "noise", "tau"),
+        ("t", "q", "q_ref"),
+        ("t", "q", "v"),
+    ):
+        x = np.hstack([blocks[name] for name in orders])
+        with pytest.raises(RecordingError, match=r"motion explains 2 others.*--column"):
+            named_by_numbers(x, arm(), None, "x")
+    with pytest.raises(RecordingError, match=r"300 columns have no names.*--column"):
+        named_by_numbers(np.zeros((50, 300)), arm(), None, "x")

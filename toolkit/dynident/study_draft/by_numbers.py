@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -20,8 +22,16 @@ UNUSED = "-"
 _SAMPLES = 6000  # of a file that are looked at
 _DERIVATIVE = 0.9  # correlation of a speed with the difference of its position
 _SAME = 0.99  # correlation of a position with its reference
+_NEAR = 0.15  # of a motion by which a reference misses what follows it
 _EXACT = 1e-9  # share that counts as explained in full
 _SLOPES = (0.5, 2.0)  # of a speed against that difference
+_SHOWN = 0.5 * math.log(2.0)
+"""Likelihood from which on a motion without speeds counts: half of the power of each torque."""
+_MOST_COLUMNS = 200
+_MOST_PAIRS = 400
+_MOST_READINGS = 3
+_TURN, _DEGREE = 2 * math.pi, math.pi / 180
+_WORDS = {"q": "positions", "v": "speeds", "tau": "torques"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,32 +40,41 @@ class NamedByNumbers:
 
     Attributes
     ----------
-    names : ours, or `UNUSED`; those of torques are missing.
-    torques : first columns of the blocks that may be torques, the likeliest first.
+    readings : first columns of the blocks of "q", "v" (where there are speeds) and "tau", counted
+        from 0; the likeliest reading first.
+    clock : column of the clock; None where the rate was given.
+    columns, joints : how many there are.
     reason : what tells them.
     """
 
-    names: tuple[str, ...]
-    torques: tuple[int, ...]
+    readings: tuple[Mapping[str, int], ...]
+    clock: int | None
+    columns: int
     joints: int
     reason: str
 
     @property
     def choices(self) -> tuple[str, ...]:
-        """The blocks in words, columns counted from 1."""
-        return tuple(f"torques in columns {s + 1} to {s + self.joints}" for s in self.torques)
+        """The readings in words, columns counted from 1."""
+        return tuple(
+            ", ".join(f"{_WORDS[x]} in {_span(s, self.joints)}" for x, s in one.items())
+            for one in self.readings
+        )
 
     def named(self, chosen: int, joints: Sequence[str]) -> tuple[str, ...]:
-        """Return the names with those of the torques.
+        """Return a name for each column, or `UNUSED`.
 
         Parameters
         ----------
-        chosen : which of `torques`.
+        chosen : which of `readings`.
         joints : their names.
         """
-        found = list(self.names)
-        for j, joint in enumerate(joints):
-            found[self.torques[chosen] + j] = f"tau.{joint}"
+        found = [UNUSED] * self.columns
+        if self.clock is not None:
+            found[self.clock] = "t"
+        for signal, start in self.readings[chosen].items():
+            for j, joint in enumerate(joints):
+                found[start + j] = f"{signal}.{joint}"
         return tuple(found)
 
 
@@ -66,6 +85,7 @@ def named_by_numbers(
 
     Signals are looked for in blocks of as many columns as the robot has joints, in their order:
     speeds are the derivative of positions, and torques are what the equations of motion explain.
+    Where there are no speeds, positions are those whose motion explains other columns best.
 
     Parameters
     ----------
@@ -76,21 +96,27 @@ def named_by_numbers(
 
     Returns
     -------
-    Names, but for the torques, of which several blocks may be left to choose from.
+    Names, of which several readings may be left to choose from.
 
     Raises
     ------
     RecordingError
-        If there is no clock and no rate, or no block of columns is a position and its speed.
+        If there is no clock and no rate, or no block of columns is a position whose motion explains
+        another, with or without its speed.
     """
     x, n = x[:_SAMPLES], robot.n
+    remedy = "write a header line, or say which they are, "
+    remedy += f'--column "q.{robot.names[0]} = column2", for each position and torque'
+    if x.shape[1] > _MOST_COLUMNS:
+        what = f"{x.shape[1]} columns have no names, and {_MOST_COLUMNS} are looked at at most"
+        raise RecordingError(what, where, remedy)
     clocks = [k for k in range(x.shape[1]) if is_clock(x[:, k])]
     # Beside a clock, what goes up by one is the number of the sample.
     clocks.sort(key=lambda k: bool(np.all(np.diff(x[:, k]) == 1.0)))
     clock = clocks[0] if clocks and rate_hz is None else None
     if clock is None and rate_hz is None:
-        remedy = "give the samples' rate: --rate 125"
-        raise RecordingError("none of its columns is a clock", where, remedy)
+        rate = "give the samples' rate: --rate 125"
+        raise RecordingError("none of its columns is a clock", where, rate)
     if clock is None:
         t = np.arange(len(x)) / (rate_hz or 1.0)
     else:
@@ -100,38 +126,127 @@ def named_by_numbers(
         for s in range(x.shape[1] - n + 1)
         if not any(s <= k < s + n for k in clocks) and np.ptp(x[:, s : s + n], axis=0).any()
     ]
-    pairs = [(q, v) for q in starts for v in starts if abs(q - v) >= n and _is_rate(x, t, q, v, n)]
-    if not pairs:
-        what = f"no {n} of its columns are positions of which {n} others are the speeds"
-        raise RecordingError(what, where, "write a header line, or columns = [...] in the study")
-    # A reference and its speed are such a pair too: what was measured is rougher.
-    alike = [
-        pair for pair in pairs if pair[0] == pairs[0][0] or _is_same(x, pairs[0][0], pair[0], n)
-    ]
-    q, v = max(alike, key=lambda pair: [_roughness(x[:, s : s + n]) for s in pair])
-    taken = {clock, *range(q, q + n), *range(v, v + n)}
-    free = [s for s in starts if not taken & set(range(s, s + n))]
-    free = [s for s in free if not _is_same(x, q, s, n) and not _is_same(x, v, s, n)]
-    scored = sorted(((_explained(x, t, q, s, robot), -s) for s in free), reverse=True)
-    if not scored:
-        what = f"no {n} columns are left that may be torques"
-        raise RecordingError(what, where, "write a header line, or columns = [...] in the study")
-    tau = -scored[0][1]
-    names = [UNUSED] * x.shape[1]
-    if clock is not None:
-        names[clock] = "t"
-    for signal, start in (("q", q), ("v", v)):
-        for j, joint in enumerate(robot.names):
-            names[start + j] = f"{signal}.{joint}"
-    # Blocks that overlap the best one are no choice of their own.
-    others = [-s for _, s in scored[1:] if abs(-s - tau) >= n]
+    blocks = _Blocks(x=x, t=t, robot=robot, starts=tuple(starts))
+    readings, reason = blocks.with_speeds() or blocks.without_speeds() or ([], "")
+    if not readings:
+        what = f"no {n} of its columns are positions whose motion explains {n} others as torques"
+        raise RecordingError(what, where, remedy)
     return NamedByNumbers(
-        names=tuple(names),
-        torques=(tau, *others[:2]),
-        joints=n,
-        reason=f"columns {v + 1} to {v + n} are the derivative of {q + 1} to {q + n}, and the "
-        "equations of motion explain these best",
+        readings=tuple(readings), clock=clock, columns=x.shape[1], joints=n, reason=reason
     )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Blocks:
+    """Runs of as many columns as there are joints, by the first of each.
+
+    Attributes
+    ----------
+    x : (T, m) the file's numbers.
+    t : (T,) s.
+    robot : as it is described.
+    starts : of runs that may be a signal: of no clock, and not at rest.
+    """
+
+    x: np.ndarray
+    t: np.ndarray
+    robot: Robot
+    starts: tuple[int, ...]
+
+    @cached_property
+    def model(self) -> Model:
+        """The robot alone."""
+        return Model(self.robot)
+
+    def of(self, start: int) -> np.ndarray:
+        """Return the columns (T, n) of a block."""
+        return self.x[:, start : start + self.robot.n]
+
+    def with_speeds(self) -> tuple[list[dict[str, int]], str] | None:
+        """Positions, the speeds that are their derivative, and torques; None without speeds."""
+        x, n = self.x, self.robot.n
+        starts = self.starts
+        pairs = [
+            (q, v)
+            for q in starts
+            for v in starts
+            if abs(q - v) >= n and _is_rate(x, self.t, q, v, n)
+        ]
+        if not pairs:
+            return None
+        # A reference and its speed are such a pair too: what was measured is rougher.
+        first = pairs[0][0]
+        alike = [pair for pair in pairs if pair[0] == first or _is_same(x, first, pair[0], n)]
+        q, v = max(alike, key=lambda pair: [_roughness(self.of(s)) for s in pair])
+        free = [s for s in starts if min(abs(s - q), abs(s - v)) >= n]
+        # Accelerations are explained in full, by the rotors alone.
+        speeds = {pair[1] for pair in pairs}
+        free = [s for s in free if not any(_is_rate(x, self.t, one, s, n) for one in speeds)]
+        free = [s for s in free if not _is_same(x, q, s, n) and not _is_same(x, v, s, n)]
+        scored = sorted(((self.explained(q, s), -s) for s in free), reverse=True)
+        what = f"what is in {_span(v, n)} is the derivative of what is in {_span(q, n)}"
+        reason = f"{what}, and the equations of motion explain these torques best"
+        return self._apart([{"q": q, "v": v, "tau": -s} for _, s in scored]), reason
+
+    def without_speeds(self) -> tuple[list[dict[str, int]], str] | None:
+        """Positions and the torques that their motion explains; None where none does."""
+        x, n = self.x, self.robot.n
+        pairs = [(q, s) for q in self.starts for s in self.starts if abs(q - s) >= n]
+        pairs = [(q, s) for q, s in pairs if not self._repeats(q, s)]
+        if len(pairs) > _MOST_PAIRS:
+            return None
+        scored = sorted(((self.explained(q, s), -q, -s) for q, s in pairs), reverse=True)
+        shown = [(-q, -s) for score, q, s in scored if score > n * _SHOWN]
+        if not shown:
+            return None
+        # A reference moves as what follows it does: what was measured is rougher.
+        best, tau = shown[0]
+        alike = [q for q, s in shown if s == tau and (q == best or _is_same(x, best, q, n))]
+        q = max(alike, key=lambda one: _roughness(self.of(one)))
+        others = [pair for pair in shown if pair[0] not in alike and pair != (tau, q)]
+        reason = "no columns are their speeds, and their motion explains these torques best"
+        return self._apart([{"q": p, "tau": s} for p, s in ((q, tau), *others)]), reason
+
+    def explained(self, q: int, tau: int) -> float:
+        """Logarithmic likelihood per row of a block as torques of a motion, over constants'.
+
+        A temperature is nearly a constant, which friction explains as far as it goes.
+        """
+        torque, positions = self.of(tau), self.of(q)
+        if not np.ptp(torque, axis=0).all():
+            return -np.inf
+        turns = np.abs(positions).max() > _TURN
+        return max(self._fit(x, torque) for x in (positions, positions * _DEGREE)[: 1 + turns])
+
+    def _fit(self, q: np.ndarray, torque: np.ndarray) -> float:
+        criteria = DEFAULTS.wiring
+        try:
+            one = Recording(t=self.t, q=q, tau=torque, joints=self.robot.names)
+            rows = rows_of(Dataset((one,)), criteria.rows, criteria.independent_hz)
+        except RecordingError:
+            return -np.inf
+        n = self.robot.n
+        found = WiringRegression.of(self.model, rows).fit(np.arange(n), np.ones(n))
+        varies = np.var(rows.tau, axis=0) / np.mean(rows.tau**2, axis=0)
+        return -0.5 * float(np.sum(np.log(np.maximum(found.unexplained / varies, _EXACT))))
+
+    def _repeats(self, one: int, other: int) -> bool:
+        """Whether a column of one block is that of the same joint in the other once more."""
+        a, b = (self.of(s) - self.of(s).mean(axis=0) for s in (one, other))
+        return bool(np.any(np.sum((a - b) ** 2, axis=0) < _NEAR**2 * np.sum(a * a, axis=0)))
+
+    def _apart(self, readings: Sequence[dict[str, int]]) -> list[dict[str, int]]:
+        """The first readings, less those that overlap one before in part."""
+        found: list[dict[str, int]] = []
+        for one in readings:
+            if all(self._is_other(one, before) for before in found):
+                found.append(one)
+        return found[:_MOST_READINGS]
+
+    def _is_other(self, one: Mapping[str, int], before: Mapping[str, int]) -> bool:
+        """Whether a reading has other positions or torques, and no part of the same ones."""
+        shifts = [abs(one[signal] - before[signal]) for signal in ("q", "tau")]
+        return any(shifts) and not any(0 < shift < self.robot.n for shift in shifts)
 
 
 def _roughness(x: np.ndarray) -> float:
@@ -166,20 +281,8 @@ def _is_same(x: np.ndarray, one: int, other: int, n: int) -> bool:
     return bool(np.all(np.sum(a * b, axis=0) >= _SAME * both) and both.any())
 
 
-def _explained(x: np.ndarray, t: np.ndarray, q: int, tau: int, robot: Robot) -> float:
-    """Logarithmic likelihood per row of a block of columns as torques, over that of constants.
-
-    A temperature is nearly a constant, which friction explains as far as it goes.
-    """
-    n, criteria = robot.n, DEFAULTS.wiring
-    torque = x[:, tau : tau + n]
-    if not np.ptp(torque, axis=0).all():
-        return -np.inf
-    try:
-        one = Recording(t=t, q=x[:, q : q + n], tau=torque, joints=robot.names)
-        rows = rows_of(Dataset((one,)), criteria.rows, criteria.independent_hz)
-    except RecordingError:
-        return -np.inf
-    found = WiringRegression.of(Model(robot), rows).fit(np.arange(n), np.ones(n))
-    varies = np.var(rows.tau, axis=0) / np.mean(rows.tau**2, axis=0)
-    return -0.5 * float(np.sum(np.log(np.maximum(found.unexplained / varies, _EXACT))))
+def _span(start: int, count: int) -> str:
+    """The columns of a block, counted from 1."""
+    if count == 1:
+        return f"column {start + 1}"
+    return f"columns {start + 1} to {start + count}"

@@ -28,6 +28,7 @@ from dynident.study_draft.decision import Ask, Decision, decided
 from dynident.study_draft.draft import StudyDraft
 from dynident.study_draft.entries import drafted_recordings
 from dynident.study_draft.guesses.amendments import amended
+from dynident.study_draft.guesses.degrees import positions_in_radians
 from dynident.study_draft.guesses.drive_unit import drive_sizes
 from dynident.study_draft.guesses.file_reading import Reading
 from dynident.study_draft.guesses.motor_side import joint_side, require_ratios
@@ -102,6 +103,8 @@ def draft_study(
         return _of_sensor(files, described, columns | wrench, notes)
     reading = _of_joints(columns, described, facts, logs, notes)
     torque = matched.groups["tau"][chosen["tau"]]
+    if _may_be_current(torque, logs) and not (reading.geared or reading.stated):
+        reading = positions_in_radians(reading, _read(logs, reading), notes.take)
     unit = _unit(torque, logs, reading, notes)
     if unit == "A":
         require_no_sums(reading.columns, facts.columns)
@@ -212,7 +215,11 @@ def _named(
     layout = FileLayout(names="numbered", rate_hz=facts.rate_hz, topic=facts.topic)
     logs = _opened(data, layout)
     if logs[0].is_unnamed:
-        names = _by_numbers(logs[0], robot, facts.rate_hz, notes)
+        told = {f"{signal}.{joint}" for signal in ("q", "tau") for joint in robot.names}
+        if told <= facts.columns.keys():
+            names = tuple(name for name in logs[0].columns if name != "t")
+        else:
+            names = _by_numbers(logs[0], robot, facts.rate_hz, notes)
         logs = _opened(data, replace(layout, names=names))
     return logs
 
@@ -344,6 +351,12 @@ def _without_strangers(reading: Reading, logs: Sequence[Log], notes: _Notes) -> 
     return {ours: one for ours, one in columns.items() if not ours.startswith("q_ref.")}
 
 
+def _may_be_current(torque: Group, logs: Sequence[Log]) -> bool:
+    """Whether what stands for torques is in amperes, or no name says that it is not."""
+    unnamed = logs[0].layout.names not in ((), "numbered")
+    return torque.is_current or unnamed or torque.roles[0].word in _ANYTHING
+
+
 def _unit(
     torque: Group, logs: Sequence[Log], reading: Reading, notes: _Notes
 ) -> Literal["N m", "A"]:
@@ -353,8 +366,7 @@ def _unit(
         why = f"the columns are called currents: {identified}"
         choices = ["A, the drives' own", "N m, although the columns are called currents"]
         return "A" if notes.take("torque_unit", choices, why) == 0 else "N m"
-    unnamed = logs[0].layout.names not in ((), "numbered")
-    if not (unnamed or torque.roles[0].word in _ANYTHING):
+    if not _may_be_current(torque, logs):
         return "N m"
     sizes = drive_sizes(reading.robot, _read(logs, reading))
     if sizes.are_newton_metres:
