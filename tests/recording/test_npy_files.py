@@ -39,6 +39,21 @@ def test_fields_that_hold_all_joints_are_taken_apart(tmp_path):
     np.testing.assert_array_equal(found.tau[:, 0], ROWS[:, 3])
 
 
+def test_fields_of_text_are_left_alone_and_named(tmp_path):
+    kinds = [("t", "f8"), ("state", "U7"), ("q.a", "f8"), ("at", "M8[s]"), ("tau.a", "f4")]
+    rows = np.zeros(60, kinds)
+    rows["t"], rows["q.a"], rows["tau.a"] = ROWS[:, 0], ROWS[:, 1], ROWS[:, 3]
+    rows["state"] = "running"
+    np.save(tmp_path / "run.npy", rows)
+    found = read(tmp_path / "run.npy", ["a"])
+    np.testing.assert_array_equal(found.q[:, 0], ROWS[:, 1])
+    np.testing.assert_array_equal(found.tau[:, 0], ROWS[:, 3])
+    assert found.provenance.skipped == ("no numbers: state, at",)
+    np.save(tmp_path / "run.npy", rows[["state", "at"]])
+    with pytest.raises(RecordingError, match="the type"):
+        read(tmp_path / "run.npy", ["a"])
+
+
 @pytest.mark.parametrize(
     ("array", "layout", "said"),
     [

@@ -97,19 +97,19 @@ def open_npy(source: FileSource, file: str, layout: FileLayout) -> ColumnTable:
         require_unpacked(rows * row_size, ARRAYS, file)
         return joined(parts(wanted))
 
-    return ColumnTable(file, names, load, parts=parts)
+    others = tuple(name for name in header.dtype.names or () if name not in names)
+    left = (f"no numbers: {', '.join(others)}",) if others else ()
+    return ColumnTable(file, names, load, parts=parts, skipped=lambda _: left)
 
 
 def _fields(header: ArrayHeader | None) -> tuple[str, ...] | None:
-    """Names of an array's fields, () for a table; None where it is neither, or not of numbers."""
+    """Fields of numbers of an array, () for a table of them; None where it is neither."""
     if header is None or header.dtype.hasobject:
         return None
     if header.dtype.names is None:
         return () if len(header.shape) == 2 and header.dtype.kind in NUMBERS else None
-    kinds = [header.dtype[name].base.kind for name in header.dtype.names]
-    if len(header.shape) != 1 or not all(kind in NUMBERS for kind in kinds):
-        return None
-    return header.dtype.names
+    fields = [name for name in header.dtype.names if header.dtype[name].base.kind in NUMBERS]
+    return tuple(fields) if len(header.shape) == 1 and fields else None
 
 
 def _numbers(stream: BinaryIO, header: ArrayHeader, place: int, count: int) -> np.ndarray:
