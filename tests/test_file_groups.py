@@ -81,7 +81,7 @@ def test_a_kill_at_any_line_loses_nothing(tmp_path: Path) -> None:
         put(folder, third)
         assert seen(folder) == third
         assert (folder / "log.csv").read_text() == "of the user"
-        assert left(folder) - {*third, "log.csv"} <= {x for x in left(folder) if x[:5] == ".new."}
+        assert left(folder) == {*third, "log.csv"}
         line += 1
     assert outcomes == {"old", "new"} and line > 20
 
@@ -106,10 +106,20 @@ def test_two_writers_leave_one_group(tmp_path: Path) -> None:
         for name in NAMES:
             files.write_text(beside / name, "second")
         put(tmp_path, NEW)
-        assert seen(tmp_path) == NEW
+        assert seen(tmp_path) == NEW and beside.is_dir()
         os.mkdir(tmp_path / ".complete")
         (tmp_path / ".complete" / "a.txt").write_text("first")
     assert seen(tmp_path) == dict.fromkeys(NAMES, "second") and left(tmp_path) == set(NAMES)
+
+
+def test_folders_of_the_user_stay(tmp_path: Path) -> None:
+    for name in (".new.plan", ".new.2026-11-23"):
+        (tmp_path / name).mkdir()
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (tmp_path / ".new.abcdefgh").symlink_to(elsewhere)
+    put(tmp_path, NEW)
+    assert left(tmp_path) == {*NEW, ".new.plan", ".new.2026-11-23", ".new.abcdefgh", "elsewhere"}
 
 
 def test_who_changes_places_is_alone(tmp_path: Path, monkeypatch) -> None:

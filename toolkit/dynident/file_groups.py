@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -18,6 +19,8 @@ _COMPLETE = ".complete"
 """Folder of new files, all of them whole, that have not all taken their places yet."""
 _OBSOLETE = ".obsolete"
 """File in it: the names of older files that go, one a line."""
+_NEW = ".new."
+"""What names of folders begin with in which somebody writes, followed by eight letters."""
 
 
 @contextmanager
@@ -44,14 +47,16 @@ def replaced_together(folder: str | Path, names: Sequence[str], last: str) -> It
         If the folder cannot be made or written, or what is in the place of a file is none.
     """
     folder = files.require_folder(folder)
-    new = None
+    new, held = None, None
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name in names:
             files.require_place(folder / name)
         with _alone(folder):
             _finish(folder, last)
-        new = Path(tempfile.mkdtemp(dir=folder, prefix=".new."))
+            _remove_abandoned(folder)
+            new = Path(tempfile.mkdtemp(dir=folder, prefix=_NEW))
+            held = _held(new)
         yield new
         files.write_text(new / _OBSOLETE, "\n".join(names))
         with _alone(folder):
@@ -63,6 +68,8 @@ def replaced_together(folder: str | Path, names: Sequence[str], last: str) -> It
     finally:
         if new is not None:
             shutil.rmtree(new, ignore_errors=True)
+        if held is not None:
+            os.close(held)
 
 
 def in_group(folder: Path, name: str) -> Path:
@@ -98,6 +105,34 @@ def _alone(folder: Path) -> Iterator[None]:
         yield
     finally:
         os.close(handle)
+
+
+def _held(folder: Path) -> int | None:
+    """Hold a folder as long as the process lives; None where another does, or none can be held."""
+    try:
+        import fcntl
+    except ImportError:
+        return None
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(handle)
+        return None
+    return handle
+
+
+def _remove_abandoned(folder: Path) -> None:
+    """Remove what writers have left that were killed: nobody holds their folders any more."""
+    for one in folder.glob(f"{_NEW}*"):
+        if not re.fullmatch(r"[a-z0-9_]{8}", one.name.removeprefix(_NEW)):
+            continue
+        if one.is_symlink() or not one.is_dir():
+            continue
+        held = _held(one)
+        if held is not None:
+            shutil.rmtree(one, ignore_errors=True)
+            os.close(held)
 
 
 def _is_complete(new: Path, folder: Path) -> bool:
