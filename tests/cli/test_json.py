@@ -121,6 +121,14 @@ def test_nothing_missing(run, study):
     assert said["test_error"]["after"] <= 1.15 * said["test_error"]["noise_floor"]
 
 
+@pytest.mark.slow
+def test_a_search_that_was_stopped_says_its_limit(run, study):
+    said = run("explain", study(), "--most", "0", "--json").json
+    assert (said["verdict"], said["limit"], said["steps"]) == ("unexplained", 0, [])
+    said = run("explain", study(), "--most", "1", "--json").json
+    assert said["verdict"] == "explained" and "limit" not in said
+
+
 def test_without_test_recordings(run, study):
     text = STUDY[: STUDY.rindex("[[recordings]]")]
     said = run("diagnose", study(text), "--json").json

@@ -279,6 +279,7 @@ class Diagnosis(Shown):
         return {
             "verdict": self.verdict,
             "noise": {"source": self.noise_source},
+            **({} if self.limit is None else {"limit": self.limit}),
             **({"training_only": list(self.training_only)} if self.training_only else {}),
             **({"following_motion": list(self.following_motion)} if self.following_motion else {}),
             "joints": [
