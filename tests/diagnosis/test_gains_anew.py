@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
+import pytest
+from click.testing import CliRunner
 
 import dynident as di
-from dynident.diagnosis.recorded_units import with_gains
+from dynident.cli import commands
+from dynident.diagnosis.recorded_units import made_up_for, with_gains
 from dynident.effects import effects_of
 from dynident.fitting.drive_gains import GainProblem, fit_drive_gains, in_newton_metres
-from dynident.recording import Dataset, Recording
-from synthetic import arm, smooth_motion, true_values
+from dynident.recording import Dataset, Recording, write
+from synthetic import ARM, arm, smooth_motion, true_values
 
 GAINS = np.array([20.0, -4.0])
+STUDY = """\
+robot = "arm.urdf"
+effects = ["viscous_friction", "coulomb_friction"]
+torque_unit = "A"
+drive_gains = { shoulder = 20.0 }
+recordings = [{ file = "run*.csv", period = 8.0 }]
+"""
 
 
 def recordings() -> tuple[di.Model, Dataset]:
@@ -49,6 +62,28 @@ def test_gains_are_fitted_anew_with_what_was_added() -> None:
     titles = [getattr(one, "title", "") for one in shown.tables()]
     assert "Gains of the drives, with the effects added" in titles
     assert shown.to_dict()["drives_anew"]["joints"][1]["gain"] == shown.drives_anew.gains[1]
+    # Nor is it of use once the gains are those with the friction.
+    assert made_up_for(shown) == tuple(labels[1:])
+    again = di.diagnose(model, in_newton_metres(amperes, shown.drives_anew, model.robot))
+    assert [one.effect.label for one in again.steps] == ["stribeck_friction@elbow"]
+    assert made_up_for(with_gains(again, shown.drives_anew, problem)) == ()
+
+
+@pytest.mark.slow
+def test_explain_begins_again_where_a_gain_made_up_for_others(tmp_path: Path) -> None:
+    _, amperes = recordings()
+    for number, one in enumerate(amperes.recordings):
+        write(one, tmp_path / f"run{number}.csv")
+    (tmp_path / "arm.urdf").write_text(ARM)
+    (tmp_path / "study.toml").write_text(STUDY)
+    answer = CliRunner().invoke(commands, ["explain", str(tmp_path / "study.toml"), "--json"])
+    said = json.loads(answer.stdout)
+    assert [(one["effect"], one["joint"]) for one in said["steps"]] == [
+        ("stribeck_friction", "elbow")
+    ]
+    assert any("the search was begun again" in one for one in said["notes"])
+    gains = [said[key]["joints"][1]["gain"] for key in ("drives", "drives_anew")]
+    np.testing.assert_allclose(gains, GAINS[1], rtol=2e-3)
 
 
 def test_gains_stay_where_nothing_was_added() -> None:

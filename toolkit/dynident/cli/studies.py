@@ -69,6 +69,7 @@ def explain(
         raise FileError("is there already", str(laws), "name another file: laws may be in it")
     loaded = load_study(study, report, laws)
     diagnosis = diagnosis_of(loaded, most, propose, "none" if report is None else "all")
+    loaded = loaded.with_drives(diagnosis.drives)
     following = NextRecording() if next_ is None else next_recording(diagnosis, loaded, next_)
     diagnosis = following.advised(diagnosis)
     write_report(loaded, diagnosis, report)
@@ -125,6 +126,7 @@ def diagnose(study: Path, most: int | None, propose: Propose) -> CommandAnswer:
     """
     loaded = load_study(study)
     diagnosis = diagnosis_of(loaded, most, propose)
+    loaded = loaded.with_drives(diagnosis.drives)
     answer = CommandAnswer(content=diagnosis.to_dict, parts=diagnosis.tables)
     return with_drives(loaded, answer)
 
@@ -273,6 +275,7 @@ def report(study: Path, most: int | None, to: Path) -> CommandAnswer:
     require_places(study, to)
     loaded = load_study(study, to)
     diagnosis = diagnosis_of(loaded, most, switches="all")
+    loaded = loaded.with_drives(diagnosis.drives)
     write_report(loaded, diagnosis, to)
     return CommandAnswer(
         content=lambda: {"report": str(to), **diagnosis.to_dict()}, lines=(diagnosis.sentence,)

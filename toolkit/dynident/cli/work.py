@@ -186,21 +186,34 @@ def diagnosis_of(
     What the search found, torques in the unit in which they were recorded.
     """
     from dynident.diagnosis import diagnose as search
-    from dynident.diagnosis.recorded_units import in_recorded_units, with_gains
+    from dynident.diagnosis.recorded_units import (
+        begun_again,
+        in_recorded_units,
+        made_up_for,
+        with_gains,
+    )
 
-    with progress("diagnosing") as show_progress:
+    def searched(one: Study) -> Diagnosis:
         found = search(
-            study.model,
-            study.train,
-            study.test,
-            controller=study.controller,
+            one.model,
+            one.train,
+            one.test,
+            controller=one.controller,
             most=most,
             propose=propose,
             switches=switches,
-            criteria=study.criteria,
+            criteria=one.criteria,
             progress=show_progress,
         )
-    return in_recorded_units(with_gains(found, study.drives, study.gain_problem), study.drives)
+        return with_gains(found, one.drives, one.gain_problem)
+
+    with progress("diagnosing") as show_progress:
+        found = searched(study)
+        wrong = made_up_for(found)
+        if wrong and found.drives_anew is not None:
+            study = study.with_drives(found.drives_anew)
+            found = begun_again(searched(study), wrong)
+    return in_recorded_units(found, study.drives)
 
 
 def proposed_laws(diagnosis: Diagnosis, number: int, study: Path) -> tuple[Law, ...]:

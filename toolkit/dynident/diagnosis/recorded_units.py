@@ -5,6 +5,7 @@ Effects, laws and what could have been seen stay in N m: they are physics, not c
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -64,6 +65,35 @@ def _anew(diagnosis: Diagnosis, drives: DriveGains, problem: GainProblem) -> Dri
         return fit_drive_gains(replace(problem, model=wider), drives.unit)
     except (FitError, StudyError):  # such as a gain of its own that the search added
         return None
+
+
+def made_up_for(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Return drive gains among the effects added that stand for gains found without the others.
+
+    Parameters
+    ----------
+    diagnosis : from `with_gains`.
+    """
+    drives = diagnosis.drives
+    # Where all gains are given, one that is another is a finding.
+    if drives is None or diagnosis.drives_anew is None or np.all(drives.given):
+        return ()
+    return tuple(x.effect.label for x in diagnosis.steps if x.effect.name == "drive_gain")
+
+
+def begun_again(diagnosis: Diagnosis, labels: Sequence[str]) -> Diagnosis:
+    """Return a diagnosis whose notes say that it began again with other gains.
+
+    Parameters
+    ----------
+    diagnosis : by gains with the effects that were found first.
+    labels : the drive gains that were among these.
+    """
+    said = (
+        f"{' and '.join(labels)} made up for gains that were found without the other effects: with "
+        "these in the model the gains were fitted anew, and the search was begun again."
+    )
+    return replace(diagnosis, notes=(*diagnosis.notes, said))
 
 
 def in_recorded_units(diagnosis: Diagnosis, drives: DriveGains | None) -> Diagnosis:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +49,7 @@ class Study:
     drives : gains by which torques were converted, and loads that were identified; None where the
         recordings are in N m and no load has a name.
     gain_problem : what they solve; None where they are None.
+    recorded_test : `test` in the unit of the drives and with its loads; None where they are None.
     controller : of the closed loop, where the study states one.
     criteria : the numbers that decide a diagnosis, with those that the study wants otherwise: a
         table for each group, as `[criteria.gates] level = 0.005`; see `dynident.criteria`.
@@ -62,6 +63,7 @@ class Study:
     test: Dataset
     drives: DriveGains | None = None
     gain_problem: GainProblem | None = None
+    recorded_test: Dataset | None = None
     controller: Controller | None = None
     criteria: Criteria = DEFAULTS
     digest: str = ""
@@ -71,6 +73,21 @@ class Study:
     def robot(self) -> Robot:
         """The robot as its description gives it."""
         return self.model.robot
+
+    def with_drives(self, drives: DriveGains | None) -> Study:
+        """Return the study with torques by other gains and loads.
+
+        Parameters
+        ----------
+        drives : of its drives; None where it is in N m and no load has a name.
+        """
+        if drives is self.drives or drives is None:
+            return self
+        if self.gain_problem is None or self.recorded_test is None:
+            return self
+        sets = (self.gain_problem.dataset, self.recorded_test)
+        train, test = (in_newton_metres(one, drives, self.robot) for one in sets)
+        return replace(self, train=train, test=test, drives=drives)
 
 
 @checked
@@ -132,13 +149,13 @@ def load(path: str | Path, *, modules: Permission = "trusted") -> Study:
     controller = None
     if said.controller:
         controller = said.controller.controller(robot, f"{path}: controller")
-    drives = problem = None
+    drives = problem = recorded = None
     if said.torque_unit != "N m" or said.drive_gains or said.trusted or loads:
         known = said.drive_gains
         if said.torque_unit == "N m":
             known = dict.fromkeys(robot.names, 1.0)
         problem = GainProblem(model, sets["train"], known, loads, trusted=tuple(said.trusted))
-        drives = _drives(said, path, problem)
+        drives, recorded = _drives(said, path, problem), sets["test"]
         sets = {use: in_newton_metres(one, drives, robot) for use, one in sets.items()}
     return Study(
         path=path,
@@ -147,6 +164,7 @@ def load(path: str | Path, *, modules: Permission = "trusted") -> Study:
         test=sets["test"],
         drives=drives,
         gain_problem=problem,
+        recorded_test=recorded,
         controller=controller,
         criteria=criteria,
         digest=digest,

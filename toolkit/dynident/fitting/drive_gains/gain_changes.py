@@ -15,7 +15,7 @@ def anew_tables(drives: DriveGains | None, anew: DriveGains | None) -> tuple[Tab
 
     Parameters
     ----------
-    drives : of the model as given, by which torques were converted.
+    drives : by which torques were converted: of the model as given, or of one with other effects.
     anew : of the model with the effects.
     """
     if drives is None or anew is None:
@@ -27,10 +27,10 @@ def anew_tables(drives: DriveGains | None, anew: DriveGains | None) -> tuple[Tab
         return tuple(tables)
     most = int(np.argmax(change))
     words = (
-        "Torques in N m are those by the gains of the model as given. With the effects added that "
-        f"of {drives.joints[most]} changes most, by {percent(float(change[most]), 2)}: with them "
-        "in the study (`dynident add`) everything rests on the new gains. A drive gain among the "
-        "effects added is in these gains: do not add it."
+        "Torques in N m are those by the gains that the search began with. With the effects added "
+        f"that of {drives.joints[most]} changes most, by {percent(float(change[most]), 2)}: with "
+        "them in the study (`dynident add`) everything rests on the new gains. A drive gain among "
+        "the effects added is in these gains: do not add it."
     )
     notes = [note for note in tables[0].notes if note != anew.conversion]
     first = replace(tables[0], notes=(*notes, words))
