@@ -127,7 +127,7 @@ CALLS: dict[str, str] = {
     "di.compare(model, test)": "compare: estimates is a Model. give an Estimate or a dictionary",
     "di.compare([fit], test)": "compare: estimates is a list of Estimate. give an Estimate or",
     "di.compare({'a': model}, test)": "compare: estimates is a dict. give an Estimate or a dict",
-    "di.compare({}, test)": "no estimate. ",
+    "di.compare({}, test)": "no estimate to compare. give one",
     "di.compare(fit, di.Dataset(()))": "no recording to compare with",
     "di.compare(fit, recording)": "compare: dataset is a Recording. give a Dataset",
     "di.compare(fit, None)": "compare: dataset is None. give a Dataset",

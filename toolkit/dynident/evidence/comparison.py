@@ -156,9 +156,11 @@ def compare(
         If there is no estimate or no recording.
     """
     named = {"model": estimates} if isinstance(estimates, Estimate) else dict(estimates)
-    if not named or not dataset.recordings:
-        what = "no estimate" if not named else "no recording to compare with"
-        raise FitError(what, remedy='mark some recordings use = "test"')
+    if not named:
+        raise FitError("no estimate to compare", remedy="give one, or several by their names")
+    if not dataset.recordings:
+        remedy = 'mark some recordings use = "test"'
+        raise FitError("no recording to compare with", remedy=remedy)
     runs = gather(dataset, criteria.noise)
     results = []
     for estimate in named.values():
