@@ -14,9 +14,11 @@ from dynident.fitting.linear_solution import solve_factors
 from dynident.fitting.sampling import rows
 from dynident.fitting.uncertainty.input_bias import InputBias, input_bias
 from dynident.fitting.uncertainty.trembling import trembling
+from dynident.model import Model
 from dynident.moments.factors import factorise
 from dynident.recording import Dataset, Filter, Noise, Recording, lowpass
 from dynident.recording.white_noise import encoder_noise_std
+from synthetic import arm, synthetic
 
 TORQUE = (2.0, 0.8)
 NOISY, HEALTHY, LOUD, LOUDER = 1e-5, 1e-5, 1e-4, 2e-4
@@ -74,6 +76,18 @@ def test_the_trembling_is_that_of_the_true_motion() -> None:
     found = trembling(model, lab.truth(model), one, 40.0).between(0.5)[:-1]
     left = np.std(found - true, axis=0) / np.std(true, axis=0)
     assert np.all(left < 0.2), left
+
+
+@pytest.mark.parametrize("heavy", [1.0, 1e-6])
+def test_noise_of_a_torque_is_no_trembling_however_small_the_inertia(heavy: float) -> None:
+    """A drive that does not feel the encoders: what of its torque follows them is chance."""
+    model, rng = Model(arm()), np.random.default_rng(4)
+    one = synthetic(model, model.given_values(), rate_hz=200.0, duration=6.0, period=None)
+    read = one.q + 1e-5 * rng.normal(size=one.q.shape)
+    one = one.replace(q=read, tau=one.tau + 0.05 * rng.normal(size=one.tau.shape))
+    assert not trembling(model, heavy * model.given_values(), one, 25.0).q.any()
+    follows = one.replace(tau=one.tau - 2e4 * (read - lowpass(read, one.rate_hz, 25.0)))
+    assert trembling(model, heavy * model.given_values(), follows, 25.0).q.any()
 
 
 def test_the_size_of_the_noise_is_found_beside_motion_and_jumps() -> None:

@@ -103,7 +103,8 @@ def draft_study(
         return _of_sensor(files, described, columns | wrench, notes)
     reading = _of_joints(columns, described, facts, logs, notes)
     torque = matched.groups["tau"][chosen["tau"]]
-    if _may_be_current(torque, logs) and not (reading.geared or reading.stated):
+    sized = not (torque.is_current or _is_unnamed(logs))
+    if not (sized or reading.geared or reading.stated):
         reading = positions_in_radians(reading, _read(logs, reading), notes.take)
     unit = _unit(torque, logs, reading, notes)
     if unit == "A":
@@ -351,10 +352,9 @@ def _without_strangers(reading: Reading, logs: Sequence[Log], notes: _Notes) -> 
     return {ours: one for ours, one in columns.items() if not ours.startswith("q_ref.")}
 
 
-def _may_be_current(torque: Group, logs: Sequence[Log]) -> bool:
-    """Whether what stands for torques is in amperes, or no name says that it is not."""
-    unnamed = logs[0].layout.names not in ((), "numbered")
-    return torque.is_current or unnamed or torque.roles[0].word in _ANYTHING
+def _is_unnamed(logs: Sequence[Log]) -> bool:
+    """Whether columns were told by how they move, or by position."""
+    return logs[0].layout.names not in ((), "numbered")
 
 
 def _unit(
@@ -366,7 +366,7 @@ def _unit(
         why = f"the columns are called currents: {identified}"
         choices = ["A, the drives' own", "N m, although the columns are called currents"]
         return "A" if notes.take("torque_unit", choices, why) == 0 else "N m"
-    if not _may_be_current(torque, logs):
+    if not (_is_unnamed(logs) or torque.roles[0].word in _ANYTHING):
         return "N m"
     sizes = drive_sizes(reading.robot, _read(logs, reading))
     if sizes.are_newton_metres:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import fdtrc
 
 from dynident.errors import SimulationError
 from dynident.model import InertiaMatrices, Model
@@ -21,6 +22,9 @@ from dynident.recording import Recording, lowpass
 _READINGS = 8
 """Last readings that the drive's torque is explained by: PD laws with a delay, or with a filter on
 the velocity, need no more."""
+_CHANCE = 1e-4
+"""Probability with which noise of a torque alone would follow readings as far as it does, below
+which a drive has made it of them: divided by a small inertia, noise would be a large motion."""
 _POSES = 50
 
 
@@ -74,7 +78,7 @@ def _above(x: np.ndarray, rate_hz: float, cutoff_hz: float) -> np.ndarray:
 
 
 def _fed_back(torque: np.ndarray, readings: np.ndarray) -> np.ndarray:
-    """What the last readings (T, n) explain of a torque (T, n)."""
+    """What the last readings (T, n) explain of a torque (T, n), beyond what chance does."""
     count, n = readings.shape
     rows = np.zeros((_READINGS, n, count))
     for lag in range(min(_READINGS, count)):
@@ -87,4 +91,8 @@ def _fed_back(torque: np.ndarray, readings: np.ndarray) -> np.ndarray:
     (factor,) = factorise([(both[:, :, :-1], both[:, :, -1])]).R
     size, rounding = len(rows), np.finfo(float).eps * max(rows.shape)
     found = np.linalg.lstsq(factor[:, :size], factor[:, size:], rcond=rounding)[0]
-    return (found.T @ rows).T
+    explained = (found.T @ rows).T
+    more, left = (np.sum(x**2, axis=0) for x in (explained, torque - explained))
+    free = max(count - size, 1)
+    by_chance = fdtrc(size, free, more / size / np.maximum(left / free, 1e-300)) > _CHANCE
+    return np.where(by_chance, 0.0, explained)
