@@ -135,10 +135,10 @@ def _numbers(name: str, x: np.ndarray | None) -> dict[str, np.ndarray] | None:
     if x.ndim == 2 and 1 in x.shape:
         x = x.ravel()
     if x.ndim == 1:
-        return {name: x.astype(float)}
+        return {name: x.astype(float, copy=False)}
     if len(x.T) > MOST_COLUMNS:
         return None
-    return {f"{name}[{k}]": column.astype(float) for k, column in enumerate(x.T)}
+    return {f"{name}[{k}]": column.astype(float, copy=False) for k, column in enumerate(x.T)}
 
 
 def same_columns(logs: Sequence[Log]) -> None:

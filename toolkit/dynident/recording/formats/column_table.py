@@ -215,7 +215,8 @@ def is_lying(shape: Sequence[int]) -> bool:
 def joined(parts: Iterator[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
     """Return whole arrays of what comes in parts, one at least."""
     whole = [*parts]
-    return {name: np.concatenate([one[name] for one in whole]) for name in whole[0]}
+    # Pieces go as they are put together: they take as much memory as the arrays.
+    return {name: np.concatenate([one.pop(name) for one in whole]) for name in [*whole[0]]}
 
 
 def left_of(table: ColumnTable, used: Sequence[str]) -> tuple[str, ...]:
