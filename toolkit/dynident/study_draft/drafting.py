@@ -103,13 +103,8 @@ def draft_study(
         return _of_sensor(files, described, columns | wrench, notes)
     reading = _of_joints(columns, described, facts, logs, notes)
     torque = matched.groups["tau"][chosen["tau"]]
-    sized = not (torque.is_current or _is_unnamed(logs))
-    if not (sized or reading.geared or reading.stated):
-        reading = positions_in_radians(reading, _read(logs, reading), notes.take)
-    unit = _unit(torque, logs, reading, notes)
-    if unit == "A":
-        require_no_sums(reading.columns, facts.columns)
-    reading = replace(reading, torque_unit=unit)
+    reading = _with_units(reading, torque, facts, logs, notes)
+    unit = reading.torque_unit
     reading = replace(reading, columns=_without_strangers(reading, logs, notes))
     reading = amended(reading, lambda one: _read(logs, one), notes.take)
     reading, otherwise = with_shared_motors(reading, _read(logs, reading), notes.take)
@@ -350,6 +345,19 @@ def _without_strangers(reading: Reading, logs: Sequence[Log], notes: _Notes) -> 
         return columns
     notes.take("q_ref", ["left out"], "the positions do not follow these columns")
     return {ours: one for ours, one in columns.items() if not ours.startswith("q_ref.")}
+
+
+def _with_units(
+    reading: Reading, torque: Group, facts: LogFacts, logs: Sequence[Log], notes: _Notes
+) -> Reading:
+    """The reading with the unit of what stands for torques, and positions beside it in rad."""
+    sized = not (torque.is_current or _is_unnamed(logs))
+    if not (sized or reading.geared or reading.stated):
+        reading = positions_in_radians(reading, _read(logs, reading), notes.take)
+    unit = _unit(torque, logs, reading, notes)
+    if unit == "A":
+        require_no_sums(reading.columns, facts.columns)
+    return replace(reading, torque_unit=unit)
 
 
 def _is_unnamed(logs: Sequence[Log]) -> bool:
