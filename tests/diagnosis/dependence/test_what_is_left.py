@@ -47,13 +47,31 @@ def test_a_law_that_no_catalogue_has_is_found_without_a_noise_floor() -> None:
     assert found.noise_source == "unknown"
     assert (found.verdict, found.following_motion) == ("unexplained", ("elbow",))
     assert "What is left at elbow is not all noise" in found.sentence
-    assert "elbow follows position and velocity" in headline(found).sentence
+    assert "elbow follows the motion" in headline(found).sentence
     # What is printed is the regression that the verdict goes by.
     (printed,) = [one for one in found.residual_dependence if one.joint == "elbow"]
     assert "position and velocity" in printed.of_the_motion(DEFAULTS.verdict)
     first = found.proposals[0]
     assert first.effect.joint == "elbow"
     assert first.test_error_after < 0.5 * found.test_error.before
+
+
+@pytest.mark.slow
+def test_a_product_of_two_speeds_is_found_without_a_noise_floor() -> None:
+    """No function of one joint's position and velocity predicts it."""
+
+    def coupled(seed: int) -> Recording:
+        made = unrepeated(seed, rate_hz=200.0, torque_std=0.1)
+        v = np.gradient(made.q, made.t, axis=0)
+        push = np.column_stack([0.5 * v[:, 0] * v[:, 1], np.zeros(len(v))])
+        return replace(made, tau=made.tau + push)
+
+    train = Dataset(tuple(coupled(seed) for seed in (0, 1, 2)))
+    found = di.diagnose(true_model(), train, Dataset((coupled(3),)))
+    assert (found.verdict, found.following_motion) == ("unexplained", ("shoulder",))
+    (printed,) = [one for one in found.residual_dependence if one.joint == "shoulder"]
+    assert set(printed.of_the_motion(DEFAULTS.verdict)) == {"speeds of other joints"}
+    assert found.proposals[0].test_error_after < 0.5 * found.test_error.before
 
 
 @pytest.mark.slow

@@ -84,7 +84,7 @@ class Diagnosis(Shown):
     training_only : joints at which the training recordings leave more than their noise, where the
         held-out recordings leave none: the verdict is "unexplained" for that alone.
     following_motion : joints without a noise floor at which what is left is no noise, as functions
-        of position and velocity predict it; empty elsewhere.
+        of position and velocity, or of the speeds of all joints, predict it; empty elsewhere.
     switches : every choice among the effects added, fitted and judged, where that was asked for.
     drives : gains by which currents became torques, and loads that were identified; None where
         nothing had to be found.
@@ -190,8 +190,9 @@ class Diagnosis(Shown):
             added = f"Added: {effects}." if effects else "No effect in the catalogue is of use."
             return (
                 f"{added} What is left at {' and '.join(self.following_motion)} is not all noise: "
-                "functions of the joint's position and velocity predict it on blocks of time that "
-                "they were not fitted to. How much of it is noise is unknown."
+                "functions of the joint's position and velocity, or of the joints' speeds, predict "
+                "it on blocks of time that they were not fitted to. How much of it is noise is "
+                "unknown."
             )
         if self.training_only:
             added = f"Added: {effects}." if effects else "No effect in the catalogue explains it:"

@@ -105,7 +105,7 @@ def _rest(diagnosis: Diagnosis) -> str:
 
 def _followed(diagnosis: Diagnosis) -> str:
     joints = " and ".join(diagnosis.following_motion)
-    return f"at {joints} follows position and velocity: it is not all noise"
+    return f"at {joints} follows the motion: it is not all noise"
 
 
 def _in_training(diagnosis: Diagnosis) -> str:

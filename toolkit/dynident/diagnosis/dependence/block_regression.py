@@ -58,6 +58,16 @@ def of_past(x: JointInputs) -> np.ndarray:
     return _at_any_state(x, _mean([kernel(column[:, None]) for column in x.past.T]))
 
 
+def of_speeds(x: JointInputs) -> np.ndarray:
+    """Kernel of what the speeds of other joints add: with that of the joint, and their products."""
+    others = [one[:, 1:2] for one in x.others]
+    if not others:
+        return np.zeros((len(x.time),) * 2)
+    together = _mean([kernel(x.velocity, one) for one in others])
+    straight = _mean([one @ one.T for one in (x.velocity, *others)])
+    return 0.5 * centred(together + straight**2)
+
+
 def of_others(x: JointInputs) -> np.ndarray:
     """Kernel of what the motion of each other joint adds, at any velocity."""
     found = []

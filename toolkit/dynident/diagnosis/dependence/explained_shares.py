@@ -20,6 +20,7 @@ from dynident.diagnosis.dependence.motion_blocks import HeldOutUnit
 
 INPUTS: dict[str, Callable[[JointInputs], np.ndarray]] = {
     "position and velocity": regression.of_state,
+    "speeds of other joints": regression.of_speeds,
     "acceleration and load": regression.of_acceleration,
     "past": regression.of_past,
     "other joints": regression.of_others,

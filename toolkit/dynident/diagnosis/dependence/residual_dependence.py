@@ -32,12 +32,15 @@ FEWEST_UNITS = 8
 Whole = Literal["systematic", "all"]
 """What shares are of: the systematic residual, or all of it, noise included."""
 
-MOTION = (("position and velocity",),)
-"""What noise does not come again at. Accelerations hold noise of encoders, which columns have too,
-and a controller makes torque of past noise."""
+MOTION = (("position and velocity",), ("speeds of other joints",))
+"""What noise does not come again at, in the order in which it is asked. Accelerations hold noise of
+encoders, which columns have too, and a controller makes torque of past noise."""
+MOTION_FIRST = (*MOTION, *ORDER[1:])
+"""Turns of a regression by which, without a noise floor, the verdict goes."""
 
 _WORDS = {
     "position and velocity": "position and velocity of this joint",
+    "speeds of other joints": "the speeds of other joints",
     "acceleration and load": "its acceleration and load",
     "past": "its past",
     "other joints": "the other joints",
@@ -68,7 +71,7 @@ class JointDependence:
         return {} if self.shares is None else {k: s for k, s in self.shares.by.items() if s.told}
 
     def of_the_motion(self, c: VerdictCriteria) -> dict[str, Share]:
-        """Shares that its position and velocity explain, so large that no noise has them.
+        """Shares that its state or all joints' speeds explain, so large that no noise has them.
 
         At least so large that, were the rest noise that is known, something would be missing.
         """
@@ -197,10 +200,11 @@ def _too_little(rows: int, units: int) -> str:
 
 def dependence_table(found: Sequence[JointDependence]) -> Table:
     """Shares at each joint, in %, with their standard errors."""
+    asked = [name for name in INPUTS if any(one.shares and name in one.shares.by for one in found)]
     rows = tuple(
         (
             one.joint,
-            *(_cell(one.shares.by.get(name) if one.shares else None) for name in INPUTS),
+            *(_cell(one.shares.by.get(name) if one.shares else None) for name in asked),
             _cell(one.shares.rest if one.shares else None),
         )
         for one in found
@@ -212,7 +216,7 @@ def dependence_table(found: Sequence[JointDependence]) -> Table:
     )
     return Table(
         "What is left, by what a flexible regression explains on held-out blocks of time",
-        ("joint", *INPUTS, "none of these"),
+        ("joint", *asked, "none of these"),
         rows,
         (
             f"{noise} Each with its standard error over the blocks; told from nothing at the level "

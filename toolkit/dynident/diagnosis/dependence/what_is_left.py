@@ -1,10 +1,10 @@
 """A diagnosis with what its residual depends on, and its verdict where noise alone cannot be left.
 
 Where nothing repeats, nothing tells the noise of what is left. But noise of the torque does not
-come again at the same position and velocity: a residual that a function of both predicts, on
-blocks of time that it was not fitted to, is no noise, whatever its size. Asked is the residual of
-the fit itself, of which its own columns leave nothing: what errors of the parameters make of a test
-recording is a function of the motion too.
+come again at the same position and velocity, nor at the same speeds of all joints: a residual that
+functions of these predict, on blocks of time that they were not fitted to, is no noise, whatever
+its size. Asked is the residual of the fit itself, of which its own columns leave nothing: what
+errors of the parameters make of a test recording is a function of the motion too.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from dynident.diagnosis.dependence.explained_shares import ORDER
 from dynident.diagnosis.dependence.residual_dependence import (
     MOTION,
+    MOTION_FIRST,
     JointDependence,
     residual_dependence,
 )
@@ -48,7 +48,7 @@ def with_dependence(
     With `residual_dependence`.
     """
     if found.noise_source == "unknown":
-        return replace(found, residual_dependence=_of_fit(evidence, path.final, ORDER))
+        return replace(found, residual_dependence=_of_fit(evidence, path.final, MOTION_FIRST))
     judged = path.judged[-1]
     records = residual_records(judged, (held or evidence).runs)
     if held is not None:
@@ -78,24 +78,26 @@ def doubted(
     """
     if found.verdict == "unexplained":
         return found
-    follow, payloads = (
-        _following(evidence, path.final),
-        [r.recording.payload for r in evidence.runs],
-    )
+    follow = _following(evidence, path.final)
+    payloads = [run.recording.payload for run in evidence.runs]
     for one in narrow:
         if follow:
             lower = marked(one, payloads)
             again = _following(lower, fit_evidence(lower, path.final.model))
-            follow = tuple(joint for joint in follow if joint in again)
+            follow = {joint: inputs & again.get(joint, set()) for joint, inputs in follow.items()}
+            follow = {joint: inputs for joint, inputs in follow.items() if inputs}
     if not follow:
         return found
-    return replace(found, verdict="unexplained", following_motion=follow, detection_limits=())
+    return replace(
+        found, verdict="unexplained", following_motion=tuple(follow), detection_limits=()
+    )
 
 
-def _following(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
-    """Joints at which functions of position and velocity predict what a fit leaves."""
+def _following(evidence: Evidence, fitted: EvidenceFit) -> dict[str, set[str]]:
+    """Which inputs of the motion predict what a fit leaves, of joints where any does."""
     told, criteria = _of_fit(evidence, fitted, MOTION), evidence.criteria.verdict
-    return tuple(one.joint for one in told if one.of_the_motion(criteria))
+    found = {one.joint: set(one.of_the_motion(criteria)) for one in told}
+    return {joint: inputs for joint, inputs in found.items() if inputs}
 
 
 def _of_fit(
