@@ -7,7 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from dynident.criteria import DEFAULTS, Criteria
-from dynident.diagnosis.dependence.residual_dependence import JointDependence, dependence_table
+from dynident.diagnosis.dependence.residual_dependence import (
+    JointDependence,
+    dependence_sentences,
+    dependence_table,
+)
 from dynident.diagnosis.details import (
     Candidate,
     JointResult,
@@ -353,7 +357,7 @@ class Diagnosis(Shown):
             *anew_tables(self.drives, self.drives_anew),
             self.sentence,
             *((limit_table(self.detection_limits),) if self.detection_limits else ()),
-            *(one.sentence for one in self.residual_dependence),
+            *dependence_sentences(self.residual_dependence),
             *((dependence_table(self.residual_dependence),) if self.residual_dependence else ()),
             *self._proposed(),
             *self.caveats,

@@ -9,6 +9,7 @@ from typing import Any
 import dash_bootstrap_components as dbc
 from dash import dcc, html
 
+from dynident.diagnosis.dependence.residual_dependence import dependence_sentences
 from dynident.explorer.effect_choices import EffectChoice, Group
 from dynident.explorer.next_recording import next_recording
 from dynident.explorer.opened_study import OpenedStudy
@@ -256,7 +257,7 @@ def verdict(opened: OpenedStudy) -> list[Any]:
     if found is None:
         return [html.P(f"No diagnosis: {search.failure}")]
     more = [html.P(one) for one in found.caveats]
-    asked = [html.P(one.sentence) for one in found.residual_dependence]
+    asked = [html.P(one) for one in dependence_sentences(found.residual_dependence)]
     return [
         html.P("The diagnosis of the study:", className="quiet"),
         html.P(found.sentence, className="sentence"),

@@ -10,7 +10,7 @@ import jinja2
 
 from dynident import files
 from dynident.arguments import checked
-from dynident.diagnosis.dependence.residual_dependence import dependence_table
+from dynident.diagnosis.dependence.residual_dependence import dependence_sentences, dependence_table
 from dynident.diagnosis.detection_limits import limit_table
 from dynident.diagnosis.result import Diagnosis
 from dynident.evidence.maps import ResidualMap
@@ -177,6 +177,7 @@ def _diagnosis_page(
         proposals=[
             (f"law-{k}", p, proposal_table(p, diagnosis)) for k, p in enumerate(diagnosis.proposals)
         ],
+        depends=dependence_sentences(diagnosis.residual_dependence),
         dependence=dependence_table(diagnosis.residual_dependence),
         joints=joint_table(diagnosis),
         steps=step_table(diagnosis),

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from dynident.diagnosis.result import Diagnosis
 
-_OTHER_JOINTS = "other joints"
+_OTHER_JOINTS = {"other joints", "speeds of other joints"}
 
 
 def with_geometry_doubt(found: Diagnosis) -> Diagnosis:
@@ -42,7 +42,7 @@ def with_geometry_doubt(found: Diagnosis) -> Diagnosis:
     pairs += [
         f"{one.joint} goes with the other joints"
         for one in found.residual_dependence
-        if _OTHER_JOINTS in one.told and one.joint not in stated
+        if _OTHER_JOINTS & one.told.keys() and one.joint not in stated
     ]
     if not pairs:
         return found

@@ -79,18 +79,17 @@ class JointDependence:
         found = {name: self.told[name] for turn in MOTION for name in turn if name in self.told}
         return {k: one for k, one in found.items() if one.value - one.needed * one.error > least}
 
-    @property
-    def sentence(self) -> str:
-        """What it depends on, in plain words."""
+    def said_of(self, joints: str) -> str:
+        """What it depends on, in plain words, of joints of which the same is to be said."""
         if self.shares is None:
-            return f"What is left at {self.joint} is not asked what it depends on: {self.why}."
+            return f"What is left at {joints} is not asked what it depends on: {self.why}."
         what = "what is left beyond the noise"
         if self.whole == "all":
             what = "what is left, noise included,"
         told, others = self.told, [_WORDS[k] for k, s in self.shares.by.items() if not s.told]
         if not told:
             return (
-                f"At {self.joint}, on blocks of time that it was not fitted to, a flexible "
+                f"At {joints}, on blocks of time that it was not fitted to, a flexible "
                 f"regression explains nothing that can be told of {what} by "
                 f"{_listed(others, 'or')}."
             )
@@ -104,7 +103,7 @@ class JointDependence:
         rest = self.shares.rest
         left = f" {_rounded(rest.value)} ({_rounded(rest.error)}) is explained by none of them."
         return (
-            f"At {self.joint}, on blocks of time that it was not fitted to, a flexible regression "
+            f"At {joints}, on blocks of time that it was not fitted to, a flexible regression "
             f"explains {_listed(parts, 'and')}.{nothing}{left if rest.told else ''}"
         )
 
@@ -119,6 +118,16 @@ class JointDependence:
         ]
         rest = self.shares.rest.to_dict()
         return {**found, "blocks": self.shares.units, "inputs": inputs, "rest": rest, "why": None}
+
+
+def dependence_sentences(found: Sequence[JointDependence]) -> tuple[str, ...]:
+    """What they depend on, in plain words; joints that are alike in it share a sentence."""
+    alike: dict[str, list[JointDependence]] = {}
+    for one in found:
+        alike.setdefault(one.said_of(""), []).append(one)
+    return tuple(
+        some[0].said_of(_listed([one.joint for one in some], "and")) for some in alike.values()
+    )
 
 
 def residual_dependence(
