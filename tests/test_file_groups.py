@@ -113,13 +113,20 @@ def test_two_writers_leave_one_group(tmp_path: Path) -> None:
 
 
 def test_folders_of_the_user_stay(tmp_path: Path) -> None:
-    for name in (".new.plan", ".new.2026-11-23"):
+    for name in (".new.plan", ".new.my_notes", ".dynident-new.2026-11-23"):
         (tmp_path / name).mkdir()
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
-    (tmp_path / ".new.abcdefgh").symlink_to(elsewhere)
+    (tmp_path / ".dynident-new.abcdefgh").symlink_to(elsewhere)
     put(tmp_path, NEW)
-    assert left(tmp_path) == {*NEW, ".new.plan", ".new.2026-11-23", ".new.abcdefgh", "elsewhere"}
+    assert left(tmp_path) == {
+        *NEW,
+        ".new.plan",
+        ".new.my_notes",
+        ".dynident-new.2026-11-23",
+        ".dynident-new.abcdefgh",
+        "elsewhere",
+    }
 
 
 def test_who_changes_places_is_alone(tmp_path: Path, monkeypatch) -> None:

@@ -19,7 +19,7 @@ _COMPLETE = ".complete"
 """Folder of new files, all of them whole, that have not all taken their places yet."""
 _OBSOLETE = ".obsolete"
 """File in it: the names of older files that go, one a line."""
-_NEW = ".new."
+_NEW = ".dynident-new."
 """What names of folders begin with in which somebody writes, followed by eight letters."""
 
 
@@ -113,7 +113,10 @@ def _held(folder: Path) -> int | None:
         import fcntl
     except ImportError:
         return None
-    handle = os.open(folder, os.O_RDONLY)
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError:  # of somebody else, or gone meanwhile
+        return None
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:

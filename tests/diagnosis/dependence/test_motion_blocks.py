@@ -5,9 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from dynident.diagnosis.dependence.motion_blocks import motion_blocks
-from residuals import record
+from dynident.diagnosis.dependence.motion_blocks import (
+    FEWEST_BLOCKS,
+    independent_stretches,
+    motion_blocks,
+)
+from residuals import record, rough_friction
 
 
 def test_every_row_is_held_out_once_and_its_neighbours_are_not_learnt_from() -> None:
@@ -63,3 +68,17 @@ def test_two_motions_are_not_one() -> None:
 def test_a_single_joint_is_in_every_state_often_and_repeats_nothing() -> None:
     one = record(5, {}, joints=1)
     assert len(np.unique(motion_blocks((one,), [0]).unit)) >= 16
+
+
+@pytest.mark.parametrize("correlation_s", [2.0, 3.0])
+def test_slow_noise_leaves_a_short_recording_few_independent_stretches(
+    correlation_s: float,
+) -> None:
+    short = [record(k, {}, duration=16.0, correlation_s=correlation_s) for k in range(20)]
+    assert np.mean([independent_stretches((one,), 0) >= FEWEST_BLOCKS for one in short]) <= 0.1
+
+
+def test_a_law_of_the_motion_leaves_many() -> None:
+    for seed in range(5):
+        law = record(seed, {rough_friction: 0.6}, duration=32.0)
+        assert independent_stretches((law,), 0) >= FEWEST_BLOCKS

@@ -88,6 +88,19 @@ def test_what_an_effect_explains_more_than_the_law_must_be_worth_an_effect(
     assert (laws_that_do_as_well(evidence, fitted, better, 0) == ()) == named
 
 
+def test_a_law_that_explains_a_small_part_of_an_effect_does_not_stand_in_for_it() -> None:
+    evidence = Evidence(given(), gather(dataset(0, 1, lead=6e-3)))
+    fitted = fit_evidence(evidence, evidence.model)
+    stands_in = StribeckFriction("elbow").on(evidence.model.robot)
+    (one,) = rank(evidence, fitted, 0, only=(stands_in,)).scores
+    (law,) = laws_that_do_as_well(evidence, fitted, one, 0)
+    # Whatever the share of the residual is that an effect has to explain.
+    gates = replace(evidence.criteria.gates, first_share=1.0)
+    careful = Evidence(given(), evidence.runs, criteria=replace(evidence.criteria, gates=gates))
+    far_better = replace(one, penalised=3.0 * law.drop)
+    assert laws_that_do_as_well(careful, fitted, far_better, 0) == ()
+
+
 @pytest.mark.parametrize(("lead", "excused"), [(6e-3, ["elbow"]), (0.0, ["elbow"]), (-6e-3, [])])
 def test_what_no_effect_explains_is_excused_unless_friction_lags(
     lead: float, excused: list[str]

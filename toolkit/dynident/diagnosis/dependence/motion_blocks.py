@@ -111,6 +111,21 @@ def motion_blocks(records: tuple[ResidualRecord, ...], joints: list[int]) -> Mot
     )
 
 
+def independent_stretches(records: tuple[ResidualRecord, ...], joint: int) -> float:
+    """How often the records are longer than what is left at a joint hangs together in time.
+
+    Noise as slow as a few blocks is alike in neighbours, and so is the motion: a regression learns
+    one by the other.
+
+    Parameters
+    ----------
+    records : all records.
+    joint : column of the joint.
+    """
+    lasting = max((_correlation_time(one, joint) for one in records), default=0.0)
+    return sum(float(np.ptp(one.t)) for one in records) / max(lasting, 1e-12)
+
+
 def _cut(records: tuple[ResidualRecord, ...], lengths: list[float], count: int) -> np.ndarray:
     """Number of the block of each row; a period is cut once, for all its repetitions.
 

@@ -4,7 +4,8 @@ Where nothing repeats, nothing tells the noise of what is left. But noise of the
 come again at the same position and velocity, nor at the same speeds of all joints: a residual that
 functions of these predict, on blocks of time that they were not fitted to, is no noise, whatever
 its size. Asked is the residual of the fit itself, of which its own columns leave nothing: what
-errors of the parameters make of a test recording is a function of the motion too.
+errors of the parameters make of a test recording is a function of the motion too. Nothing is said
+where what is left hangs together for longer than a small part of the recordings.
 """
 
 from __future__ import annotations
@@ -12,13 +13,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from dynident.diagnosis.dependence.motion_blocks import FEWEST_BLOCKS, independent_stretches
 from dynident.diagnosis.dependence.residual_dependence import (
     MOTION,
     MOTION_FIRST,
     JointDependence,
     residual_dependence,
 )
-from dynident.diagnosis.dependence.residual_record import joined, residual_records
+from dynident.diagnosis.dependence.residual_record import (
+    ResidualRecord,
+    joined,
+    residual_records,
+)
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.payload_recordings import marked
 from dynident.diagnosis.search.withdrawal import Path
@@ -96,7 +102,12 @@ def doubted(
 def _following(evidence: Evidence, fitted: EvidenceFit) -> dict[str, set[str]]:
     """Which inputs of the motion predict what a fit leaves, of joints where any does."""
     told, criteria = _of_fit(evidence, fitted, MOTION), evidence.criteria.verdict
-    found = {one.joint: set(one.of_the_motion(criteria)) for one in told}
+    records, names = _records(evidence, fitted), fitted.model.robot.names
+    found = {
+        one.joint: set(one.of_the_motion(criteria))
+        for one in told
+        if independent_stretches(records, names.index(one.joint)) >= FEWEST_BLOCKS
+    }
     return {joint: inputs for joint, inputs in found.items() if inputs}
 
 
@@ -105,5 +116,10 @@ def _of_fit(
 ) -> tuple[JointDependence, ...]:
     """What a fit leaves of the data that it was fitted to, by what it depends on."""
     judged, criteria = on_recordings(evidence, fitted), evidence.criteria.verdict
-    records, names = joined(residual_records(judged, evidence.runs)), fitted.model.robot.names
+    records, names = _records(evidence, fitted), fitted.model.robot.names
     return residual_dependence(judged, records, names, criteria, order)
+
+
+def _records(evidence: Evidence, fitted: EvidenceFit) -> tuple[ResidualRecord, ...]:
+    """What a fit leaves of the data that it was fitted to, along its recordings."""
+    return joined(residual_records(on_recordings(evidence, fitted), evidence.runs))

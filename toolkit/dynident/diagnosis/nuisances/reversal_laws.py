@@ -34,6 +34,8 @@ _TURNED = 3.0
 """Speed over the width at which dry friction has turned: tanh(3) is 0.995."""
 _USUAL = 99.0
 """Percentile of a joint's acceleration that counts as its highest."""
+_AS_MUCH = 0.5
+"""Share of what an effect explains that a law must explain at least, to stand in for it."""
 _AT_ONCE = 5e-5
 """s, below which it reverses with the joint."""
 
@@ -134,7 +136,7 @@ def laws_that_do_as_well(
     gates = evidence.criteria.gates
     # What it explains more than they do must itself be worth an effect.
     least = (gates.later_share if added else gates.first_share) * fitted.error_total
-    if sum(law.drop for law in found) < one.penalised - least:
+    if sum(law.drop for law in found) < max(one.penalised - least, _AS_MUCH * one.penalised):
         return ()
     beside = fit_evidence(evidence, fitted.model + tuple(law.column for law in found), fitted)
     if rank(evidence, beside, added, only=(one.effect,)).passing:
