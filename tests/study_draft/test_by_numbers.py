@@ -94,3 +94,15 @@ def test_what_is_no_motion_or_has_no_torque_is_refused() -> None:
             named_by_numbers(x, arm(), None, "x")
     with pytest.raises(RecordingError, match=r"300 columns have no names.*--column"):
         named_by_numbers(np.zeros((50, 300)), arm(), None, "x")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_only_drifts_is_no_motion_and_no_torque(seed: int) -> None:
+    rng, blocks = np.random.default_rng(seed), table()
+    walks = np.cumsum(rng.normal(size=(len(blocks["t"]), 6)), axis=0)
+    warming = 25.0 + 20.0 * (1.0 - np.exp(-np.outer(blocks["t"] - blocks["t"][0], [0.02, 0.05])))
+    warming += 0.05 * rng.normal(size=warming.shape)
+    for columns in ((walks,), (blocks["q"], warming)):
+        x = np.hstack([blocks["t"], *columns])
+        with pytest.raises(RecordingError, match=r"motion explains 2 others.*--column"):
+            named_by_numbers(x, arm(), None, "x")

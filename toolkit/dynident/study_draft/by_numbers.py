@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +17,7 @@ from dynident.recording import Dataset, Recording
 from dynident.robot import Robot
 from dynident.study_draft.timing import clock_scale, is_clock
 from dynident.wiring.wiring_regression import WiringRegression
-from dynident.wiring.wiring_rows import rows_of
+from dynident.wiring.wiring_rows import WiringRows, rows_of
 
 UNUSED = "-"
 _SAMPLES = 6000  # of a file that are looked at
@@ -27,6 +28,7 @@ _EXACT = 1e-9  # share that counts as explained in full
 _SLOPES = (0.5, 2.0)  # of a speed against that difference
 _SHOWN = 0.5 * math.log(2.0)
 """Likelihood from which on a motion without speeds counts: half of the power of each torque."""
+_PARTS = 4  # of the time, each predicted from the others
 _MOST_COLUMNS = 200
 _MOST_PAIRS = 400
 _MOST_READINGS = 3
@@ -197,6 +199,7 @@ class _Blocks:
             return None
         scored = sorted(((self.explained(q, s), -q, -s) for q, s in pairs), reverse=True)
         shown = [(-q, -s) for score, q, s in scored if score > n * _SHOWN]
+        shown = [pair for pair in shown if self._holds(*pair)]
         if not shown:
             return None
         # A reference moves as what follows it does: what was measured is rougher.
@@ -218,12 +221,44 @@ class _Blocks:
         turns = np.abs(positions).max() > _TURN
         return max(self._fit(x, torque) for x in (positions, positions * _DEGREE)[: 1 + turns])
 
-    def _fit(self, q: np.ndarray, torque: np.ndarray) -> float:
+    def _holds(self, q: int, tau: int) -> bool:
+        """Whether the motion predicts half of the torques in each quarter of the time by the rest.
+
+        What drifts, as temperatures do, is explained by whatever else drifts, and not predicted.
+        """
+        positions, n = self.of(q), self.robot.n
+        order, one = np.arange(n), np.ones(n)
+        for x in (positions, positions * _DEGREE):
+            rows = self._rows(x, self.of(tau))
+            if rows is None:
+                continue
+            ends = np.linspace(0, len(rows.q), _PARTS + 1).round().astype(int)
+            each = [
+                WiringRegression.of(self.model, _part(rows, slice(*pair)))
+                for pair in itertools.pairwise(ends)
+            ]
+            missed = np.zeros(n)
+            for asked in each:
+                rest = [other for other in each if other is not asked]
+                values = _together(rest).fit(order, one).values
+                missed += asked.power - 2.0 * asked.cross[order, order] @ values
+                missed += (asked.gram @ values) @ values
+            varies = len(rows.tau) * np.var(rows.tau, axis=0)
+            if -0.5 * np.sum(np.log(np.maximum(missed / varies, _EXACT))) > n * _SHOWN:
+                return True
+        return False
+
+    def _rows(self, q: np.ndarray, torque: np.ndarray) -> WiringRows | None:
         criteria = DEFAULTS.wiring
         try:
             one = Recording(t=self.t, q=q, tau=torque, joints=self.robot.names)
-            rows = rows_of(Dataset((one,)), criteria.rows, criteria.independent_hz)
+            return rows_of(Dataset((one,)), criteria.rows, criteria.independent_hz)
         except RecordingError:
+            return None
+
+    def _fit(self, q: np.ndarray, torque: np.ndarray) -> float:
+        rows = self._rows(q, torque)
+        if rows is None:
             return -np.inf
         n = self.robot.n
         found = WiringRegression.of(self.model, rows).fit(np.arange(n), np.ones(n))
@@ -272,6 +307,19 @@ def _is_rate(x: np.ndarray, t: np.ndarray, q: int, v: int, n: int) -> bool:
         return False
     usual = float(np.median(slopes))
     return all(_SLOPES[0] < slope / usual < _SLOPES[1] for slope in slopes)
+
+
+def _together(parts: Sequence[WiringRegression]) -> WiringRegression:
+    """The second moments of several parts of the time; inertia and friction are not asked."""
+    gram, cross, power = (
+        np.sum([getattr(one, name) for one in parts], axis=0) for name in ("gram", "cross", "power")
+    )
+    return replace(parts[0], gram=gram, cross=cross, power=power)
+
+
+def _part(rows: WiringRows, at: slice) -> WiringRows:
+    """Rows of a part of the time."""
+    return replace(rows, q=rows.q[at], v=rows.v[at], a=rows.a[at], tau=rows.tau[at])
 
 
 def _is_same(x: np.ndarray, one: int, other: int, n: int) -> bool:
