@@ -62,7 +62,7 @@ def test_joints_where_only_noise_is_left_are_not_asked() -> None:
     shares = found.shares
     assert shares is not None and shares.by["position and velocity"].value > 0.7
     assert "of what is left beyond the noise by position and velocity of this joint" in (
-        found.said_of("shoulder")
+        found.sentence
     )
 
 
@@ -72,8 +72,8 @@ def test_without_a_noise_floor_shares_are_of_everything_and_it_says_so() -> None
     shares = first.shares
     assert shares is not None
     assert 0.4 < shares.by["position and velocity"].value < 0.65
-    assert first.whole == "all" and "noise included" in first.said_of(first.joint)
-    assert second.told == {} and "nothing that can be told" in second.said_of(second.joint)
+    assert first.whole == "all" and "noise included" in first.sentence
+    assert second.told == {} and "nothing that can be told" in second.sentence
     assert "noise included" in " ".join(str(dependence_table((first, second))).split())
 
 
@@ -118,7 +118,7 @@ def test_rows_that_do_not_count_are_not_asked() -> None:
 def test_too_little_data_is_a_reason_and_no_number() -> None:
     short = record(14, {rough_friction: 0.6}, duration=2.0)
     first = asked(short)[0]
-    assert first.shares is None and "100 rows are too few" in first.said_of(first.joint)
+    assert first.shares is None and "100 rows are too few" in first.sentence
     said = first.to_dict()
     assert said["inputs"] == [] and said["rest"] is None and "too few" in said["why"]
     assert json.loads(json.dumps(said)) == said
@@ -158,7 +158,7 @@ def test_the_sentence_names_what_is_told_and_what_is_not() -> None:
         other_joints=(-0.4, 0.1),
         time=(0.004, 0.001),
     )
-    assert one.said_of("elbow") == (
+    assert one.sentence == (
         "At elbow, on blocks of time that it was not fitted to, a flexible regression explains "
         "62 % (standard error 4 %) of what is left beyond the noise by position and velocity of "
         "this joint and 20 % (3 %) more by its past. Of its acceleration and load, the other "
@@ -177,8 +177,8 @@ def test_the_sentence_names_what_is_told_and_what_is_not() -> None:
 
 def test_where_nothing_is_told_no_share_is_named() -> None:
     one = shares(position_and_velocity=(0.05, 0.04), time=(-0.1, 0.05))
-    assert one.said_of("elbow").endswith("by position and velocity of this joint or time.")
-    assert "%" not in one.said_of("elbow")
+    assert one.sentence.endswith("by position and velocity of this joint or time.")
+    assert "%" not in one.sentence
 
 
 def test_joints_of_which_the_same_is_to_be_said_share_a_sentence() -> None:

@@ -42,7 +42,7 @@ def with_geometry_doubt(found: Diagnosis) -> Diagnosis:
     pairs += [
         f"{one.joint} goes with the other joints"
         for one in found.residual_dependence
-        if _OTHER_JOINTS & one.told.keys() and one.joint not in stated
+        if not _OTHER_JOINTS.isdisjoint(one.told) and one.joint not in stated
     ]
     if not pairs:
         return found

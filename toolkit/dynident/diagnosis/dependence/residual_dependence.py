@@ -79,8 +79,13 @@ class JointDependence:
         found = {name: self.told[name] for turn in MOTION for name in turn if name in self.told}
         return {k: one for k, one in found.items() if one.value - one.needed * one.error > least}
 
+    @property
+    def sentence(self) -> str:
+        """What it depends on, in plain words."""
+        return self.said_of(self.joint)
+
     def said_of(self, joints: str) -> str:
-        """What it depends on, in plain words, of joints of which the same is to be said."""
+        """Return the sentence with names of all joints of which the same is to be said."""
         if self.shares is None:
             return f"What is left at {joints} is not asked what it depends on: {self.why}."
         what = "what is left beyond the noise"
