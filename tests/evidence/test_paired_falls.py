@@ -39,7 +39,7 @@ def slow(stream: np.random.Generator, memory: float) -> np.ndarray:
     kept = np.exp(-1.0 / memory) if memory else 0.0
     white = stream.standard_normal((BLOCKS * ROWS, 2))
     white[1:] *= np.sqrt(1.0 - kept**2)
-    return lfilter([1.0], [1.0, -kept], white, axis=0)
+    return np.asarray(lfilter([1.0], [1.0, -kept], white, axis=0))
 
 
 def pair(seed: int, memory: float, missing: float) -> tuple[HeldOut, HeldOut]:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import dynident as di
+from dynident.diagnosis import Diagnosis
 from dynident.recording import Dataset, Recording
 from dynident.robot import structural_base
 from synthetic import smooth_motion
@@ -56,7 +57,7 @@ def test_the_digits_of_a_right_angle_add_no_parameters(digits: str) -> None:
 
 
 @cache
-def fitted_and_told(right_angle: str) -> tuple[di.Estimate, di.Diagnosis]:
+def fitted_and_told(right_angle: str) -> tuple[di.Estimate, Diagnosis]:
     """What is said of the arm by a description with these digits."""
     train, test = recordings(arm(EXACT))
     fitted = di.fit(di.Model(arm(right_angle)), train)

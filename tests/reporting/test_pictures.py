@@ -65,7 +65,8 @@ def test_no_number_lies_on_the_line_of_the_floor(found, after):
         begin = {"inside": end - room, "outside": end, "none": behind.get(i)}[place]
         assert begin is not None and not begin < line < begin + room
         assert (place == "none") == (i in behind)
-    drawn = {text.get_text(): text.xy[0] for text in plots.waterfall(one).axes[0].texts}
+    texts: list[Any] = list(plots.waterfall(one).axes[0].texts)  # annotations, at data
+    drawn = {text.get_text(): text.xy[0] for text in texts}
     assert all(not begin < line < begin + room for begin in drawn.values())
 
 
