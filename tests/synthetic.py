@@ -30,12 +30,18 @@ def arm() -> Robot:
 
 
 def smooth_motion(
-    n: int, seed: int, rate_hz: float, duration: float, period: float, amplitude: float = 0.5
+    n: int,
+    seed: int,
+    rate_hz: float,
+    duration: float,
+    period: float | None,
+    amplitude: float = 0.5,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Periodic Fourier motion: t (T,), q, v, a (T, n)."""
+    """Sum of five sines, t (T,), q, v, a (T, n); without a period as fast as with one of 8 s."""
     rng = np.random.default_rng(seed)
     t = np.arange(round(duration * rate_hz) + 1) / rate_hz
-    k = 2 * np.pi / period * np.arange(1, 6)
+    orders = np.arange(1, 6) if period else np.sqrt([1, 5, 10, 17, 26])  # no common period
+    k = 2 * np.pi / (period or 8.0) * orders
     s, c = rng.normal(size=(2, n, 5)) * amplitude / np.arange(1, 6)
     sin, cos = np.sin(t[:, None] * k), np.cos(t[:, None] * k)
     q = sin @ s.T + cos @ c.T
@@ -59,7 +65,7 @@ def synthetic(
     """A recording whose torque is exactly the model's at known values, plus noise."""
     rng = np.random.default_rng([seed, 1])
     n = model.robot.n
-    t, q, v, a = smooth_motion(n, seed, rate_hz, duration, period or 8.0)
+    t, q, v, a = smooth_motion(n, seed, rate_hz, duration, period)
     tau = model.torque(model.block(t, q, v, a, carries_payload=bool(payload)), values)
     return Recording(
         t,

@@ -68,6 +68,12 @@ def of_speeds(x: JointInputs) -> np.ndarray:
     return 0.5 * centred(together + straight**2)
 
 
+def of_position_errors(x: JointInputs) -> np.ndarray:
+    """Kernel of what errors of the measured positions do, where they depend on the position."""
+    columns = x.position_errors
+    return columns @ columns.T / max(columns.shape[1], 1)
+
+
 def of_others(x: JointInputs) -> np.ndarray:
     """Kernel of what the motion of each other joint adds, at any velocity."""
     found = []

@@ -21,6 +21,7 @@ from dynident.diagnosis.dependence.motion_blocks import HeldOutUnit
 INPUTS: dict[str, Callable[[JointInputs], np.ndarray]] = {
     "position and velocity": regression.of_state,
     "speeds of other joints": regression.of_speeds,
+    "position errors": regression.of_position_errors,
     "acceleration and load": regression.of_acceleration,
     "past": regression.of_past,
     "other joints": regression.of_others,
@@ -29,6 +30,7 @@ INPUTS: dict[str, Callable[[JointInputs], np.ndarray]] = {
 """Sets of inputs with their kernels."""
 ORDER = (
     ("position and velocity",),
+    ("position errors",),
     ("acceleration and load", "past"),
     ("acceleration and load", "past"),
     ("other joints",),

@@ -36,6 +36,7 @@ class JointInputs:
     others : for each other joint that moves, (T, 4): position, velocity, direction, acceleration.
     time : (T, 1) on the clock of the session.
     record : (T,) number of the record.
+    position_errors : (T, k) what errors of the measured positions do to its torque; k may be 0.
     """
 
     position: np.ndarray
@@ -47,6 +48,7 @@ class JointInputs:
     others: tuple[np.ndarray, ...]
     time: np.ndarray
     record: np.ndarray
+    position_errors: np.ndarray
 
     def rows(self, index: np.ndarray) -> JointInputs:
         """Return the inputs of some rows."""
@@ -81,6 +83,7 @@ def joint_inputs(records: tuple[ResidualRecord, ...], joint: int) -> JointInputs
         others=tuple(x for i, x in enumerate(motion) if i != joint and np.any(x)),
         time=_scaled(session[:, None]),
         record=np.concatenate(numbers),
+        position_errors=np.empty((len(own), 0)),
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -18,6 +18,7 @@ from dynident.diagnosis.dependence.explained_shares import (
 )
 from dynident.diagnosis.dependence.joint_inputs import joint_inputs
 from dynident.diagnosis.dependence.motion_blocks import motion_blocks
+from dynident.diagnosis.dependence.position_errors import position_error_columns
 from dynident.diagnosis.dependence.residual_record import ResidualRecord
 from dynident.evidence.held_out import HeldOut
 from dynident.tables import Table, percent
@@ -32,15 +33,18 @@ FEWEST_UNITS = 8
 Whole = Literal["systematic", "all"]
 """What shares are of: the systematic residual, or all of it, noise included."""
 
-MOTION = (("position and velocity",), ("speeds of other joints",))
-"""What noise does not come again at, in the order in which it is asked. Accelerations hold noise of
-encoders, which columns have too, and a controller makes torque of past noise."""
-MOTION_FIRST = (*MOTION, *ORDER[1:])
+MOTION = (("position and velocity",), ("speeds of other joints",), ("position errors",))
+"""What noise does not come again at, in the order in which it is asked. Functions of accelerations
+are not among them: these hold noise of encoders, which columns have too, and a controller makes
+torque of past noise. What position errors do to the torque goes with accelerations in a few ways
+alone, that differ from place to place."""
+MOTION_FIRST = (*MOTION, *(turn for turn in ORDER if turn not in MOTION))
 """Turns of a regression by which, without a noise floor, the verdict goes."""
 
 _WORDS = {
     "position and velocity": "position and velocity of this joint",
     "speeds of other joints": "the speeds of other joints",
+    "position errors": "errors of the measured positions that depend on the position",
     "acceleration and load": "its acceleration and load",
     "past": "its past",
     "other joints": "the other joints",
@@ -169,7 +173,8 @@ def residual_dependence(
         units = blocks.units(rows)
         shares, why = None, _too_little(len(rows), len(units))
         if not why:
-            x = joint_inputs(records, j).rows(rows)
+            errors = position_error_columns(records, rows, j)
+            x = replace(joint_inputs(records, j).rows(rows), position_errors=errors)
             residual = np.concatenate([one.residual[:, j] for one in records])[rows]
             noise = power[rows] if known else np.zeros(len(rows))
             shares = explained_shares(x, residual, noise, units, order)

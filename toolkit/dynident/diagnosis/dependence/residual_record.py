@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut, HeldOutRun
 from dynident.evidence.runs import Run
+from dynident.robot.dynamics import TorqueDerivatives
+
+DerivativesAt = Callable[[np.ndarray, np.ndarray, np.ndarray], TorqueDerivatives]
+"""Derivatives of the torque along a motion q, v, a, (N, n) each."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -25,6 +30,8 @@ class ResidualRecord:
     certain : (T, n) mask of the rows by which a joint is judged.
     noise_power : (T, n) mean square of the noise, (N m)^2 or N^2; NaN where it is unknown.
     period : s, of a motion that repeats; None where none is known.
+    torque_derivatives : how the torque of the fitted robot, its payload on board or not, goes with
+        motions q, v, a (N, n); None where no robot is known.
     """
 
     source: Hashable
@@ -38,39 +45,65 @@ class ResidualRecord:
     certain: np.ndarray
     noise_power: np.ndarray
     period: float | None
+    torque_derivatives: DerivativesAt | None = None
 
     def rows(self, index: np.ndarray) -> ResidualRecord:
         """Return some of its rows, by an index or a mask (T,)."""
         return ResidualRecord(
             source=self.source,
             period=self.period,
+            torque_derivatives=self.torque_derivatives,
             **{name: getattr(self, name)[index] for name in _ARRAYS},
         )
 
 
-_ARRAYS = tuple(one.name for one in fields(ResidualRecord) if one.name not in ("source", "period"))
+_OF_THE_WHOLE = ("source", "period", "torque_derivatives")
+_ARRAYS = tuple(one.name for one in fields(ResidualRecord) if one.name not in _OF_THE_WHOLE)
 
 
-def residual_records(judged: HeldOut, runs: tuple[Run, ...]) -> tuple[ResidualRecord, ...]:
+def residual_records(
+    judged: HeldOut, runs: tuple[Run, ...], fitted: EvidenceFit
+) -> tuple[ResidualRecord, ...]:
     """Return what a model leaves in each recording.
 
     Parameters
     ----------
     judged : the residual on data that the model was not fitted to.
     runs : the recordings that were judged, in the same order.
+    fitted : the model.
     """
     n = judged.runs[0].residual.shape[1]
     unknown = judged.noise_std is None
     power = np.full(n, np.nan) if unknown else np.asarray(judged.noise_std) ** 2
     pairs = enumerate(zip(judged.runs, runs, strict=True))
-    return tuple(_record(one, run, power, i) for i, (one, run) in pairs)
+    return tuple(
+        replace(
+            _record(one, run, power, i),
+            torque_derivatives=_derivatives(fitted, bool(run.recording.payload)),
+        )
+        for i, (one, run) in pairs
+    )
+
+
+def _derivatives(fitted: EvidenceFit, carries_payload: bool) -> DerivativesAt:
+    """How torques of a fitted robot go with its motion, rotors included."""
+    robot = fitted.model.current_robot(fitted.values, carries_payload=carries_payload)
+    rotors = np.diag(fitted.model.rotor(fitted.values))
+
+    def at(q: np.ndarray, v: np.ndarray, a: np.ndarray) -> TorqueDerivatives:
+        found = robot.torque_derivatives(q, v, a)
+        return replace(found, by_a=found.by_a + rotors)
+
+    return at
 
 
 def _record(one: HeldOutRun, run: Run, power: np.ndarray, number: int) -> ResidualRecord:
     recording = run.recording
     windowed = recording.window is not None and recording.period is None
     # Only windows are known to share a clock: two recordings may have one name.
-    source = ("windows of", recording.where) if windowed else (recording.name, number, id(run))
+    source = (recording.name, number, id(run))
+    if windowed:
+        source = ("windows of", recording.where, recording.payload)
     return ResidualRecord(
         source=source,
         t=one.t,
@@ -98,6 +131,7 @@ def _joined(group: list[ResidualRecord]) -> ResidualRecord:
     whole = ResidualRecord(
         source=group[0].source,
         period=group[0].period,
+        torque_derivatives=group[0].torque_derivatives,
         **{name: np.concatenate([getattr(one, name) for one in group]) for name in _ARRAYS},
     )
     # Windows may overlap: no instant counts twice.

@@ -1,11 +1,12 @@
 """A diagnosis with what its residual depends on, and its verdict where noise alone cannot be left.
 
 Where nothing repeats, nothing tells the noise of what is left. But noise of the torque does not
-come again at the same position and velocity, nor at the same speeds of all joints: a residual that
-functions of these predict, on blocks of time that they were not fitted to, is no noise, whatever
-its size. Asked is the residual of the fit itself, of which its own columns leave nothing: what
-errors of the parameters make of a test recording is a function of the motion too. Nothing is said
-where what is left hangs together for longer than a small part of the recordings.
+come again at the same position and velocity, nor at the same speeds of all joints, and it does not
+go with what errors of the measured positions would make: a residual that functions of these
+predict, on blocks of time that they were not fitted to, is no noise, whatever its size. Asked is
+the residual of the fit itself, of which its own columns leave nothing: what errors of the
+parameters make of a test recording is a function of the motion too. Nothing is said where what is
+left hangs together for longer than a small part of the recordings.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from dynident.diagnosis.search.payload_recordings import marked
 from dynident.diagnosis.search.withdrawal import Path
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
-from dynident.evidence.held_out import on_blocks, on_recordings
+from dynident.evidence.held_out import HeldOut, on_blocks, on_recordings
 
 
 def with_dependence(
@@ -54,13 +55,14 @@ def with_dependence(
     With `residual_dependence`.
     """
     if found.noise_source == "unknown":
-        return replace(found, residual_dependence=_of_fit(evidence, path.final, MOTION_FIRST))
-    judged = path.judged[-1]
-    records = residual_records(judged, (held or evidence).runs)
+        return replace(found, residual_dependence=_of_fit(evidence, path.final))
+    judged, fitted = path.judged[-1], path.final
+    records = residual_records(judged, (held or evidence).runs, fitted)
     if held is not None:
         # Of the training recordings blocks of time that the model was not fitted to.
-        records = (*records, *residual_records(on_blocks(evidence, path.final), evidence.runs))
-    names, criteria = path.final.model.robot.names, evidence.criteria.verdict
+        blocks = on_blocks(evidence, fitted)
+        records = (*records, *residual_records(blocks, evidence.runs, fitted))
+    names, criteria = fitted.model.robot.names, evidence.criteria.verdict
     shares = residual_dependence(judged, joined(records), names, criteria)
     return replace(found, residual_dependence=shares)
 
@@ -101,25 +103,23 @@ def doubted(
 
 def _following(evidence: Evidence, fitted: EvidenceFit) -> dict[str, set[str]]:
     """Which inputs of the motion predict what a fit leaves, of joints where any does."""
-    told, criteria = _of_fit(evidence, fitted, MOTION), evidence.criteria.verdict
-    records, names = _records(evidence, fitted), fitted.model.robot.names
+    judged, criteria = on_recordings(evidence, fitted), evidence.criteria.verdict
+    records, names = _along(judged, evidence, fitted), fitted.model.robot.names
     found = {
         one.joint: set(one.of_the_motion(criteria))
-        for one in told
+        for one in residual_dependence(judged, records, names, criteria, MOTION)
         if independent_stretches(records, names.index(one.joint)) >= FEWEST_BLOCKS
     }
     return {joint: inputs for joint, inputs in found.items() if inputs}
 
 
-def _of_fit(
-    evidence: Evidence, fitted: EvidenceFit, order: Sequence[tuple[str, ...]]
-) -> tuple[JointDependence, ...]:
+def _of_fit(evidence: Evidence, fitted: EvidenceFit) -> tuple[JointDependence, ...]:
     """What a fit leaves of the data that it was fitted to, by what it depends on."""
     judged, criteria = on_recordings(evidence, fitted), evidence.criteria.verdict
-    records, names = _records(evidence, fitted), fitted.model.robot.names
-    return residual_dependence(judged, records, names, criteria, order)
+    records, names = _along(judged, evidence, fitted), fitted.model.robot.names
+    return residual_dependence(judged, records, names, criteria, MOTION_FIRST)
 
 
-def _records(evidence: Evidence, fitted: EvidenceFit) -> tuple[ResidualRecord, ...]:
+def _along(judged: HeldOut, evidence: Evidence, fitted: EvidenceFit) -> tuple[ResidualRecord, ...]:
     """What a fit leaves of the data that it was fitted to, along its recordings."""
-    return joined(residual_records(on_recordings(evidence, fitted), evidence.runs))
+    return joined(residual_records(judged, evidence.runs, fitted))
