@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -10,10 +10,21 @@ import numpy as np
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut, HeldOutRun
 from dynident.evidence.runs import Run
-from dynident.robot.dynamics import TorqueDerivatives
+from dynident.robot import Robot
 
-DerivativesAt = Callable[[np.ndarray, np.ndarray, np.ndarray], TorqueDerivatives]
-"""Derivatives of the torque along a motion q, v, a, (N, n) each."""
+
+@dataclass(frozen=True, eq=False)
+class FittedBody:
+    """A robot with the parameters that a fit found.
+
+    Attributes
+    ----------
+    robot : with its bodies.
+    rotor : (n,) inertia that rotors add at each joint, kg m^2 or kg.
+    """
+
+    robot: Robot
+    rotor: np.ndarray
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -30,8 +41,7 @@ class ResidualRecord:
     certain : (T, n) mask of the rows by which a joint is judged.
     noise_power : (T, n) mean square of the noise, (N m)^2 or N^2; NaN where it is unknown.
     period : s, of a motion that repeats; None where none is known.
-    torque_derivatives : how the torque of the fitted robot, its payload on board or not, goes with
-        motions q, v, a (N, n); None where no robot is known.
+    body : the fitted robot, with its payload where that is on board; None where none is known.
     """
 
     source: Hashable
@@ -45,19 +55,19 @@ class ResidualRecord:
     certain: np.ndarray
     noise_power: np.ndarray
     period: float | None
-    torque_derivatives: DerivativesAt | None = None
+    body: FittedBody | None = None
 
     def rows(self, index: np.ndarray) -> ResidualRecord:
         """Return some of its rows, by an index or a mask (T,)."""
         return ResidualRecord(
             source=self.source,
             period=self.period,
-            torque_derivatives=self.torque_derivatives,
+            body=self.body,
             **{name: getattr(self, name)[index] for name in _ARRAYS},
         )
 
 
-_OF_THE_WHOLE = ("source", "period", "torque_derivatives")
+_OF_THE_WHOLE = ("source", "period", "body")
 _ARRAYS = tuple(one.name for one in fields(ResidualRecord) if one.name not in _OF_THE_WHOLE)
 
 
@@ -76,25 +86,17 @@ def residual_records(
     unknown = judged.noise_std is None
     power = np.full(n, np.nan) if unknown else np.asarray(judged.noise_std) ** 2
     pairs = enumerate(zip(judged.runs, runs, strict=True))
-    return tuple(
-        replace(
-            _record(one, run, power, i),
-            torque_derivatives=_derivatives(fitted, bool(run.recording.payload)),
+    bodies = {
+        loaded: FittedBody(
+            fitted.model.current_robot(fitted.values, carries_payload=loaded),
+            fitted.model.rotor(fitted.values),
         )
+        for loaded in {bool(run.recording.payload) for run in runs}
+    }
+    return tuple(
+        replace(_record(one, run, power, i), body=bodies[bool(run.recording.payload)])
         for i, (one, run) in pairs
     )
-
-
-def _derivatives(fitted: EvidenceFit, carries_payload: bool) -> DerivativesAt:
-    """How torques of a fitted robot go with its motion, rotors included."""
-    robot = fitted.model.current_robot(fitted.values, carries_payload=carries_payload)
-    rotors = np.diag(fitted.model.rotor(fitted.values))
-
-    def at(q: np.ndarray, v: np.ndarray, a: np.ndarray) -> TorqueDerivatives:
-        found = robot.torque_derivatives(q, v, a)
-        return replace(found, by_a=found.by_a + rotors)
-
-    return at
 
 
 def _record(one: HeldOutRun, run: Run, power: np.ndarray, number: int) -> ResidualRecord:
@@ -131,7 +133,7 @@ def _joined(group: list[ResidualRecord]) -> ResidualRecord:
     whole = ResidualRecord(
         source=group[0].source,
         period=group[0].period,
-        torque_derivatives=group[0].torque_derivatives,
+        body=group[0].body,
         **{name: np.concatenate([getattr(one, name) for one in group]) for name in _ARRAYS},
     )
     # Windows may overlap: no instant counts twice.
