@@ -5,9 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dynident.diagnosis.nuisances.friction_width import WidthProfile, with_friction_width
+from dynident.diagnosis.nuisances.friction_width import (
+    WidthProfile,
+    at_best_widths,
+    with_friction_width,
+)
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import fit_evidence, in_metric_of
+from dynident.evidence.held_out import on_recordings
 from dynident.evidence.runs import gather
 from dynident.recording import Dataset
 from study_files import recording, true_model
@@ -62,3 +67,20 @@ def test_where_nothing_repeats_a_width_is_taken_if_it_is_worth_its_price(
         assert found.model.friction_widths[1] == pytest.approx(STATED, rel=0.5)
         worth = start.error_signal - in_metric_of(evidence, found, start).error_signal
         assert worth > 2 * np.log(start.rows)
+
+
+def test_dithered_friction_may_be_as_wide_as_the_speeds_whatever_is_stated() -> None:
+    """Far beyond the widths that are tried as a parameter of the joint."""
+    truth = true_model().with_friction_width("elbow", 0.4)
+    friction = {"Fv__shoulder": 2.0, "Fv__elbow": 1.0, "Fc__elbow": 1.5}
+    once = synthetic(
+        truth, true_values(truth, **friction), 8, rate_hz=200, period=None, torque_std=0.01
+    )
+    evidence = Evidence(true_model(), gather(Dataset((once,))))
+    start = fit_evidence(evidence, true_model())
+    found = at_best_widths(evidence, start, {"elbow"})
+    assert found.model.friction_widths[1] == pytest.approx(0.4, rel=0.35)
+    assert found.model.friction_widths[0] == start.model.friction_widths[0]
+    left = [on_recordings(evidence, one).residual_rms[1] for one in (found, start)]
+    assert left[0] < 0.2 * left[1]
+    assert at_best_widths(evidence, start, {"shoulder"}) is start  # no dry friction there

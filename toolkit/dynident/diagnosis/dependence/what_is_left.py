@@ -26,6 +26,7 @@ from dynident.diagnosis.dependence.residual_record import (
     joined,
     residual_records,
 )
+from dynident.diagnosis.nuisances.friction_width import at_best_widths
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.payload_recordings import marked
 from dynident.diagnosis.search.withdrawal import Path
@@ -87,18 +88,26 @@ def doubted(
     if found.verdict == "unexplained":
         return found
     follow = _following(evidence, path.final)
+    if follow:
+        # Dry friction that reverses over another width than stated is nothing that is missing.
+        other = at_best_widths(evidence, path.final, follow)
+        follow = _both(follow, _following(evidence, other)) if other is not path.final else follow
     payloads = [run.recording.payload for run in evidence.runs]
     for one in narrow:
         if follow:
             lower = marked(one, payloads)
-            again = _following(lower, fit_evidence(lower, path.final.model))
-            follow = {joint: inputs & again.get(joint, set()) for joint, inputs in follow.items()}
-            follow = {joint: inputs for joint, inputs in follow.items() if inputs}
+            follow = _both(follow, _following(lower, fit_evidence(lower, path.final.model)))
     if not follow:
         return found
     return replace(
         found, verdict="unexplained", following_motion=tuple(follow), detection_limits=()
     )
+
+
+def _both(one: dict[str, set[str]], other: dict[str, set[str]]) -> dict[str, set[str]]:
+    """Inputs at each joint that are in both."""
+    found = {joint: inputs & other.get(joint, set()) for joint, inputs in one.items()}
+    return {joint: inputs for joint, inputs in found.items() if inputs}
 
 
 def _following(evidence: Evidence, fitted: EvidenceFit) -> dict[str, set[str]]:

@@ -11,7 +11,7 @@ say, explains more than any width.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -205,6 +205,38 @@ def with_friction_width(evidence: Evidence, fitted: EvidenceFit) -> EvidenceFit:
         if _drop(evidence, fitted, other) > _price(fitted):
             fitted = other
     return fitted
+
+
+def at_best_widths(evidence: Evidence, fitted: EvidenceFit, joints: Collection[str]) -> EvidenceFit:
+    """Return the fit with the friction widths that fit best, whether or not they are worth it.
+
+    Noise that a stiff loop feeds into the drive dithers friction over as much as its speeds,
+    however narrow the stated width.
+
+    Parameters
+    ----------
+    evidence : the training recordings.
+    fitted : the model as it fits them.
+    joints : whose widths; those without dry friction stay.
+
+    Returns
+    -------
+    As it is where no other width fits better.
+    """
+    model, own = fitted.model, evidence.criteria.nuisances
+    speed = np.concatenate([one.v for run in evidence.runs for one in run.replicates])
+    for joint, stated, usual in zip(
+        model.robot.names, evidence.model.friction_widths, np.std(speed, axis=0), strict=True
+    ):
+        if joint not in joints or f"coulomb_friction@{joint}" not in model.slices:
+            continue
+        profile = WidthProfile(evidence, fitted, joint)
+        widest = max(own.widest_width * stated, usual)
+        tried = np.geomspace(own.narrowest_width * stated, widest, 2 * own.widths)
+        missed = profile.missed(tried / profile.width)
+        if missed.min() < fitted.error_signal:
+            model = model.with_friction_width(joint, float(tried[np.argmin(missed)]))
+    return fitted if model is fitted.model else fit_evidence(evidence, model, fitted)
 
 
 def _price(fitted: EvidenceFit) -> float:
