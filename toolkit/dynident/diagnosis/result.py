@@ -194,9 +194,9 @@ class Diagnosis(Shown):
             added = f"Added: {effects}." if effects else "No effect in the catalogue is of use."
             return (
                 f"{added} What is left at {' and '.join(self.following_motion)} is not all noise: "
-                "functions of the joint's position and velocity, or of the joints' speeds, predict "
-                "it on blocks of time that they were not fitted to. How much of it is noise is "
-                "unknown."
+                "functions of the joint's position and velocity, or of the joints' speeds, or "
+                "errors of the measured positions that depend on the position, predict it on "
+                "blocks of time that they were not fitted to. How much of it is noise is unknown."
             )
         if self.training_only:
             added = f"Added: {effects}." if effects else "No effect in the catalogue explains it:"
