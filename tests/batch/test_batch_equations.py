@@ -8,7 +8,13 @@ import pytest
 from random_trees import joint_names, random_tree, urdf
 
 from chains import chain
-from dynident.batch import joint_space_tape, regressor_kernel, tape, torque_kernel
+from dynident.batch import (
+    joint_space_tape,
+    regressor_kernel,
+    tape,
+    torque_derivative_kernel,
+    torque_kernel,
+)
 from dynident.robot import Robot, structural_base
 
 pin: Any = pinocchio  # its bindings carry no types
@@ -76,6 +82,20 @@ def test_joint_space_inertia_and_bias_are_pinocchios(seed):
         M = (upper + upper.T - np.diag(np.diag(upper)))[np.ix_(index, index)]
         found = [row[k] for row in results[:-n]]
         np.testing.assert_allclose(found, M[np.tril_indices(n)], rtol=0, atol=1e-13 * M.max())
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_derivatives_by_one_joint_are_pinocchios(seed):
+    robot = robot_of(seed)
+    motion = robot.random_motion(seed, 40)
+    every = robot.torque_derivatives(*motion)
+    wanted = np.stack([every.by_q, every.by_v, every.by_a], axis=1)
+    scale = np.abs(wanted).max(axis=(0, 2, 3))
+    for joint in range(robot.n):
+        kernel = torque_derivative_kernel(tree_of(robot), joint)
+        found = kernel(*motion, parameters=robot.theta.tolist())
+        error = np.abs(found - wanted[..., joint]).max(axis=(0, 2))
+        assert np.all(error < 1e-14 * scale)
 
 
 def test_axes_against_the_frames_and_tidy_frames_are_as_exact():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from dataclasses import replace
 from typing import Any, cast
 
@@ -190,8 +192,20 @@ def test_derivatives_between_samples_are_those_at_them() -> None:
     samples = block(3, 2000.0)
     _, fine = along.along_motion(samples)
     exact = ROBOT.torque_derivatives(samples.q, samples.v, samples.a)
-    for found, expected in ((fine.by_q, exact.by_q), (fine.by_v, exact.by_v)):
-        np.testing.assert_allclose(found, expected, atol=1e-5 * np.abs(expected).max())
+    for joint in range(ROBOT.n):
+        found = fine.by(joint)
+        for one, every in ((found.by_q, exact.by_q), (found.by_v, exact.by_v)):
+            error = 1e-5 * np.abs(every).max()
+            np.testing.assert_allclose(one, every[:, :, joint], atol=error)
+
+
+def test_what_is_kept_of_a_motion_goes_with_it() -> None:
+    samples = block(3)
+    along.along_motion(samples)[1].by(0)
+    held = weakref.ref(samples.q)
+    del samples
+    gc.collect()
+    assert held() is None
 
 
 def test_screened_shapes_share_the_dynamics_of_a_joint() -> None:

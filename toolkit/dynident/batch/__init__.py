@@ -1,4 +1,4 @@
-"""Dynamics of many samples at once: the regressor and the torque of a tree of joints.
+"""Dynamics of many samples at once: regressor, torque and its derivatives of a tree of joints.
 
 `newton_euler` writes the equations of motion of a robot as CasADi expressions, once; a `Tape` lists
 what is left of them as additions and products, and a `Kernel` replays it, one NumPy call an

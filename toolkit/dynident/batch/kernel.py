@@ -16,6 +16,7 @@ from dynident.batch.joint_tree import JointTree
 from dynident.batch.memory import side_by_side
 from dynident.batch.newton_euler import SIGNALS, Equations, regressor_equations, torque_equations
 from dynident.batch.tape import Tape, tape_of
+from dynident.batch.torque_derivatives import torque_derivative_equations
 
 _KEPT = 32  # functions; one of 60 joints takes some MB
 _used: dict[Evaluation, None] = {}
@@ -131,6 +132,20 @@ def torque_kernel(tree: JointTree) -> Kernel:
     tree : the robot.
     """
     return Kernel(torque_equations(tree), (tree.n,))
+
+
+@lru_cache(maxsize=_KEPT)
+def torque_derivative_kernel(tree: JointTree, joint: int) -> Kernel:
+    """Return the function of the torque's derivatives by one joint's q, v and a, (T, 3, n).
+
+    Its parameters are the 10 n of the bodies.
+
+    Parameters
+    ----------
+    tree : the robot.
+    joint : by whose motion.
+    """
+    return Kernel(torque_derivative_equations(tree, joint), (3, tree.n))
 
 
 def evaluations() -> tuple[Evaluation, ...]:

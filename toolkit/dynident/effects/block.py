@@ -9,7 +9,7 @@ import numpy as np
 
 from dynident.errors import EffectError
 from dynident.robot import Robot
-from dynident.robot.dynamics import TorqueDerivatives
+from dynident.robot.joint_derivatives import JointDerivatives
 
 FRICTION_WIDTH = 0.01
 """Speed (rad/s, or m/s for a prismatic joint) over which dry friction changes its sign.
@@ -83,11 +83,10 @@ class Block:
         return self.body
 
     @cached_property
-    def derivatives(self) -> TorqueDerivatives:
+    def derivatives(self) -> JointDerivatives:
         """Derivatives of the torque of `body` by q, v and a; made once, for all effects."""
-        return self.fitted_robot("the derivatives of the torque").torque_derivatives(
-            self.q, self.v, self.a
-        )
+        robot = self.fitted_robot("the derivatives of the torque")
+        return JointDerivatives(robot, self.q, self.v, self.a)
 
     def sign(self, speed: np.ndarray, *joints: str | None) -> np.ndarray:
         """Smoothed sign of a speed at joints, the package's one law of dry friction.

@@ -380,6 +380,22 @@ class Robot:
         own = self.theta if theta is None else self._vector(theta)
         return self._dynamics.derivatives(*self._motion(q, v, a), own)
 
+    def torque_derivatives_by(
+        self, joint: int, q: ArrayLike, v: ArrayLike, a: ArrayLike
+    ) -> TorqueDerivatives | None:
+        """Return the derivatives of the torque by one joint's q, v and a; see `JointDerivatives`.
+
+        Parameters
+        ----------
+        joint : column of the joint.
+        q, v, a : (T, n), in rad or m, and per s and s^2.
+
+        Returns
+        -------
+        (T, n) each, [t, i] = d tau_i / d x; None where `torque_derivatives` take no longer.
+        """
+        return self._dynamics.derivatives_by(joint, *self._motion(q, v, a), self.theta)
+
     def random_motion(self, seed: int, samples: int) -> tuple[Array, Array, Array]:
         """Return q, v, a (samples, n), uniform within the limits; see `tree.random_motion`."""
         return random_motion(self.joints, seed, samples)

@@ -9,6 +9,7 @@ import numpy as np
 from dynident.effects.bodies.turn import turn_about
 from dynident.effects.effect import Block, Forceless, Parameter, motion_unit
 from dynident.effects.traits import Needs
+from dynident.robot.joint_derivatives import JointDerivatives
 
 _NEXT_TO_NOTHING = 1e-5
 """Offset in rad or m below which a difference has fewer digits than the derivative in the middle
@@ -43,11 +44,11 @@ class JointZero(Forceless):
         body, j = block.fitted_robot(self.label), block.index(self.joint)
         (offset,) = self.point or (0.0,)
         if offset == 0.0:
-            return block.derivatives.by_q[:, :, [j]]
+            return block.derivatives.by(j).by_q[:, :, None]
         moved = np.array(block.q)
         if abs(offset) < _NEXT_TO_NOTHING:
             moved[:, j] += offset / 2
-            return body.torque_derivatives(moved, block.v, block.a).by_q[:, :, [j]]
+            return JointDerivatives(body, moved, block.v, block.a).by(j).by_q[:, :, None]
         moved[:, j] += offset
         rise = body.inverse_dynamics(moved, block.v, block.a)
         rise -= body.inverse_dynamics(block.q, block.v, block.a)

@@ -3,27 +3,66 @@
 from __future__ import annotations
 
 import weakref
-from dataclasses import dataclass
 
 import numpy as np
 
 from dynident.effects.block import Block
 from dynident.errors import EffectError
 from dynident.robot import Robot
+from dynident.robot.dynamics import TorqueDerivatives
+from dynident.robot.joint_derivatives import JointDerivatives
 
 _POSES = 64
 _RATE = 200.0
 """Hz at which the derivatives of the torque are evaluated."""
 
 
-@dataclass(frozen=True, eq=False)
 class Along:
-    """The rigid robot along a motion: torque (T, n) and its derivatives (T, n, n)."""
+    """The rigid robot along a motion.
 
-    torque: np.ndarray
-    by_q: np.ndarray
-    by_v: np.ndarray
-    by_a: np.ndarray
+    Parameters
+    ----------
+    robot : the fitted model's.
+    block : the motion.
+
+    Attributes
+    ----------
+    torque : (T, n) N m or N.
+    """
+
+    def __init__(self, robot: Robot, block: Block) -> None:
+        self.torque = robot.inverse_dynamics(block.q, block.v, block.a)
+        step, self._samples = float(np.mean(np.diff(block.t))), len(block.t)
+        every = max(1, min(int(1.0 / (_RATE * step)), self._samples // 4))
+        rows = np.arange(0, self._samples, every)
+        self._rows = np.unique(np.append(rows, self._samples - 1))
+        # Copies: what is kept as long as the positions live must not keep them alive.
+        motion = (x[self._rows] for x in (block.q, block.v, block.a))
+        self._derivatives = JointDerivatives(robot, *motion)
+        self._between: dict[int, TorqueDerivatives] = {}
+
+    def by(self, joint: int) -> TorqueDerivatives:
+        """Return the derivatives of the torque by one joint's q, v and a, (T, n) each.
+
+        They cost most of all, and change as slowly as the motion: splines give them between
+        samples.
+
+        Parameters
+        ----------
+        joint : column of the joint.
+        """
+        found = self._derivatives.by(joint)
+        if len(self._rows) == self._samples:
+            return found
+        if joint not in self._between:
+            from scipy.interpolate import make_interp_spline
+
+            some = np.stack([found.by_q, found.by_v, found.by_a], axis=1)
+            spline = make_interp_spline(self._rows, some, k=3)
+            self._between[joint] = TorqueDerivatives(
+                *spline(np.arange(self._samples)).swapaxes(0, 1)
+            )
+        return self._between[joint]
 
 
 _ALONG: dict[int, tuple[Robot, np.ndarray, np.ndarray, Along]] = {}
@@ -41,28 +80,11 @@ def along_motion(block: Block) -> tuple[Robot, Along]:
         same = kept[0] is robot or np.array_equal(kept[0].theta, robot.theta)
         if same and kept[0].names == robot.names:
             return robot, kept[3]
-    along = Along(robot.inverse_dynamics(block.q, block.v, block.a), *_derivatives(robot, block))
+    along = Along(robot, block)
     if kept is None:
         weakref.finalize(block.q, _ALONG.pop, key, None)
     _ALONG[key] = (robot, block.v, block.a, along)
     return robot, along
-
-
-def _derivatives(robot: Robot, block: Block) -> tuple[np.ndarray, ...]:
-    """Derivatives of the torque by q, v and a, (T, n, n) each.
-
-    They cost most of all, and change as slowly as the motion: splines give them between samples.
-    """
-    step = float(np.mean(np.diff(block.t)))
-    every = max(1, min(int(1.0 / (_RATE * step)), len(block.t) // 4))
-    rows = np.unique(np.append(np.arange(0, len(block.t), every), len(block.t) - 1))
-    by = robot.torque_derivatives(block.q[rows], block.v[rows], block.a[rows])
-    if every == 1:
-        return by.by_q, by.by_v, by.by_a
-    from scipy.interpolate import make_interp_spline
-
-    every = np.stack([by.by_q, by.by_v, by.by_a], axis=1)
-    return tuple(make_interp_spline(rows, every, k=3)(np.arange(len(block.t))).swapaxes(0, 1))
 
 
 def mean_inertia(robot: Robot, joint: int) -> float:

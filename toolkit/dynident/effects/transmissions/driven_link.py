@@ -46,9 +46,8 @@ class DrivenLink:
         robot, along = along_motion(block)
         rotor = 0.0 if block.rotor is None else float(block.rotor[joint])
         self.joint, self.a = joint, block.a[:, joint]
-        self.M, self.C, self.G = (
-            np.ascontiguousarray(x[:, :, joint]) for x in (along.by_a, along.by_v, along.by_q)
-        )
+        by = along.by(joint)
+        self.M, self.C, self.G = map(np.ascontiguousarray, (by.by_a, by.by_v, by.by_q))
         self.whole = self.M[:, joint] + rotor
         self.load = along.torque[:, joint] + rotor * self.a
         # What is stiff stays as stiff when a payload is taken up.
