@@ -8,6 +8,7 @@ import pytest
 from dynident.errors import RecordingError
 from dynident.model import Model
 from dynident.robot import Robot
+from dynident.robot.poses import poses
 from dynident.study_draft.by_numbers import UNUSED, named_by_numbers
 from study_files import recording
 from synthetic import ARM, arm, synthetic, true_values
@@ -106,3 +107,38 @@ def test_what_only_drifts_is_no_motion_and_no_torque(seed: int) -> None:
         x = np.hstack([blocks["t"], *columns])
         with pytest.raises(RecordingError, match=r"motion explains 2 others.*--column"):
             named_by_numbers(x, arm(), None, "x")
+
+
+MIXED = np.array([[80.0, 0.0], [-31.0, -100.0]])
+"""Positions of motors behind gears, of which the second turns with the first joint."""
+
+
+def tool(q: np.ndarray) -> np.ndarray:
+    """Where a point of the last link is, m: of six coordinates those that the plane arm moves."""
+    R, p = zip(*(poses(arm(), one) for one in q), strict=True)
+    point = np.array([r[-1] @ [0.1, 0.02, 0.3] + o[-1] for r, o in zip(R, p, strict=True)])
+    return point[:, np.ptp(point, axis=0) > 1e-6]
+
+
+@pytest.mark.parametrize("order", [("t", "q", "{}"), ("t", "q", "v", "{}"), ("t", "{}", "q")])
+@pytest.mark.parametrize("copy", ["motor", "tool"])
+def test_positions_of_motors_and_of_the_tool_are_no_torques(order, copy: str) -> None:
+    blocks = table()
+    rng = np.random.default_rng(0)
+    moved = blocks["q"] @ MIXED.T if copy == "motor" else tool(blocks["q"])
+    blocks["copy"] = moved + 1e-4 * np.ptp(moved, axis=0) * rng.normal(size=moved.shape)
+    names = [name.format("copy") for name in order]
+    x = np.hstack([blocks[name] for name in names])
+    with pytest.raises(RecordingError, match=r"motion explains 2 others.*--column"):
+        named_by_numbers(x, arm(), None, "x")
+    x = np.hstack([blocks[name] for name in (*names, "tau")])
+    found = named_by_numbers(x, arm(), None, "x").named(0, arm().names)
+    assert found[-2:] == ("tau.shoulder", "tau.elbow")
+
+
+def test_more_pairs_than_are_tried_are_said() -> None:
+    blocks = table()
+    rng = np.random.default_rng(0)
+    x = np.hstack([blocks["t"], rng.normal(size=(len(blocks["t"]), 30))])
+    with pytest.raises(RecordingError, match=r"\d+ pairs of them.*at most 400 are tried.*--column"):
+        named_by_numbers(x, arm(), None, "x")

@@ -15,6 +15,7 @@ from dynident.errors import RecordingError
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
 from dynident.robot import Robot
+from dynident.study_draft.places import Places
 from dynident.study_draft.timing import clock_scale, is_clock
 from dynident.wiring.wiring_regression import WiringRegression
 from dynident.wiring.wiring_rows import WiringRows, rows_of
@@ -128,7 +129,7 @@ def named_by_numbers(
         for s in range(x.shape[1] - n + 1)
         if not any(s <= k < s + n for k in clocks) and np.ptp(x[:, s : s + n], axis=0).any()
     ]
-    blocks = _Blocks(x=x, t=t, robot=robot, starts=tuple(starts))
+    blocks = _Blocks(x=x, t=t, robot=robot, starts=tuple(starts), where=where, remedy=remedy)
     readings, reason = blocks.with_speeds() or blocks.without_speeds() or ([], "")
     if not readings:
         what = f"no {n} of its columns are positions whose motion explains {n} others as torques"
@@ -148,12 +149,15 @@ class _Blocks:
     t : (T,) s.
     robot : as it is described.
     starts : of runs that may be a signal: of no clock, and not at rest.
+    where, remedy : for messages.
     """
 
     x: np.ndarray
     t: np.ndarray
     robot: Robot
     starts: tuple[int, ...]
+    where: str
+    remedy: str
 
     @cached_property
     def model(self) -> Model:
@@ -185,6 +189,7 @@ class _Blocks:
         speeds = {pair[1] for pair in pairs}
         free = [s for s in free if not any(_is_rate(x, self.t, one, s, n) for one in speeds)]
         free = [s for s in free if not _is_same(x, q, s, n) and not _is_same(x, v, s, n)]
+        free = [s for s in free if not self._is_place(q, s)]
         scored = sorted(((self.explained(q, s), -s) for s in free), reverse=True)
         what = f"what is in {_span(v, n)} is the derivative of what is in {_span(q, n)}"
         reason = f"{what}, and the equations of motion explain these torques best"
@@ -196,9 +201,13 @@ class _Blocks:
         pairs = [(q, s) for q in self.starts for s in self.starts if abs(q - s) >= n]
         pairs = [(q, s) for q, s in pairs if not self._repeats(q, s)]
         if len(pairs) > _MOST_PAIRS:
-            return None
+            what = f"no columns are the derivative of others, and {len(pairs)} pairs of them may "
+            what += f"be positions and torques: at most {_MOST_PAIRS} are tried"
+            raise RecordingError(what, self.where, self.remedy)
         scored = sorted(((self.explained(q, s), -q, -s) for q, s in pairs), reverse=True)
         shown = [(-q, -s) for score, q, s in scored if score > n * _SHOWN]
+        # Either of two may be the positions of which the other is made.
+        shown = [(q, s) for q, s in shown if not self._is_place(q, s) and not self._is_place(s, q)]
         shown = [pair for pair in shown if self._holds(*pair)]
         if not shown:
             return None
@@ -218,8 +227,17 @@ class _Blocks:
         torque, positions = self.of(tau), self.of(q)
         if not np.ptp(torque, axis=0).all():
             return -np.inf
-        turns = np.abs(positions).max() > _TURN
-        return max(self._fit(x, torque) for x in (positions, positions * _DEGREE)[: 1 + turns])
+        return max(self._fit(x, torque) for x in _in_radians(positions))
+
+    def _is_place(self, q: int, tau: int) -> bool:
+        """Whether a block follows from positions: those of motors or of a tool, and no torques."""
+        if q not in self._places:
+            self._places[q] = [Places(self.robot, x) for x in _in_radians(self.of(q))]
+        return any(one.tell(self.of(tau)) for one in self._places[q])
+
+    @cached_property
+    def _places(self) -> dict[int, list[Places]]:
+        return {}
 
     def _holds(self, q: int, tau: int) -> bool:
         """Whether the motion predicts half of the torques in each quarter of the time by the rest.
@@ -282,6 +300,12 @@ class _Blocks:
         """Whether a reading has other positions or torques, and no part of the same ones."""
         shifts = [abs(one[signal] - before[signal]) for signal in ("q", "tau")]
         return any(shifts) and not any(0 < shift < self.robot.n for shift in shifts)
+
+
+def _in_radians(positions: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Positions (T, n) as they are and, where they would be more than a turn, as degrees."""
+    turns = np.abs(positions).max() > _TURN
+    return (positions, positions * _DEGREE)[: 1 + turns]
 
 
 def _roughness(x: np.ndarray) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import weakref
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +29,7 @@ class Along:
     Attributes
     ----------
     torque : (T, n) N m or N.
+    latest : what was made of it last, and of what else; for whoever makes it to keep.
     """
 
     def __init__(self, robot: Robot, block: Block) -> None:
@@ -40,6 +42,7 @@ class Along:
         motion = (x[self._rows] for x in (block.q, block.v, block.a))
         self._derivatives = JointDerivatives(robot, *motion)
         self._between: dict[int, TorqueDerivatives] = {}
+        self.latest: tuple[tuple[Any, ...], Any] | None = None
 
     def by(self, joint: int) -> TorqueDerivatives:
         """Return the derivatives of the torque by one joint's q, v and a, (T, n) each.

@@ -25,6 +25,23 @@ _LEAST = 0.05
 """Of the mean inertia: no link is lighter, or unlikely estimates would ring beyond reason."""
 
 
+def driven_link(block: Block, joint: int) -> DrivenLink:
+    """Return the link of a joint along a motion; the latest one of each motion is kept.
+
+    Whoever seeks shapes of one joint asks for the same link again and again.
+
+    Parameters
+    ----------
+    block, joint : as for `DrivenLink`.
+    """
+    _, along = along_motion(block)
+    rotor = 0.0 if block.rotor is None else float(block.rotor[joint])
+    asked = (joint, rotor, block.period, block.empty)
+    if along.latest is None or along.latest[0] != asked:
+        along.latest = asked, DrivenLink(block, joint)
+    return along.latest[1]
+
+
 class DrivenLink:
     """The link of one joint, along the motion of a recording.
 
@@ -60,6 +77,19 @@ class DrivenLink:
         # A record that is shorter than its period does not hold what came before it.
         whole = 0 if block.period is None else round(block.period / self.step)
         self.period = whole if whole <= len(block.t) else 0
+        self._latest: tuple[tuple[int, int], Fine] | None = None
+
+    def fine(self, per: int, before: np.ndarray) -> Fine:
+        """Return the link's motion in finer steps, the latest as it was made.
+
+        Parameters
+        ----------
+        per, before : as for `Fine.of`; rows before are those of `run_up`, told by their number.
+        """
+        asked = (per, len(before))
+        if self._latest is None or self._latest[0] != asked:
+            self._latest = asked, Fine.of(self, per, before)
+        return self._latest[1]
 
     def behind(self, gear: Transmitting) -> np.ndarray:
         """Return the inertia behind a transmission, (T,): no less than a part of the mean."""

@@ -12,7 +12,7 @@ from dynident.effects.traits import Needs
 from dynident.effects.transmission import Transmission
 from dynident.effects.transmissions.along import mean_inertia, share_of_rotor
 from dynident.effects.transmissions.dead_zone import Transmitting
-from dynident.effects.transmissions.driven_link import DrivenLink
+from dynident.effects.transmissions.driven_link import DrivenLink, driven_link
 from dynident.effects.transmissions.link_response import Response, responses, stacked
 from dynident.robot import Robot
 
@@ -89,7 +89,7 @@ class FlexibleJoint(Forceless):
         return stacked(found)
 
     def _link(self, block: Block) -> DrivenLink:
-        return DrivenLink(block, block.index(self.joint))
+        return driven_link(block, block.index(self.joint))
 
     def _column(self, link: DrivenLink) -> np.ndarray:
         gear, response = self._response(link)

@@ -52,7 +52,7 @@ def responses(
         followed = [gear for gear in each if link.follows(gear)]
         per = max(map(link.steps_per_sample, followed), default=1)
         before = max((link.run_up(gear) for gear in followed), key=len, default=np.zeros(0, int))
-        fine = Fine.of(link, per, before)
+        fine = link.fine(per, before)
         made.append(
             [(Response if link.follows(gear) else Unmoved)(link, fine, gear) for gear in each]
         )

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from dynident.errors import DynidentError
 from dynident.reporting.content import AFTER_COLOUR, BEFORE_COLOUR, GREY
 from dynident.reporting.pictures.plots import Picture, plain
-from dynident.reporting.pictures.solids import Solid, poses, solid, solids
+from dynident.reporting.pictures.solids import Solid, solid, solids
 from dynident.reporting.pictures.strokes import (
     IMPOSSIBLE_COLOUR,
     Sketch,
@@ -22,6 +22,7 @@ from dynident.reporting.pictures.strokes import (
     tips,
 )
 from dynident.robot import Robot
+from dynident.robot.poses import poses
 
 _LINES = ("-", "-", "--", "-.")
 _COLOURS = (BEFORE_COLOUR, AFTER_COLOUR, "#2e8b57", GREY)

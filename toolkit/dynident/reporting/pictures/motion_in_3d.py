@@ -14,9 +14,10 @@ from dynident.errors import DesignError, DynidentError
 from dynident.experiment_design import RecordingDesign
 from dynident.experiment_design.geometry.robot_shapes import RobotShapes
 from dynident.experiment_design.geometry.surroundings import Obstacle
-from dynident.reporting.pictures.solids import poses, solid
+from dynident.reporting.pictures.solids import solid
 from dynident.robot import Robot
 from dynident.robot.formats.tree_assembly import quiet
+from dynident.robot.poses import poses
 
 _RATE, _MOST_FRAMES = 30, 3000  # frames per s, and of a page
 _THINNEST = 0.05  # of an ellipsoid's longest semi-axis, or the eye loses it

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from dynident.inertia import margins, to_com
 from dynident.robot import Robot
+from dynident.robot.poses import poses
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -118,26 +118,6 @@ def solids(robot: Robot, q: np.ndarray) -> tuple[Solid, ...]:
     R, p = poses(robot, q)
     bodies = zip(robot.bodies, robot.theta.reshape(-1, 10), strict=True)
     return tuple(solid(body, phi).moved(R[k], p[k]) for k, (body, phi) in enumerate(bodies))
-
-
-def poses(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Orientation (n, 3, 3) and origin (n, 3) m of every joint frame in the world at q (n,)."""
-    found: dict[int, tuple[np.ndarray, np.ndarray]] = {-1: (np.eye(3), np.zeros(3))}
-
-    def pose(index: int) -> tuple[np.ndarray, np.ndarray]:
-        if index not in found:
-            joint = robot.joints[index]
-            R, p = pose(joint.parent)
-            p, R = p + R @ joint.p, R @ joint.R
-            if joint.kind == "revolute":
-                R = R @ Rotation.from_rotvec(q[index] * joint.axis).as_matrix()
-            else:
-                p = p + R @ joint.axis * q[index]
-            found[index] = R, p
-        return found[index]
-
-    every = [pose(index) for index in range(robot.n)]
-    return np.stack([R for R, _ in every]), np.stack([p for _, p in every])
 
 
 def signed(value: float) -> str:

@@ -11,8 +11,9 @@ from scipy.optimize import linear_sum_assignment
 
 from dynident.reporting.content import GREY
 from dynident.reporting.pictures.plots import plain
-from dynident.reporting.pictures.solids import Solid, poses
+from dynident.reporting.pictures.solids import Solid
 from dynident.robot import Robot
+from dynident.robot.poses import poses
 
 IMPOSSIBLE_COLOUR = "#d1102e"
 _BONE = "#404040"
