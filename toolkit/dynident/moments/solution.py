@@ -151,12 +151,22 @@ def solve_products(
     """
     scale = np.sqrt(np.diag(total))
     white = orthonormal_directions(total, np.where(scale > 0, scale, 1.0))
-    reliability, turn = np.linalg.eigh(white.T @ signal @ white)
+    reliability, turn = eigenvectors(white.T @ signal @ white)
     good = reliability > least_reliability
     basis = white @ turn[:, good]
     reliability = reliability[good]
     values = basis @ ((basis.T @ moment) / reliability)
     return MomentSolution(values, basis, reliability)
+
+
+def eigenvectors(products: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues (p,), ascending, and eigenvectors (p, p) of symmetric products (p, p).
+
+    Most effects have one column, of which there is nothing to work out.
+    """
+    if products.shape == (1, 1):
+        return products[0].copy(), np.ones((1, 1))
+    return np.linalg.eigh(products)
 
 
 def orthonormal_directions(products: np.ndarray, scale: np.ndarray) -> np.ndarray:
@@ -172,7 +182,7 @@ def orthonormal_directions(products: np.ndarray, scale: np.ndarray) -> np.ndarra
     FitError
         If a product is not finite.
     """
-    size, directions = np.linalg.eigh(products / np.outer(scale, scale))
+    size, directions = eigenvectors(products / np.outer(scale, scale))
     if not np.all(np.isfinite(size)):
         raise FitError("the columns of the model are not finite")
     keep = size > EXACT * max(float(size[-1]), 1e-300)

@@ -8,7 +8,12 @@ import numpy as np
 
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.moments.second_moments import SecondMoments
-from dynident.moments.solution import MomentSolution, orthonormal_directions, solve_products
+from dynident.moments.solution import (
+    MomentSolution,
+    eigenvectors,
+    orthonormal_directions,
+    solve_products,
+)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -63,7 +68,7 @@ def cleared(
     white = orthonormal_directions(
         with_self.signal * np.outer(seen, seen), np.where(seen, scale, 1.0)
     )
-    left, turn = np.linalg.eigh(white.T @ left_signal @ white)
+    left, turn = eigenvectors(white.T @ left_signal @ white)
     visible = left > fitted.criteria.gates.not_identifiable**2
     if not np.any(visible):
         return None
