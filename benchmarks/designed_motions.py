@@ -117,7 +117,8 @@ def told_apart(study, name: str, pair: tuple[str, str], starts: int) -> tuple[st
     ours, best = phis(found)
     if best <= 0:
         return name, label, "no motion tells them", "", "", "", f"{spent:.1f}"
-    so_far = one.recorded**2
+    asked = found.program.information
+    so_far = float(asked.about(np.zeros_like(asked.prior))[0, 0])
     alone = phis(unrecorded(found, starts, task.seed))
     figures = ours / best, (ours - so_far) / (best - so_far), alone[0] / alone[1]
     return name, label, *(f"{x:.2f}" for x in figures), f"{10.0 * one.worth:.0f}", f"{spent:.1f}"

@@ -6,8 +6,8 @@ A two-link arm has an effect that a few recordings of small motions cannot tell 
 diagnosis names both; the next recording is designed, simulated in closed loop with the arm as it
 truly is, and the diagnosis repeated with it. Printed are, of the cases in which both were named:
 in how many the right effect alone is named afterwards; the separation that was predicted; and that
-which was measured, the square root of the drop of the weighted squared residual from the model with
-the other effect to that with the right one.
+which was measured, the square root of the fall of the squared residual, over the noise, from the
+model with the other effect, in the shape in which it imitates most, to that with the right one.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ import numpy as np
 import dynident as di
 from dynident.closed_loop import Experiment, ExperimentRun, Fourier, TrueEffect, load_experiment
 from dynident.experiment_design import DesignTask
+from dynident.experiment_design.telling.imitations import shapes_of
 from dynident.experiment_design.virtual_recording import ClosedDesignLoop, close_design_loop
-from dynident.fitting.fit_model import fit
-from dynident.recording.dataset import numbered
+from dynident.fitting.sampling import sample
 from dynident.tables import Table
 
 PROBLEM = Path(__file__).resolve().parents[1] / "problems" / "hidden_effect"
@@ -69,21 +69,31 @@ def measured(loop: ClosedDesignLoop, recorded: di.Dataset, group: int) -> float:
     """Standard deviations by which the recordings, with the designed one, prefer the first."""
     first, *others = loop.designed.task.tell[group]
     model = loop.before.after.model - first.label
-    (every,) = numbered(replace(recorded, recordings=(*recorded.recordings, loop.recording)))
-    right = fit(model + first, every)
-    wrong = [fit(model + one, every) for one in others]
+    every = replace(recorded, recordings=(*recorded.recordings, loop.recording))
     noise = loop.designed.estimate.torque_std
-    rows = right.rows / len(noise)
-    drops = [
-        rows * float(np.sum((one.torque_std**2 - right.torque_std**2) / noise**2)) for one in wrong
-    ]
-    return float(np.sqrt(max(min(drops), 0.0)))
+    right = left(model + first, every, noise)
+    wrong = min(left(model + one, every, noise) for one in shapes_of(others, model.robot))
+    return float(np.sqrt(max(wrong - right, 0.0)))
+
+
+def left(model: di.Model, data: di.Dataset, noise: np.ndarray) -> float:
+    """Squared residual of a model that is fitted to all recordings, in units of the noise."""
+    columns, torque = [], []
+    for recording in data.recordings:
+        sampled = sample(recording, data.filter)
+        found = np.concatenate(list(sampled.columns(model)))
+        columns.append((found / noise[None, :, None]).reshape(-1, model.size))
+        torque.append((sampled.tau / noise).ravel())
+    whole, wanted = np.concatenate(columns), np.concatenate(torque)
+    values = np.linalg.lstsq(whole, wanted, rcond=1e-10)[0]
+    return float(np.sum((wanted - whole @ values) ** 2))
 
 
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--first", type=int, default=0, help="seed")
     parser.add_argument("--pairs", nargs="*", help="hidden effects; default: all")
     asked = parser.parse_args()
     study = di.load(PROBLEM / "study.toml")
@@ -92,8 +102,8 @@ def main() -> None:
     for pair in PAIRS:
         if asked.pairs and pair.hidden not in asked.pairs:
             continue
-        both, right, wrong, predicted, found, so_far = 0, 0, 0, [], [], []
-        for seed in range(asked.seeds):
+        both, decides, right, wrong, predicted, found, so_far = 0, 0, 0, 0, [], [], []
+        for seed in range(asked.first, asked.first + asked.seeds):
             made = truth(base, pair, seed)
             recorded = replace(study.train, recordings=made.run())
             try:
@@ -113,17 +123,21 @@ def main() -> None:
             separation = loop.designed.separations[meant[0]]
             predicted.append(separation.designed)
             so_far.append(separation.recorded)
+            decides += separation.decides
             told = separation.designed > 0
             if told and loop.designed.task.tell[meant[0]][0].label == pair.hidden:
                 found.append(measured(loop, recorded, meant[0]) / separation.designed)
-        middle = [f"{np.median(x):.2g}" if x else "" for x in (so_far, predicted, found)]
-        cells = (f"{both} of {asked.seeds}", str(right), str(wrong), *middle)
+        middle = [f"{np.median(x):.2g}" if x else "" for x in (so_far, predicted)]
+        over = f"{min(found):.2f} to {max(found):.2f}" if found else ""
+        counts = (str(one) for one in (decides, right, wrong))
+        cells = (f"{both} of {asked.seeds}", *counts, *middle, over)
         rows.append((pair.hidden, pair.rival, *cells))
         print(rows[-1], flush=True)
     heads = (
         "hidden",
         "taken for",
         "open",
+        "said to decide",
         "then right alone",
         "then wrong",
         "sigma so far",

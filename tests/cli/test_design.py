@@ -56,6 +56,7 @@ def test_what_cannot_be_designed_is_one_line(run, tmp_path) -> None:
         ("--duration", "1e9"),
         ("--limits", "nothing.toml"),
         ("--harmonics", "1"),
+        ("--harmonics", "4", "--intervals", "8"),
         ("--clearance", "-1"),
         ("--clearance", "0.01"),  # of an arm without shapes
         ("--show", "joint_zero@wrist"),

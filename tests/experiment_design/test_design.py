@@ -17,6 +17,7 @@ from dynident.experiment_design.motion_program import FINER, MotionProgram, inst
 from dynident.experiment_design.motion_solver import MotionSolver
 from dynident.experiment_design.motions.fourier_motions import FourierMotions
 from dynident.experiment_design.predicted_torque import PredictedTorque
+from dynident.experiment_design.telling.separation import DECIDES
 from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.robot import Robot
@@ -172,7 +173,7 @@ def test_pairs_are_told_apart_better_than_by_any_of_many_motions(pair, times: fl
     assert one.designed > one.recorded
     # So many times a usual motion separate as far; so many times the designed one decide.
     usual, ours = (program.told(nothing, x) for x in (found.usual, found.motion.variables))
-    for times_, matrix, wanted in ((one.worth, usual, one.designed), (one.enough, ours, 3.0)):
+    for times_, matrix, wanted in ((one.worth, usual, one.designed), (one.enough, ours, DECIDES)):
         if 0 < times_ < 1000:
             reached = np.sqrt(nothing.about(times_ * matrix)[0, 0])
             assert reached == pytest.approx(wanted, rel=1e-6)

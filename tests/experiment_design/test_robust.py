@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from dynident.effects import effects_of
+from dynident.errors import DesignError
 from dynident.experiment_design import DesignTask, MotionLimits, design
 from dynident.experiment_design.column_function import ColumnFunction
 from dynident.experiment_design.design_question import DesignQuestion
@@ -74,3 +75,19 @@ def test_a_rival_whose_shape_is_not_known_has_several_columns() -> None:
     )
     few = one.about(whole[np.ix_(kept, kept)])[0, 0]
     assert 0 < asked.about(whole)[0, 0] < 0.999 * few
+
+
+@pytest.mark.parametrize(
+    ("upper_arm", "torque", "remedy"),
+    [(0.0, 0.9, "widen them"), (1.5, 1.3, "add recordings that tell more of it")],
+)
+def test_limits_refused_for_what_is_not_known_say_so(upper_arm, torque, remedy) -> None:
+    """Stretched out the recordings know what it weighs; upright, the description alone does."""
+    model, pose = Model(ROBOT), np.array([upper_arm, 0.0])
+    still = np.zeros((1, 2))
+    rest = np.abs(ROBOT.inverse_dynamics(pose[None], still, still))[0]
+    limits = MotionLimits.of(ROBOT)
+    tight = replace(limits, lower=pose - 0.05, upper=pose + 0.05, torque=torque * rest + 0.02)
+    task = DesignTask(duration=4.0, repeat=1, harmonics=3, starts=1)
+    with pytest.raises(DesignError, match=remedy):
+        design(model, small_motion(model, true_values(model)), task, limits=tight)

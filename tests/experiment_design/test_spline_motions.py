@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -48,6 +49,19 @@ def test_they_begin_and_end_at_rest_and_are_linear_in_their_variables(intervals:
         linear = some.limits.speed * (basis @ variables.T)
         moved = part - part[0] if basis is not some.bases(t)[1] else part
         np.testing.assert_allclose(moved, linear - linear[0], atol=1e-10)
+
+
+def test_memory_is_that_of_the_motion_however_many_points_it_has() -> None:
+    points = np.pad(np.random.default_rng(0).normal(size=(2, 3000)), ((0, 0), (3, 3)))
+    motion, t = BSpline(600.0, points), np.linspace(0.0, 600.0, 2000)
+    motion.at(t[:2])
+    tracemalloc.start()
+    try:
+        motion.at(t)
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert most < 2e6  # a matrix of instants and points has 48 MB
 
 
 def test_derivatives_are_those_of_the_position() -> None:

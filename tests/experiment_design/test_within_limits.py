@@ -9,7 +9,7 @@ from designs_within_limits import Drawn, seen
 from dynident.experiment_design.design_question import DesignQuestion
 from dynident.experiment_design.motion_limits import above_instants
 from dynident.experiment_design.motions.fourier_motions import FourierMotions
-from dynident.experiment_design.predicted_torque import SIGMAS
+from dynident.experiment_design.predicted_torque import SIGMAS, PredictedTorque
 from dynident.model import Model
 
 
@@ -59,3 +59,27 @@ def test_random_robots_keep_their_limits(seed: int) -> None:
     """A sample of the benchmark: by Pinocchio and Drake, on a hundred times as many instants."""
     drawn = Drawn.of(seed)
     assert seen(drawn, drawn.designed()).beyond == []
+
+
+def test_what_is_open_between_the_instants_looked_at_counts() -> None:
+    drawn = Drawn.of(3)
+    motions = FourierMotions(limits=drawn.limits, period=5.0, harmonics=4)
+    question = DesignQuestion.of(Model(drawn.described), drawn.recorded, drawn.task, motions)
+    torque, t = question.torque, motions.times(1000)
+    for seed in range(5):
+        motion = motions.trajectory(motions.random(seed) * 0.3).at(t)
+        exact = np.linalg.norm(torque.columns.along(t, *motion) @ torque.factor, axis=2)
+        counted = np.abs(torque.farthest(t, *motion) - torque.along(t, *motion)) / SIGMAS
+        assert np.all(counted >= (1.0 - 1e-3) * exact)
+        assert np.mean(counted) < 1.2 * np.mean(exact)
+
+
+def test_an_effect_that_usual_motions_do_not_show_is_not_taken_for_known() -> None:
+    drawn = Drawn.of(3)
+    model = Model(drawn.described) + "viscous_friction"
+    size = np.ones(model.size)
+    size[-1] = 0.0
+    nothing = np.zeros((model.size,) * 2)
+    found = PredictedTorque.of(model, model.given_values(), nothing, size)
+    sigma = np.linalg.norm(found.factor, axis=1)
+    assert sigma[-1] >= sigma[-2] > 0

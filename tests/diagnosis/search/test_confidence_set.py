@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from arch.bootstrap import MCS
 
 from dynident.criteria import DEFAULTS
 from dynident.diagnosis.search import confidence_set as module
-from dynident.diagnosis.search.confidence_set import confidence_set
+from dynident.diagnosis.search.confidence_set import as_good_as_first, confidence_set
 
 BLOCKS = 20
 
@@ -59,3 +61,39 @@ def test_it_is_that_of_arch_to_the_last_draw(models: int) -> None:
         assert found == tuple(sorted(int(str(i)) for i in theirs.included))
         sizes.add(len(found))
     assert len(sizes) > 1
+
+
+FEW = replace(DEFAULTS.search, set_draws=200)
+
+
+def of_uneven_blocks(seed: int, worse: float) -> np.ndarray:
+    """Losses of two models on blocks of which one tells far more than all others."""
+    rng = np.random.default_rng(seed)
+    told = rng.uniform(5.0, 15.0, BLOCKS)  # squared distance of the two in each block
+    told[rng.integers(BLOCKS)] = 1000.0
+    noise = 2.0 * np.sqrt(told) * rng.normal(size=BLOCKS)
+    common = rng.normal(100.0, 30.0, BLOCKS)
+    return np.column_stack([common, common + worse * told + noise])
+
+
+def test_a_block_that_tells_more_than_all_others_leaves_no_doubt_of_them() -> None:
+    found = [of_uneven_blocks(seed, 1.0) for seed in range(20)]
+    assert np.mean([confidence_set(one, FEW) == (0, 1) for one in found]) > 0.4
+    assert np.mean([as_good_as_first(one, FEW) == (0,) for one in found]) > 0.8
+
+
+def test_one_block_alone_decides_nothing() -> None:
+    one = losses((0.0, 0.0), 3)
+    one[7, 1] += 1e4
+    assert as_good_as_first(one, FEW) == (0, 1)
+
+
+def test_what_is_as_good_stays_however_unevenly_blocks_tell() -> None:
+    """Two that are equally good; and the better one that is not first."""
+    even = [of_uneven_blocks(seed, 0.0) for seed in range(60)]
+    alone = [
+        [kept(one, FEW) == (0,) for one in even] for kept in (confidence_set, as_good_as_first)
+    ]
+    assert np.mean(alone[1]) <= np.mean(alone[0]) + 0.02
+    turned = [of_uneven_blocks(seed, 0.5)[:, ::-1] for seed in range(20)]
+    assert all(1 in as_good_as_first(one, FEW) for one in turned)

@@ -27,7 +27,9 @@ _PATH = click.Path(path_type=Path)
 @answered
 @click.option("--duration", type=float, default=10.0, show_default=True, help="s, of a repetition.")
 @click.option("--repeat", type=click.IntRange(1, 1000), default=3, show_default=True)
-@click.option("--harmonics", type=click.IntRange(2, 60), default=8, show_default=True)
+@click.option(
+    "--harmonics", type=click.IntRange(2, 60), show_default="8", help="Of Fourier series."
+)
 @click.option(
     "--intervals",
     type=click.IntRange(2, 200),
@@ -76,6 +78,11 @@ def design(study: Path, limits: Path | None, out: Path | None, **settings) -> Co
             raise DesignError(f"'{label}' stands for {len(found)} effects", None, "add @JOINT")
         return found[0]
 
+    if settings["harmonics"] is None:
+        del settings["harmonics"]
+    elif settings["intervals"] is not None:
+        what = "--harmonics are of series, and --intervals of splines in their place"
+        raise DesignError(what, remedy="choose one of them")
     tell, show = settings.pop("tell"), settings.pop("show")
     task = DesignTask(
         **settings,

@@ -31,11 +31,18 @@ def spline_basis(
     -------
     Three arrays (T, intervals + 5).
     """
-    inner = np.linspace(0.0, period, intervals + 1)
+    return _along(t, period, np.eye(intervals + DEGREE))
+
+
+def _along(
+    t: np.ndarray, period: float, points: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Splines of points (k, m), their first and their second derivatives, (T, m) each."""
+    inner = np.linspace(0.0, period, len(points) - DEGREE + 1)
     knots = np.concatenate([np.zeros(DEGREE), inner, np.full(DEGREE, period)])
-    every = Spline(knots, np.eye(intervals + DEGREE), DEGREE)
+    spline = Spline(knots, points, DEGREE)
     phase = np.remainder(np.asarray(t, dtype=float), period)
-    return every(phase), every(phase, 1), every(phase, 2)
+    return spline(phase), spline(phase, 1), spline(phase, 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +87,7 @@ class BSpline:
         """Return position, velocity and acceleration at times t (T,) s, each (T, n)."""
         # About the position at rest, so that rounding does not move what rests.
         moved = self.points - self.points[:, :1]
-        intervals = self.points.shape[1] - DEGREE
-        q, v, a = (one @ moved.T for one in spline_basis(t, self.period, intervals))
+        q, v, a = _along(t, self.period, moved.T)
         return q + self.points[:, 0], v, a
 
     @property

@@ -70,6 +70,14 @@ class SearchCriteria(CriteriaGroup):
         over=0,
         most=1,
     )
+    worse_level: float = criterion(
+        0.01,
+        "1",
+        "p value of a signed-rank test over blocks of time, over the number of rivals, below which "
+        "a rival of that set is worse: few blocks may tell much more than all others",
+        over=0,
+        most=1,
+    )
     set_draws: int = criterion(1000, "draws", "bootstrap draws behind that set", least=100)
     set_block: int = criterion(
         2,

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
+from operator import add
 
 import numpy as np
 
@@ -14,6 +16,7 @@ from dynident.experiment_design.design_task import DesignTask
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.motions.motion_family import MotionFamily
 from dynident.experiment_design.predicted_torque import PredictedTorque
+from dynident.experiment_design.telling.imitations import Imitations, TellingMoments, shapes_of
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.fit_model import fit
 from dynident.fitting.sampling import sample
@@ -40,11 +43,13 @@ class Asked:
     softer : the same with dry friction over wider ranges of speed, the widest first; none where
         that makes no difference to the effects that are asked for.
     labels : of what is told, those of interest last.
+    rows : of each joint that the recording will have.
     """
 
     information: Information
     softer: tuple[Information, ...]
     labels: tuple[str, ...]
+    rows: float
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -153,7 +158,29 @@ class DesignQuestion:
             information=information,
             softer=tuple(replace(information, columns=one) for one in softer),
             labels=tuple(np.array(labels)[kept].tolist()),
+            rows=rows,
         )
+
+    def imitations(self, asked: Asked) -> Imitations:
+        """Return what the rivals can imitate of the effect that is taken for true."""
+        first, *rivals = self.told
+        return Imitations(
+            model=self.bare,
+            values=self.values,
+            columns=asked.information.columns,
+            effect_values=self.estimate.effect_values(first.label),
+            std=self.std,
+            rivals=shapes_of(rivals, self.bare.robot),
+        )
+
+    @staticmethod
+    def known(rivals: Imitations, recorded: Dataset) -> TellingMoments:
+        """Return what the recordings so far tell of the rivals of an effect."""
+        found = []
+        for recording in recorded.recordings:
+            rows = sample(recording, recorded.filter)
+            found.append(rivals.moments(rows.t, (rows.q, rows.v, rows.a)))
+        return reduce(add, found)
 
     def _softer(
         self, columns: ColumnFunction, extra: Sequence[Effect], motions: MotionFamily

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import brentq
 
 from dynident.arguments import checked
 from dynident.errors import DesignError
@@ -16,21 +15,22 @@ from dynident.experiment_design.geometry.clearance import Clearance
 from dynident.experiment_design.geometry.workspace import Workspace
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.motion_limits import MotionLimits
-from dynident.experiment_design.motion_program import MotionProgram
+from dynident.experiment_design.motion_program import FINER, MotionProgram
 from dynident.experiment_design.motions.fourier_motions import FourierMotions
 from dynident.experiment_design.motions.motion_family import MotionFamily
 from dynident.experiment_design.motions.spline_motions import SplineMotions
-from dynident.experiment_design.predicted_torque import PredictedTorque
-from dynident.experiment_design.recording_design import DECIDES, RecordingDesign, Separation
+from dynident.experiment_design.predicted_torque import WRONG, PredictedTorque
+from dynident.experiment_design.recording_design import RecordingDesign
+from dynident.experiment_design.telling.separation import Separation, times_until
 from dynident.model import Model
 from dynident.progress import logged
 from dynident.recording import Dataset
 from dynident.robot import Robot
+from dynident.tables import percent
 from dynident.threads import single_threaded
 
 _FIRST_USUAL = 10_000  # seed
 _USUAL = 20  # random motions, whose median a design is compared with
-_MOST_TIMES = 1000.0
 _HOPELESS = 0.01  # standard deviations with the best usual motion: told by none
 
 
@@ -101,7 +101,7 @@ def design(
         estimate=first.estimate,
         labels=asked[0].labels,
         separations=tuple(
-            _separation(program, one.information, (found.variables, usual), question)
+            _separation(program, one, (found.variables, usual), question, recorded)
             for one, question in zip(asked, questions, strict=True)
             if task.tell
         ),
@@ -162,12 +162,24 @@ def _usual(program: MotionProgram) -> np.ndarray:
     """Variables of the median of some random motions within the limits."""
     possible = sorted(_some_usual(program), key=program.loss)
     if not possible:
+        _require_known_torque(program)
         kept = program.workspace.in_words()
         what = "no usual motion is within the limits" + (f" and {kept}" if kept else "")
         raise DesignError(
             what, remedy="widen them, or move the joints' ranges to where there is room"
         )
     return possible[len(possible) // 2]
+
+
+def _require_known_torque(program: MotionProgram) -> None:
+    """Raise `DesignError` if motions are refused for what is not known of their torque alone."""
+    if not _some_usual(replace(program, torque=program.torque.taken_for_known)):
+        return
+    raise DesignError(
+        "no usual motion is surely within the limits of torque: too much of it is left open by the "
+        f"recordings, and by the description with each link taken for {percent(WRONG, 0)} wrong",
+        remedy="add recordings that tell more of it, or state higher limits of torque",
+    )
 
 
 def _sigma(information: Information, matrix: np.ndarray) -> float:
@@ -177,33 +189,28 @@ def _sigma(information: Information, matrix: np.ndarray) -> float:
 
 def _separation(
     program: MotionProgram,
-    information: Information,
+    asked: Asked,
     motions: tuple[np.ndarray, np.ndarray],
     question: DesignQuestion,
+    recorded: Dataset,
 ) -> Separation:
     """How far effects are apart: so far, with the design, with a usual motion."""
-    told, other = (program.told(information, one) for one in motions)
-
-    def sigma(matrix: np.ndarray) -> float:
-        return _sigma(information, matrix)
-
+    rivals = question.imitations(asked)
+    known = question.known(rivals, recorded)
+    t = program.motions.times(FINER * program.instants)
+    own, other = (
+        rivals.moments(t, program.motions.trajectory(one).at(t), asked.rows) for one in motions
+    )
+    told = rivals.told(known + own)
     first, *others = question.told
     return Separation(
         first=first.title,
         others=tuple(one.title for one in others),
         advice=first.advice,
-        recorded=sigma(0.0 * told),
-        designed=sigma(told),
-        usual=sigma(other),
-        worth=_times(lambda k: sigma(k * other), sigma(told)),
-        enough=_times(lambda k: sigma(k * told), DECIDES),
+        recorded=rivals.told(known).sigma,
+        designed=told.sigma,
+        usual=rivals.told(known + other).sigma,
+        share=told.share,
+        worth=times_until(lambda k: rivals.told(known + other * k).sigma - told.sigma),
+        enough=times_until(lambda k: rivals.told(known + own * k).beyond),
     )
-
-
-def _times(sigma: Callable[[float], float], wanted: float) -> float:
-    """How many times a motion separates as far as is wanted; what was recorded stays as it is."""
-    if sigma(_MOST_TIMES) < wanted:
-        return float("inf")
-    if sigma(0.0) >= wanted:
-        return 0.0
-    return float(brentq(lambda k: sigma(float(k)) - wanted, 0.0, _MOST_TIMES))  # type: ignore[arg-type]

@@ -8,7 +8,8 @@ from dynident.diagnosis import Diagnosis
 from dynident.effects import Effect
 from dynident.experiment_design.column_function import is_of_an_instant
 from dynident.experiment_design.design_task import DesignTask
-from dynident.experiment_design.recording_design import RecordingDesign, Separation
+from dynident.experiment_design.recording_design import RecordingDesign
+from dynident.experiment_design.telling.separation import Separation
 
 ADVISED = 2.0
 """Standard deviations below which a recording is not worth advising."""

@@ -7,13 +7,13 @@ inertia are taken for off by a fifth, and the posterior of the two is what is pr
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from dynident.constraints import ParameterSpace
 from dynident.experiment_design.column_function import ColumnFunction
-from dynident.experiment_design.motion_limits import MotionLimits
+from dynident.experiment_design.motion_limits import MotionLimits, above_instants
 from dynident.inertia import distance_rows
 from dynident.model import Model
 
@@ -26,7 +26,8 @@ _EFFECTS = 100.0
 _INDEPENDENT = 0.25
 """Share of the rows of a filtered recording that count: neighbours have their noise in common."""
 _COARSER = 10
-"""Instants from one at which the deviation is worked out to the next: it changes slowly."""
+"""Instants from one at which the deviation is worked out to the next; between them it counts as the
+larger of the two, and as what a parabola through three of them has above them."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -66,7 +67,9 @@ class PredictedTorque:
         spread = np.zeros((space.size, space.size))
         for k, one in enumerate(inertial):
             spread[10 * k : 10 * k + 10, 10 * k : 10 * k + 10] = one
-        largest = _EFFECTS / np.where(size > 0, size, np.inf)
+        # What no usual motion shows may still make a torque: as little is known of it as of any.
+        seen = size[size > 0]
+        largest = _EFFECTS / np.where(size > 0, size, seen.min() if len(seen) else np.inf)
         for k, effect in zip(
             range(space.rigid, space.size), range(model.base.rank, model.size), strict=True
         ):
@@ -96,14 +99,22 @@ class PredictedTorque:
 
         Parameters
         ----------
-        t : (T,) s.
+        t : (T,) s, evenly spaced over a period.
         q, v, a : (T, n).
         """
         torque = self.along(t, q, v, a)
         some = slice(None, None, _COARSER)
         rows = self.columns.along(t[some], q[some], v[some], a[some]) @ self.factor
-        deviation = np.repeat(np.linalg.norm(rows, axis=2), _COARSER, axis=0)[: len(t)]
+        coarse = np.linalg.norm(rows, axis=2)
+        coarse = coarse + above_instants(coarse)
+        between = np.maximum(coarse, np.roll(coarse, -1, axis=0))
+        deviation = np.repeat(between, _COARSER, axis=0)[: len(t)]
         return torque + np.copysign(SIGMAS * deviation, torque)
+
+    @property
+    def taken_for_known(self) -> PredictedTorque:
+        """The same, as if nothing of it were open."""
+        return replace(self, factor=np.zeros_like(self.factor))
 
     def certain(self, limits: MotionLimits, t: np.ndarray, *motion: np.ndarray) -> np.ndarray:
         """Return the share of each limit that is left to what is predicted along a motion, (n,).

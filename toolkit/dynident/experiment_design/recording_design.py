@@ -13,79 +13,15 @@ from dynident.experiment_design.design_task import DesignTask
 from dynident.experiment_design.motion_limits import MotionLimits
 from dynident.experiment_design.motion_program import FINER, MotionProgram
 from dynident.experiment_design.motion_solver import DesignedMotion
+from dynident.experiment_design.telling.separation import Separation
 from dynident.fitting.estimate import Estimate
 from dynident.model import Model
-from dynident.tables import Shown, Table, finite, number, percent
+from dynident.tables import Shown, Table, number, percent
 
-DECIDES = 3.0
-"""Standard deviations that tell two effects apart."""
-NEVER = 0.1
-"""Standard deviations below which no length of such a motion does."""
 _CAVEAT = (
     "Predicted from the training recordings, as if the residual of the fit, with all that the "
     "model lacks, were noise, and rows independent."
 )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Separation:
-    """How far an effect stands from what the model with its rivals can imitate.
-
-    Attributes
-    ----------
-    first, others : the effect that is taken for true, and its rivals.
-    advice : the usual experiment that shows the first, in words.
-    recorded, designed, usual : standard deviations, by the recordings so far; by these and the
-        designed recording; by these and a usual motion of the same length.
-    worth : length of usual motion that separates as far, over that of the design; infinite beyond a
-        thousand.
-    enough : length of the designed motion that decides, over what was asked for; likewise.
-    """
-
-    first: str
-    others: tuple[str, ...]
-    advice: str
-    recorded: float
-    designed: float
-    usual: float
-    worth: float
-    enough: float
-
-    def sentence(self, length: float) -> str:
-        """Say what the recording is worth, in plain words.
-
-        Parameters
-        ----------
-        length : s, of the designed recording.
-        """
-        others = " and ".join(self.others)
-        words = (
-            f"{length:g} s of this tell {self.first} from {others} by {number(self.designed, 3)} "
-            f"standard deviations; the recordings so far by {number(self.recorded, 3)}"
-        )
-        if self.designed < NEVER:
-            return (
-                f"{words}. No motion within the limits tells them apart: another experiment might"
-                f"{f', {self.advice}' if self.advice else ''}, or a load, another base, a sensor."
-            )
-        needs = f"{length * self.worth:.0f} s" if np.isfinite(self.worth) else "far longer"
-        words += f"; a usual motion needs {needs}."
-        if self.designed >= DECIDES:
-            return words
-        more = f"{self.enough:.0f}" if np.isfinite(self.enough) else "more than a thousand"
-        return f"{words} That does not decide: {DECIDES:g} take {more} times as long."
-
-    def to_dict(self) -> dict[str, Any]:
-        """The separation as JSON has it; what is infinite is null."""
-        return {
-            "first": self.first,
-            "others": list(self.others),
-            "recorded": self.recorded,
-            "designed": self.designed,
-            "usual": self.usual,
-            "worth": finite(self.worth),
-            "enough": finite(self.enough),
-        }
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

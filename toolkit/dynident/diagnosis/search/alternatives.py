@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dynident.criteria import SearchCriteria
-from dynident.diagnosis.search.confidence_set import confidence_set
+from dynident.diagnosis.search.confidence_set import as_good_as_first
 from dynident.diagnosis.search.payload_recordings import with_payload
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.search.scoring import (
@@ -116,7 +116,7 @@ def _of_the_confidence_set(
     if not rivals:
         return ()
     losses = np.column_stack([one.losses for one in (winner, *rivals) if one.losses is not None])
-    kept = confidence_set(losses, criteria)
+    kept = as_good_as_first(losses, criteria)
     return tuple(
         other.effect
         for k, other in enumerate(rivals, 1)

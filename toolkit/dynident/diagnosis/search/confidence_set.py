@@ -13,6 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from dynident.criteria import SearchCriteria
+from dynident.diagnosis.search.cross_validation import signed_rank
 
 _SEED = 20_110  # of the bootstrap
 
@@ -50,6 +51,26 @@ def confidence_set(losses: np.ndarray, criteria: SearchCriteria) -> tuple[int, .
             break
         kept = kept[worse < worse.max()]
     return tuple(int(one) for one in kept)
+
+
+def as_good_as_first(losses: np.ndarray, criteria: SearchCriteria) -> tuple[int, ...]:
+    """Return those columns of the set which the blocks do not show to be worse than the first.
+
+    A block that tells more than all others together makes a mean uncertain, whichever model it
+    speaks for: recordings designed to tell two apart hold such blocks. By ranks such a block counts
+    as one (Wilcoxon's test, corrected for the number of rivals).
+
+    Parameters
+    ----------
+    losses : (B, k), the first column that of the winner.
+    criteria : of both tests.
+    """
+    level = criteria.worse_level / max(losses.shape[1] - 1, 1)
+    return tuple(
+        k
+        for k in confidence_set(losses, criteria)
+        if k == 0 or signed_rank(losses[:, k], losses[:, 0]) >= level
+    )
 
 
 def _resampled(count: int, criteria: SearchCriteria) -> Iterator[np.ndarray]:

@@ -1,0 +1,128 @@
+"""How far an effect is told from its rivals: by least squares, in the shape that imitates most."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dynident.effects import effects_of
+from dynident.experiment_design.column_function import ColumnFunction
+from dynident.experiment_design.telling.imitations import Imitations, shapes_of
+from dynident.experiment_design.telling.separation import ALIKE, DECIDES, Separation, Told
+from dynident.model import Model
+from synthetic import arm, true_values
+
+ROBOT = arm()
+BARE = Model(ROBOT) + "viscous_friction" + "coulomb_friction"
+VALUES = true_values(BARE)
+(DRAG,), (STRIBECK,), (SPRING,), (RIPPLE,) = (
+    effects_of(f"{one}@elbow", ROBOT)
+    for one in ("quadratic_drag", "stribeck_friction", "joint_spring", "torque_ripple")
+)
+STD = np.array([0.2, 0.05])
+SIZES = {DRAG.label: (0.3,), SPRING.label: (2.0, 0.5)}
+
+
+def imitations(first, *rivals) -> Imitations:
+    return Imitations(
+        model=BARE,
+        values=VALUES,
+        columns=ColumnFunction.of(BARE, VALUES, (first,)),
+        effect_values=np.array(SIZES[first.label]),
+        std=STD,
+        rivals=shapes_of(rivals, ROBOT),
+    )
+
+
+def motion(count: int = 400):
+    return np.linspace(0.0, 4.0, count), ROBOT.random_motion(5, count)
+
+
+def left(first, rival, t, moved) -> float:
+    """Square of what a rival in its shape cannot imitate, by least squares on all rows."""
+    block = BARE.block(t, *moved)
+    torque = first.columns(block) @ np.array(SIZES[first.label])
+    columns = np.concatenate([BARE.columns(block), rival.columns(block)], axis=2)
+    rows = (columns / STD[None, :, None]).reshape(-1, columns.shape[2])
+    wanted = (torque / STD).ravel()
+    return float(np.sum((wanted - rows @ np.linalg.lstsq(rows, wanted, rcond=1e-11)[0]) ** 2))
+
+
+@pytest.mark.parametrize(
+    ("first", "rivals"), [(DRAG, (STRIBECK,)), (SPRING, (RIPPLE,)), (DRAG, (SPRING, RIPPLE))]
+)
+def test_it_is_what_the_nearest_rival_leaves_of_the_torque(first, rivals) -> None:
+    found, (t, moved) = imitations(first, *rivals), motion()
+    every = [left(first, one, t, moved) for one in found.rivals]
+    told = found.told(found.moments(t, moved))
+    assert told.sigma == pytest.approx(np.sqrt(min(every)), rel=1e-5)
+    assert 0.0 < told.share < 1.0
+    # No shape between those that are tried imitates much more.
+    (most,) = np.flatnonzero(np.array(every) == min(every))[:1]
+    shape = np.array(found.rivals[most].shape)
+    if len(shape):
+        near = [
+            left(first, found.rivals[most].shaped(*(x * shape)), t, moved) for x in (0.97, 1.03)
+        ]
+        assert min(near) > 0.85 * min(every)
+
+
+def test_moments_add_up_and_grow_with_rows() -> None:
+    found, (t, moved) = imitations(DRAG, STRIBECK), motion()
+    whole = found.moments(t, moved)
+    halves = [
+        found.moments(t[at], [one[at] for one in moved]) for at in (slice(150), slice(150, None))
+    ]
+    assert found.told(halves[0] + halves[1]).sigma == pytest.approx(found.told(whole).sigma)
+    more = found.told(found.moments(t, moved, 4.0 * len(t)))
+    assert more.sigma == pytest.approx(2.0 * found.told(whole).sigma)
+    assert more.share == pytest.approx(found.told(whole).share)
+
+
+def test_what_the_model_explains_is_told_from_nothing() -> None:
+    (viscous,) = effects_of("viscous_friction@elbow", ROBOT)
+    found = Imitations(
+        model=BARE,
+        values=VALUES,
+        columns=ColumnFunction.of(BARE, VALUES, (viscous,)),
+        effect_values=np.array([1.0]),
+        std=STD,
+        rivals=shapes_of((SPRING,), ROBOT),
+    )
+    t, moved = motion()
+    assert found.told(found.moments(t, moved)) == Told(sigma=0.0, share=0.0)
+
+
+def test_the_least_that_decides_is_what_a_comparison_of_squares_can_tell() -> None:
+    """Two simple hypotheses, x apart: the squares that they leave differ beyond chance or not."""
+    rng, count = np.random.default_rng(0), 20_000
+    # Along the line from one to the other, where x is the distance and the first is true.
+    noise = rng.normal(size=count)
+    more = (noise + DECIDES) ** 2 - noise**2  # squares left by the second, beyond the first's
+    assert np.mean(more / (2 * DECIDES) > 1.96) == pytest.approx(0.9, abs=0.02)
+
+
+def separation(designed: float, share: float, enough: float) -> Separation:
+    return Separation(
+        first="drag",
+        others=("spring",),
+        advice="",
+        recorded=1.0,
+        designed=designed,
+        usual=2.0,
+        share=share,
+        worth=3.0,
+        enough=enough,
+    )
+
+
+def test_what_decides_is_said() -> None:
+    assert separation(50.0, 0.2, 0.1).decides
+    assert "decide" not in separation(50.0, 0.2, 0.1).sentence(8.0)
+    weak = separation(4.0, 0.2, 2.6)
+    assert not weak.decides
+    assert f"{DECIDES:g}" in weak.sentence(8.0) and "take 2.6 times as long" in weak.sentence(8.0)
+    alike = separation(50.0, 0.5 * ALIKE, np.inf)
+    assert not alike.decides
+    assert "may name both" in alike.sentence(8.0)
+    assert alike.to_dict()["enough"] is None and alike.to_dict()["decides"] is False
