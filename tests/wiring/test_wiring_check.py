@@ -14,7 +14,7 @@ from dynident.cli import main
 from dynident.recording import Dataset, Recording, write
 from dynident.wiring import check_wiring
 from study_files import edited, recording, true_model, write_study
-from synthetic import smooth_motion
+from synthetic import smooth_motion, true_values
 from wiring_faults import Injected, broken, column_faults, data_faults
 
 FAULTS = [*column_faults(2), *data_faults(2)]
@@ -46,6 +46,20 @@ def test_missing_physics_is_no_fault() -> None:
         lambda r: r.replace(q=r.q + np.array([0.0, 0.3])),
     ):
         assert check_wiring(true_model(), broken(data(), change)) == ()
+
+
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_noise_of_a_joint_at_rest_is_no_position_in_degrees(seed: int) -> None:
+    """Any scale that makes it smaller makes its accelerations fit better."""
+    model, rng = true_model(), np.random.default_rng(seed)
+    t, q, v, a = (np.array(x) for x in smooth_motion(2, seed, 200.0, 16.0, 8.0))
+    for x in (q, v, a):
+        x[:, 0] = 0.0
+    values = true_values(model, Fv__shoulder=2.0, Fv__elbow=1.0, Fc__elbow=1.5)
+    tau = model.torque(model.block(t, q, v, a), values)
+    noisy = (x + std * rng.normal(size=x.shape) for x, std in ((q, 1e-3), (tau, 0.05)))
+    one = Recording(t, *noisy, model.robot.names, period=8.0, name="shoulder at rest")
+    assert check_wiring(model, Dataset((one,))) == ()
 
 
 @pytest.mark.slow

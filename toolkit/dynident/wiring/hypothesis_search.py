@@ -31,6 +31,8 @@ from dynident.wiring.wiring_rows import WiringRows
 _LEAST_RATIO = 3.0  # of gears and units; below it is another torque constant
 _OF_SIZE = ("torque_scale", "motor_side")
 """Faults that say of which size a torque is already."""
+_SMALLER = ("degrees", "motor_side")
+"""Faults whose mend makes a position smaller."""
 _ALIKE = 0.8
 """Share of the best gain with which scales of other joints stay in question."""
 
@@ -84,6 +86,7 @@ def search(model: Model, rows: WiringRows, criteria: WiringCriteria) -> SearchRe
         if not _settled(best, here, criteria):
             gears = motor_side_hypotheses(model, rows, now, here.start, criteria)
             tried = [*_but_degrees_of_all(tried, gears), *gears]
+            tried = [one for one in tried if not here.stands_still(*one, criteria.tie)]
             best = _best(tried, here.start, criteria.tie)
         if best is None or not _wins(best, here.start, rows, criteria):
             break
@@ -105,6 +108,7 @@ class _Fits:
         self.model, self.rows, self.now = model, rows, now
         self.regression = WiringRegression.of(model, rows.moved(now.change))
         self.start = self.regression.fit(now.torque_of, now.torque_scale)
+        self._at_rest: dict[int, float] = {}
 
     def all_plain(self) -> list[tuple[Hypothesis, TorqueFit]]:
         """Hypotheses with their fits, the plainest first."""
@@ -118,6 +122,26 @@ class _Fits:
             found += [(one, _fit(regression, one)) for one in group]
         scales = torque_scale_hypotheses(self.regression, self.now, self.start)
         return [*found, *(one for one in scales if _is_no_gain(one[0], self.model))]
+
+    def stands_still(self, one: Hypothesis, fit: TorqueFit, tie: float) -> bool:
+        """Whether a smaller position fits better only as a position that stays where it is does.
+
+        Of a joint at rest the position is noise, and any scale that makes it smaller helps.
+
+        Parameters
+        ----------
+        one, fit : a hypothesis with its fit.
+        tie : share of a gain within which two are alike.
+        """
+        gain = fit.score - self.start.score
+        if one.kind not in _SMALLER or len(one.joints) != 1 or gain <= 0:
+            return False
+        if one.joints[0] not in self._at_rest:
+            rows = self.rows.moved(self.now.change).held(one.joints[0])
+            still = WiringRegression.of(self.model, rows)
+            fitted = still.fit(self.now.torque_of, self.now.torque_scale)
+            self._at_rest[one.joints[0]] = fitted.score - self.start.score
+        return self._at_rest[one.joints[0]] >= (1.0 - tie) * gain
 
 
 def _is_no_gain(one: Hypothesis, model: Model) -> bool:

@@ -38,6 +38,12 @@ class WiringRows:
         motors = None if self.motors is None else self.motors @ np.linalg.inv(change)
         return replace(self, q=q, v=v, a=a, motors=motors)
 
+    def held(self, joint: int) -> WiringRows:
+        """Return the rows with a joint (a column) that stands still where it is on average."""
+        q, v, a = self.q.copy(), self.v.copy(), self.a.copy()
+        q[:, joint], v[:, joint], a[:, joint] = q[:, joint].mean(), 0.0, 0.0
+        return replace(self, q=q, v=v, a=a)
+
     def thinned(self, most: int) -> WiringRows:
         """Return at most so many of the rows, evenly."""
         at = np.unique(np.linspace(0, len(self.q) - 1, min(most, len(self.q))).round().astype(int))
