@@ -75,6 +75,14 @@ def test_joints_that_stand_still_and_robots_that_nobody_knows_have_none() -> Non
     np.testing.assert_allclose(np.mean(columns**2), 1.0)
 
 
+def test_a_body_with_a_first_moment_and_no_mass_has_none() -> None:
+    """Its derivatives are no numbers; the regression goes on without them."""
+    theta = arm().theta.copy()
+    theta[0] = 0.0
+    one = replace(record(3, {}), body=FittedBody(arm().with_theta(theta), np.zeros(2)))
+    assert position_error_columns((one,), np.arange(200), 0).shape == (200, 0)
+
+
 def once(seed: int, size: float) -> Recording:
     """An arm that never repeats; its elbow's encoder is eccentric by `size`, rad."""
     model = true_model()

@@ -97,3 +97,32 @@ def test_what_is_as_good_stays_however_unevenly_blocks_tell() -> None:
     assert np.mean(alone[1]) <= np.mean(alone[0]) + 0.02
     turned = [of_uneven_blocks(seed, 0.5)[:, ::-1] for seed in range(20)]
     assert all(1 in as_good_as_first(one, FEW) for one in turned)
+
+
+def _of_differences(worse: np.ndarray) -> np.ndarray:
+    """Losses (B, 2) of which the second is worse by so much."""
+    return np.column_stack([np.full(len(worse), 10.0), 10.0 + worse])
+
+
+def test_an_effect_that_shows_in_a_few_blocks_is_not_lost_for_being_worse_in_all_others() -> None:
+    """By the mean of all recordings it is the better one, of which these blocks show too little."""
+    rng, found = np.random.default_rng(0), []
+    while len(found) < 30:
+        worse = 0.2 + 0.05 * rng.normal(size=40)
+        seen = rng.random(40) < 0.08
+        worse -= seen * rng.exponential(4.0, size=40)
+        if worse.mean() > 0 and worse.min() < -0.5:
+            found.append(_of_differences(worse))
+    both = [[1 in kept(one, FEW) for one in found] for kept in (confidence_set, as_good_as_first)]
+    assert both[0] == both[1] and any(both[0])
+
+
+def test_blocks_that_go_together_drop_no_equal_that_the_means_keep() -> None:
+    rng, lost = np.random.default_rng(1), []
+    for _ in range(60):
+        worse = np.zeros(70)
+        for i in range(1, 70):
+            worse[i] = 0.6 * worse[i - 1] + rng.normal()
+        one = _of_differences(worse[-20:] * np.sign(worse[-20:].mean()))
+        lost.append(1 in confidence_set(one, FEW) and 1 not in as_good_as_first(one, FEW))
+    assert np.mean(lost) <= 0.05

@@ -64,7 +64,8 @@ class SearchCriteria(CriteriaGroup):
     set_level: float = criterion(
         0.05,
         "1",
-        "chance that the best effect is not in the model confidence set",
+        "chance that the best effect is not in the model confidence set, of which rivals that lose "
+        "block after block are then left out",
         "literature: Hansen, Lunde and Nason, The model confidence set, Econometrica 79 (2011); "
         "the conventional level",
         over=0,
@@ -74,7 +75,8 @@ class SearchCriteria(CriteriaGroup):
         0.01,
         "1",
         "p value of a signed-rank test over blocks of time, over the number of rivals, below which "
-        "a rival of that set is worse: few blocks may tell much more than all others",
+        "a rival of that set is worse, unless a block speaks for it by more than the median block "
+        "speaks against it: few blocks may tell much more than all others",
         over=0,
         most=1,
     )

@@ -38,7 +38,8 @@ def position_error_columns(
     Returns
     -------
     (N, k), less what other inertial parameters would make of them, as a fit has taken that; of
-    mean square one on average. None where no robot is known.
+    mean square one on average. None where no robot is known, or its derivatives are not: of a body
+    with a first moment and no mass, as a fit may leave one that the description has without mass.
     """
     bodies = [one.body for one in records if one.body is not None]
     if len(bodies) < len(records):
@@ -58,6 +59,8 @@ def position_error_columns(
         # Of links that carry a payload in some recordings only.
         other = body.robot.theta != first.robot.theta
         known.append(regressor[:, other] * here[:, None])
+    if not np.isfinite(wrong).all():
+        return np.empty((len(rows), 0))
     basis = orth(_scaled(np.hstack(known)), rcond=_NOTHING)
     wrong = _scaled(wrong)
     left = wrong - basis @ (basis.T @ wrong)

@@ -75,7 +75,7 @@ class JointDependence:
         return {} if self.shares is None else {k: s for k, s in self.shares.by.items() if s.told}
 
     def of_the_motion(self, c: VerdictCriteria) -> dict[str, Share]:
-        """Shares that its state or all joints' speeds explain, so large that no noise has them.
+        """Shares that the inputs of `MOTION` explain, so large that no noise has them.
 
         At least so large that, were the rest noise that is known, something would be missing.
         """

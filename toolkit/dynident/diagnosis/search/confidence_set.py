@@ -58,7 +58,9 @@ def as_good_as_first(losses: np.ndarray, criteria: SearchCriteria) -> tuple[int,
 
     A block that tells more than all others together makes a mean uncertain, whichever model it
     speaks for: recordings designed to tell two apart hold such blocks. By ranks such a block counts
-    as one (Wilcoxon's test, corrected for the number of rivals).
+    as one (Wilcoxon's test, corrected for the number of rivals). As ranks forget sizes, and take
+    blocks for independent, no block may speak for the rival by more than blocks usually speak
+    against it: an effect that shows in a few blocks alone is the worse one in all others.
 
     Parameters
     ----------
@@ -69,8 +71,20 @@ def as_good_as_first(losses: np.ndarray, criteria: SearchCriteria) -> tuple[int,
     return tuple(
         k
         for k in confidence_set(losses, criteria)
-        if k == 0 or signed_rank(losses[:, k], losses[:, 0]) >= level
+        if k == 0
+        or signed_rank(losses[:, k], losses[:, 0]) >= level
+        or _speaks_for(losses[:, k] - losses[:, 0])
     )
+
+
+def _speaks_for(worse: np.ndarray) -> bool:
+    """Whether a block speaks for a rival by more than the median one speaks against it.
+
+    Parameters
+    ----------
+    worse : (B,) what the rival loses more in each block.
+    """
+    return bool(-worse.min() >= np.median(worse))
 
 
 def _resampled(count: int, criteria: SearchCriteria) -> Iterator[np.ndarray]:
