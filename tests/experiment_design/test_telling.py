@@ -71,7 +71,8 @@ def test_moments_add_up_and_grow_with_rows() -> None:
     found, (t, moved) = imitations(DRAG, STRIBECK), motion()
     whole = found.moments(t, moved)
     halves = [
-        found.moments(t[at], [one[at] for one in moved]) for at in (slice(150), slice(150, None))
+        found.moments(t[at], tuple(one[at] for one in moved))
+        for at in (slice(150), slice(150, None))
     ]
     assert found.told(halves[0] + halves[1]).sigma == pytest.approx(found.told(whole).sigma)
     more = found.told(found.moments(t, moved, 4.0 * len(t)))

@@ -57,8 +57,8 @@ def test_noise_of_a_joint_at_rest_is_no_position_in_degrees(seed: int) -> None:
         x[:, 0] = 0.0
     values = true_values(model, Fv__shoulder=2.0, Fv__elbow=1.0, Fc__elbow=1.5)
     tau = model.torque(model.block(t, q, v, a), values)
-    noisy = (x + std * rng.normal(size=x.shape) for x, std in ((q, 1e-3), (tau, 0.05)))
-    one = Recording(t, *noisy, model.robot.names, period=8.0, name="shoulder at rest")
+    q, tau = (x + std * rng.normal(size=x.shape) for x, std in ((q, 1e-3), (tau, 0.05)))
+    one = Recording(t, q, tau, model.robot.names, period=8.0, name="shoulder at rest")
     assert check_wiring(model, Dataset((one,))) == ()
 
 
