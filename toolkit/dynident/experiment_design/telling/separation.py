@@ -72,7 +72,7 @@ class Separation:
 
     @property
     def decides(self) -> bool:
-        """Whether a diagnosis will name one of them alone, nine times in ten or more."""
+        """Whether their residuals will differ beyond chance nine times in ten, and by enough."""
         return Told(sigma=self.designed, share=self.share).beyond > 0
 
     def sentence(self, length: float) -> str:
@@ -99,8 +99,9 @@ class Separation:
         if not np.isfinite(self.enough):
             return f"{words} That may not decide, however long it is: {self._alike()}"
         return (
-            f"{words} That does not decide: {DECIDES:g}, from which on a diagnosis names one of "
-            f"them alone nine times in ten, take {number(self.enough, 2)} times as long."
+            f"{words} That does not decide: {DECIDES:g}, from which on the residuals that they "
+            f"leave differ beyond chance nine times in ten, take {number(self.enough, 2)} times as "
+            "long."
         )
 
     def _alike(self) -> str:
