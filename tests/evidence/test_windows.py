@@ -13,7 +13,7 @@ from dynident.evidence.columns import Evidence
 from dynident.evidence.runs import gather
 from dynident.evidence.windows import sources
 from dynident.model import Model
-from dynident.recording import Dataset, Recording, numbered
+from dynident.recording import Dataset, Noise, Recording, numbered
 from synthetic import arm, synthetic, true_values
 
 _WINDOWS = ((0.5, 2.0), (2.0, 3.0), (4.0, 6.0))
@@ -120,3 +120,29 @@ def test_the_latest_shapes_are_kept() -> None:
     kept.put("d", column)
     assert kept.get("b") is None
     assert all(kept.get(name) is column for name in "acd")
+
+
+def test_windows_have_the_noise_of_one_recording_on_their_copies() -> None:
+    """A copy of the whole recording is evaluated once, whatever windows are taken out of it."""
+    model = _model()
+    recordings = _windows(0, model)
+    noise = Noise(np.full(2, 1e-4), np.full(2, 0.1))
+    runs = gather(Dataset(recordings, noise=noise))
+    whole = gather(Dataset((recordings[0].replace(window=None),), noise=noise))[0]
+    motions = {id(one.motion) for run in runs for one in run.replicates}
+    assert len(motions) == len(whole.replicates)
+    for k, copy in enumerate(whole.replicates):
+        at = {time: row for row, time in enumerate(copy.t)}
+        for run in runs:
+            rows = [at[time] for time in run.replicates[k].t]
+            assert np.allclose(run.replicates[k].tau, copy.tau[rows], rtol=1e-12, atol=1e-12)
+
+
+def test_recordings_of_their_own_have_noise_of_their_own() -> None:
+    """Noise that were the same in two recordings would not be averaged over them."""
+    model = _model()
+    first, second = (_windows(seed, model)[0] for seed in (0, 1))
+    noise = Noise(np.full(2, 1e-4), np.full(2, 0.1))
+    one, two = gather(Dataset((first, second), noise=noise))
+    drawn = [run.replicates[1].q - run.replicates[0].q for run in (one, two)]
+    assert abs(np.corrcoef(drawn[0].ravel(), drawn[1].ravel())[0, 1]) < 0.2

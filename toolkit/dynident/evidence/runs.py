@@ -239,10 +239,10 @@ def gather(
     """
     require_torque(dataset.recordings)
     per_run = max(criteria.blocks_per_recording, -(-criteria.blocks // len(dataset.recordings)))
-    runs = []
-    streams = np.random.default_rng(seed).spawn(len(dataset.recordings))
+    runs: list[Run] = []
+    streams = np.random.SeedSequence(seed).spawn(len(dataset.recordings))
     repeats = any(r.period for r in dataset.recordings)
-    for recording, stream in zip(dataset.recordings, streams, strict=True):
+    for number, recording in enumerate(dataset.recordings):
         # Noise on top would hide the signs of a jittered clock: straighten it before.
         recording = uniform(recording)
         first = shared_motion(sample(recording, dataset.filter), (r.replicates[0] for r in runs))
@@ -257,8 +257,15 @@ def gather(
         elif dataset.noise and not repeats:
             # Where columns come from elsewhere, the copies tell the size of the noise only.
             count = criteria.copies if simulated is None else criteria.copies_beside_simulation
+            # Windows of one recording have the same noise on their copies: each is evaluated once.
+            windows = [k for k, run in enumerate(runs) if run.replicates[0].motion is first.motion]
+            stream = np.random.default_rng(streams[min(windows, default=number)])
+            known = [one for k in windows for one in runs[k].replicates]
             copies = (noisy(recording, dataset.noise, stream) for _ in range(count))
-            replicates = (first, *(shared_motion(sample(copy, dataset.filter)) for copy in copies))
+            replicates = (
+                first,
+                *(shared_motion(sample(copy, dataset.filter), known) for copy in copies),
+            )
             index, kind = np.tile(usable, (len(replicates), 1)), "noise_augmented"
         else:
             replicates, index, kind = (first,), usable[None, :], "single"
