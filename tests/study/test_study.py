@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from dynident.errors import DynidentError, DynidentWarning, FileError, StudyError
 from dynident.evidence import compare_models
 from dynident.fitting import fit
-from dynident.recording import Recording, write
+from dynident.recording import Recording, default_filter, write
 from dynident.study import Study, load
 from study_files import CONTROLLER, RATE_HZ, STUDY, edited, recording, reordered, write_study
 
@@ -128,6 +129,31 @@ def test_only_robot_and_recordings_are_needed(study):
     assert (run.use, run.torque, run.period, run.window) == ("train", "measured", None, None)
     assert made.train.filter is None and made.train.noise is None and made.controller is None
     assert not len(made.test)
+
+
+@pytest.mark.parametrize(
+    ("table", "expected"),
+    [
+        ("position_cutoff_hz = 30.0", (30.0, 13.5, 37.5)),
+        ("rate_hz = 20.0", (20.0, 7.2, 20.0)),
+        ("cutoff_hz = 18.0", (36.0, 18.0, None)),
+        ('position_cutoff_hz = 30.0\ncutoff_hz = "none"', (30.0, None, None)),
+        ('position_cutoff_hz = "none"', (None, None, None)),
+        ('position_cutoff_hz = 30.0\nends = "keep"', (30.0, None, None)),
+        ('position_cutoff_hz = 30.0\nrate_hz = 20.0\ndecimation = "chebyshev"', (30.0, None, 20.0)),
+    ],
+)
+def test_a_filter_asks_of_the_torque_what_the_positions_can_tell(study, table, expected):
+    """What is left out suits what is stated; a recipe that is stated whole is followed as it is."""
+    made = study(f"{STUDY}[filter]\n{table}\n").train.filter
+    assert made is not None
+    assert (made.position_cutoff_hz, made.cutoff_hz, made.rate_hz) == pytest.approx(expected)
+
+
+def test_edges_alone_leave_the_filter_as_it_is_by_default(study):
+    made = study(f"{STUDY}[filter]\nedge_s = [0.1, 0.1]\n").train
+    usual = default_filter(made.recordings[0].rate_hz)
+    assert made.filter == replace(usual, edge_s=(0.1, 0.1))
 
 
 def test_paths_are_relative_to_the_file(tmp_path, monkeypatch):

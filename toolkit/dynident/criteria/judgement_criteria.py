@@ -148,6 +148,15 @@ class NuisanceCriteria(CriteriaGroup):
     rounding_recordings: int = criterion(
         2, "recordings", "recordings along which the steps of encoders are looked at", least=1
     )
+    rounding_places: int = criterion(
+        6, "1", "places of the positions between two steps of their encoders that are tried", least=3
+    )
+    rounding_deviations: float = criterion(
+        2.0,
+        "1",
+        "standard deviations over these places by which encoders' steps may leave more than usual",
+        least=0,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,6 +16,7 @@ from dynident.recording.dataset import Dataset, Noise, numbered, without_ends
 from dynident.recording.filters import (
     Filter,
     central_difference,
+    default_cutoff,
     default_filter,
     default_position_cutoff,
     lowpass,
@@ -77,6 +78,7 @@ __all__ = [
     "central_difference",
     "choose_factor",
     "count_rows",
+    "default_cutoff",
     "default_filter",
     "default_position_cutoff",
     "differentiate",

@@ -18,6 +18,10 @@ FORGOTTEN = 1e-12
 """Share of a disturbance at the end of a part that is left where the part is used."""
 _LEAST_SHARE = 1e-6
 """Cut-off over sampling rate below which a filter's coefficients run out of digits."""
+_OF_POSITIONS = 0.45
+"""Usual cut-off of columns and torque over that of the positions."""
+_OF_RATE = 0.36
+"""The same over the rate of the rows."""
 
 
 @checked
@@ -128,6 +132,23 @@ def default_position_cutoff(rate_hz: float, cutoff_hz: float | None) -> float:
     """
     wanted = max(40.0 * min(1.0, rate_hz / 200.0), 2.0 * (cutoff_hz or 0.0))
     return min(wanted, 0.4 * rate_hz)
+
+
+def default_cutoff(
+    position_cutoff_hz: float, rate_hz: float | None = None
+) -> tuple[float, float]:
+    """Cut-off and rate of columns and torque, in Hz, that suit the low-pass of the positions.
+
+    Above what positions let through they predict no torque: all that the torque holds there would
+    count as missing from the model. The proportions are those of `default_filter`.
+
+    Parameters
+    ----------
+    position_cutoff_hz : of the positions.
+    rate_hz : to which rows are decimated, where that is chosen already.
+    """
+    cutoff = _OF_POSITIONS * position_cutoff_hz
+    return (min(cutoff, _OF_RATE * rate_hz), rate_hz) if rate_hz else (cutoff, cutoff / _OF_RATE)
 
 
 def default_filter(rate_hz: float) -> Filter:

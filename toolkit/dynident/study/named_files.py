@@ -17,6 +17,7 @@ from dynident.recording import (
     FileLayout,
     Filter,
     Recording,
+    default_cutoff,
     default_position_cutoff,
     frame_of,
     read,
@@ -60,14 +61,20 @@ def robot_of(said: StudyFile, path: Path) -> Robot:
 
 
 def filter_of(said: FilterEntry, recordings: list[Recording]) -> Filter:
-    """Return the filter of a study; only "none" leaves positions unfiltered."""
+    """Return the filter of a study: what it leaves out is chosen to suit what it states.
+
+    Only "none" leaves positions unfiltered, or lets columns and torque through where positions are
+    filtered; but a recipe that says how ends or decimation are to be treated is followed as it is.
+    """
     values = said.model_dump()
-    match said.position_cutoff_hz:
-        case "default":
-            rate = min(recording.rate_hz for recording in recordings)
-            values["position_cutoff_hz"] = default_position_cutoff(rate, said.cutoff_hz)
-        case "none":
-            values["position_cutoff_hz"] = None
+    cutoff = said.cutoff_hz if isinstance(said.cutoff_hz, float) else None
+    position = said.position_cutoff_hz
+    if position == "default":
+        position = default_position_cutoff(min(one.rate_hz for one in recordings), cutoff)
+    values |= {"position_cutoff_hz": None if position == "none" else position, "cutoff_hz": cutoff}
+    is_recipe = said.decimation != "pick" or said.ends != "drop"
+    if said.cutoff_hz == "default" and position != "none" and not is_recipe:
+        values["cutoff_hz"], values["rate_hz"] = default_cutoff(position, said.rate_hz)
     return Filter(**values)
 
 

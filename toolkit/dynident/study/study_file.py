@@ -59,10 +59,13 @@ class FilterEntry(SettingsTable):
     position_cutoff_hz: Rate | Literal["default", "none"] = "default"
     """Zero-phase low-pass of q before it is differentiated; `"none"` for none. By default it
     follows the sampling rate."""
-    cutoff_hz: Rate | None = None
-    """The same low-pass on every column and on the torque."""
+    cutoff_hz: Rate | Literal["default", "none"] = "default"
+    """The same low-pass on every column and on the torque; `"none"` for none. By default 0.45 of
+    the positions' cut-off, above which these predict no torque; none where positions are not
+    filtered, `decimation` is `"chebyshev"`, or `ends` are kept."""
     rate_hz: Rate | None = None
-    """Decimated to about this; without it every sample is kept."""
+    """Decimated to about this. Without it every sample is kept; where the cut-off is the default
+    one, about three for each of its periods."""
     decimation: Literal["pick", "chebyshev"] = "pick"
     """`"pick"` keeps every k-th filtered row, `"chebyshev"` filters as MATLAB's `decimate`."""
     edge_s: tuple[Time, Time] = (0.0, 0.0)

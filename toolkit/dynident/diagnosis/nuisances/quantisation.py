@@ -58,10 +58,12 @@ def nothing_but_rounding(judged: HeldOut, fitted: EvidenceFit, dataset: Dataset)
 def rounding_power(
     fitted: EvidenceFit, dataset: Dataset, judged: Sequence[HeldOutRun] = ()
 ) -> np.ndarray:
-    """Mean square of the torque error that repeats because positions are rounded, (n,).
+    """Largest usual mean square of the torque error that repeats as positions are rounded, (n,).
 
     The filtered motion is rounded again, on a lattice that is moved, with two draws of the noise
-    that the recording has: what both do to the prediction is what repeats.
+    that the recording has: what both do to the prediction is what repeats. How much that is depends
+    on where the motion lies between the steps, which nobody knows: it is said from the mean and the
+    spread over several places.
 
     Parameters
     ----------
@@ -74,21 +76,26 @@ def rounding_power(
     -------
     Mean over the recordings in which rows of a joint count; zero where none does.
     """
-    looked_at = dataset.recordings[: fitted.criteria.nuisances.rounding_recordings]
-    total, recordings = np.zeros((2, fitted.model.robot.n))
+    own = fitted.criteria.nuisances
+    looked_at = dataset.recordings[: own.rounding_recordings]
+    total = np.zeros((own.rounding_places, fitted.model.robot.n))
+    recordings = np.zeros(fitted.model.robot.n)
     for number, recording in enumerate(looked_at):
         steps = resolution(recording.q)
         if not steps.any():
             recordings += 1
             continue
-        t, (smooth, *rounded) = _predicted(fitted, dataset, _again(recording, dataset, steps))
+        again = _again(recording, dataset, steps, own.rounding_places)
+        t, (smooth, *rounded) = _predicted(fitted, dataset, again)
         certain = _certain(t, judged[number]) if judged else np.ones(smooth.shape, dtype=bool)
         rows = certain.sum(axis=0)
-        first, second = (one - smooth for one in rounded)
-        common = np.sum(first * second, axis=0, where=certain) / np.maximum(rows, 1)
+        first, second = (np.stack(rounded[draw::_DRAWS]) - smooth for draw in range(_DRAWS))
+        common = np.sum(first * second, axis=1, where=certain) / np.maximum(rows, 1)
         total += np.clip(common, 0.0, None)
         recordings += rows > 0
-    return total / np.maximum(recordings, 1)
+    power = total / np.maximum(recordings, 1)
+    spread = np.std(power, axis=0, ddof=1)
+    return np.mean(power, axis=0) + own.rounding_deviations * spread
 
 
 def _certain(t: np.ndarray, judged: HeldOutRun) -> np.ndarray:
@@ -98,8 +105,13 @@ def _certain(t: np.ndarray, judged: HeldOutRun) -> np.ndarray:
     return certain
 
 
-def _again(recording: Recording, dataset: Dataset, steps: np.ndarray) -> list[Recording]:
-    """Return the recording with its filtered positions, and these rounded with draws of noise."""
+def _again(
+    recording: Recording, dataset: Dataset, steps: np.ndarray, places: int
+) -> list[Recording]:
+    """Return the recording with its filtered positions, and these rounded with draws of noise.
+
+    Two draws, one after the other, at each place of the lattice.
+    """
     recording = uniform(recording)
     motion = sample(recording, dataset.filter).motion
     rows = slice(motion.first, motion.first + motion.samples)
@@ -109,10 +121,10 @@ def _again(recording: Recording, dataset: Dataset, steps: np.ndarray) -> list[Re
     power = np.mean((recording.q[rows] - motion.q) ** 2, axis=0) - steps**2 / 12.0
     std = np.sqrt(np.clip(power, 0.0, None))
     rng, safe = np.random.default_rng(0), np.where(steps > 0, steps, 1.0)
-    # Another place of the lattice: what the filter left of the first rounding is in `smooth`.
-    shift = steps * rng.uniform(0.0, 1.0, len(steps))
+    # Other places of the lattice: what the filter left of the first rounding is in `smooth`.
+    shifts = steps * rng.uniform(0.0, 1.0, (places, len(steps)))
     found = [recording.replace(q=smooth)]
-    for _ in range(_DRAWS):
+    for shift in np.repeat(shifts, _DRAWS, axis=0):
         noisy = smooth + shift + std * rng.standard_normal(smooth.shape)
         rounded = np.where(steps > 0, np.round(noisy / safe) * safe - shift, smooth)
         found.append(recording.replace(q=rounded))
@@ -152,8 +164,8 @@ def rounding_notes(
         return ()
     share = np.sqrt(judged.rounding) / np.where(judged.noise_std > 0, judged.noise_std, np.inf)
     return tuple(
-        f"The steps of the encoder at {name} leave a residual of {part:.2g} times the noise, the "
-        "same in every repetition: what is smaller than that cannot be told from them."
+        f"The steps of the encoder at {name} leave a residual of up to {part:.2g} times the noise, "
+        "the same in every repetition: what is smaller than that cannot be told from them."
         for name, part in zip(names, share, strict=True)
         if part > criteria.within_noise
     )
