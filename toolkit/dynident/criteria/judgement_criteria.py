@@ -149,7 +149,7 @@ class NuisanceCriteria(CriteriaGroup):
         2, "recordings", "recordings along which the steps of encoders are looked at", least=1
     )
     rounding_places: int = criterion(
-        6, "1", "places of the positions between two steps of their encoders that are tried", least=3
+        6, "1", "places of a motion between the steps of its encoders that are tried", least=3
     )
     rounding_deviations: float = criterion(
         2.0,

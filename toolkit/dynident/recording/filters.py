@@ -134,9 +134,7 @@ def default_position_cutoff(rate_hz: float, cutoff_hz: float | None) -> float:
     return min(wanted, 0.4 * rate_hz)
 
 
-def default_cutoff(
-    position_cutoff_hz: float, rate_hz: float | None = None
-) -> tuple[float, float]:
+def default_cutoff(position_cutoff_hz: float, rate_hz: float | None = None) -> tuple[float, float]:
     """Cut-off and rate of columns and torque, in Hz, that suit the low-pass of the positions.
 
     Above what positions let through they predict no torque: all that the torque holds there would
