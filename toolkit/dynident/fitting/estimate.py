@@ -166,18 +166,17 @@ class Estimate(Shown):
 
     def parameter_table(self) -> Table:
         """Values, standard deviations and what each parameter is a combination of."""
-        heads = dict(zip(self.basis.independent, self.basis.expressions, strict=True))
+        words = self.model.stands_for(self.basis)
+        heads = dict(zip(self.basis.independent, words, strict=True))
         # What is identified is the combination: its value and sigma, not those of its head.
         values, sigma = np.array(self.values), self.sigma
         values[list(self.basis.independent)] = self.basis.coordinates(self.values)
         values[~self.identified] = np.nan
         rows = []
         for i, name in enumerate(self.names):
-            expression = heads.get(i, "not identified on its own, only in combinations")
+            stands_for = heads.get(i, "not identified on its own, only in combinations")
             if name in self.trading_off:
-                expression = "not determined: size and shape trade off"
-            if expression == name:
-                expression = self.model.expressions[i]
+                stands_for = "not determined: size and shape trade off"
             rows.append(
                 (
                     name,
@@ -185,7 +184,7 @@ class Estimate(Shown):
                     number(sigma[i], 3),
                     percent(float(sigma[i] / abs(values[i])) if values[i] else None, 1),
                     self.model.units[i],
-                    "" if expression == name else expression,
+                    stands_for,
                 )
             )
         columns = ("parameter", "value", "sigma", "relative", "unit", "stands for")

@@ -155,15 +155,14 @@ class Fleet(Shown):
         values, variances = values_in_common(list(self.estimates.values()), self.basis)
         usual = usual_value(values, variances)
         model = next(iter(self.estimates.values())).model
-        rows = []
+        words, rows = model.stands_for(self.basis), []
         for k, head in enumerate(self.basis.independent):
-            name, expression = model.names[head], self.basis.expressions[k]
+            name = model.names[head]
             mean, spread = float(usual.mean[k]), float(usual.spread[k])
             share = percent(spread / abs(mean) if mean else None, 1)
             own = number(float(np.sqrt(np.median(variances[:, k]))), 3)
-            says = "" if expression == name else expression
             cells = (number(mean), number(spread, 3), share, own, model.units[head])
-            rows.append((name, *cells, says))
+            rows.append((name, *cells, words[k]))
         columns = ("parameter", "usual", "spread", "relative", "own sigma", "unit", "stands for")
         notes = (
             "spread: between all robots, beyond their own uncertainty (its median: own sigma).",

@@ -11,7 +11,16 @@ import numpy as np
 
 from dynident.effects import FRICTION_WIDTH, Effect, Law, effects_of
 from dynident.errors import EffectError
-from dynident.robot import BaseParameters, Robot, nearest_parameters, structural_base
+from dynident.robot import (
+    BaseParameters,
+    Robot,
+    nearest_parameters,
+    structural_base,
+    written_out,
+)
+
+_CANCELLED = 1e-9
+"""Share of what is added up below which a coefficient is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,6 +184,38 @@ class ParametrisedRobot:
     def expressions(self) -> tuple[str, ...]:
         """Each parameter as a combination of standard parameters."""
         return (*self.base.expressions, *self._effect_names)
+
+    def stands_for(self, basis: BaseParameters) -> tuple[str, ...]:
+        """What data tell, written in standard parameters of the links and those of effects.
+
+        A combination of base parameters, each of them a combination itself, may lack a standard
+        parameter that its first one has.
+
+        Parameters
+        ----------
+        basis : of combinations of the model's parameters, or of some of them.
+
+        Returns
+        -------
+        For each combination; empty where it is the parameter alone.
+        """
+        every = (*self.base.names, *self._effect_names)
+        place = {name: k for k, name in enumerate(every)}
+        told = np.zeros((len(basis.names), len(every)))
+        heads = dict(zip(self.names, self.base.combination, strict=False))
+        for row, name in enumerate(basis.names):
+            if name in heads:
+                told[row, : len(self.base.names)] = heads[name]
+            else:
+                told[row, place[name]] = 1.0
+        total, terms = basis.combination @ told, np.abs(basis.combination) @ np.abs(told)
+        total[np.abs(total) <= _CANCELLED * terms] = 0.0
+        found = []
+        for row, head in zip(total, basis.independent, strict=True):
+            name = basis.names[head]
+            row[place[name]] = 0.0
+            found.append(written_out(name, row, every) if np.any(row) else "")
+        return tuple(found)
 
     @cached_property
     def units(self) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from dynident.robot.base_parameters import (
     base_parameters,
     nearest_parameters,
     structural_base,
+    written_out,
 )
 from dynident.robot.robot import Robot
 from dynident.robot.tree import Description, Joint, Link
@@ -18,4 +19,5 @@ __all__ = [
     "base_parameters",
     "nearest_parameters",
     "structural_base",
+    "written_out",
 ]

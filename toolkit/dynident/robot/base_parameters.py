@@ -224,7 +224,7 @@ def base_parameters(
         dependent=tuple(int(i) for i in dependent),
         K=K,
         expressions=tuple(
-            _expression(names[i], K[row], [names[j] for j in dependent])
+            written_out(names[i], K[row], [names[j] for j in dependent])
             for row, i in enumerate(independent)
         ),
         scale=scale,
@@ -278,7 +278,8 @@ def _borne(robot: Robot, a: Array) -> Array:
     return np.sqrt(len(a)) * each
 
 
-def _expression(name: str, coefficients: Array, others: list[str]) -> str:
+def written_out(name: str, coefficients: Array, others: Sequence[str]) -> str:
+    """Return a parameter and multiples of others as a sum in words, without what is zero."""
     text = name
     for value, other in zip(coefficients, others, strict=True):
         if value:

@@ -72,14 +72,14 @@ def estimate_changes(before: Estimate, after: Estimate) -> EstimateChanges:
     shown, least = contrasts[0], max(contrasts, key=lambda one: one.p_value)
     adjusted = np.max([one.adjusted for one in contrasts], axis=0)
     units = [before.model.units[i] for i in places[0]]
-    found = []
+    words, found = before.model.stands_for(basis), []
     for i in np.flatnonzero(shown.sigma > 0):
-        head, expression = basis.independent[i], basis.expressions[i]
+        head = basis.independent[i]
         found.append(
             ParameterChange(
                 parameter=basis.names[head],
                 unit=units[head],
-                stands_for="" if expression == basis.names[head] else expression,
+                stands_for=words[i],
                 before=float(shown.values[0][i]),
                 after=float(shown.values[1][i]),
                 sigma=float(shown.sigma[i]),

@@ -73,20 +73,19 @@ def lone_parameters(estimate: Estimate, labels: tuple[str, ...]) -> tuple[LonePa
     """
     model, basis, found = estimate.model, estimate.basis, []
     rows = {head: row for row, head in enumerate(basis.independent)}
-    heads = basis.coordinates(estimate.values)
+    heads, words = basis.coordinates(estimate.values), model.stands_for(basis)
     for effect in model.effects:
         if effect.label in labels:
             continue
         own = model.slices[effect.label]
         for i in range(own.start, own.stop):
             row = rows.get(i)
-            words = "" if row is None else basis.expressions[row]
             found.append(
                 LoneParameter(
                     effect=effect.label,
                     parameter=estimate.names[i],
                     unit=model.units[i],
-                    stands_for="" if words == estimate.names[i] else words,
+                    stands_for="" if row is None else words[row],
                     value=float("nan") if row is None else float(heads[row]),
                     sigma=float(estimate.sigma[i]),
                 )

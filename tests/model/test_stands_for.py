@@ -1,0 +1,47 @@
+"""What a combination is said to stand for is a sum that the true parameters add up to."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from chains import chain
+from dynident.model import Model
+from dynident.robot import base_parameters
+
+_TERM = re.compile(r"(?:^| ([+-]) )(?:([0-9.e+-]+) )?([^ +-][^ ]*)")
+
+
+def _added_up(words: str, truth: dict[str, float]) -> float:
+    """The sum that stands in the words, of true values."""
+    found = 0.0
+    for sign, factor, name in _TERM.findall(words):
+        found += (-1.0 if sign == "-" else 1.0) * float(factor or 1.0) * truth[name]
+    return found
+
+
+def test_combinations_are_written_in_standard_parameters() -> None:
+    """Rotors lean on base parameters that are sums themselves, of which parts cancel."""
+    model = Model(chain(4)) + "rotor_inertia" + "viscous_friction"
+    rng = np.random.default_rng(3)
+    theta = model.robot.theta
+    effects = rng.uniform(0.2, 2.0, model.size - model.base.rank)
+    values = np.concatenate([model.base.coordinates(theta), effects])
+    q, v, a = model.robot.random_motion(0, 400)
+    columns = model.columns(model.block(np.arange(400.0), q, v, a), values)
+    basis = base_parameters(columns.reshape(-1, model.size), model.names)
+    assert basis.rank < model.size, "every parameter is told apart"
+    truth = dict(zip(model.base.names, theta, strict=True))
+    truth |= dict(zip(model.names[model.base.rank :], effects, strict=True))
+    words = model.stands_for(basis)
+    heads = [basis.names[head] for head in basis.independent]
+    assert any("Ia@" in one and " m." in one for one in words)
+    for name, said, value in zip(heads, words, basis.coordinates(values), strict=True):
+        assert np.isclose(_added_up(said or name, truth), value, rtol=1e-4, atol=1e-6), said
+
+
+def test_a_parameter_alone_stands_for_itself() -> None:
+    model = Model(chain(1)) + "viscous_friction"
+    alone = base_parameters(np.eye(model.size), model.names)
+    assert model.stands_for(alone)[-1] == ""
