@@ -20,7 +20,7 @@ from dynident.evidence.runs import gather
 from dynident.fitting.sampling import sample
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
-from synthetic import arm, smooth_motion, true_values
+from synthetic import arm, smooth_motion, synthetic, true_values
 
 RATE_HZ = 500.0
 COULOMB = np.array([3.0, 2.0])
@@ -71,6 +71,19 @@ def test_only_the_joint_that_stands_sticks() -> None:
         assert held is None
         assert (without is of) == (not expected)
         assert without_sticking(without, None, fitted)[0] is without
+
+
+@pytest.mark.parametrize("rate_hz", [250.0, 1000.0, 4000.0])
+def test_a_joint_that_passes_from_sample_to_sample_does_not_stand(rate_hz: float) -> None:
+    """An encoder so fine that a reversal is one sample within the noise of the speed."""
+    model, each = given(), []
+    truth = true_values(model, Fv__shoulder=1.0, Fc__shoulder=COULOMB[0], Fc__elbow=COULOMB[1])
+    for seed in range(2):
+        noise = 1e-7 * np.random.default_rng(seed).normal(size=(round(16 * rate_hz) + 1, 2))
+        one = synthetic(model, truth, seed, rate_hz=rate_hz, torque_std=0.05)
+        each.append(one.replace(q=one.q + noise))
+    of = Evidence(model, gather(Dataset(tuple(each))))
+    assert sticking_joints(of, fit_evidence(of, model)) == ()
 
 
 def rested(recording: Recording, still: slice | None = None) -> Recording:

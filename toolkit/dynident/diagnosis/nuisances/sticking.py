@@ -177,7 +177,11 @@ def _used(sampled: Sampled) -> slice:
 
 
 def _stands(evidence: Evidence, j: int, criteria: StickingCriteria) -> bool:
-    """Whether a joint is seen to stand at many of its stops; a rest at an end is none of them."""
+    """Whether a joint is seen to stand at many of its stops; a rest at an end is none of them.
+
+    Counted in samples, a passage may last one longer within a band than it does, and one shorter on
+    either side of it: a joint that passes from one sample to the next is not seen to stand.
+    """
     stops = [
         stop
         for sampled in (run.replicates[0] for run in evidence.runs)
@@ -186,7 +190,7 @@ def _stands(evidence: Evidence, j: int, criteria: StickingCriteria) -> bool:
             criteria.noise * _speed_noise(evidence, sampled)[j],
         )
     ]
-    longer = sum(within > criteria.longer * around for within, around in stops)
+    longer = sum(within - 1 > criteria.longer * (around + 2) for within, around in stops)
     return longer >= max(criteria.stops, criteria.stops_share * len(stops))
 
 
