@@ -117,7 +117,9 @@ def assemble(
         impossible = impossible_joints_of(evidence, final.model, final.values, final.covariance)
         verdict = "unexplained" if impossible else verdict
     complete, left = verdict == "nothing_missing", shares_left_out(evidence)
-    limits = detection_limits(evidence, held, stages[-1], rounds[-1]) if complete else ()
+    limits = ()
+    if complete:
+        limits = detection_limits(evidence, held, stages[-1], rounds[-1], trained)
     pushed = contact_candidates(given, evidence, search.disturbances)
     gains, last_gains = _gains(search, held, before.error, after.error)
     first = _merged(_candidates(rounds[0], gains), pushed)

@@ -18,6 +18,7 @@ from dynident.diagnosis.search.scoring import Score
 from dynident.effects import Effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
+from dynident.evidence.held_out import HeldOut
 from dynident.tables import Table, number
 
 POWER = 0.95
@@ -47,7 +48,11 @@ class DetectionLimit:
 
 
 def detection_limits(
-    evidence: Evidence, held: Evidence | None, fitted: EvidenceFit, ranking: Ranking
+    evidence: Evidence,
+    held: Evidence | None,
+    fitted: EvidenceFit,
+    ranking: Ranking,
+    trained: HeldOut,
 ) -> tuple[DetectionLimit, ...]:
     """Return how large each candidate could have been without passing the gates.
 
@@ -56,12 +61,14 @@ def detection_limits(
     evidence, held : of the training and of the test recordings; `held` may be None.
     fitted : the model that was said to be complete.
     ranking : of the candidates on that model.
+    trained : what it leaves of the training recordings.
 
     Returns
     -------
     One for each effect that the data can show and each joint at which it acts.
     """
     robot, found = fitted.model.robot, []
+    beside_steps = _deviations_beside_steps(trained, fitted)
     share = 1.0 if held is None else _rows(held) / _rows(evidence)
     for one in ranking.scores:
         if one.rank == 0 or one.covariance is None:
@@ -73,7 +80,7 @@ def detection_limits(
             one.effect.acting_at(robot), _mean_squares(one, evidence, fitted), strict=True
         ):
             largest = float(np.linalg.eigvals(one.covariance @ squares).real.max())
-            torque = deviations * np.sqrt(max(largest, 0.0))
+            torque = max(deviations, beside_steps[joint]) * np.sqrt(max(largest, 0.0))
             if np.isfinite(torque) and torque > 0:
                 name, unit = robot.names[joint], robot.torque_units[joint]
                 found.append(
@@ -82,15 +89,29 @@ def detection_limits(
     return tuple(found)
 
 
-def _deviations_to_stay(one: Score, fitted: EvidenceFit, share: float) -> float:
-    """Standard deviations at which an effect takes enough off the test residual to be kept.
+def _deviations_beside_steps(trained: HeldOut, fitted: EvidenceFit) -> np.ndarray:
+    """Standard deviations at which an effect is no longer taken for encoders' steps, by joint.
 
-    With a share of the rows, the test recordings know it so much less well.
+    Zero where these were not looked at: then what is left is the noise.
+    """
+    if trained.rounding is None or trained.noise_std is None:
+        return np.zeros(fitted.model.robot.n)
+    power = trained.rounding / np.where(trained.noise_std > 0, trained.noise_std, np.inf) ** 2
+    rows = fitted.rows / fitted.model.robot.n
+    return np.sqrt(rows * (power + fitted.criteria.verdict.within_noise**2))
+
+
+def _deviations_to_stay(one: Score, fitted: EvidenceFit, share: float) -> float:
+    """Standard deviations at which an effect lowers the test residual, and by enough to be kept.
+
+    With a share of the rows, the test recordings know it so much less well. Noise changes the fall
+    of a squared residual by twice its own standard deviation times the effect's norm.
     """
     joints = len(one.effect.acting_at(fitted.model.robot)) / fitted.model.robot.n
     rows = share * fitted.rows * joints
     least = fitted.criteria.search.least_fall * rows
-    return float((np.sqrt(least) + special.ndtri(POWER)) / np.sqrt(share))
+    chance = float(special.ndtri(POWER))
+    return float(max(np.sqrt(least) + chance, 2.0 * chance) / np.sqrt(share))
 
 
 def _rows(evidence: Evidence) -> int:

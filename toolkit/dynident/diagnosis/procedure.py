@@ -23,7 +23,7 @@ it is called, that is the answer, and nothing is added.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -210,7 +210,10 @@ def _rank(stage: Stage, task: DiagnosisTask) -> Stage:
 
 def _extend(stage: Stage, task: DiagnosisTask) -> Stage:
     """Add the best effect, refit, and rank again, until none passes every gate."""
-    while stage.proposals < task.most and not _resolved(stage, task):
+    while stage.proposals < task.most:
+        if why := _resolved(stage, task):
+            every = [one.effect.label for one in stage.rounds[-1].passing]
+            return _refusing(stage, dict.fromkeys(every, why))
         best = choose(stage.evidence, stage.fitted, stage.rounds[-1])
         if best is None:
             laws = laws_of_the_rest(stage.evidence, stage.fitted)
@@ -227,16 +230,17 @@ def _extend(stage: Stage, task: DiagnosisTask) -> Stage:
             continue
         if laws:
             why = as_much(laws, label)
-            stage = _refusing(replace(stage, notes=(*stage.notes, f"{why}.")), label, why)
+            noted = replace(stage, notes=(*stage.notes, f"{why}."))
+            stage = _refusing(noted, {label: why})
             continue
         wider, why = _tried(stage, best, task)
-        stage = _refusing(stage, label, why) if why else _rank(wider, task)
+        stage = _refusing(stage, {label: why}) if why else _rank(wider, task)
     return stage
 
 
-def _refusing(stage: Stage, label: str, why: str) -> Stage:
-    """Return a stage whose latest ranking refuses an effect."""
-    ranking = stage.rounds[-1].refusing({label: why})
+def _refusing(stage: Stage, reasons: Mapping[str, str]) -> Stage:
+    """Return a stage whose latest ranking refuses effects, by their labels."""
+    ranking = stage.rounds[-1].refusing(reasons)
     return replace(stage, rounds=(*stage.rounds[:-1], ranking))
 
 
@@ -405,9 +409,12 @@ def _has_changed(evidence: Evidence, start: EvidenceFit, fitted: EvidenceFit) ->
     return now.error < before.error - evidence.criteria.search.another_model
 
 
-def _resolved(stage: Stage, task: DiagnosisTask) -> bool:
-    """Whether what is left is what the processing cannot resolve, or what encoders' steps leave."""
+def _resolved(stage: Stage, task: DiagnosisTask) -> str:
+    """Why nothing is sought in what is left; empty where it may be missing physics."""
     judged = on_recordings(stage.evidence, stage.fitted)
     least = stage.evidence.criteria.verdict.resolution
-    small = np.all(judged.residual_rms <= least * judged.torque_rms)
-    return bool(small) or nothing_but_rounding(judged, stage.fitted, task.train)
+    if np.all(judged.residual_rms <= least * judged.torque_rms):
+        return "all that is left is less than the processing resolves"
+    if nothing_but_rounding(judged, stage.fitted, task.train):
+        return "all that is left may be the steps of the encoders"
+    return ""
