@@ -108,3 +108,28 @@ def test_a_recording_is_resampled_once_and_shared_by_its_windows():
     np.testing.assert_allclose(shaken.q, even.q + 0.1, atol=1e-12)
     with pytest.warns(DynidentWarning, match="jittered"):
         assert uniform(recording.replace(period=0.7)).rate_hz != even.rate_hz
+
+
+def test_samples_that_are_missing_leave_the_rate_as_it_is():
+    """A log that loses 2 % of its samples is no slower clock."""
+    whole = jittered().replace(t=np.arange(4000) / 500.0)
+    rng = np.random.default_rng(4)
+    kept = np.sort(rng.choice(np.arange(1, 3999), 3920, replace=False))
+    kept = np.concatenate([[0], kept, [3999]])
+    signals = {name: x[kept] for name in ("q", "tau") if (x := getattr(whole, name)) is not None}
+    lossy = whole.replace(t=whole.t[kept], v=None, a=None, q_ref=None, **signals)
+    with pytest.warns(DynidentWarning, match="78 samples are missing; resampled to 500 Hz"):
+        even = uniform(lossy)
+    assert even.rate_hz == pytest.approx(500.0, rel=1e-9)
+    assert even.samples == 4000
+    np.testing.assert_allclose(even.q[kept], lossy.q, atol=1e-12)
+
+
+def test_readings_that_come_late_are_not_missing():
+    """Arrivals in pairs, a long step before a short one, are a jittered clock at its mean rate."""
+    whole = jittered()
+    t = np.arange(4000) / 500.0
+    t[1::2] += 0.9 / 500.0
+    with pytest.warns(DynidentWarning, match="are jittered by 90 % of a step"):
+        even = uniform(whole.replace(t=t))
+    assert even.rate_hz == pytest.approx(500.0, rel=1e-3)

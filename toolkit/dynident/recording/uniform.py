@@ -15,6 +15,10 @@ TOLERANCE = 1e-3
 """Relative jitter up to which a recording counts as uniform."""
 _LONGEST_GAP = (20, 0.05)
 """A gap is too long to be bridged if it exceeds both so many samples and so many s."""
+_LONG = 1.5
+"""Of the usual time step, above which a step has left samples out."""
+_UNEXPLAINED = 0.2
+"""Share of the missing samples by which the length of the record may say otherwise."""
 _LONGEST_STALE = 5
 """Repeated rows in a run up to which they are a stale reading, not a robot at rest."""
 
@@ -52,7 +56,8 @@ def uniform(recording: Recording) -> Recording:
     Returns
     -------
     Recording
-        At the mean rate, or the nearest at which the period is a whole number of samples.
+        At the mean rate of what was sampled, single samples that are missing filled in, or at the
+        nearest at which the period is a whole number of samples.
 
     Raises
     ------
@@ -108,7 +113,8 @@ def _resampled(recording: Recording, step: float | None) -> _Even:
     fresh = _fresh(recording) if jittered else np.ones(recording.samples, dtype=bool)
     t = recording.t[fresh]
     _refuse_gaps(recording, np.flatnonzero(fresh))
-    step = step or recording.duration / (recording.samples - 1)
+    missing = _missing(recording.t)
+    step = step or recording.duration / (recording.samples - 1 + missing)
     grid = t[0] + step * np.arange(int(np.floor((t[-1] - t[0]) / step * (1 + 1e-12))) + 1)
     signals = {
         signal: None
@@ -119,7 +125,7 @@ def _resampled(recording: Recording, step: float | None) -> _Even:
     if recording.torque == "held_command":
         signals["tau"] = _held(recording.t, recording.tau, grid)
     if jittered:
-        why = f"the time stamps are jittered by {100 * jitter:.3g} % of a step"
+        why = _irregular(recording.t, missing)
         dropped = recording.samples - int(fresh.sum())
         if dropped:
             share = 100 * dropped / recording.samples
@@ -132,6 +138,29 @@ def _resampled(recording: Recording, step: float | None) -> _Even:
     source = replace(recording.provenance, filter=_history(recording, 1 / step))
     even = recording.replace(t=grid, provenance=source, **signals)
     return _Even(even, f"{why}; {_done(1 / step)}")
+
+
+def _missing(t: np.ndarray) -> int:
+    """Samples that a clock (T,) has left out: their steps are longer, and no others are shorter."""
+    steps = np.diff(t)
+    usual = float(np.median(steps))
+    long = steps > _LONG * usual
+    missing = int(np.sum(np.round(steps[long] / usual) - 1))
+    # Where readings come late, the next steps are short: nothing is missing then.
+    surplus = (t[-1] - t[0]) / usual - len(steps)
+    return missing if abs(surplus - missing) <= 1.0 + _UNEXPLAINED * missing else 0
+
+
+def _irregular(t: np.ndarray, missing: int) -> str:
+    """What is irregular about a clock, in words."""
+    steps = np.diff(t)
+    step = (t[-1] - t[0]) / (len(steps) + missing)
+    own = steps[steps <= _LONG * step] if missing else steps
+    jitter = float(np.max(np.abs(own - step))) / step
+    said = [f"{missing} samples are missing"] if missing else []
+    if jitter > TOLERANCE or not missing:
+        said.append(f"the time stamps are jittered by {100 * jitter:.3g} % of a step")
+    return ", and ".join(said)
 
 
 def _interpolated(t: np.ndarray, x: np.ndarray, fresh: np.ndarray, grid: np.ndarray) -> np.ndarray:
