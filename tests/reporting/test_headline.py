@@ -5,6 +5,7 @@ from itertools import product
 
 import pytest
 
+from dynident.diagnosis.details import Withdrawn
 from dynident.reporting.content import step_groups
 from dynident.reporting.glossary import glossary
 from dynident.reporting.headline import headline
@@ -50,13 +51,25 @@ def test_verdict_icon_title_and_colour_agree(verdict, steps, noise):
 @pytest.mark.parametrize("steps", [True, False])
 def test_a_part_below_the_noise_is_told_with_every_verdict(steps):
     found = of_kind("explained" if steps else "nothing_missing", steps, noise=True)
-    for left, told in ((0.4, False), (0.7, True)):
+    for left, told in ((0.4, False), (0.7, True), (1.1, True)):
         joints = tuple(replace(joint, ratio_after=left) for joint in found.joints)
         one = replace(found, joints=joints)
         assert ("though not nothing" in headline(one).sentence) == told
-        assert ("(0.7 of it), though not nothing" in one.sentence) == told
+        size = {0.4: "within", 0.7: "smaller than the noise (0.7 of it)", 1.1: "as large as the"}
+        assert size[left] in one.sentence
+        assert ("smaller" in headline(one).sentence) == ("smaller" in one.sentence)
         assert ("Nothing is missing" in one.sentence) == (not steps and not told)
         assert (headline(one).title == "nothing is missing") == (not steps and not told)
+
+
+def test_what_was_found_and_withdrawn_is_not_said_to_be_nothing():
+    found = of_kind("nothing_missing", False, noise=True)
+    alike = (effect("drive_gain", "elbow"),)
+    taken = Withdrawn(effect=effect("drive_gain", "shoulder"), why="raises the error", with_it=alike)
+    one = replace(found, withdrawn=(taken,))
+    assert "drive gain at shoulder or drive gain at elbow, which is withdrawn" in one.sentence
+    assert "Nothing is missing:" not in one.sentence + headline(one).sentence
+    assert headline(one).mark == "?"
 
 
 def opening(html):

@@ -118,7 +118,7 @@ def assemble(
         verdict = "unexplained" if impossible else verdict
     complete, left = verdict == "nothing_missing", shares_left_out(evidence)
     limits = ()
-    if complete:
+    if complete and not path.withdrawn:  # what was found, and withdrawn, is no limit
         limits = detection_limits(evidence, held, stages[-1], rounds[-1], trained)
     pushed = contact_candidates(given, evidence, search.disturbances)
     gains, last_gains = _gains(search, held, before.error, after.error)

@@ -212,10 +212,10 @@ class Diagnosis(Shown):
         left = max((j.ratio_after or 0.0 for j in self.joints), default=0.0)
         if self.verdict != "unexplained" and left > self.criteria.verdict.not_nothing:
             found = f"Explained: {effects} added, and" if effects else "No missing effect is found:"
-            return (
-                f"{found} what remains is smaller than the noise ({left:.2g} of it), though not "
-                "nothing."
-            )
+            size = f"smaller than the noise ({left:.2g} of it)"
+            if left >= 1.0:
+                size = f"as large as the noise ({left:.2g} times it)"
+            return f"{found} what remains is {size}, though not nothing."
         if self.verdict == "unexplained" and effects:
             before, after = percent(self.test_error.before), percent(self.test_error.after)
             return (
@@ -223,7 +223,20 @@ class Diagnosis(Shown):
                 "residual beyond the noise remains, and none of the effects in the catalogue "
                 "explains it."
             )
+        if self.verdict == "nothing_missing" and self.withdrawn:
+            return (
+                "Nothing is missing that held-out data confirm: what remains is within the noise. "
+                f"Training recordings call for {self._withdrawn_titles}, which is withdrawn."
+            )
         return _VERDICTS[self.verdict].format(effects=effects)
+
+    @property
+    def _withdrawn_titles(self) -> str:
+        """What was taken back, each with what cannot be told from it."""
+        return " and ".join(
+            " or ".join(effect.title for effect in (one.effect, *one.with_it))
+            for one in self.withdrawn
+        )
 
     def _stopped(self, effects: str) -> str:
         """The verdict where the limit ended the search: what else the catalogue has is not known.

@@ -16,6 +16,7 @@ Mark = Literal["\u2713", "!", "?"]
 
 _COLOURS: dict[Mark, str] = {"\u2713": "nothing_missing", "!": "unexplained", "?": "unknown"}
 _WITHIN, _SMALLER = "within the noise", "smaller than the noise, though not nothing"
+_AS_LARGE = "as large as the noise, though not nothing"
 _MOST_NAMED = 2
 """Effects that the sentence names."""
 _NOT_KNOWN = "The noise is unknown, so more may be missing."
@@ -100,7 +101,9 @@ def _title(diagnosis: Diagnosis) -> str:
 
 def _rest(diagnosis: Diagnosis) -> str:
     left = max((joint.ratio_after or 0.0 for joint in diagnosis.joints), default=0.0)
-    return _WITHIN if left <= diagnosis.criteria.verdict.not_nothing else _SMALLER
+    if left <= diagnosis.criteria.verdict.not_nothing:
+        return _WITHIN
+    return _SMALLER if left < 1.0 else _AS_LARGE
 
 
 def _followed(diagnosis: Diagnosis) -> str:
@@ -132,8 +135,11 @@ def _nothing_added(diagnosis: Diagnosis, known: bool) -> Headline:
         return Headline("?", "nothing added, noise unknown", said)
     if known:
         rest = _rest(diagnosis)
-        if rest == _SMALLER:
+        if rest != _WITHIN:
             return Headline("?", "no missing effect is found", f"What remains is {rest}.")
+        if diagnosis.withdrawn:
+            said = f"Held-out data confirm nothing that is missing, and what remains is {rest}."
+            return Headline("?", "no missing effect is confirmed", said)
         said = f"Nothing is missing: what remains is {rest}."
         return Headline("\u2713", "nothing is missing", said)
     said = f"No effect of the catalogue would be of use. {_NOT_KNOWN}"
