@@ -65,7 +65,9 @@ def test_a_part_below_the_noise_is_told_with_every_verdict(steps):
 def test_what_was_found_and_withdrawn_is_not_said_to_be_nothing():
     found = of_kind("nothing_missing", False, noise=True)
     alike = (effect("drive_gain", "elbow"),)
-    taken = Withdrawn(effect=effect("drive_gain", "shoulder"), why="raises the error", with_it=alike)
+    taken = Withdrawn(
+        effect=effect("drive_gain", "shoulder"), why="raises the error", with_it=alike
+    )
     one = replace(found, withdrawn=(taken,))
     assert "drive gain at shoulder or drive gain at elbow, which is withdrawn" in one.sentence
     assert "Nothing is missing:" not in one.sentence + headline(one).sentence

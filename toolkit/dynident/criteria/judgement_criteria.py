@@ -182,6 +182,13 @@ class StickingCriteria(CriteriaGroup):
         over=0,
         most=1,
     )
+    coarse: float = criterion(
+        1.0,
+        "1",
+        "change of speed from one sample to the next, over the friction width, above which a "
+        "reversal falls between the samples: its friction is off by some 6 % of the Coulomb level",
+        over=0,
+    )
     resolved: float = criterion(
         3.0,
         "1",

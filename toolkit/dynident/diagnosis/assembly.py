@@ -19,6 +19,7 @@ from dynident.diagnosis.details import Candidate, JointResult, Status, Step, Tes
 from dynident.diagnosis.detection_limits import detection_limits
 from dynident.diagnosis.nuisances.contacts import Disturbance, contact_candidates
 from dynident.diagnosis.nuisances.quantisation import rounding_notes, with_rounding
+from dynident.diagnosis.nuisances.sampling_time import sampling_time
 from dynident.diagnosis.nuisances.stated_noise import stated_noise_notes
 from dynident.diagnosis.nuisances.sticking import shares_left_out
 from dynident.diagnosis.nuisances.unlike_recordings import training_notes, unlike_notes
@@ -151,6 +152,7 @@ def assemble(
         rows=rows_of_recordings(train if test is None else train + test),
         limit=search.limit,
         detection_limits=limits,
+        sampled=sampling_time(evidence, rounds[-1]),
         training_only=_training_only(verdict, trained, after, evidence),
         reversals_left_out={joint: left[joint] for joint in search.doubtful},
     )

@@ -26,6 +26,7 @@ from dynident.diagnosis.details import (
 from dynident.diagnosis.detection_limits import DetectionLimit, limit_table
 from dynident.diagnosis.effect_groups import hidden_effects
 from dynident.diagnosis.leading_effects import LeadingEffects
+from dynident.diagnosis.nuisances.sampling_time import SamplingTime
 from dynident.diagnosis.proposals.proposal import Proposal
 from dynident.diagnosis.switches import Switches
 from dynident.diagnosis.track_record import JOINTS, TrackRecord, track_record
@@ -89,6 +90,7 @@ class Diagnosis(Shown):
         held-out recordings leave none: the verdict is "unexplained" for that alone.
     following_motion : joints without a noise floor at which what is left is no noise, as functions
         of position and velocity, or of the speeds of all joints, predict it; empty elsewhere.
+    sampled : when the torque acts, where that is not when the study says.
     switches : every choice among the effects added, fitted and judged, where that was asked for.
     drives : gains by which currents became torques, and loads that were identified; None where
         nothing had to be found.
@@ -120,6 +122,7 @@ class Diagnosis(Shown):
     reversals_left_out: Mapping[str, float] = field(default_factory=dict)
     training_only: tuple[str, ...] = ()
     following_motion: tuple[str, ...] = ()
+    sampled: SamplingTime | None = None
     switches: Switches | None = None
     drives: DriveGains | None = None
     drives_anew: DriveGains | None = None
@@ -145,7 +148,7 @@ class Diagnosis(Shown):
         if self.wiring:
             faults = " ".join(fault.sentence for fault in self.wiring)
             return f"The recordings are not what the study says, and nothing was sought. {faults}"
-        said = " ".join([self._verdict_in_words, *self.left_out_in_words])
+        said = " ".join([self._verdict_in_words, *self.left_out_in_words, *self.when_sampled])
         if self.limit is None:
             return said
         return f"{said} {self.limit_in_words}: allow more (--most)."
@@ -177,6 +180,11 @@ class Diagnosis(Shown):
             f"That leaves out the reversals of {', '.join(each)}, where dry friction may follow "
             "another law than the model's.",
         )
+
+    @property
+    def when_sampled(self) -> tuple[str, ...]:
+        """That the torque is of another moment than the study says; empty where it is not."""
+        return () if self.sampled is None else (self.sampled.sentence,)
 
     @property
     def _verdict_in_words(self) -> str:
@@ -343,7 +351,7 @@ class Diagnosis(Shown):
             **({"drives_anew": self.drives_anew.to_dict()} if self.drives_anew else {}),
             **self._dependence(),
             "proposals": [one.to_dict() for one in self.proposals],
-            "notes": list(self.caveats),
+            "notes": [*self.caveats, *self.when_sampled],
             **({"criteria": self._changed_criteria()} if self.criteria.changed else {}),
         }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from dynident.diagnosis.effect_groups import in_words
@@ -54,6 +54,10 @@ def headline(diagnosis: Diagnosis) -> Headline:
         said = f"No robot can have what the fit says: {values}{rest}."
         return Headline("!", "impossible values", said)
     found = _of_verdict(diagnosis)
+    if diagnosis.sampled is not None:
+        mark = "?" if found.mark == "\u2713" else found.mark
+        said = f"{found.sentence} The torque is of another moment than the study says."
+        found = replace(found, mark=mark, sentence=said)
     if diagnosis.reversals_left_out:
         mark = "?" if found.mark == "\u2713" else found.mark
         where = " and ".join(diagnosis.reversals_left_out)

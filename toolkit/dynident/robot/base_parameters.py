@@ -279,7 +279,14 @@ def _borne(robot: Robot, a: Array) -> Array:
 
 
 def written_out(name: str, coefficients: Array, others: Sequence[str]) -> str:
-    """Return a parameter and multiples of others as a sum in words, without what is zero."""
+    """Return a parameter and multiples of others as a sum in words.
+
+    Parameters
+    ----------
+    name : of the parameter that comes first, once.
+    coefficients : of the others, (m,); what is zero is left out.
+    others : their names, m.
+    """
     text = name
     for value, other in zip(coefficients, others, strict=True):
         if value:

@@ -294,7 +294,7 @@ def friction_width_notes(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, 
         if f"coulomb_friction@{joint}" not in model.slices or profile.width == stated:
             continue
         if f"presliding@{joint}" in model.slices:
-            continue  # how friction reverses is told by presliding: the width is of what is beside it
+            continue  # presliding tells how friction reverses: the width is of what is beside it
         low, high = profile.interval()
         low = 0.0 if profile.width <= own.at_bound * own.narrowest_width * stated else low
         high = np.inf if profile.width >= own.widest_width * stated / own.at_bound else high

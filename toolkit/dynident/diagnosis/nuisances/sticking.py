@@ -7,7 +7,9 @@ there would be called Stribeck friction, a delay or elasticity. So these rows of
 nothing, of the model or of what it lacks.
 
 A joint counts as sticking if it is seen to stand (within the noise of its speed, for longer than it
-takes to pass through zero), or if the friction width that the data call for is below that noise.
+takes to pass through zero), if the friction width that the data call for is below that noise, or if
+many of its reversals fall between two samples: the mean of a friction that reverses there is not
+the friction of the mean speed.
 """
 
 from __future__ import annotations
@@ -77,7 +79,11 @@ def sticking_joints(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
         joint
         for j, joint in enumerate(model.robot.names)
         if f"coulomb_friction@{joint}" in model.slices
-        and (model.friction_widths[j] <= resolved[j] or _stands(evidence, j, criteria))
+        and (
+            model.friction_widths[j] <= resolved[j]
+            or _stands(evidence, j, criteria)
+            or _between_samples(evidence, j, model.friction_widths[j], criteria)
+        )
         and _share(evidence, j) <= criteria.most
     )
 
@@ -138,8 +144,9 @@ def sticking_notes(evidence: Evidence, others: Collection[str] = ()) -> tuple[st
     """
     return tuple(
         f"{joint} stands still at many of its stops, or its dry friction reverses within the noise "
-        f"of its speed: no data tell that friction, and {percent(share, 0)} of the joint's rows, "
-        "those around its stops, count neither in the fit nor in the errors."
+        "of its speed or between two samples: no data tell that friction, and "
+        f"{percent(share, 0)} of the joint's rows, those around its stops, count neither in the "
+        "fit nor in the errors."
         for joint, share in shares_left_out(evidence).items()
         if joint not in others
     )
@@ -192,6 +199,14 @@ def _stands(evidence: Evidence, j: int, criteria: StickingCriteria) -> bool:
     ]
     longer = sum(within - 1 > criteria.longer * (around + 2) for within, around in stops)
     return longer >= max(criteria.stops, criteria.stops_share * len(stops))
+
+
+def _between_samples(evidence: Evidence, j: int, width: float, criteria: StickingCriteria) -> bool:
+    """Whether many of a joint's reversals are over from one sample to the next."""
+    speeds = [run.replicates[0].motion.v[_used(run.replicates[0]), j] for run in evidence.runs]
+    steps = [np.abs(np.diff(v))[v[1:] * v[:-1] < 0] for v in speeds]
+    quick = np.concatenate(steps) > criteria.coarse * width
+    return bool(np.sum(quick) >= max(criteria.stops, criteria.stops_share * len(quick)))
 
 
 def _stops(v: np.ndarray, reach: float) -> Iterator[tuple[int, int]]:

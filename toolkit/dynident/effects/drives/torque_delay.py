@@ -41,7 +41,7 @@ class TorqueDelay(Forceless):
     def parameters(self, robot):
         return (
             Parameter(
-                "d", "s", -0.05, 0.05, means="how much later the torque acts than the record says"
+                "d", "s", -0.05, 0.05, means="how much later the torque is recorded than it acts"
             ),
         )
 

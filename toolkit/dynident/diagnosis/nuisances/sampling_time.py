@@ -1,0 +1,78 @@
+"""Torque that was sampled at another moment than the study says: less than a sample is no physics.
+
+A command that is logged at a sample acts until the next one, half a sample later in the mean. Taken
+as measured at the sample, it changes viscous friction and inertia by more than their uncertainty
+long before it is seen in the error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dynident.diagnosis.search.ranking import Ranking
+from dynident.evidence.columns import Evidence
+from dynident.tables import number
+
+_NEAR_HALF = (0.25, 0.75)
+"""Of a sample: what may be the half one by which a held command acts later than it is logged."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SamplingTime:
+    """When the torque acts, where a study takes a command that is held for a measured torque.
+
+    Or the other way round.
+
+    Attributes
+    ----------
+    later_s, sigma_s : by how much later than the study says, s.
+    step_s : from one sample to the next, s.
+    joint : at which; empty for all of them alike.
+    mend : the line of the study that mends it.
+    """
+
+    later_s: float
+    sigma_s: float
+    step_s: float
+    joint: str
+    mend: str
+
+    @property
+    def sentence(self) -> str:
+        """What was found, and what mends it, in plain words."""
+        where = f" at {self.joint}" if self.joint else ""
+        when = "later" if self.later_s > 0 else "earlier"
+        return (
+            f"The torque{where} acts {number(1e3 * abs(self.later_s), 2)} ms {when} than the study "
+            f"says (sigma {number(1e3 * self.sigma_s, 2)} ms), about half a sample, which is what "
+            f"a held command makes: try {self.mend} in the study. Until then friction and inertia "
+            "take it up."
+        )
+
+
+def sampling_time(evidence: Evidence, ranking: Ranking) -> SamplingTime | None:
+    """Return when the torque acts, where that is half a sample from when the study says.
+
+    Parameters
+    ----------
+    evidence : the training recordings.
+    ranking : of the candidates on the final model.
+    """
+    step = max(1.0 / run.recording.rate_hz for run in evidence.runs)
+    held = evidence.runs[0].recording.torque == "held_command"
+    found = [
+        score
+        for score, refusal in zip(ranking.scores, ranking.refusals, strict=True)
+        if refusal and score.values and refusal == score.effect.unresolved(score.values, step)
+    ]
+    for score in sorted(found, key=lambda one: one.effect.joint is not None):
+        later = -score.values[0]  # what is recorded late has acted before
+        if _NEAR_HALF[0] <= (-later if held else later) / step <= _NEAR_HALF[1]:
+            return SamplingTime(
+                later_s=later,
+                sigma_s=score.sigma[0],
+                step_s=step,
+                joint=str(score.effect.joint or ""),
+                mend='torque = "measured"' if held else 'torque = "held_command"',
+            )
+    return None
