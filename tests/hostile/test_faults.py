@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 
 import dynident as di
-from hostile.kills import WRITERS, Writer, content, each_writer, finished, prepare, started
+from hostile.kills import content, finished, started
+from hostile.writers import WRITERS, Writer, each_writer, prepare
 
 pytestmark = [
     pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks here"),
