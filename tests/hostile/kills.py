@@ -23,6 +23,7 @@ from pathlib import Path
 
 from dynident import file_groups, files
 from dynident.cli import main as command
+from dynident.experiment_design import motion_program
 from dynident.explorer.effect_choices import EffectChoice
 from dynident.explorer.local_server import LocalServer
 from hostile.worker import load_libraries
@@ -76,6 +77,7 @@ def started(
             sys.stdout = os.fdopen(1, "w", closefd=False)
             sys.stderr = os.fdopen(2, "w", closefd=False)
         LocalServer.serve = _click
+        motion_program._TRIED = 10  # a design is written whatever its search began with
         before()
         command(words)
     except SystemExit as stop:
