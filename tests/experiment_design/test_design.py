@@ -113,6 +113,7 @@ def test_the_symbolic_loss_is_the_loss() -> None:
         assert symbolic == pytest.approx(plain, rel=1e-6)
 
 
+@pytest.mark.usefixtures("few_begins")
 def test_predicted_sigma_is_that_of_the_regression() -> None:
     task = DesignTask(duration=8.0, repeat=2, harmonics=4, starts=1)
     found = design(MODEL, recorded(), task)
@@ -210,6 +211,7 @@ def test_of_several_pairs_the_one_told_least_counts() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_begins")
 def test_a_pair_that_nothing_tells_hides_no_other() -> None:
     law = law_effect(Law(name="again", torque="c*v"))("elbow").on(ROBOT)
     (viscous,), (drag,), (spring,) = (
@@ -224,6 +226,7 @@ def test_a_pair_that_nothing_tells_hides_no_other() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_begins")
 def test_several_effects_are_shown_together() -> None:
     effects = tuple(effects_of(one, ROBOT)[0] for one in ("torque_offset@shoulder", "base_tilt"))
     found = design(MODEL, recorded(), DesignTask(show=effects, starts=1, harmonics=4))
@@ -236,6 +239,7 @@ def test_several_effects_are_shown_together() -> None:
 @pytest.mark.parametrize(
     "seed", [pytest.param(k, marks=pytest.mark.slow if k > 1 else ()) for k in range(12)]
 )
+@pytest.mark.usefixtures("few_begins")
 def test_no_limit_is_exceeded_on_a_fine_grid(seed: int) -> None:
     robot = chain(1 + seed % 4, seed)
     rng = np.random.default_rng(seed)
@@ -261,6 +265,7 @@ def test_no_limit_is_exceeded_on_a_fine_grid(seed: int) -> None:
     assert np.all(np.abs(a) <= (1 + small) * limits.acceleration)
 
 
+@pytest.mark.usefixtures("few_begins")
 def test_torque_limits_hold() -> None:
     plain = MotionLimits.of(ROBOT)
     limits = replace(plain, torque=np.array([45.0, 12.0]))
@@ -284,6 +289,7 @@ def written(monkeypatch: pytest.MonkeyPatch) -> list[frozenset[int]]:
     return found
 
 
+@pytest.mark.usefixtures("few_begins")
 def test_torques_far_from_their_limits_cost_a_large_search_no_rows(monkeypatch) -> None:
     programs = written(monkeypatch)
     limits = replace(MotionLimits.of(ROBOT), torque=np.array([1e3, 1e3]))
@@ -295,6 +301,7 @@ def test_torques_far_from_their_limits_cost_a_large_search_no_rows(monkeypatch) 
     assert programs == [frozenset()]
 
 
+@pytest.mark.usefixtures("few_begins")
 def test_torques_that_turn_out_too_large_are_limited_then() -> None:
     task, free = (
         DesignTask(starts=1, harmonics=2),
@@ -317,6 +324,7 @@ def test_torques_that_turn_out_too_large_are_limited_then() -> None:
     assert program.within(found.motion.variables) is None
 
 
+@pytest.mark.usefixtures("few_begins")
 def test_the_next_recording_complements_those_so_far() -> None:
     """What is known already counts: without it the sigmas are larger."""
     task = DesignTask(duration=8.0, repeat=1, harmonics=3, starts=1)
@@ -368,6 +376,7 @@ def test_limits_by_file(tmp_path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_begins")
 def test_what_no_motion_tells_is_infinite_and_named() -> None:
     """Beside viscous friction the law c v has no sigma; rivals that are the same are not told."""
     law = law_effect(Law(name="again", torque="c*v"))("elbow").on(ROBOT)

@@ -7,9 +7,12 @@ from dynident.fitting import Estimate
 from dynident.robot import Robot
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def client() -> Iterator:
-    """The client of a cluster of two processes on this machine."""
+    """The client of a cluster of two processes on this machine.
+
+    No longer than a file: with nothing to do it takes a twelfth of a processor all the same.
+    """
     distributed = pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
     with (
         distributed.LocalCluster(

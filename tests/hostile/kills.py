@@ -13,228 +13,24 @@ import signal
 import sys
 import tempfile
 import time
-import tomllib
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import wraps
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
 from pathlib import Path
 
-import numpy as np
-import pytest
-
-import dynident as di
+from dynident import file_groups, files
 from dynident.cli import main as command
+from dynident.experiment_design import motion_program
 from dynident.explorer.effect_choices import EffectChoice
 from dynident.explorer.local_server import LocalServer
-from dynident.recording import write
-from dynident.robot import Robot
-from hostile.case import place
-from hostile.experiments import EXPERIMENT
 from hostile.worker import load_libraries
-from laws_hidden import recordings as hidden_recordings
-from loop_studies import LOOP_STUDY, write_loop_study
-from study_files import CONTROLLER, STUDY, edited, write_study
-from synthetic import ARM
+from hostile.writers import WRITERS, Writer, prepare
 
-WRITING = {
-    "dynident/files.py": ("write_bytes", "write_text"),
-    "dynident/file_groups.py": ("_finish",),
-}
-"""Code that writes: functions of a file, within which a command is killed."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Writer:
-    """A command that writes.
-
-    Attributes
-    ----------
-    words : of the command.
-    results : files that it writes, with what reads them or raises.
-    folder : in which others may stand beside them.
-    """
-
-    words: tuple[str, ...]
-    results: dict[str, Callable[[Path], object]]
-    folder: str = ""
-
-    def may_write(self, file: str) -> bool:
-        """Whether a file is in the folder that it fills."""
-        return bool(self.folder) and file.startswith(f"{self.folder}/")
-
-
-def _page(path: Path) -> None:
-    assert path.read_text().rstrip().endswith("</html>")
-
-
-def _picture(path: Path) -> None:
-    data = path.read_bytes()
-    assert data.startswith(b"\x89PNG") and b"IEND" in data[-12:]
-
-
-def _tables(path: Path) -> None:
-    assert di.read(path).samples > 2
-
-
-def _reference(path: Path) -> None:
-    assert np.loadtxt(path, delimiter=",", skiprows=1).shape[1] == 5
-
-
-def _toml(path: Path) -> None:
-    tomllib.loads(path.read_text())
-
-
-WRITERS = {
-    "add": Writer(
-        words=("add", "study.toml", "coulomb_friction@elbow"), results={"study.toml": di.load}
-    ),
-    "fit": Writer(
-        words=("fit", "study.toml", "--out", "fit.json", "--robot", "fit.urdf"),
-        results={"fit.json": di.load_estimate, "fit.urdf": Robot.from_file},
-    ),
-    "refit": Writer(
-        words=("refit", "arm.urdf", "--out", "new.urdf"), results={"new.urdf": Robot.from_file}
-    ),
-    "refit in place": Writer(
-        words=("refit", "broken.urdf", "--out", "broken.urdf"),
-        results={"broken.urdf": Robot.from_file},
-    ),
-    "init": Writer(
-        words=("init", "arm.urdf", "train.csv", "test.csv", "--out", "draft.toml"),
-        results={"draft.toml": di.load},
-    ),
-    "show": Writer(words=("show", "study.toml", "--to", "old.png"), results={"old.png": _picture}),
-    "explain": Writer(
-        words=("explain", "whole.toml", "--most", "0", "--report", "old.html"),
-        results={"old.html": _page},
-    ),
-    "report": Writer(
-        words=("report", "whole.toml", "--most", "0", "--to", "new.html"),
-        results={"new.html": _page},
-    ),
-    "simulate": Writer(
-        words=("simulate", "loop/study.toml", "--report", "loop.html", "--plot", "loop.png"),
-        results={"loop.html": _page, "loop.png": _picture},
-    ),
-    "experiment": Writer(
-        words=("simulate", "experiment.toml", "--out", "virtual"),
-        results={"virtual/run1.csv": _tables, "virtual/study.toml": _toml},
-        folder="virtual",
-    ),
-    "demo": Writer(words=("demo", "--to", "demo.html"), results={"demo.html": _page}),
-    "demo of a design": Writer(
-        words=("demo", "--design", "settled"),
-        results={"settled/study.toml": _toml, "settled/next/design.toml": _toml},
-        folder="settled",
-    ),
-    "design": Writer(
-        words=("design", "study.toml", "--starts", "1", "--harmonics", "3", "--out", "next"),
-        results={
-            "next/reference.csv": _reference,
-            "next/robot.urdf": Robot.from_file,
-            "next/experiment.toml": _toml,
-            "next/motion.html": _page,
-            "next/design.toml": _toml,
-        },
-    ),
-    "changes": Writer(
-        words=("changes", "before.json", "after.json", "--to", "old.html"),
-        results={"old.html": _page},
-    ),
-    "instruments": Writer(
-        words=("fit", "loop/study.toml", "--method", "iv", "--plot", "old.png"),
-        results={"old.png": _picture},
-    ),
-    "laws": Writer(
-        words=("explain", "law/study.toml", "--laws", "l.toml"), results={"l.toml": _toml}
-    ),
-    "open": Writer(words=("open", "study.toml", "--no-browser"), results={"study.toml": di.load}),
-}
-
-ALIKE = {"explain --design": "design"}
-"""Options that write with the code of another writer, and take long to get there."""
-IN_PLACE = ("add study", "open study")
-"""Arguments that are written to as well as read."""
-_OF_STUDIES = ("compare", "design", "diagnose", "explain", "fit", "payload", "report", "show")
-READ = frozenset(
-    {
-        *(f"{one} study" for one in _OF_STUDIES),
-        *(f"changes {one}" for one in ("before", "after", "--study", "--effects")),
-        *(f"refit {one}" for one in ("what", "--study", "--effects", "--robot")),
-        *("check robot", "check --effects", "design --limits", "init robot"),
-        *("simulate file", "simulate --estimate"),
-    }
-)
-"""Arguments and options that name files which are read, and left as they are."""
-
-LONG = tuple(WRITERS.keys() - {"add", "fit", "refit", "init", "changes", "open"})
-"""Commands that take seconds: `make test-fast` leaves them out."""
-each_writer = pytest.mark.parametrize(
-    "name",
-    [pytest.param(one, marks=pytest.mark.slow if one in LONG else ()) for one in WRITERS],
-)
-
-
-def prepare(folder: Path) -> None:
-    """Write what the commands read, and some of what they replace."""
-    write_study(folder, STUDY + CONTROLLER)
-    # Where nothing is missing, nothing is asked of what is left.
-    complete = edited(('"viscous_friction"', '"viscous_friction", "coulomb_friction@elbow"'))
-    place(folder / "whole.toml", complete + CONTROLLER)
-    (folder / "loop").mkdir()
-    write_loop_study(folder / "loop", LOOP_STUDY)
-    robot = (folder / "arm.urdf").read_text()
-    place(folder / "broken.urdf", robot.replace('ixx="0.01"', 'ixx="9"'))
-    place(folder / "experiment.toml", EXPERIMENT)
-    place(folder / "old.html", "<html>\nan older page</html>")
-    place(folder / "old.png", b"\x89PNG older IEND\xae\x42\x60\x82")
-    for name, text in zip(("before.json", "after.json"), _estimates(), strict=True):
-        place(folder / name, text)
-    (folder / "next").mkdir()
-    for name, text in _older_design().items():
-        place(folder / "next" / name, text)
-    (folder / "law").mkdir()
-    (folder / "law" / "arm.urdf").write_text(ARM)
-    for one, text in zip(("train.csv", "test.csv"), _with_a_law(), strict=True):
-        place(folder / "law" / one, text)
-    place(folder / "law" / "study.toml", STUDY.replace(*_ALL_FRICTION))
-
-
-_ALL_FRICTION = (
-    'effects = ["viscous_friction"]',
-    'effects = ["viscous_friction", "coulomb_friction"]',
-)
-
-
-@cache
-def _estimates() -> tuple[str, str]:
-    """Two estimates of the arm, from recordings of their own."""
-    with tempfile.TemporaryDirectory(prefix="kills.") as name:
-        study = di.load(write_study(Path(name)))
-        found = [di.fit(study.model, one) for one in (study.train, study.test)]
-        first, second = (one.save(Path(name) / "fit.json").read_text() for one in found)
-    return first, second
-
-
-@cache
-def _with_a_law() -> tuple[bytes, bytes]:
-    """Two recordings of an arm with a law at its elbow that no catalogue has."""
-    with tempfile.TemporaryDirectory(prefix="kills.") as name:
-        made = hidden_recordings({"c*q*load": 0.2})[:2]
-        first, second = (write(one, Path(name) / "one.csv").read_bytes() for one in made)
-    return first, second
-
-
-def _older_design() -> dict[str, str]:
-    """Files as an earlier design left them."""
-    return {
-        "reference.csv": "t,q_ref.shoulder,v_ref.shoulder,q_ref.elbow,v_ref.elbow\n0,0,0,0,0\n",
-        "robot.urdf": ARM,
-        "experiment.toml": EXPERIMENT,
-        "motion.html": "<html>\nan older page</html>",
-        "design.toml": 'sentence = "older"\n',
-    }
+WRITING = {files: ("write_bytes", "write_text"), file_groups: ("_finish",)}
+"""Code that writes: functions of a module, within which a command is killed."""
 
 
 def _click(self: LocalServer) -> None:
@@ -253,7 +49,10 @@ def content(folder: Path) -> dict[str, bytes]:
 
 
 def started(
-    words: tuple[str, ...], folder: Path, line: int | None = None, errors: int | None = None
+    words: tuple[str, ...],
+    folder: Path,
+    before: Callable[[], object] = lambda: None,
+    errors: int | None = None,
 ) -> int:
     """Run a command in a child of this process; return its number.
 
@@ -261,8 +60,7 @@ def started(
     ----------
     words : the command.
     folder : where it runs.
-    line : that many lines of the code that writes files are run before the child kills itself;
-        None for never.
+    before : called in the child before the command.
     errors : the descriptor that errors go to; None for nowhere.
     """
     sys.stdout.flush()
@@ -279,8 +77,8 @@ def started(
             sys.stdout = os.fdopen(1, "w", closefd=False)
             sys.stderr = os.fdopen(2, "w", closefd=False)
         LocalServer.serve = _click
-        if line is not None:
-            sys.settrace(_killer(line))
+        motion_program._TRIED = 10  # a design is written whatever its search began with
+        before()
         command(words)
     except SystemExit as stop:
         status = int(stop.code or 0)
@@ -288,6 +86,45 @@ def started(
         with contextlib.suppress(OSError):
             sys.stderr.flush()
         os._exit(status)
+
+
+def _stopped_where_it_writes(lines: Sequence[int], test: Connection) -> None:
+    """Let this process stop before it first writes, and try kills there.
+
+    What comes before the writing is the same whatever the line of the kill, and may be a whole
+    diagnosis: it is done once. There a child is begun for each kill, which goes on from that
+    moment; the test, told by `test`, looks at what it leaves and puts the folder back.
+    """
+    stopped = False
+
+    def kills_come_first(function: Callable) -> Callable:
+        @wraps(function)
+        def run(*arguments: object, **options: object) -> object:
+            nonlocal stopped
+            first, stopped = not stopped, True
+            if first and _survives(lines, test):
+                test.close()
+            return function(*arguments, **options)
+
+        return run
+
+    for module, names in WRITING.items():
+        for name in names:
+            setattr(module, name, kills_come_first(getattr(module, name)))
+
+
+def _survives(lines: Sequence[int], test: Connection) -> bool:
+    """Begin a child for each kill, and say whether this process is none of them."""
+    test.send(None)
+    for line in lines:
+        test.recv()
+        child = os.fork()
+        if not child:
+            sys.settrace(_killer(line))
+            return False
+        test.send(finished(child))
+    test.recv()
+    return True
 
 
 def _killer(lines: int) -> Callable:
@@ -304,7 +141,7 @@ def _killer(lines: int) -> Callable:
 
     def enter(frame, _event, _argument):
         code = frame.f_code
-        here = (names for file, names in WRITING.items() if code.co_filename.endswith(file))
+        here = (names for module, names in WRITING.items() if code.co_filename == module.__file__)
         return within if code.co_name in next(here, ()) else None
 
     return enter
@@ -316,74 +153,121 @@ def finished(child: int) -> int:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Uninterrupted:
-    """A command that nobody killed: what it wrote, and how many seconds it took."""
+class Damage:
+    """What a command that was to be killed left behind.
 
+    Attributes
+    ----------
+    killed : whether it was; it may have been done.
+    lost : what is gone, or half there.
+    """
+
+    killed: bool
+    lost: list[str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Written:
+    """What a command writes.
+
+    Attributes
+    ----------
+    damage : what is left where it is killed, for each line.
+    files : what nobody kills writes.
+    seconds : that all took.
+    """
+
+    damage: list[Damage]
     files: dict[str, bytes]
     seconds: float
 
 
-def uninterrupted(writer: Writer) -> Uninterrupted:
-    """Run a command to its end; AssertionError if it fails."""
-    with tempfile.TemporaryDirectory(prefix="kills.") as name:
-        folder = Path(name)
-        prepare(folder)
-        begun = time.monotonic()
-        assert finished(started(writer.words, folder)) in (0, 1), writer.words
-        return Uninterrupted(files=content(folder), seconds=time.monotonic() - begun)
-
-
-def damage(writer: Writer, kill: Callable[[Path], int]) -> tuple[bool, list[str]]:
-    """Kill a command, and look at what is left.
+def written(writer: Writer, lines: Sequence[int] = ()) -> Written:
+    """Run a command to its end, and kill it on the way there.
 
     Parameters
     ----------
-    writer : the command.
-    kill : starts it in a folder and kills it; returns its status.
-
-    Returns
-    -------
-    Whether it was killed (it may have been done), and what was lost or is half there.
+    writer : the command; AssertionError if it fails.
+    lines : for each, that many lines of the code that writes files are run before a kill.
     """
     with tempfile.TemporaryDirectory(prefix="kills.") as name:
         folder = Path(name)
         prepare(folder)
+        before, begun = content(folder), time.monotonic()
+        test, theirs = Pipe()
+        child = started(writer.words, folder, lambda: _stopped_where_it_writes(lines, theirs))
+        theirs.close()
+        test.recv()  # EOFError where it ends, and has written nothing
+        stopped, damage = _Kept.of(folder), []
+        for _ in lines:
+            test.send(None)
+            damage.append(_damage(writer, folder, before, test.recv()))
+            stopped.put_back(folder)
+        test.send(None)
+        assert finished(child) in (0, 1), writer.words
+        seconds = time.monotonic() - begun
+        return Written(damage=damage, files=content(folder), seconds=seconds)
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """What a folder holds at some moment: its folders, and its files with their content."""
+
+    folders: frozenset[Path]
+    files: dict[str, bytes]
+
+    @classmethod
+    def of(cls, folder: Path) -> _Kept:
+        return cls(frozenset(p for p in folder.rglob("*") if p.is_dir()), content(folder))
+
+    def put_back(self, folder: Path) -> None:
+        """Leave in the folder what was there, and touch nothing that is as it was."""
+        inner_first = sorted(folder.rglob("*"), reverse=True)
+        for path in inner_first:
+            if path.is_dir():
+                if path not in self.folders:
+                    path.rmdir()
+            elif str(path.relative_to(folder)) not in self.files:
+                path.unlink()
+        for path in sorted(self.folders):
+            path.mkdir(exist_ok=True)
+        now = content(folder)
+        for name, data in self.files.items():
+            if now.get(name) != data:
+                (folder / name).write_bytes(data)
+
+
+def _damage(writer: Writer, folder: Path, before: dict[str, bytes], status: int) -> Damage:
+    """Look at what a command that ended with a status has left of what was there before."""
+    after = content(folder)
+    lost = [f"{file} is gone" for file in before if file not in after]
+    for file, data in after.items():
+        if before.get(file) == data:
+            continue
+        # The neighbour that was to take a place, or the folder of several.
+        hidden = any(part.startswith(".") for part in Path(file).parts)
+        if file in writer.results:
+            try:
+                writer.results[file](folder / file)
+            except Exception as error:
+                lost.append(f"{file} is broken: {error}")
+        elif not hidden and not writer.may_write(file):
+            lost.append(f"{file} is changed")
+    if status == 0 and len(after) < len(before):
+        lost.append("it said that all was well")
+    return Damage(killed=status == -signal.SIGKILL, lost=lost)
+
+
+def killed_after(writer: Writer, seconds: float) -> Damage:
+    """Kill a command after some time, and look at what is left."""
+    with tempfile.TemporaryDirectory(prefix="kills.") as name:
+        folder = Path(name)
+        prepare(folder)
         before = content(folder)
-        status = kill(folder)
-        after = content(folder)
-        lost = [f"{file} is gone" for file in before if file not in after]
-        for file, data in after.items():
-            if before.get(file) == data:
-                continue
-            # The neighbour that was to take a place, or the folder of several.
-            hidden = any(part.startswith(".") for part in Path(file).parts)
-            if file in writer.results:
-                try:
-                    writer.results[file](folder / file)
-                except Exception as error:
-                    lost.append(f"{file} is broken: {error}")
-            elif not hidden and not writer.may_write(file):
-                lost.append(f"{file} is changed")
-        if status == 0 and len(after) < len(before):
-            lost.append("it said that all was well")
-        return status == -signal.SIGKILL, lost
-
-
-def at_line(writer: Writer, line: int) -> Callable[[Path], int]:
-    """Return what kills a command in the code that writes."""
-    return lambda folder: finished(started(writer.words, folder, line))
-
-
-def at_moment(writer: Writer, seconds: float) -> Callable[[Path], int]:
-    """Return what kills a command after some time."""
-
-    def kill(folder: Path) -> int:
         child = started(writer.words, folder)
         time.sleep(seconds)
         os.kill(child, signal.SIGKILL)
-        return finished(child)
-
-    return kill
+        return _damage(writer, folder, before, finished(child))
 
 
 def main() -> None:
@@ -394,18 +278,17 @@ def main() -> None:
     asked = parser.parse_args()
     load_libraries()
     rng = random.Random(asked.seed)
-    whole = {name: uninterrupted(writer) for name, writer in WRITERS.items()}
+    seconds = {name: written(writer).seconds for name, writer in WRITERS.items()}
     count, found = Counter(), []
     for number in range(asked.kills):
         name = list(WRITERS)[number % len(WRITERS)]
         writer = WRITERS[name]
         if (number // len(WRITERS)) % 2:
-            kill = at_line(writer, rng.randrange(30 * len(writer.results)))
+            (left,) = written(writer, [rng.randrange(30 * len(writer.results))]).damage
         else:
-            kill = at_moment(writer, rng.uniform(0.0, 1.05 * whole[name].seconds))
-        killed, lost = damage(writer, kill)
-        count["killed" if killed else "done before"] += 1
-        found += [f"{name}: {one}" for one in lost]
+            left = killed_after(writer, rng.uniform(0.0, 1.05 * seconds[name]))
+        count["killed" if left.killed else "done before"] += 1
+        found += [f"{name}: {one}" for one in left.lost]
     print(dict(count), *(found or ["nothing lost, nothing half"]), sep="\n")
 
 

@@ -9,19 +9,8 @@ import click
 import pytest
 
 from dynident.cli import commands, main
-from hostile.kills import (
-    ALIKE,
-    IN_PLACE,
-    READ,
-    WRITERS,
-    at_line,
-    at_moment,
-    content,
-    damage,
-    each_writer,
-    prepare,
-    uninterrupted,
-)
+from hostile.kills import content, killed_after, written
+from hostile.writers import ALIKE, IN_PLACE, READ, WRITERS, each_writer, prepare
 
 pytestmark = [
     pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks here"),
@@ -31,19 +20,12 @@ LINES = (2, 9, 17)
 
 
 @each_writer
-def test_a_kill_leaves_the_old_or_the_new(name):
+def test_a_kill_leaves_the_old_or_the_new_and_no_kill_the_new(name):
     writer = WRITERS[name]
-    for line in LINES:
-        killed, lost = damage(writer, at_line(writer, line))
-        assert killed and lost == []
-    _, lost = damage(writer, at_moment(writer, 0.05))
-    assert lost == []
-
-
-@each_writer
-def test_what_nobody_kills_is_written(name):
-    files = uninterrupted(WRITERS[name]).files
-    assert set(WRITERS[name].results) <= set(files)
+    found = written(writer, LINES)
+    assert [(one.killed, one.lost) for one in found.damage] == [(True, [])] * len(LINES)
+    assert set(writer.results) <= set(found.files)
+    assert killed_after(writer, 0.05).lost == []
 
 
 def test_every_command_that_writes_is_among_those_that_are_killed() -> None:

@@ -46,8 +46,7 @@ def main() -> None:
     # Commands find an end where they read, not the next case.
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     load_libraries()
-    gc.collect()
-    gc.freeze()  # so that looking for garbage costs nothing from here on
+    forget_garbage()
     limit_memory()
     for line in asked:
         kind, name = line.rstrip("\n").split("\t")
@@ -68,6 +67,12 @@ def load_libraries() -> None:
     from synthetic import ARM
 
     assert dynident.study_draft and matplotlib and Robot.from_text(ARM).n == 2
+
+
+def forget_garbage() -> None:
+    """Free what is left in circles; what is there after that is looked at no more."""
+    gc.collect()
+    gc.freeze()
 
 
 def limit_memory() -> None:
@@ -94,7 +99,9 @@ def _tried(case: HostileCase) -> Iterator[Outcome]:
         case.write(folder)
         before = listing(folder)
         for arguments in case.commands:
-            gc.collect()  # what the last one left in circles is no memory of this one
+            # What the last one left in circles is no memory of this one. What it has imported
+            # stays, and would be gone through before every command from then on.
+            forget_garbage()
             limit_time()
             with contextlib.chdir(folder):
                 status, out, err = run(case.run, arguments)
