@@ -27,7 +27,14 @@ def log_of(*names: str, **values: np.ndarray) -> Log:
     rng = np.random.default_rng(0)
     columns = {name: rng.normal(size=50) for name in names}
     columns |= values
-    return Log(file=Path("log.csv"), record="", columns=columns, skipped=(), layout=FileLayout())
+    return Log(
+        file=Path("log.csv"),
+        record="",
+        columns=columns,
+        names=tuple(columns),
+        skipped=(),
+        layout=FileLayout(),
+    )
 
 
 CLOCK = np.arange(50) / 100

@@ -36,7 +36,7 @@ from dynident.study_draft.guesses.stated_columns import require_no_sums, with_st
 from dynident.study_draft.guesses.torque_timing import samples_late
 from dynident.study_draft.log import Log, logs_of, same_columns
 from dynident.study_draft.log_facts import LogFacts
-from dynident.study_draft.matching import Group, Matched, match
+from dynident.study_draft.matching import Group, Matched, match, require_clock
 from dynident.study_draft.shared_motors import with_shared_motors
 from dynident.study_draft.timing import clock_from_speeds, clock_scale
 from dynident.study_draft.wrench_groups import in_radians, wrench_columns, wrench_groups
@@ -96,7 +96,7 @@ def draft_study(
     chosen = _chosen(matched, notes)
     wrench = wrench_columns(sensors, notes.take)
     columns = matched.columns(described, chosen)
-    columns = _with_clock(columns, logs[0], matched, notes)
+    columns = _with_clock(columns, logs[0], matched, described, notes)
     files = _Sources(robot, facts, logs)
     if "tau" not in matched.groups:
         _require_no_motors(facts, logs[0].where)
@@ -213,7 +213,7 @@ def _named(
     if logs[0].is_unnamed:
         told = {f"{signal}.{joint}" for signal in ("q", "tau") for joint in robot.names}
         if told <= facts.columns.keys():
-            names = tuple(name for name in logs[0].columns if name != "t")
+            names = tuple(name for name in logs[0].names if name != "t")
         else:
             names = _by_numbers(logs[0], robot, facts.rate_hz, notes)
         logs = _opened(data, replace(layout, names=names))
@@ -234,6 +234,8 @@ def _opened(data: Sequence[str | Path], layout: FileLayout) -> tuple[Log, ...]:
 
 def _by_numbers(log: Log, robot: Robot, rate_hz: float | None, notes: _Notes) -> tuple[str, ...]:
     """Names for columns that have none."""
+    for error in log.unread.values():
+        raise error  # to leave the column out would move those behind it
     own = [x for name, x in log.columns.items() if name != "t"]
     found = named_by_numbers(np.column_stack(own), robot, rate_hz, log.where)
     taken = notes.take("columns", found.choices, found.reason)
@@ -256,17 +258,13 @@ def _chosen(matched: Matched, notes: _Notes) -> dict[str, int]:
 
 
 def _with_clock(
-    columns: dict[str, Column], log: Log, matched: Matched, notes: _Notes
+    columns: dict[str, Column], log: Log, matched: Matched, robot: Robot, notes: _Notes
 ) -> dict[str, Column]:
     """The columns with the clock in seconds."""
     if log.layout.rate_hz is not None:
         notes.take("t", [f"samples at {log.layout.rate_hz:g} Hz"], "the rate was given")
         return {ours: one for ours, one in columns.items() if ours != "t"}
-    if matched.time is None:
-        what = "no column is a clock that goes forward"
-        remedy = "name it t, or give the samples' rate: --rate 125"
-        raise RecordingError(what, log.where, remedy)
-    column, why = matched.time
+    column, why = require_clock(matched, log, robot)
     if column.scale != 1.0 or column.name not in log.columns:
         notes.take("t", [column.name], f"{why}; its name says the unit")
         return columns
