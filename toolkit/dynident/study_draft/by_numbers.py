@@ -92,7 +92,7 @@ def named_by_numbers(
 
     Parameters
     ----------
-    x : (T, m) the file's numbers.
+    x : (T, m) the file's numbers; NaN in columns of text.
     robot : as it is described.
     rate_hz : of the samples, where the file has no clock.
     where : the file, for messages.
@@ -124,10 +124,11 @@ def named_by_numbers(
         t = np.arange(len(x)) / (rate_hz or 1.0)
     else:
         t = (x[:, clock] - x[0, clock]) * clock_scale(x[:, clock])[0]
+    closed = {*clocks, *np.flatnonzero(np.isnan(x).any(axis=0))}
     starts = [
         s
         for s in range(x.shape[1] - n + 1)
-        if not any(s <= k < s + n for k in clocks) and np.ptp(x[:, s : s + n], axis=0).any()
+        if not any(s <= k < s + n for k in closed) and np.ptp(x[:, s : s + n], axis=0).any()
     ]
     blocks = _Blocks(x=x, t=t, robot=robot, starts=tuple(starts), where=where, remedy=remedy)
     readings, reason = blocks.with_speeds() or blocks.without_speeds() or ([], "")

@@ -12,6 +12,7 @@ import numpy as np
 from dynident.errors import RecordingError
 from dynident.recording import ColumnTable, FileLayout, open_table
 from dynident.recording.formats.arrays.records import COLUMNS, pick
+from dynident.recording.formats.column_values import seconds_of
 
 MOST_COLUMNS = 2000
 """Columns of a file that are looked at."""
@@ -29,6 +30,7 @@ class Log:
     names : of all columns in the file, in its order; "" for one that the layout skips.
     skipped : names of what is there and is no column of as many numbers as the others.
     layout : with which it was opened.
+    texts : names of columns that hold text.
     unread : why columns could not be read, by name: a cell is empty or no number, say.
     """
 
@@ -38,6 +40,7 @@ class Log:
     names: tuple[str, ...]
     skipped: tuple[str, ...]
     layout: FileLayout
+    texts: frozenset[str] = frozenset()
     unread: Mapping[str, RecordingError] = field(default_factory=dict)
 
     @property
@@ -113,6 +116,7 @@ def _log(path: Path, record: str, table: ColumnTable, layout: FileLayout) -> Log
         names=table.names,
         skipped=tuple(skipped),
         layout=layout,
+        texts=table.texts,
         unread=unread,
     )
 
@@ -135,6 +139,7 @@ def _arrays(
 
 def _numbers(name: str, x: np.ndarray | None) -> dict[str, np.ndarray] | None:
     """Columns of numbers under a name; None where it holds text or numbers of no use."""
+    x = x if x is None else seconds_of(x)
     if x is None or x.dtype.kind not in "fiu" or x.ndim not in (1, 2) or not x.size:
         return None
     if x.ndim == 2 and 1 in x.shape:
@@ -148,8 +153,9 @@ def _numbers(name: str, x: np.ndarray | None) -> dict[str, np.ndarray] | None:
 
 def _lies(x: np.ndarray | None) -> str:
     """What to say of a table whose rows are signals, behind its name."""
-    is_lying = x is not None and x.ndim == 2 and x.shape[1] > x.shape[0] > 1
-    return f" ({x.shape[0]} rows of {x.shape[1]}: one row a sample is needed)" if is_lying else ""
+    if x is None or x.ndim != 2 or not x.shape[1] > x.shape[0] > 1:
+        return ""
+    return f" ({x.shape[0]} rows of {x.shape[1]}: one row a sample is needed)"
 
 
 def same_columns(logs: Sequence[Log]) -> None:
