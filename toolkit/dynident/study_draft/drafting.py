@@ -5,6 +5,8 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
+from operator import add
 from pathlib import Path
 from typing import Literal
 
@@ -13,9 +15,11 @@ import numpy as np
 from dynident.arguments import checked
 from dynident.data_files import find_all
 from dynident.errors import DynidentWarning, RecordingError
+from dynident.model import Model
 from dynident.recording import (
     Column,
     FileLayout,
+    Filter,
     Recording,
     WrenchColumns,
     frames_in,
@@ -25,12 +29,13 @@ from dynident.recording import (
 from dynident.robot import Robot
 from dynident.study_draft.by_numbers import named_by_numbers
 from dynident.study_draft.decision import Ask, Decision, decided
-from dynident.study_draft.draft import StudyDraft
+from dynident.study_draft.draft import DraftedRecording, StudyDraft
 from dynident.study_draft.entries import drafted_recordings
 from dynident.study_draft.guesses.amendments import amended
 from dynident.study_draft.guesses.degrees import positions_in_radians
 from dynident.study_draft.guesses.drive_unit import drive_sizes
 from dynident.study_draft.guesses.file_reading import Reading
+from dynident.study_draft.guesses.filter_cutoffs import suitable_filter
 from dynident.study_draft.guesses.motor_side import joint_side, require_ratios
 from dynident.study_draft.guesses.stated_columns import require_no_sums, with_stated
 from dynident.study_draft.guesses.torque_timing import samples_late
@@ -112,16 +117,19 @@ def draft_study(
     held = _is_held(reading, recordings, torque.origin == "command", notes)
     behind_gears = reading.geared or reading.motors is not None or unit == "A"
     mounted = not np.array_equal(reading.robot.gravity, described.gravity)
+    effects = (*_FRICTION, "rotor_inertia") if behind_gears else _FRICTION
+    entries = drafted_recordings(logs, recordings, facts, notes.take)
     return StudyDraft(
         robot=files.robot,
         joints=files.joints,
         columns=reading.columns | wrench,
         otherwise=otherwise,
-        recordings=drafted_recordings(logs, recordings, facts, notes.take),
+        recordings=entries,
+        filter=_filter_of(reading, effects, entries, recordings, notes),
         loads=files.loads,
         torque="held_command" if held else "measured",
         torque_unit=unit,
-        effects=(*_FRICTION, "rotor_inertia") if behind_gears else _FRICTION,
+        effects=effects,
         rate_hz=min(one.rate_hz for one in recordings),
         gravity=tuple(float(x) for x in reading.robot.gravity),
         is_mounted_otherwise=mounted,
@@ -170,6 +178,7 @@ def _of_sensor(
         columns={ours: one for ours, one in columns.items() if not ours.startswith("v.")},
         otherwise=None,
         recordings=drafted_recordings(files.logs, recordings, files.facts, notes.take),
+        filter=None,
         loads=files.loads,
         torque="measured",
         torque_unit="N m",
@@ -234,9 +243,13 @@ def _opened(data: Sequence[str | Path], layout: FileLayout) -> tuple[Log, ...]:
 
 def _by_numbers(log: Log, robot: Robot, rate_hz: float | None, notes: _Notes) -> tuple[str, ...]:
     """Names for columns that have none."""
-    for error in log.unread.values():
-        raise error  # to leave the column out would move those behind it
-    own = [x for name, x in log.columns.items() if name != "t"]
+    for name, error in log.unread.items():
+        if name not in log.texts:
+            raise error
+    samples = len(next(iter(log.columns.values())))
+    # Columns of text keep their places: without them others would move.
+    nothing = np.full(samples, np.nan)
+    own = [log.columns.get(name, nothing) for name in log.names if name != "t"]
     found = named_by_numbers(np.column_stack(own), robot, rate_hz, log.where)
     taken = notes.take("columns", found.choices, found.reason)
     return found.named(taken, robot.names)
@@ -380,6 +393,22 @@ def _unit(
     choices = ["A, or another unit of the drives", "N m"]
     taken = notes.take("torque_unit", choices, f"{sizes.reason}: {identified}")
     return "A" if taken == 0 else "N m"
+
+
+def _filter_of(
+    reading: Reading,
+    effects: Sequence[str],
+    entries: Sequence[DraftedRecording],
+    recordings: Sequence[Recording],
+    notes: _Notes,
+) -> Filter | None:
+    """The filter that the recordings need; None for the usual one."""
+    # Repetitions tell noise by themselves, and of currents there is no model yet.
+    if reading.torque_unit == "A" or any(entry.period for entry in entries):
+        return None
+    train = [one for one, entry in zip(recordings, entries, strict=True) if entry.use == "train"]
+    model = reduce(add, effects, Model(reading.robot))
+    return suitable_filter(model, train, notes.take)
 
 
 def _is_held(

@@ -165,12 +165,16 @@ def _require_read(
 
 
 def require_clock(matched: Matched, log: Log, robot: Robot) -> tuple[Column, str]:
-    """The clock of a log, and why it is one.
+    """Take the clock of a log.
 
     Parameters
     ----------
     matched : what the names of its columns tell.
     log, robot : of which it was told.
+
+    Returns
+    -------
+    The column, and why it is one.
 
     Raises
     ------
