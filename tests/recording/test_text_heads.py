@@ -9,6 +9,7 @@ import pytest
 
 from dynident.errors import RecordingError
 from dynident.recording import Column, FileLayout, open_table, read
+from dynident.recording.formats.column_values import seconds_of
 
 T = np.arange(4) / 100
 Q, TAU = np.array([1.5, -2.25, 3.0, 0.125]), np.array([3.0, 4.5, -5.0, 0.0])
@@ -119,3 +120,29 @@ def test_text_stands_in_its_columns_where_no_line_has_names(tmp_path: Path) -> N
     assert table.names == tuple(f"column{k}" for k in range(1, 7))
     assert table.texts == {"column4", "column5", "column6"}
     np.testing.assert_array_equal(table.load(["column2"])["column2"], Q)
+
+
+@pytest.mark.parametrize("unit", ["ns", "us", "10us", "ms", "s"])
+@pytest.mark.parametrize("kind", ["datetime64", "timedelta64"])
+def test_dates_of_numpy_are_seconds(unit: str, kind: str) -> None:
+    seconds = np.arange(4)
+    t = (seconds * np.timedelta64(1, "s")).astype(f"timedelta64[{unit}]")
+    if kind == "datetime64":
+        t = np.datetime64("2026-03-05T10:11:12").astype(f"datetime64[{unit}]") + t
+    begin = 1772705472.0 if kind == "datetime64" else 0.0
+    np.testing.assert_allclose(seconds_of(t), begin + seconds, atol=1e-6)
+
+
+def test_dates_of_numpy_are_a_clock(tmp_path: Path) -> None:
+    t = np.datetime64("2026-03-05T10:11:12.000") + 10 * np.arange(4)
+    np.savez(path := tmp_path / "run.npz", t=t, **{"q.a": Q, "tau.a": TAU})  # pyright: ignore
+    one = read(path, ["a"])
+    np.testing.assert_allclose(one.t - one.t[0], T, atol=1e-6)
+
+
+def test_a_date_that_is_none_is_told_by_its_row(tmp_path: Path) -> None:
+    t = np.datetime64(0, "ms") + np.arange(4)
+    t[2] = np.datetime64("NaT")
+    np.savez(path := tmp_path / "run.npz", t=t, **{"q.a": Q, "tau.a": TAU})  # pyright: ignore
+    with pytest.raises(RecordingError, match=r"row 3, column t: .*nan"):
+        read(path, ["a"])

@@ -12,6 +12,8 @@ from dynident.recording.formats.column_names import ColumnTable, LocatedColumn
 from dynident.recording.formats.limits import CUT
 from dynident.recording.spooled import Spool
 
+_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+
 
 def gather(
     table: ColumnTable,
@@ -105,8 +107,10 @@ def seconds_of(x: np.ndarray) -> np.ndarray:
     """Return dates, or times since one, as seconds since 1970, and anything else as it is."""
     if x.dtype.kind not in "mM":
         return x
-    unit = "m8[ns]" if x.dtype.kind == "m" else "M8[ns]"
-    return np.where(np.isnat(x), np.nan, 1e-9 * x.astype(unit).astype(np.int64))
+    unit, count = np.datetime_data(x.dtype)
+    if unit not in _SECONDS:  # days, say
+        x, unit, count = x.astype(f"{x.dtype.kind}8[s]"), "s", 1
+    return np.where(np.isnat(x), np.nan, count * _SECONDS[unit] * x.astype(np.int64))
 
 
 def _vector(x: np.ndarray, name: str, index: int | None, file: str) -> np.ndarray:

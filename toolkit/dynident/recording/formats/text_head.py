@@ -86,18 +86,18 @@ def head_of(start: bytes, file: str, layout: FileLayout) -> TextHead:
     Raises
     ------
     RecordingError
-        If it has too many columns, or the line that names them cannot be read.
+        If it has too many columns, the line that names them cannot be read, or all are comments.
     """
     stream = io.BytesIO(start)
     comments, above = [], 0
-    first = ""
     for first in _lines(stream):
         if first.strip() and not _is_comment(first):
             break
         comments += [first] if first.strip() else []
         above += 1
     else:
-        first = ""
+        what = f"begins with {above} lines of comment, and no samples"
+        raise RecordingError(what, file, "is it the right file?")
     rest = [line for _, line in zip(range(_SAMPLES), _lines(stream), strict=False)]
     separator = _separator(first, next(iter(rest), ""))
     require_few(1 + first.count(separator), "columns", file)
