@@ -564,6 +564,16 @@ OTHERS: dict[str, tuple[str, Content, str]] = {
     "MAT of structures": (
         "run.mat",
         mat(t={"a": {"b": np.arange(T)}}),
+        r"run\.mat: no column 't'. it holds .*t\.a\.b",
+    ),
+    "MAT of structures in each other": (
+        "run.mat",
+        mat(t={"a": {"a": {"a": {"a": {"a": {"a": np.arange(T)}}}}}}),
+        r"run\.mat: no column 't'. it holds .*t\.a\.a\.a",
+    ),
+    "MAT of an array of structures": (
+        "run.mat",
+        mat(t=np.zeros(3, dtype=[("a", "O")])),
         r"run\.mat: 't' does not hold real numbers",
     ),
     "MAT of cells": (

@@ -148,6 +148,8 @@ def test_mat(tmp_path):
     path = tmp_path / "bad.mat"
     t = np.arange(3.0)
     savemat(path, {"t": t, "q_a": {"x": t}, "tau_a": t})
+    refused(path, r"no column 'q.a'. it holds t, q_a.x, tau_a", ["a"])
+    savemat(path, {"t": t, "q_a": np.array([t, "x"], dtype=object), "tau_a": t})
     refused(path, "'q_a' does not hold real numbers", ["a"])
     savemat(path, {"t": t, "q_a": t})
     refused(path, "no column 'tau.a'. it holds t, q_a")
