@@ -335,3 +335,13 @@ def test_tables_that_lie_on_their_side_are_said_to(arm: Path) -> None:
     lies = r"it holds t; .*: q \(2 rows of \d+: one row a sample is needed\), tau"
     with pytest.raises(RecordingError, match=lies):
         draft_study(arm, [data])
+
+
+def test_a_gap_that_no_study_could_hold_is_told_by_the_draft(arm: Path) -> None:
+    columns = as_logged(recording(1))
+    holed = {name: np.delete(x, range(500, 560)) for name, x in columns.items()}
+    data = written(arm.parent / "run.csv", holed)
+    with pytest.raises(
+        RecordingError, match=r"row 500.*without samples follow.*split the recording"
+    ):
+        draft_study(arm, [data])

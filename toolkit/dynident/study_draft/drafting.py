@@ -25,6 +25,7 @@ from dynident.recording import (
     frames_in,
     read,
     read_wrench,
+    uniform,
 )
 from dynident.robot import Robot
 from dynident.study_draft.by_numbers import named_by_numbers
@@ -113,7 +114,7 @@ def draft_study(
     reading = replace(reading, columns=_without_strangers(reading, logs, notes))
     reading = amended(reading, lambda one: _read(logs, one), notes.take)
     reading, otherwise = with_shared_motors(reading, _read(logs, reading), notes.take)
-    recordings = _read(logs, reading)
+    recordings = _without_gaps(_read(logs, reading))
     held = _is_held(reading, recordings, torque.origin == "command", notes)
     behind_gears = reading.geared or reading.motors is not None or unit == "A"
     mounted = not np.array_equal(reading.robot.gravity, described.gravity)
@@ -341,6 +342,15 @@ def _read(logs: Sequence[Log], reading: Reading) -> tuple[Recording, ...]:
             )
             for log in logs
         )
+
+
+def _without_gaps(recordings: tuple[Recording, ...]) -> tuple[Recording, ...]:
+    """Recordings as they are, or the error that their study would end with."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DynidentWarning)
+        for one in recordings:
+            uniform(one)
+    return recordings
 
 
 def _without_strangers(reading: Reading, logs: Sequence[Log], notes: _Notes) -> dict[str, Column]:
