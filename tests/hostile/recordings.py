@@ -332,7 +332,38 @@ OTHERS: dict[str, tuple[str, Content, str]] = {
     "a comma for the point": (
         "run.csv",
         csv_text(0).replace(",", ";").replace(".", ",").replace("q,", "q.").replace("tau,", "tau."),
+        ANSWER,
+    ),
+    "commas and points": (
+        "run.csv",
+        csv_text(0).replace(",", ";").replace("-0.840749889", "-0,840749889"),
         r"run\.csv, line 2, column q\.shoulder: '-0,840749889' is not a number",
+    ),
+    "comments without end": (
+        "run.csv",
+        "# log, once\n" * 1_000_000,
+        r"run\.csv: begins with \d+ lines of comment, and no samples",
+    ),
+    "comments in every other line": ("run.csv", csv_text(0).replace("\n", "\n# x\n"), ANSWER),
+    "a line of units, and no more": (
+        "run.csv",
+        LINES[0] + "\ns,rad,rad,Nm,Nm\n",
+        r"run\.csv, line 2, column t: 's' is not a number",
+    ),
+    "a date that there is not": (
+        "run.csv",
+        each(lambda k, c: [f"2026-02-29T10:{k // 60:02d}:{k % 60:02d}", *c[1:]]),
+        r"run\.csv, line 2, column t: '2026-02-29T10:00:00' is not a date and a time",
+    ),
+    "dates beyond all years": (
+        "run.csv",
+        each(
+            lambda k, c: [
+                f"9999-12-31T23:{k // 6000:02d}:{k // 100 % 60:02d}.{k % 100:02d}",
+                *c[1:],
+            ]
+        ),
+        ANSWER,
     ),
     "a formula": (
         "run.csv",
@@ -460,10 +491,11 @@ OTHERS: dict[str, tuple[str, Content, str]] = {
         npz(t=np.arange(T) * 1j),
         r"run\.npz: 't' does not hold real numbers",
     ),
-    "NPZ of dates": (
+    "NPZ of dates": ("run.npz", npz(t=np.datetime64(0, "ms") + 10 * np.arange(T)), ANSWER),
+    "NPZ of no dates": (
         "run.npz",
-        npz(t=np.arange(T).astype("datetime64[s]")),
-        r"run\.npz: 't' does not hold real numbers",
+        npz(t=np.full(T, "NaT", dtype="datetime64[s]")),
+        r"run\.npz, row 1, column t: .*nan",
     ),
     "NPZ of records": (
         "run.npz",
@@ -532,6 +564,16 @@ OTHERS: dict[str, tuple[str, Content, str]] = {
     "MAT of structures": (
         "run.mat",
         mat(t={"a": {"b": np.arange(T)}}),
+        r"run\.mat: no column 't'. it holds .*t\.a\.b",
+    ),
+    "MAT of structures in each other": (
+        "run.mat",
+        mat(t={"a": {"a": {"a": {"a": {"a": {"a": np.arange(T)}}}}}}),
+        r"run\.mat: no column 't'. it holds .*t\.a\.a\.a",
+    ),
+    "MAT of an array of structures": (
+        "run.mat",
+        mat(t=np.zeros(3, dtype=[("a", "O")])),
         r"run\.mat: 't' does not hold real numbers",
     ),
     "MAT of cells": (
@@ -584,7 +626,7 @@ OTHERS: dict[str, tuple[str, Content, str]] = {
     "Parquet of dates": (
         "run.parquet",
         parquet(t=np.arange(T).astype("datetime64[ns]")),
-        r"run\.parquet: 't' does not hold real numbers",
+        r"run\.parquet: samples at 1e\+09 Hz are too many",
     ),
     # HDF5
     "HDF5, cut": (

@@ -34,8 +34,13 @@ CSV = {
     "nan": (GOOD.replace("002,1", "002,nan").encode(), "line 4, column q.a: 'nan' is not a finite"),
     "too large": (GOOD.replace("002,1", "002,1e999").encode(), "line 4, .*'1e999' is not a finite"),
     "underscore": (GOOD.replace("002,1", "002,1_0").encode(), "line 4, .*'1_0' is not a number"),
-    "comma": (b"t;q.a;tau.a\n0;1,5;2\n", "line 2, column q.a: '1,5' is .* write a decimal point"),
-    "units line": (b"t,q.a,tau.a\ns,rad,Nm\n0,1,2\n", "line 2, column t: 's' is not a number"),
+    "comma": (b"t;q.a;tau.a\n0.5;1,5;2\n", "line 2, column q.a: '1,5' .* write a decimal point"),
+    "quoted comma": (b't,q.a,tau.a\n0,"1,5",2\n', "column q.a: '1,5' .* write a decimal point"),
+    "no units": (b"t,q.a,tau.a\ns,rad,furlong\n0,1,2\n", "line 2, column t: 's' is not a number"),
+    "no date": (
+        b"t,q.a,tau.a\n2026-03-05T10:00:00,1,2\n2026-02-30T10:00:00,1,2\n",
+        "line 3, column t: '2026-02-30T10:00:00' is not a date and a time. write 2026-03-05T10:",
+    ),
     "blank line": (b"t,q.a,tau.a\n0,1,2\n\n1,1,2\n", "line 3: the line is empty"),
     "time twice": (
         b"t,q.a,tau.a\n0,1,2\n0,1,2\n",
@@ -143,6 +148,8 @@ def test_mat(tmp_path):
     path = tmp_path / "bad.mat"
     t = np.arange(3.0)
     savemat(path, {"t": t, "q_a": {"x": t}, "tau_a": t})
+    refused(path, r"no column 'q.a'. it holds t, q_a.x, tau_a", ["a"])
+    savemat(path, {"t": t, "q_a": np.array([t, "x"], dtype=object), "tau_a": t})
     refused(path, "'q_a' does not hold real numbers", ["a"])
     savemat(path, {"t": t, "q_a": t})
     refused(path, "no column 'tau.a'. it holds t, q_a")

@@ -39,7 +39,7 @@ def no_careful_reader(monkeypatch):
     def fail(*_):
         pytest.fail("the careful reader was asked")
 
-    monkeypatch.setattr(csv_file, "_careful", fail)
+    monkeypatch.setattr(csv_file._Lines, "numbers", fail)
 
 
 @pytest.fixture(params=[0, csv_file._SMALL], ids=["pandas", "NumPy"])
@@ -93,7 +93,7 @@ def test_both_readers_agree(read_by, rows, end):
         patch.setattr(csv_file, "_SMALL", len(data) if read_by is csv_file._by_numpy else 0)
         fast = csv_file._fast(data, ";", 3, [2, 0])
     try:
-        careful = csv_file._careful(data, ";", ("a", "b", "c"), [2, 0], "run.csv")
+        careful = csv_file._Lines(data, ";", ("a", "b", "c"), "run.csv").numbers([2, 0])
     except RecordingError:
         assert fast is None
     else:

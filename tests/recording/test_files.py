@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.io import savemat
 
 from dynident.errors import DynidentWarning, FileError, RecordingError
-from dynident.recording import SUFFIXES, Column, Recording, read, write
+from dynident.recording import SUFFIXES, Column, Recording, open_table, read, write
 from dynident.recording.recording import LARGEST
 
 SIGNALS = ("q", "tau", "v", "q_ref")
@@ -135,3 +136,18 @@ def test_si_units_pass_without_a_warning(arm, tmp_path):
     path = write(arm, tmp_path / "run.npz")
     for kind in ("revolute", "prismatic"):
         assert read(path, kinds=(kind, kind)).n == 2
+
+
+def test_fields_of_structures_of_matlab_are_columns(arm, tmp_path):
+    """As `save` writes `log.t`, `log.joints.q` and `log.joints.tau`, with a text beside."""
+    joints = {"q": arm.q, "tau": arm.tau}
+    log = {"t": arm.t, "joints": joints, "who": "a robot"}
+    savemat(path := tmp_path / "run.mat", {"log": log, "rate": 100.0})
+    table = open_table(path)
+    assert set(table.names) == {"log.t", "log.joints.q", "log.joints.tau", "log.who", "rate"}
+    columns = {"t": "log.t"}
+    for k, joint in enumerate(arm.joints):
+        columns |= {f"{x}.{joint}": f"log.joints.{x}[{k}]" for x in ("q", "tau")}
+    again = read(path, arm.joints, columns)
+    np.testing.assert_array_equal(again.q, arm.q)
+    np.testing.assert_array_equal(again.tau, arm.tau)

@@ -124,3 +124,11 @@ def test_repetitions_are_compared_in_parts():
     least = np.maximum(least, 1e-4 * np.ptp(long.q, axis=0))
     last = np.flatnonzero(np.any(apart > least, axis=1))[-1]
     assert found.window == (long.t[last], np.inf)
+
+
+def test_noise_that_moves_from_its_first_row_and_not_from_its_last_is_all_kept():
+    """The first is far from the middle and the last in it: no row is farther from that one."""
+    q = np.random.default_rng(3).normal(size=4000)
+    q[0], q[-1] = 4.5, 0.0
+    one = usable(made(np.clip(q, -4.5, 4.5)))
+    assert not one.left_out

@@ -240,3 +240,23 @@ def test_meshes_plugins_and_transmissions_are_never_resolved(capfd):
     assert Robot.from_text(text).names == ("j",)
     out = capfd.readouterr()
     assert out.out == "" and out.err == ""
+
+
+HAND = (
+    '<link name="f"/><joint name="finger" type="prismatic"><parent link="b"/><child link="f"/>'
+    '<axis xyz="0 1 0"/></joint><link name="g"/><joint name="thumb" type="prismatic">'
+    '<parent link="b"/><child link="g"/><axis xyz="0 -1 0"/><mimic joint="finger"/></joint></robot>'
+)
+
+
+def test_fingers_that_were_not_recorded_stand_still():
+    """As those of a gripper do while an arm is identified: neither finger nor thumb moves."""
+    text = urdf("</robot>", HAND)
+    robot = Robot.from_text(text, joints=("j",))
+    assert robot.names == ("j",)
+    assert set(robot.locked) == {"finger", "thumb"}
+    alone = Robot.from_text(GOOD)
+    np.testing.assert_allclose(robot.theta, alone.theta)
+    for joints in (None, ("j", "finger"), ("j", "thumb")):
+        with pytest.raises(RobotError, match=r"joint 'thumb': mimics another joint.*--joints"):
+            Robot.from_text(text, joints=joints)

@@ -139,6 +139,26 @@ def test_positions_of_motors_and_of_the_tool_are_no_torques(order, copy: str) ->
 def test_more_pairs_than_are_tried_are_said() -> None:
     blocks = table()
     rng = np.random.default_rng(0)
-    x = np.hstack([blocks["t"], rng.normal(size=(len(blocks["t"]), 30))])
-    with pytest.raises(RecordingError, match=r"\d+ pairs of them.*at most 400 are tried.*--column"):
+    x = np.hstack([blocks["t"], rng.normal(size=(len(blocks["t"]), 45))])
+    with pytest.raises(
+        RecordingError, match=r"\d+ pairs of them.*at most 1200 are tried.*--column"
+    ):
         named_by_numbers(x, arm(), None, "x")
+
+
+@pytest.mark.parametrize("beside", [16, 26])
+def test_many_motors_that_warm_up_are_no_motion(beside: int) -> None:
+    """Each rises in its own time, and more than 21 columns are looked at where joints are few."""
+    blocks, rng = table(), np.random.default_rng(5)
+    t = blocks["t"] - blocks["t"][0]
+    warm = 30 + 5 * (1 - np.exp(-t / (4.0 + np.arange(beside))))
+    warm += 0.05 * rng.normal(size=warm.shape)
+    half = beside // 2
+    parts = [blocks["t"], warm[:, :half], blocks["q"], warm[:, half:], blocks["tau"]]
+    found = named_by_numbers(np.hstack(parts), arm(), None, "log.csv")
+    names = found.named(0, arm().names)
+    assert [k for k, name in enumerate(names) if name.startswith("q.")] == [half + 1, half + 2]
+    assert [k for k, name in enumerate(names) if name.startswith("tau.")] == [
+        beside + 3,
+        beside + 4,
+    ]

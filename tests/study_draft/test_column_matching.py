@@ -27,7 +27,14 @@ def log_of(*names: str, **values: np.ndarray) -> Log:
     rng = np.random.default_rng(0)
     columns = {name: rng.normal(size=50) for name in names}
     columns |= values
-    return Log(file=Path("log.csv"), record="", columns=columns, skipped=(), layout=FileLayout())
+    return Log(
+        file=Path("log.csv"),
+        record="",
+        columns=columns,
+        names=tuple(columns),
+        skipped=(),
+        layout=FileLayout(),
+    )
 
 
 CLOCK = np.arange(50) / 100
@@ -243,3 +250,22 @@ def test_what_was_said_of_some_joints_only_tells_no_signal(missing: str) -> None
     del told[missing]
     with pytest.raises(RecordingError, match="--column"):
         match(log, two_links(), told=told)
+
+
+@pytest.mark.parametrize(
+    ("joints", "columns"),
+    [
+        (("arm.shoulder", "arm.elbow"), ("q.shoulder", "q.elbow")),
+        (("left/arm shoulder joint", "left/arm elbow joint"), ("pos_shoulder", "pos_elbow")),
+        (("ur_shoulder_pan_joint", "ur_elbow_joint"), ("shoulder_pan_position", "elbow_position")),
+    ],
+)
+def test_what_all_joints_are_called_need_not_be_in_columns(joints, columns) -> None:
+    """Nor do numbers tell joints where only they are left of the names: they may begin at 0."""
+    for number, column in enumerate(columns):
+        role = role_of(column, joints)
+        assert role is not None and (role.signal, role.joint) == ("q", number)
+    counted = role_of("position_1", ("panda_joint1", "panda_joint2"))
+    assert counted is not None and (counted.joint, counted.number) == (None, 1)
+    (only,) = (role_of("q_1", ("joint",)),)
+    assert only is not None and only.joint is None

@@ -278,3 +278,70 @@ def test_folders_say_what_is_held_out_where_files_do_not(arm: Path) -> None:
     study = di.load(draft.write(arm.parent / "study.toml"))
     assert len(study.train.recordings) == 2
     np.testing.assert_allclose(study.test.recordings[0].q, recording(1).q, atol=1e-9)
+
+
+@pytest.mark.parametrize("cell", ["nan", ""])
+@pytest.mark.parametrize("broken", ["pos_1", "trq_2", "time"])
+def test_no_other_signal_is_taken_where_a_cell_is_broken(arm: Path, broken: str, cell: str) -> None:
+    """References and commands are there, too, and were taken for what was measured."""
+    one = recording(1)
+    others = {"target_pos_1": one.q[:, 0], "target_pos_2": one.q[:, 1]}
+    others |= {"cmd_trq_1": one.tau[:, 0], "cmd_trq_2": one.tau[:, 1]}
+    whole = written(arm.parent / "a.csv", as_logged(one, **others))
+    lines = whole.read_text().splitlines()
+    cells = lines[700].split(",")
+    cells[lines[0].split(",").index(broken)] = cell
+    holed = arm.parent / "b.csv"
+    holed.write_text("\n".join([*lines[:700], ",".join(cells), *lines[701:]]))
+    for files in ([holed], [whole, holed]):
+        with pytest.raises(RecordingError, match=rf"line 701, column {broken}"):
+            draft_study(arm, files)
+
+
+def test_where_only_the_clock_can_be_read_the_hole_is_told(arm: Path) -> None:
+    columns = as_logged(recording(1))
+    for name in columns.keys() - {"time"}:
+        columns[name] = columns[name].copy()
+        columns[name][400:420] = np.nan
+    data = written(arm.parent / "run.csv", {"t": columns.pop("time"), **columns})
+    with pytest.raises(RecordingError, match=r"line 402, column pos_1: 'nan' is not a finite"):
+        draft_study(arm, [data])
+
+
+def test_a_hole_in_a_file_without_a_header_moves_no_columns(arm: Path) -> None:
+    columns = as_logged(recording(1), temp=np.full(1601, 30.0))
+    rows = np.column_stack([columns["temp"], *list(columns.values())[:-1]])
+    rows[700, 0] = np.nan
+    np.savetxt(data := arm.parent / "run.txt", rows)
+    with pytest.raises(RecordingError, match="line 701, column column1: 'nan' is not a finite"):
+        draft_study(arm, [data])
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+def test_tables_of_numpy_are_told_by_their_numbers(arm: Path, kind: type) -> None:
+    one = recording(1)
+    rest = np.column_stack([np.cos(one.t), one.t])  # of no joint: left out, without a name
+    rows = np.column_stack([one.t, rest[:, 0], one.q, one.tau])
+    np.save(data := arm.parent / "run.npy", rows.astype(kind))
+    draft = draft_study(arm, [data])
+    found = di.load(draft.write(arm.parent / "study.toml")).train.recordings[0]
+    np.testing.assert_allclose(found.q, one.q, atol=1e-6)
+    np.testing.assert_allclose(found.tau, one.tau, rtol=1e-5, atol=1e-5)
+
+
+def test_tables_that_lie_on_their_side_are_said_to(arm: Path) -> None:
+    one = recording(1)
+    np.savez(data := arm.parent / "run.npz", t=one.t, q=one.q.T, tau=one.tau.T)
+    lies = r"it holds t; .*: q \(2 rows of \d+: one row a sample is needed\), tau"
+    with pytest.raises(RecordingError, match=lies):
+        draft_study(arm, [data])
+
+
+def test_a_gap_that_no_study_could_hold_is_told_by_the_draft(arm: Path) -> None:
+    columns = as_logged(recording(1))
+    holed = {name: np.delete(x, range(500, 560)) for name, x in columns.items()}
+    data = written(arm.parent / "run.csv", holed)
+    with pytest.raises(
+        RecordingError, match=r"row 500.*without samples follow.*split the recording"
+    ):
+        draft_study(arm, [data])

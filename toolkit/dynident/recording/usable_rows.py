@@ -241,11 +241,9 @@ def _moves(recording: Recording) -> tuple[float, float]:
     """When a joint first leaves its place, and when the last one comes to rest, s."""
     q, t = recording.q, recording.t
     least = np.maximum(_MOVES * (q.max(axis=0) - q.min(axis=0)), _NOISE * encoder_noise_std(q))
-    start = _leaves(q, q[0], least)
-    if start is None:
-        return float(t[0]), float(t[-1])  # nothing moves at all
-    stop = _leaves(q[::-1], q[-1], least)
-    assert stop is not None
+    start, stop = _leaves(q, q[0], least), _leaves(q[::-1], q[-1], least)
+    if start is None or stop is None:
+        return float(t[0]), float(t[-1])  # nothing moves at all, or noise alone does
     return float(t[start]), float(t[len(t) - 1 - stop])
 
 

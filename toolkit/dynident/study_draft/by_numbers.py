@@ -30,8 +30,13 @@ _SLOPES = (0.5, 2.0)  # of a speed against that difference
 _SHOWN = 0.5 * math.log(2.0)
 """Likelihood from which on a motion without speeds counts: half of the power of each torque."""
 _PARTS = 4  # of the time, each predicted from the others
+_MEANS = 50  # parts of the time, in whose means noise is little
+_TO_AND_FRO = 1.5  # way of these means over their range: 1 where they only rise
 _MOST_COLUMNS = 200
 _MOST_PAIRS = 400
+"""Blocks that are tried as positions and torques; of few joints more, which take less time each."""
+_MOST_COLUMN_PAIRS = 2400
+"""The same times the joints."""
 _MOST_READINGS = 3
 _TURN, _DEGREE = 2 * math.pi, math.pi / 180
 _WORDS = {"q": "positions", "v": "speeds", "tau": "torques"}
@@ -92,7 +97,7 @@ def named_by_numbers(
 
     Parameters
     ----------
-    x : (T, m) the file's numbers.
+    x : (T, m) the file's numbers; NaN in columns of text.
     robot : as it is described.
     rate_hz : of the samples, where the file has no clock.
     where : the file, for messages.
@@ -124,10 +129,11 @@ def named_by_numbers(
         t = np.arange(len(x)) / (rate_hz or 1.0)
     else:
         t = (x[:, clock] - x[0, clock]) * clock_scale(x[:, clock])[0]
+    closed = {*clocks, *np.flatnonzero(np.isnan(x).any(axis=0))}
     starts = [
         s
         for s in range(x.shape[1] - n + 1)
-        if not any(s <= k < s + n for k in clocks) and np.ptp(x[:, s : s + n], axis=0).any()
+        if not any(s <= k < s + n for k in closed) and np.ptp(x[:, s : s + n], axis=0).any()
     ]
     blocks = _Blocks(x=x, t=t, robot=robot, starts=tuple(starts), where=where, remedy=remedy)
     readings, reason = blocks.with_speeds() or blocks.without_speeds() or ([], "")
@@ -198,11 +204,13 @@ class _Blocks:
     def without_speeds(self) -> tuple[list[dict[str, int]], str] | None:
         """Positions and the torques that their motion explains; None where none does."""
         x, n = self.x, self.robot.n
-        pairs = [(q, s) for q in self.starts for s in self.starts if abs(q - s) >= n]
+        motions = [q for q in self.starts if _comes_back(self.of(q))]
+        pairs = [(q, s) for q in motions for s in self.starts if abs(q - s) >= n]
         pairs = [(q, s) for q, s in pairs if not self._repeats(q, s)]
-        if len(pairs) > _MOST_PAIRS:
+        most = max(_MOST_PAIRS, _MOST_COLUMN_PAIRS // n)
+        if len(pairs) > most:
             what = f"no columns are the derivative of others, and {len(pairs)} pairs of them may "
-            what += f"be positions and torques: at most {_MOST_PAIRS} are tried"
+            what += f"be positions and torques: at most {most} are tried"
             raise RecordingError(what, self.where, self.remedy)
         scored = sorted(((self.explained(q, s), -q, -s) for q, s in pairs), reverse=True)
         shown = [(-q, -s) for score, q, s in scored if score > n * _SHOWN]
@@ -313,6 +321,14 @@ def _roughness(x: np.ndarray) -> float:
     return float(
         np.sum(np.abs(np.diff(x, 2, axis=0))) / max(float(np.sum(np.ptp(x, axis=0))), 1e-300)
     )
+
+
+def _comes_back(x: np.ndarray) -> bool:
+    """Whether a column of a block goes to and fro, as joints do, and motors that warm up do not."""
+    parts = np.array_split(x, min(len(x), _MEANS))
+    means = np.array([part.mean(axis=0) for part in parts])
+    way = np.sum(np.abs(np.diff(means, axis=0)), axis=0)
+    return bool(np.any(way > _TO_AND_FRO * np.ptp(means, axis=0)))
 
 
 def _is_rate(x: np.ndarray, t: np.ndarray, q: int, v: int, n: int) -> bool:

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 Signal = Literal["t", "q", "v", "a", "tau", "current", "temperature"]
@@ -185,18 +186,40 @@ def _by_unit(words: Sequence[str]) -> tuple[Signal, str] | None:
 
 
 def _without_joint(words: list[str], joints: Sequence[str]) -> tuple[list[str], int | None]:
-    """The words less those of the longest joint's name among them, and that joint."""
+    """The words less those of the longest joint's name among them, and that joint.
+
+    What all joints' names have in common need not be in the column's: the robot's, say.
+    """
+    whole = tuple(tuple(_words(joint)) for joint in joints)
+    for names in (whole, _apart(whole)):
+        found = _joint_in(words, names)
+        if found is not None:
+            start, length, number = found
+            return words[:start] + words[start + length :], number
+    return words, None
+
+
+@lru_cache(maxsize=16)
+def _apart(names: tuple[tuple[str, ...], ...]) -> tuple[tuple[str, ...], ...]:
+    """Words of names without those that all of them begin and end with."""
+    shortest = min(map(len, names), default=0)
+    head = next((k for k in range(shortest) if len({one[k] for one in names}) > 1), shortest)
+    names = tuple(one[head:] for one in names)
+    shortest -= head
+    tail = next((k for k in range(shortest) if len({one[-1 - k] for one in names}) > 1), shortest)
+    return tuple(one[: len(one) - tail] for one in names)
+
+
+def _joint_in(words: Sequence[str], names: Sequence[Sequence[str]]) -> tuple[int, int, int] | None:
+    """Where the longest of joints' names is among words, how many words it has, and which it is."""
     found: tuple[int, int, int] | None = None
-    for number, joint in enumerate(joints):
-        own = _words(joint)
+    for number, name in enumerate(names):
+        own = [*name]
         # A joint called "q" or "1" is no name that a column can be told by.
         if not own or (len(own) == 1 and (own[0] in _SIGNAL_OF or own[0].isdigit())):
             continue
         for start in range(len(words) - len(own) + 1):
             longer = found is None or len(own) > found[1]
-            if longer and words[start : start + len(own)] == own:
+            if longer and [*words[start : start + len(own)]] == own:
                 found = start, len(own), number
-    if found is None:
-        return words, None
-    start, length, number = found
-    return words[:start] + words[start + length :], number
+    return found

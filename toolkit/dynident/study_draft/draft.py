@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from dynident import files
 from dynident.effects import FRICTION_WIDTH
-from dynident.recording import Column, FileLayout, default_filter
+from dynident.recording import Column, FileLayout, Filter, default_filter
 from dynident.study import load, load_wrenches
 from dynident.study_draft.decision import Decision
 from dynident.study_draft.drafted_columns import (
@@ -56,6 +56,7 @@ class StudyDraft:
     columns : ours -> theirs, also where both are called the same.
     otherwise : columns that another reading has in their place; None where there is none.
     recordings : entries of the study.
+    filter : that they need; None for the usual one.
     loads : name -> mass, kg, or None.
     torque : "measured" or "held_command".
     torque_unit : "N m", or "A" of drives.
@@ -74,6 +75,7 @@ class StudyDraft:
     columns: dict[str, Column]
     otherwise: OtherReading | None
     recordings: tuple[DraftedRecording, ...]
+    filter: Filter | None
     loads: dict[str, float | None]
     torque: Literal["measured", "held_command"]
     torque_unit: Literal["N m", "A"]
@@ -185,16 +187,22 @@ class StudyDraft:
         ]
 
     def _filter(self) -> str:
-        usual = default_filter(self.rate_hz)
+        if self.filter is None:
+            one, mark = default_filter(self.rate_hz), "# "
+            said = f"The usual filter at {self.rate_hz:.5g} Hz; with this table, what it says."
+        else:
+            one, mark = self.filter, ""
+            (taken,) = (each for each in self.decisions if each.subject == "filter")
+            said = f"The cut-offs of positions and of columns: {taken.words}, for {taken.reason}."
         return as_lines(
             [
                 "",
-                f"# The usual filter at {self.rate_hz:.5g} Hz; with this table, what it says.",
-                "# [filter]",
-                f"# position_cutoff_hz = {usual.position_cutoff_hz:g}  # of q, before it is"
+                *as_comment(said),
+                f"{mark}[filter]",
+                f"{mark}position_cutoff_hz = {one.position_cutoff_hz:g}  # of q, before it is"
                 " differentiated",
-                f"# cutoff_hz = {usual.cutoff_hz:g}  # of columns and torque alike",
-                f"# rate_hz = {usual.rate_hz:g}  # rows that are kept",
+                f"{mark}cutoff_hz = {one.cutoff_hz:g}  # of columns and torque alike",
+                f"{mark}rate_hz = {one.rate_hz:g}  # rows that are kept",
             ]
         )
 

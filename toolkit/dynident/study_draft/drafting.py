@@ -5,6 +5,8 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
+from operator import add
 from pathlib import Path
 from typing import Literal
 
@@ -13,30 +15,34 @@ import numpy as np
 from dynident.arguments import checked
 from dynident.data_files import find_all
 from dynident.errors import DynidentWarning, RecordingError
+from dynident.model import Model
 from dynident.recording import (
     Column,
     FileLayout,
+    Filter,
     Recording,
     WrenchColumns,
     frames_in,
     read,
     read_wrench,
+    uniform,
 )
 from dynident.robot import Robot
 from dynident.study_draft.by_numbers import named_by_numbers
 from dynident.study_draft.decision import Ask, Decision, decided
-from dynident.study_draft.draft import StudyDraft
+from dynident.study_draft.draft import DraftedRecording, StudyDraft
 from dynident.study_draft.entries import drafted_recordings
 from dynident.study_draft.guesses.amendments import amended
 from dynident.study_draft.guesses.degrees import positions_in_radians
 from dynident.study_draft.guesses.drive_unit import drive_sizes
 from dynident.study_draft.guesses.file_reading import Reading
+from dynident.study_draft.guesses.filter_cutoffs import suitable_filter
 from dynident.study_draft.guesses.motor_side import joint_side, require_ratios
 from dynident.study_draft.guesses.stated_columns import require_no_sums, with_stated
 from dynident.study_draft.guesses.torque_timing import samples_late
 from dynident.study_draft.log import Log, logs_of, same_columns
 from dynident.study_draft.log_facts import LogFacts
-from dynident.study_draft.matching import Group, Matched, match
+from dynident.study_draft.matching import Group, Matched, match, require_clock
 from dynident.study_draft.shared_motors import with_shared_motors
 from dynident.study_draft.timing import clock_from_speeds, clock_scale
 from dynident.study_draft.wrench_groups import in_radians, wrench_columns, wrench_groups
@@ -96,7 +102,7 @@ def draft_study(
     chosen = _chosen(matched, notes)
     wrench = wrench_columns(sensors, notes.take)
     columns = matched.columns(described, chosen)
-    columns = _with_clock(columns, logs[0], matched, notes)
+    columns = _with_clock(columns, logs[0], matched, described, notes)
     files = _Sources(robot, facts, logs)
     if "tau" not in matched.groups:
         _require_no_motors(facts, logs[0].where)
@@ -108,20 +114,23 @@ def draft_study(
     reading = replace(reading, columns=_without_strangers(reading, logs, notes))
     reading = amended(reading, lambda one: _read(logs, one), notes.take)
     reading, otherwise = with_shared_motors(reading, _read(logs, reading), notes.take)
-    recordings = _read(logs, reading)
+    recordings = _without_gaps(_read(logs, reading))
     held = _is_held(reading, recordings, torque.origin == "command", notes)
     behind_gears = reading.geared or reading.motors is not None or unit == "A"
     mounted = not np.array_equal(reading.robot.gravity, described.gravity)
+    effects = (*_FRICTION, "rotor_inertia") if behind_gears else _FRICTION
+    entries = drafted_recordings(logs, recordings, facts, notes.take)
     return StudyDraft(
         robot=files.robot,
         joints=files.joints,
         columns=reading.columns | wrench,
         otherwise=otherwise,
-        recordings=drafted_recordings(logs, recordings, facts, notes.take),
+        recordings=entries,
+        filter=_filter_of(reading, effects, entries, recordings, notes),
         loads=files.loads,
         torque="held_command" if held else "measured",
         torque_unit=unit,
-        effects=(*_FRICTION, "rotor_inertia") if behind_gears else _FRICTION,
+        effects=effects,
         rate_hz=min(one.rate_hz for one in recordings),
         gravity=tuple(float(x) for x in reading.robot.gravity),
         is_mounted_otherwise=mounted,
@@ -170,6 +179,7 @@ def _of_sensor(
         columns={ours: one for ours, one in columns.items() if not ours.startswith("v.")},
         otherwise=None,
         recordings=drafted_recordings(files.logs, recordings, files.facts, notes.take),
+        filter=None,
         loads=files.loads,
         torque="measured",
         torque_unit="N m",
@@ -213,7 +223,7 @@ def _named(
     if logs[0].is_unnamed:
         told = {f"{signal}.{joint}" for signal in ("q", "tau") for joint in robot.names}
         if told <= facts.columns.keys():
-            names = tuple(name for name in logs[0].columns if name != "t")
+            names = tuple(name for name in logs[0].names if name != "t")
         else:
             names = _by_numbers(logs[0], robot, facts.rate_hz, notes)
         logs = _opened(data, replace(layout, names=names))
@@ -234,7 +244,13 @@ def _opened(data: Sequence[str | Path], layout: FileLayout) -> tuple[Log, ...]:
 
 def _by_numbers(log: Log, robot: Robot, rate_hz: float | None, notes: _Notes) -> tuple[str, ...]:
     """Names for columns that have none."""
-    own = [x for name, x in log.columns.items() if name != "t"]
+    for name, error in log.unread.items():
+        if name not in log.texts:
+            raise error
+    samples = len(next(iter(log.columns.values())))
+    # Columns of text keep their places: without them others would move.
+    nothing = np.full(samples, np.nan)
+    own = [log.columns.get(name, nothing) for name in log.names if name != "t"]
     found = named_by_numbers(np.column_stack(own), robot, rate_hz, log.where)
     taken = notes.take("columns", found.choices, found.reason)
     return found.named(taken, robot.names)
@@ -256,17 +272,13 @@ def _chosen(matched: Matched, notes: _Notes) -> dict[str, int]:
 
 
 def _with_clock(
-    columns: dict[str, Column], log: Log, matched: Matched, notes: _Notes
+    columns: dict[str, Column], log: Log, matched: Matched, robot: Robot, notes: _Notes
 ) -> dict[str, Column]:
     """The columns with the clock in seconds."""
     if log.layout.rate_hz is not None:
         notes.take("t", [f"samples at {log.layout.rate_hz:g} Hz"], "the rate was given")
         return {ours: one for ours, one in columns.items() if ours != "t"}
-    if matched.time is None:
-        what = "no column is a clock that goes forward"
-        remedy = "name it t, or give the samples' rate: --rate 125"
-        raise RecordingError(what, log.where, remedy)
-    column, why = matched.time
+    column, why = require_clock(matched, log, robot)
     if column.scale != 1.0 or column.name not in log.columns:
         notes.take("t", [column.name], f"{why}; its name says the unit")
         return columns
@@ -332,6 +344,15 @@ def _read(logs: Sequence[Log], reading: Reading) -> tuple[Recording, ...]:
         )
 
 
+def _without_gaps(recordings: tuple[Recording, ...]) -> tuple[Recording, ...]:
+    """Recordings as they are, or the error that their study would end with."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DynidentWarning)
+        for one in recordings:
+            uniform(one)
+    return recordings
+
+
 def _without_strangers(reading: Reading, logs: Sequence[Log], notes: _Notes) -> dict[str, Column]:
     """The columns without references that nothing follows, whose name promised more."""
     columns = reading.columns
@@ -382,6 +403,22 @@ def _unit(
     choices = ["A, or another unit of the drives", "N m"]
     taken = notes.take("torque_unit", choices, f"{sizes.reason}: {identified}")
     return "A" if taken == 0 else "N m"
+
+
+def _filter_of(
+    reading: Reading,
+    effects: Sequence[str],
+    entries: Sequence[DraftedRecording],
+    recordings: Sequence[Recording],
+    notes: _Notes,
+) -> Filter | None:
+    """The filter that the recordings need; None for the usual one."""
+    # Repetitions tell noise by themselves, and of currents there is no model yet.
+    if reading.torque_unit == "A" or any(entry.period for entry in entries):
+        return None
+    train = [one for one, entry in zip(recordings, entries, strict=True) if entry.use == "train"]
+    model = reduce(add, effects, Model(reading.robot))
+    return suitable_filter(model, train, notes.take)
 
 
 def _is_held(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from dynident.errors import RecordingError
 from dynident.recording import ColumnTable, FileLayout, open_table
 from dynident.recording.formats.arrays.records import COLUMNS, pick
+from dynident.recording.formats.column_values import seconds_of
 
 MOST_COLUMNS = 2000
 """Columns of a file that are looked at."""
@@ -26,17 +27,21 @@ class Log:
     file : path as it was given.
     record : which of a file that holds several; empty where it holds one.
     columns : name -> (T,) numbers; `name[k]` for column k of a table. Text is left out.
+    names : of all columns in the file, in its order; "" for one that the layout skips.
     skipped : names of what is there and is no column of as many numbers as the others.
     layout : with which it was opened.
-    trouble : why the first of its columns could not be read; None where all could, or are text.
+    texts : names of columns that hold text.
+    unread : why columns could not be read, by name: a cell is empty or no number, say.
     """
 
     file: Path
     record: str
     columns: Mapping[str, np.ndarray]
+    names: tuple[str, ...]
     skipped: tuple[str, ...]
     layout: FileLayout
-    trouble: RecordingError | None = None
+    texts: frozenset[str] = frozenset()
+    unread: Mapping[str, RecordingError] = field(default_factory=dict)
 
     @property
     def where(self) -> str:
@@ -46,7 +51,8 @@ class Log:
     @property
     def is_unnamed(self) -> bool:
         """Whether its columns have no names but their numbers."""
-        return all(re.fullmatch(r"column\d+|t", name) for name in self.columns)
+        own = [name for name in (*self.columns, *self.unread) if name != "t"]
+        return bool(own) and all(re.fullmatch(r"column\d+", name) for name in own)
 
 
 def logs_of(path: str | Path, layout: FileLayout) -> tuple[Log, ...]:
@@ -80,17 +86,18 @@ def logs_of(path: str | Path, layout: FileLayout) -> tuple[Log, ...]:
 def _log(path: Path, record: str, table: ColumnTable, layout: FileLayout) -> Log:
     found: dict[str, np.ndarray] = {}
     skipped: list[str] = []
-    arrays, trouble = _arrays(table, table.names[:MOST_COLUMNS])
-    for name in table.names[:MOST_COLUMNS]:
+    named = [name for name in table.names if name]
+    arrays, unread = _arrays(table, named[:MOST_COLUMNS])
+    for name in named[:MOST_COLUMNS]:
         columns = _numbers(name, arrays.get(name))
         if columns is None:
-            skipped.append(name)
+            skipped.append(name + _lies(arrays.get(name)))
         else:
             found |= columns
-    skipped += table.names[MOST_COLUMNS:]
+    skipped += named[MOST_COLUMNS:]
     lengths = [len(x) for x in found.values()]
-    if not lengths and trouble is not None:
-        raise trouble
+    if not lengths and unread:
+        raise next(iter(unread.values()))
     if not lengths:
         what = "holds no column of numbers"
         raise RecordingError(what, table.file, "is it the right file?")
@@ -106,39 +113,49 @@ def _log(path: Path, record: str, table: ColumnTable, layout: FileLayout) -> Log
         file=path,
         record=record,
         columns=kept,
+        names=table.names,
         skipped=tuple(skipped),
         layout=layout,
-        trouble=trouble,
+        texts=table.texts,
+        unread=unread,
     )
 
 
 def _arrays(
     table: ColumnTable, names: Sequence[str]
-) -> tuple[dict[str, np.ndarray], RecordingError | None]:
-    """What a table holds under some names, at once if it can be, and the first that cannot."""
+) -> tuple[dict[str, np.ndarray], dict[str, RecordingError]]:
+    """What a table holds under some names, at once if it can be, and why some cannot be read."""
     try:
-        return table.load(names), None
+        return table.load(names), {}
     except RecordingError:  # one is text, say, or the messages of a bag do not share it
-        found, trouble = {}, None
+        found, unread = {}, {}
         for name in names:
             try:
                 found[name] = table.load([name])[name]
             except RecordingError as error:
-                trouble = trouble or error
-        return found, trouble
+                unread[name] = error
+        return found, unread
 
 
 def _numbers(name: str, x: np.ndarray | None) -> dict[str, np.ndarray] | None:
     """Columns of numbers under a name; None where it holds text or numbers of no use."""
+    x = x if x is None else seconds_of(x)
     if x is None or x.dtype.kind not in "fiu" or x.ndim not in (1, 2) or not x.size:
         return None
     if x.ndim == 2 and 1 in x.shape:
         x = x.ravel()
     if x.ndim == 1:
         return {name: x.astype(float, copy=False)}
-    if len(x.T) > MOST_COLUMNS:
+    if len(x.T) > min(MOST_COLUMNS, len(x)):
         return None
     return {f"{name}[{k}]": column.astype(float, copy=False) for k, column in enumerate(x.T)}
+
+
+def _lies(x: np.ndarray | None) -> str:
+    """What to say of a table whose rows are signals, behind its name."""
+    if x is None or x.ndim != 2 or not x.shape[1] > x.shape[0] > 1:
+        return ""
+    return f" ({x.shape[0]} rows of {x.shape[1]}: one row a sample is needed)"
 
 
 def same_columns(logs: Sequence[Log]) -> None:
@@ -147,12 +164,14 @@ def same_columns(logs: Sequence[Log]) -> None:
     Raises
     ------
     RecordingError
-        Naming the first that differs, and a column.
+        Naming the first that differs, and a column; or why that column could not be read.
     """
     first = logs[0]
     for one in logs[1:]:
         odd = sorted(set(first.columns) ^ set(one.columns))
         if odd:
             have, lack = (first, one) if odd[0] in first.columns else (one, first)
+            if odd[0] in lack.unread:
+                raise lack.unread[odd[0]]
             what = f"has no column '{odd[0]}', which {have.where} has"
             raise RecordingError(what, lack.where, "draft a study of files with the same columns")

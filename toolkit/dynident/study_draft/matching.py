@@ -100,9 +100,11 @@ def match(
     Raises
     ------
     RecordingError
-        If no group of columns holds what is needed of every joint.
+        If no group of columns holds what is needed of every joint, or the likeliest one holds a
+        column that cannot be read: a lesser one would be another signal.
     """
-    roles = [role for name in log.columns if (role := role_of(name, robot.names)) is not None]
+    named = (*log.columns, *log.unread)
+    roles = [role for name in named if (role := role_of(name, robot.names)) is not None]
     torques = [
         *_groups(roles, "tau", _MEASURED, robot),
         *_groups(roles, "current", _MEASURED, robot),
@@ -123,13 +125,19 @@ def match(
         "temperature": _groups(roles, "temperature", _MEASURED, robot),
         "q_ref": [one for one in positions if one.origin in _ASKED and measured],
     }
+    for signal in needed:
+        if not all(f"{signal}.{joint}" in told for joint in robot.names):
+            _require_read(groups[signal][:1], signal, roles, log)
+    for signal, some in groups.items():
+        groups[signal] = [one for one in some if not _unread(one.roles, log)]
     for signal in _SIGNALS:
         groups[signal] = groups[signal] or _stated(told, signal, robot, log.columns)
     for signal, what in (("q", "positions"), ("tau", "torques or currents")):
         if signal in needed and not groups[signal]:
-            if log.trouble is not None:
-                raise log.trouble
             shown = ", ".join(list(log.columns)[:20]) + (", ..." if len(log.columns) > 20 else "")
+            if log.skipped:
+                shown += f"; of another length, or no numbers: {', '.join(log.skipped[:10])}"
+                shown += ", ..." if len(log.skipped) > 10 else ""
             remedy = (
                 f"it holds {shown}; joints: {', '.join(robot.names)}. Say which they are, "
                 f'--column "{signal}.{robot.names[0]} = NAME" for each joint'
@@ -137,7 +145,50 @@ def match(
             lack = f"no {what} of {robot.n} joints are told by name"
             raise RecordingError(lack, log.where, remedy)
     found = {signal: tuple(some) for signal, some in groups.items() if some}
-    return Matched(time=_clock(log, roles), groups=found)
+    readable = [role for role in roles if role.column in log.columns]
+    return Matched(time=_clock(log, readable), groups=found)
+
+
+def _unread(roles: Sequence[ColumnRole], log: Log) -> list[str]:
+    """Those columns of some that could not be read."""
+    return [role.column for role in roles if role.column in log.unread]
+
+
+def _require_read(
+    likeliest: Sequence[Group], signal: str, roles: Sequence[ColumnRole], log: Log
+) -> None:
+    """Refuse a log in which columns of the likeliest group cannot be read, or of none there is."""
+    of_it = [one for group in likeliest for one in group.roles]
+    alike = {"q": ("q",), "tau": ("tau", "current")}[signal]
+    for column in _unread(of_it or [one for one in roles if one.signal in alike], log):
+        raise log.unread[column]
+
+
+def require_clock(matched: Matched, log: Log, robot: Robot) -> tuple[Column, str]:
+    """Take the clock of a log.
+
+    Parameters
+    ----------
+    matched : what the names of its columns tell.
+    log, robot : of which it was told.
+
+    Returns
+    -------
+    The column, and why it is one.
+
+    Raises
+    ------
+    RecordingError
+        If no column is one: it says why a column that is called so could not be read.
+    """
+    if matched.time is not None:
+        return matched.time
+    for column, error in log.unread.items():
+        role = role_of(column, robot.names)
+        if role is not None and role.signal == "t" and role.joint is None:
+            raise error
+    what = "no column is a clock that goes forward"
+    raise RecordingError(what, log.where, "name it t, or give the samples' rate: --rate 125")
 
 
 def _stated(

@@ -131,6 +131,7 @@ class ColumnTable:
         is skipped of the columns themselves, `left_of` says.
     sha256 : hexadecimal digits of the file's content.
     first_line : line of the first sample in a text file, from 1; 0 in any other.
+    texts : columns of a text file without a number or a date in the first samples.
     joints : "prefixed" where the names of joints may have a prefix that the robot's have not, or
         be without one that they have, as on topics of ROS; "exact" anywhere else.
     """
@@ -143,6 +144,7 @@ class ColumnTable:
     skipped: Callable[[Sequence[str]], tuple[str, ...]] = _nothing_more
     sha256: str = ""
     first_line: int = 0
+    texts: frozenset[str] = frozenset()
     joints: Literal["exact", "prefixed"] = "exact"
 
     @cached_property

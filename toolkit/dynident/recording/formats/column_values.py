@@ -12,6 +12,8 @@ from dynident.recording.formats.column_names import ColumnTable, LocatedColumn
 from dynident.recording.formats.limits import CUT
 from dynident.recording.spooled import Spool
 
+_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+
 
 def gather(
     table: ColumnTable,
@@ -83,7 +85,11 @@ def _combined(
     ours: str, column: LocatedColumn, arrays: Mapping[str, np.ndarray], file: str
 ) -> np.ndarray:
     """One of our columns from theirs; a plain name without a scale keeps every bit."""
-    vectors = [_vector(arrays[one.name], one.name, one.index, file) for one in column.terms]
+    found = [arrays[one.name] for one in column.terms]
+    found = [seconds_of(x) for x in found] if ours == "t" else found
+    vectors = [
+        _vector(x, one.name, one.index, file) for x, one in zip(found, column.terms, strict=True)
+    ]
     lengths = [len(x) for x in vectors]
     if len(set(lengths)) > 1:
         shown = ", ".join(f"'{one.name}' {n}" for one, n in zip(column.terms, lengths, strict=True))
@@ -95,6 +101,16 @@ def _combined(
         total = sum(parts[1:], start=parts[0])
         total = total + column.offset if column.offset else total
         return total if column.scale == 1.0 else column.scale * total
+
+
+def seconds_of(x: np.ndarray) -> np.ndarray:
+    """Return dates, or times since one, as seconds since 1970, and anything else as it is."""
+    if x.dtype.kind not in "mM":
+        return x
+    unit, count = np.datetime_data(x.dtype)
+    if unit not in _SECONDS:  # days, say
+        x, unit, count = x.astype(f"{x.dtype.kind}8[s]"), "s", 1
+    return np.where(np.isnat(x), np.nan, count * _SECONDS[unit] * x.astype(np.int64))
 
 
 def _vector(x: np.ndarray, name: str, index: int | None, file: str) -> np.ndarray:

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import csv
 import io
-import re
 from array import array
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import numpy as np
@@ -20,17 +21,12 @@ import numpy as np
 from dynident.errors import RecordingError
 from dynident.recording.formats.column_table import ColumnTable, FileLayout, joined
 from dynident.recording.formats.file_source import FileSource
-from dynident.recording.formats.limits import (
-    TEXT,
-    require_distinct,
-    require_few,
-    require_unpacked,
-)
+from dynident.recording.formats.limits import TEXT, require_distinct, require_unpacked
+from dynident.recording.formats.text_head import head_of, is_comment, is_number
 from dynident.recording.formats.text_pieces import text_pieces
 
-_NUMPY_HEADER = b"# "
-"""How NumPy marks the line of a header."""
 _HEADER = "write a header line: t, q.<joint>, tau.<joint> ..."
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _SMALL = 1 << 18
 """Bytes that NumPy has read sooner than pandas is loaded, which takes a third of a second."""
 
@@ -38,7 +34,9 @@ _SMALL = 1 << 18
 def open_csv(source: FileSource, file: str, layout: FileLayout) -> ColumnTable:
     """Return the table that a CSV file holds.
 
-    Commas, semicolons, tabs or blanks separate the columns; numbers have a decimal point.
+    Commas, semicolons, tabs or blanks separate the columns; numbers have a decimal point, or where
+    no commas separate columns a decimal comma. Columns of dates (ISO 8601) are read as such.
+    Comments (`#`, `%`, `//`) are skipped, and a line of units below the names is read.
 
     Parameters
     ----------
@@ -61,45 +59,51 @@ def open_csv(source: FileSource, file: str, layout: FileLayout) -> ColumnTable:
         start = next(text_pieces(stream, file), b"")
     if not start or start.isspace():
         raise RecordingError("is empty", file, "the first line names the columns: t, q.<joint> ...")
-    blanks = _has_blanks(start)
-    start = _commas(start.removeprefix(_NUMPY_HEADER)) if blanks else start
-    first, second = (line.decode() for line in _two_lines(start))
-    separator = _separator(first, second)
-    require_few(1 + first.count(separator), "columns", file)
-    cells = _cells(first, separator, file)
-    is_header = not all(is_number(cell) for cell in cells)
-    where = f"{file}, line 1"
-    if is_header:
-        names = layout.by_name(cells, where, "the first line names the columns")
+    head = head_of(start, file, layout)
+    where = f"{file}, line {head.line}"
+    if head.names:
+        names = layout.by_name(head.names, where, "the first line names the columns")
     else:
         what = "the first line holds numbers, not the names of columns"
-        names = layout.by_position(len(cells), where, what, _HEADER)
-    require_distinct([name for name in names if name], "column", f"{file}, line 1")
+        names = layout.by_position(head.columns, where, what, _HEADER)
+    require_distinct([name for name in names if name], "column", where)
     places = {name: place for place, name in reversed([*enumerate(names)])}
+    names_in = "header" if head.names else "first line"
 
     def parts(wanted: Sequence[str]) -> Iterator[dict[str, np.ndarray]]:
-        at, above = [places[name] for name in wanted], 0
+        numbers = [name for name in wanted if places[name] not in head.dates]
+        at, above = [places[name] for name in numbers], 0
         with source.open() as stream:
             for piece in text_pieces(stream, file):
-                if blanks:
-                    piece = _commas(piece if above else piece.removeprefix(_NUMPY_HEADER))
-                # The readers below skip the line of the header.
-                lines = piece if is_header and not above else b"\n" + piece
-                above = above or int(is_header)
-                columns = _fast(lines, separator, len(names), at)
-                if columns is None:
-                    kind = "header" if is_header else "first line"
-                    rows = _careful(
-                        lines, separator, names, at, file, lines_above=above, names_in=kind
-                    )
-                    columns = list(rows.T)
-                yield dict(zip(wanted, columns, strict=True))
-                above += lines.count(b"\n") - 1
+                body = piece if above else _below(piece, head.above)
+                above = above or head.above
+                # The readers below skip the line of a header.
+                lines = _Lines(b"\n" + head.plain(body), head.mark, names, file, above, names_in)
+                columns = _fast(lines.data, head.mark, len(names), at) if at else []
+                columns = lines.numbers(at).T if columns is None else columns
+                found = dict(zip(numbers, columns, strict=True))
+                found |= {one: lines.dates(places[one]) for one in wanted if one not in found}
+                yield {name: found[name] for name in wanted}
+                above += body.count(b"\n")
 
     def load(wanted: Sequence[str]) -> dict[str, np.ndarray]:
         return joined(_few_enough(parts(wanted), file))
 
-    return ColumnTable(file, names, load, parts=parts, first_line=2 if is_header else 1)
+    return ColumnTable(
+        file,
+        names,
+        load,
+        parts=parts,
+        skipped=lambda _: head.skipped,
+        first_line=head.above + 1,
+        texts=frozenset(names[place] for place in head.texts) - {""},
+    )
+
+
+def _below(piece: bytes, lines: int) -> bytes:
+    """What is below the first lines of a piece."""
+    parts = piece.split(b"\n", lines)
+    return parts[lines] if len(parts) > lines else b""
 
 
 def _few_enough(
@@ -111,39 +115,6 @@ def _few_enough(
         size += sum(x.nbytes for x in part.values())
         require_unpacked(size, TEXT, file)
         yield part
-
-
-def _has_blanks(data: bytes) -> bool:
-    """Whether nothing but blanks separates the columns."""
-    first = data.partition(b"\n")[0].strip()
-    return b" " in first and not any(mark in first for mark in (b",", b";", b"\t", b'"'))
-
-
-def _commas(data: bytes) -> bytes:
-    """Lines with commas in the place of blanks."""
-    return re.sub(rb" +", b",", re.sub(rb"^ +| +$", b"", data, flags=re.MULTILINE))
-
-
-def _two_lines(data: bytes) -> tuple[bytes, bytes]:
-    """Return the header and the line below it."""
-    stream = io.BytesIO(data)
-    return stream.readline().rstrip(b"\n"), stream.readline().rstrip(b"\n")
-
-
-def _separator(header: str, row: str) -> str:
-    """What separates the columns; names may hold other separators, which no row of numbers has."""
-    bare = re.sub('"[^"]*"', "", header)
-    both = [mark for mark in ",;\t" if 0 < bare.count(mark) == row.count(mark)]
-    return max(both or ",;\t", key=bare.count)
-
-
-def _cells(line: str, separator: str, file: str) -> list[str]:
-    """Cells of the first line."""
-    try:
-        cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
-    except (csv.Error, StopIteration) as error:
-        raise RecordingError(f"the header cannot be read ({error})", f"{file}, line 1") from None
-    return [cell.strip() for cell in cells]
 
 
 def _fast(data: bytes, separator: str, width: int, places: list[int]) -> list[np.ndarray] | None:
@@ -202,62 +173,97 @@ def _regular_rows(data: bytes, separator: str, width: int) -> int | None:
     return rows if marks == (mark * (width - 1) + b"\n") * rows else None
 
 
-def _careful(
-    data: bytes,
-    separator: str,
-    names: tuple[str, ...],
-    places: list[int],
-    file: str,
-    *,
-    lines_above: int = 1,
-    names_in: str = "header",
-) -> np.ndarray:
-    """Values (T, k), line by line, with an error that names the line and the column."""
-    body = data.decode().partition("\n")[2].rstrip("\n ")
-    if not body.strip():
-        remedy = "is the file complete?"
-        raise RecordingError("holds a header but no samples", file, remedy)
-    numbers = array("d")
-    reader = csv.reader(io.StringIO(body, newline=""), delimiter=separator, skipinitialspace=True)
-    line = lines_above
-    try:
-        for cells in reader:
-            line = reader.line_num + lines_above
-            where = f"{file}, line {line}"
-            if not any(cell.strip() for cell in cells):
-                raise RecordingError("the line is empty", where, "remove it")
-            if len(cells) != len(names):
-                raise RecordingError(
-                    f"{len(cells)} column{'s' * (len(cells) != 1)} where the "
-                    f"{names_in} has {len(names)}",
-                    where,
-                    "is the file complete?" if len(cells) < len(names) else "name every column",
-                )
-            numbers.extend(_cell(cells[i], f"{where}, column {names[i] or i + 1}") for i in places)
-    except csv.Error as error:
-        raise RecordingError(f"cannot be read ({error})", f"{file}, after line {line}") from None
-    return np.frombuffer(numbers, dtype=np.float64).reshape(-1, len(places))
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """Lines that are read one by one, with errors that name the line and the column.
+
+    Attributes
+    ----------
+    data : the lines, below one that is skipped.
+    separator : of the columns.
+    names : of the columns; "" for one without.
+    file : for messages.
+    above : lines above the first of them.
+    names_in : what says how many columns there are, in words.
+    """
+
+    data: bytes
+    separator: str
+    names: tuple[str, ...]
+    file: str
+    above: int = 1
+    names_in: str = "header"
+
+    def numbers(self, places: Sequence[int]) -> np.ndarray:
+        """Return the numbers (T, k) of k columns."""
+        found = array("d")
+        for where, cells in self._rows():
+            found.extend(_number(cells[i], f"{where}, {self._column(i)}") for i in places)
+        return np.frombuffer(found, dtype=np.float64).reshape(-1, len(places))
+
+    def dates(self, place: int) -> np.ndarray:
+        """Return the dates (T,) of a column."""
+        found = array("q")
+        for where, cells in self._rows():
+            found.append(_microseconds(cells[place], f"{where}, {self._column(place)}"))
+        return np.frombuffer(found, dtype="datetime64[us]")
+
+    def _column(self, place: int) -> str:
+        return f"column {self.names[place] or place + 1}"
+
+    def _rows(self) -> Iterator[tuple[str, list[str]]]:
+        """Where each line is, and its cells, as many as there are columns."""
+        body = self.data.decode().partition("\n")[2].rstrip("\n ")
+        if not body.strip():
+            remedy = "is the file complete?"
+            raise RecordingError("holds a header but no samples", self.file, remedy)
+        text = io.StringIO(body, newline="")
+        reader = csv.reader(text, delimiter=self.separator, skipinitialspace=True)
+        line = self.above
+        try:
+            for cells in reader:
+                line = reader.line_num + self.above
+                if is_comment(cells):
+                    continue
+                yield self._complete(cells, f"{self.file}, line {line}")
+        except csv.Error as error:
+            where = f"{self.file}, after line {line}"
+            raise RecordingError(f"cannot be read ({error})", where) from None
+
+    def _complete(self, cells: list[str], where: str) -> tuple[str, list[str]]:
+        count, wanted = len(cells), len(self.names)
+        if not any(cell.strip() for cell in cells):
+            raise RecordingError("the line is empty", where, "remove it")
+        if count != wanted:
+            what = f"{count} column{'s' * (count != 1)} where the {self.names_in} has {wanted}"
+            remedy = "is the file complete?" if count < wanted else "name every column"
+            raise RecordingError(what, where, remedy)
+        return where, cells
 
 
-def _cell(text: str, where: str) -> float:
+def _number(text: str, where: str) -> float:
     text = text.strip()
     if not text:
         raise RecordingError("the cell is empty", where, "every cell holds a number")
     if not is_number(text):
         comma = text.count(",") == 1 and is_number(text.replace(",", "."))
-        shown = text if len(text) <= 30 else text[:27] + "..."
         remedy = "write a decimal point" if comma else "every cell holds a number"
-        raise RecordingError(f"'{shown}' is not a number", where, remedy)
+        raise RecordingError(f"'{_short(text)}' is not a number", where, remedy)
     if not np.isfinite(value := float(text)):
         raise RecordingError(f"'{text}' is not a finite number", where, "repair or cut the gap")
     return value
 
 
-def is_number(text: str) -> bool:
-    """Whether a cell of a file is a number."""
-    # float() takes 1_000 for a number; no other program does.
+def _microseconds(text: str, where: str) -> int:
+    """Time since 1970 of a date of ISO 8601; without a zone it is that of Greenwich."""
     try:
-        float(text)
+        date = datetime.fromisoformat(text.strip())
     except ValueError:
-        return False
-    return "_" not in text and text.isascii()
+        what = f"'{_short(text)}' is not a date and a time"
+        raise RecordingError(what, where, "write 2026-03-05T10:11:12.345") from None
+    date = date if date.tzinfo else date.replace(tzinfo=UTC)
+    return (date - _EPOCH) // timedelta(microseconds=1)
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 30 else text[:27] + "..."

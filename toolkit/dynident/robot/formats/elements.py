@@ -55,6 +55,24 @@ def named(root: Element, tag: str, where: str) -> dict[str, Element]:
     return found
 
 
+def mimics_of(joints: Mapping[str, Element], place: str) -> dict[str, str]:
+    """Return the moving joints that follow another one, and which.
+
+    Parameters
+    ----------
+    joints : dict
+        Name -> element of a joint.
+    place : str
+        Where in it the element `<mimic joint="...">` is.
+    """
+    found = {}
+    for name, joint in joints.items():
+        mimic = joint.find(f"{place}/mimic")
+        if mimic is not None and joint.get("type") in MOVING:
+            found[name] = mimic.get("joint", "")
+    return found
+
+
 def refuse_closed_chains(joints: Iterable[tuple[str, str, str]], where: str) -> dict[str, str]:
     """Return child -> parent, of joints as (name, parent, child).
 

@@ -40,6 +40,8 @@ class Contents:
         Joint name -> effort limit, where the description states a positive one.
     gravity : (3,) ndarray or None
         m/s^2, in the world's axes, if the description states it.
+    mimics : dict
+        Joint name -> the joint that it follows, as the fingers of a gripper do.
     """
 
     name: str
@@ -49,6 +51,7 @@ class Contents:
     joints: tuple[str, ...]
     efforts: dict[str, float]
     gravity: Array | None = None
+    mimics: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

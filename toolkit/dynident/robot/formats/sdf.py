@@ -24,6 +24,7 @@ from dynident.robot.formats.elements import (
     from_rpy,
     keep,
     limits,
+    mimics_of,
     named,
     readable_shapes,
     refuse_closed_chains,
@@ -99,6 +100,7 @@ def _read(root: Element, where: str) -> Contents:
         joints=tuple(n for n, joint in joints.items() if joint.get("type") in MOVING),
         efforts=efforts,
         gravity=gravity,
+        mimics=mimics_of(joints, "axis"),
     )
 
 
@@ -207,12 +209,6 @@ def _joint(joint: Element, where: str) -> tuple[Element, float | None]:
         return clean, None
     if axis is None:
         raise RobotError("has no <axis>", where, "add <axis><xyz>0 0 1</xyz></axis>")
-    if axis.find("mimic") is not None:
-        raise UnsupportedError(
-            "mimics another joint, which is not supported",
-            where,
-            "remove <mimic> to make it independent, or make the joint fixed",
-        )
     clean_axis = Element("axis")
     clean.append(clean_axis)
     xyz = only(axis, "xyz", where)

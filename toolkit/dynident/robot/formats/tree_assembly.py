@@ -208,6 +208,7 @@ def _choose(contents: Contents, wanted: tuple[str, ...] | None, where: str) -> t
             "has no revolute or prismatic joint", where, "there is nothing to identify"
         )
     if wanted is None:
+        _refuse_mimics(contents, contents.joints, where)
         return contents.joints
     if not wanted:
         raise RobotError("no joints are asked for", where, closest("", contents.joints))
@@ -216,7 +217,20 @@ def _choose(contents: Contents, wanted: tuple[str, ...] | None, where: str) -> t
             raise RobotError(f"has no moving joint '{name}'", where, closest(name, contents.joints))
         if name in wanted[:index]:
             raise RobotError(f"joint '{name}' is asked for twice", where, "name each joint once")
+    _refuse_mimics(contents, wanted, where)
     return wanted
+
+
+def _refuse_mimics(contents: Contents, wanted: tuple[str, ...], where: str) -> None:
+    """Refuse a joint that moves as another one; where neither is wanted, both stand still."""
+    for name, leader in contents.mimics.items():
+        if name in wanted or leader in wanted:
+            raise UnsupportedError(
+                "mimics another joint, which is not supported",
+                f"{where}: joint '{name}'",
+                "name the joints that were recorded, without these two (--joints, or joints = "
+                "[...] in the study), or remove <mimic> to make it independent",
+            )
 
 
 def _joint(one: Any, parent: int, X: Any, effort: float) -> Joint:

@@ -20,6 +20,7 @@ from dynident.robot.formats.elements import (
     from_rpy,
     keep,
     limits,
+    mimics_of,
     named,
     readable_shapes,
     refuse_closed_chains,
@@ -78,6 +79,7 @@ def _read(root: Element, where: str) -> Contents:
         elements=links,
         joints=tuple(n for n, joint in joints.items() if joint.get("type") in MOVING),
         efforts=efforts,
+        mimics=mimics_of(joints, "."),
     )
 
 
@@ -113,12 +115,6 @@ def _joint(joint: Element, where: str) -> Element:
     if kind not in (*MOVING, "fixed"):
         remedy = f"use one of {', '.join((*MOVING, 'fixed'))}"
         raise RobotError(f"is of unknown type '{kind}'", where, remedy)
-    if joint.find("mimic") is not None:
-        raise UnsupportedError(
-            "mimics another joint, which is not supported",
-            where,
-            "remove <mimic> to make it independent, or make the joint fixed",
-        )
     clean = keep(joint, ("name", "type"))
     origin = only(joint, "origin", where)
     if origin is not None:

@@ -6,7 +6,8 @@ import io
 import math
 import warnings
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -25,12 +26,14 @@ from dynident.recording.formats.limits import (
 )
 
 _MAT_HEADER, _MAT_COMPRESSED = 128, 15
+_DEEPEST = 4
+"""Structures in each other that are looked into."""
 _MOST_DEFLATED = 1032
 """Bytes that one compressed byte can become."""
 
 
 def open_mat(source: FileSource, file: str) -> ColumnTable:
-    """Return the table that a MATLAB file holds.
+    """Return the table that a MATLAB file holds; a field of a structure is `name.field`.
 
     Parameters
     ----------
@@ -56,28 +59,60 @@ def open_mat(source: FileSource, file: str) -> ColumnTable:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            sizes = {}
-            names = []
-            for name, shape, _ in scipy.io.whosmat(io.BytesIO(data)):
-                names.append(name)
-                sizes[name] = 8 * math.prod(shape)
+            found = scipy.io.whosmat(io.BytesIO(data))
     except Exception as error:
         raise damaged("a MATLAB file", file, error) from None
-    require_few(len(names), "variables", file)
-    require_distinct(names, "variable", file)
+    variables = [name for name, _, _ in found]
+    require_few(len(variables), "variables", file)
+    require_distinct(variables, "variable", file)
+    sizes = {name: 8 * math.prod(shape) for name, shape, _ in found}
+    structures = [name for name, shape, kind in found if kind == "struct" and math.prod(shape) == 1]
 
-    def load(wanted: Sequence[str]) -> dict[str, np.ndarray]:
-        require_unpacked(sum(sizes[name] for name in wanted), ARRAYS, file)
+    def read(wanted: Sequence[str]) -> dict[str, Any]:
         require_unpacked(_unpacked_mat(data), ARRAYS, file)
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                found = scipy.io.loadmat(io.BytesIO(data), variable_names=list(wanted))
-                return {name: np.asarray(found[name]) for name in wanted}
+                return scipy.io.loadmat(io.BytesIO(data), variable_names=list(wanted))
+        except Exception as error:
+            raise damaged("the MATLAB file", file, error) from None
+
+    fields = _fields(read(structures), structures) if structures else {}
+    names = [one for name in variables for one in fields.get(name, (name,))]
+    require_few(len(names), "variables", file)
+    of = {one: name for name in variables for one in fields.get(name, (name,))}
+
+    def load(wanted: Sequence[str]) -> dict[str, np.ndarray]:
+        needed = list(dict.fromkeys(of[name] for name in wanted))
+        require_unpacked(sum(sizes[name] for name in needed), ARRAYS, file)
+        content = read(needed)
+        try:
+            return {name: np.asarray(_at(content[of[name]], name)) for name in wanted}
         except Exception as error:
             raise damaged("the MATLAB file", file, error) from None
 
     return ColumnTable(file, tuple(names), load)
+
+
+def _fields(content: Mapping[str, Any], structures: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Names of the fields of each structure, those of structures in it too."""
+    return {name: tuple(_below(content.get(name), name, _DEEPEST)) for name in structures}
+
+
+def _below(x: Any, name: str, levels: int) -> Iterator[str]:
+    fields = getattr(getattr(x, "dtype", None), "names", None)
+    if not fields or not levels or x.size != 1:
+        yield name
+        return
+    for field in fields:
+        yield from _below(x[field].item(), f"{name}.{field}", levels - 1)
+
+
+def _at(x: Any, name: str) -> Any:
+    """What is under the name of a variable, or of a field of it."""
+    for field in name.split(".")[1:]:
+        x = x[field].item()
+    return x
 
 
 def _open_mat_73(source: FileSource, file: str) -> ColumnTable:
