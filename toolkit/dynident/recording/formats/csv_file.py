@@ -77,14 +77,16 @@ def open_csv(source: FileSource, file: str, layout: FileLayout) -> ColumnTable:
             for piece in text_pieces(stream, file):
                 body = piece if above else _below(piece, head.above)
                 above = above or head.above
-                # The readers below skip the line of a header.
-                lines = _Lines(b"\n" + head.plain(body), head.mark, names, file, above, names_in)
+                lines = _Lines(head.plain(body), head.mark, names, file, above, names_in)
                 columns = _fast(lines.data, head.mark, len(names), at) if at else []
-                columns = lines.numbers(at).T if columns is None else columns
+                if columns:
+                    above += len(columns[0])
+                else:
+                    columns = lines.numbers(at).T if columns is None else columns
+                    above += body.count(b"\n")  # a cell in quotation marks may hold some
                 found = dict(zip(numbers, columns, strict=True))
                 found |= {one: lines.dates(places[one]) for one in wanted if one not in found}
                 yield {name: found[name] for name in wanted}
-                above += body.count(b"\n")
 
     def load(wanted: Sequence[str]) -> dict[str, np.ndarray]:
         return joined(_few_enough(parts(wanted), file))
@@ -117,14 +119,14 @@ def _few_enough(
         yield part
 
 
-def _fast(data: bytes, separator: str, width: int, places: list[int]) -> list[np.ndarray] | None:
+def _fast(body: bytes, separator: str, width: int, places: list[int]) -> list[np.ndarray] | None:
     """Columns (T,) each, or None if anything is odd: then the careful reader has to say what."""
-    rows = _regular_rows(data, separator, width)
+    rows = _regular_rows(body, separator, width)
     if rows is None:
         return None
-    read = _by_numpy if len(data) <= _SMALL else _by_pandas
+    read = _by_numpy if len(body) <= _SMALL else _by_pandas
     try:
-        columns = read(data.partition(b"\n")[2], separator, width, places)
+        columns = read(body, separator, width, places)
     except (ValueError, OverflowError):  # of text that is no number; a ParserError is one, too
         return None
     return columns if all(len(x) == rows and np.isfinite(x).all() for x in columns) else None
@@ -155,6 +157,7 @@ def _by_pandas(body: bytes, separator: str, width: int, places: list[int]) -> li
         index_col=False,
         dtype=np.float64,
         engine="c",
+        low_memory=False,
         keep_default_na=False,
         skipinitialspace=b" " in body,
         **exact,
@@ -162,13 +165,13 @@ def _by_pandas(body: bytes, separator: str, width: int, places: list[int]) -> li
     return [frame[place].to_numpy() for place in places]
 
 
-def _regular_rows(data: bytes, separator: str, width: int) -> int | None:
+def _regular_rows(body: bytes, separator: str, width: int) -> int | None:
     """How many rows there are, if each has as many columns as the header and none is quoted."""
-    if width < 2 or data.find(b'"', data.find(b"\n")) >= 0:
+    if width < 2 or b'"' in body:
         return None
     mark = separator.encode()
     others = bytes(range(256)).translate(None, mark + b"\n")
-    marks = data.translate(None, others).partition(b"\n")[2].rstrip(b"\n") + b"\n"
+    marks = body.translate(None, others).rstrip(b"\n") + b"\n"
     rows = len(marks) // width
     return rows if marks == (mark * (width - 1) + b"\n") * rows else None
 
@@ -179,7 +182,7 @@ class _Lines:
 
     Attributes
     ----------
-    data : the lines, below one that is skipped.
+    data : the lines.
     separator : of the columns.
     names : of the columns; "" for one without.
     file : for messages.
@@ -213,7 +216,7 @@ class _Lines:
 
     def _rows(self) -> Iterator[tuple[str, list[str]]]:
         """Where each line is, and its cells, as many as there are columns."""
-        body = self.data.decode().partition("\n")[2].rstrip("\n ")
+        body = self.data.decode().rstrip("\n ")
         if not body.strip():
             remedy = "is the file complete?"
             raise RecordingError("holds a header but no samples", self.file, remedy)

@@ -7,11 +7,15 @@ from collections.abc import Iterator
 from typing import BinaryIO
 
 from dynident.errors import FileError, RecordingError
-from dynident.recording.formats.limits import AT_ONCE
 
+AT_ONCE = 1 << 21
+"""Bytes of text that are read at a time. What pandas takes for more of it goes back to the system
+after each piece, and comes again page by page, which took a fifth of the time of reading."""
 LONGEST_LINE = 1 << 24
 """Bytes of a line, of a stretch of empty ones, or of lines between two quotation marks."""
 _BREAKS = b"\r\n"
+_TAIL = 1 << 12
+"""Bytes in which the end of the last line is looked for at a time."""
 
 
 def text_pieces(stream: BinaryIO, file: str) -> Iterator[bytes]:
@@ -40,7 +44,8 @@ def text_pieces(stream: BinaryIO, file: str) -> Iterator[bytes]:
             raise FileError(f"cannot be read ({error.strerror or error})", file) from None
         raw = rest + block
         end = _end(raw) if block else len(raw)
-        if block and end < len(raw) and raw.count(b'"', 0, end) % 2:
+        # Marks are rare: to find that there is none takes far less than to count them.
+        if block and end < len(raw) and b'"' in raw and raw.count(b'"', 0, end) % 2:
             end = 0
         is_header = not place and not any(one in raw[:end].strip() for one in (b"\r", b"\n"))
         if block and is_header:
@@ -52,9 +57,10 @@ def text_pieces(stream: BinaryIO, file: str) -> Iterator[bytes]:
             if not end or is_header:
                 what = f"holds a line, or empty lines, of more than {LONGEST_LINE >> 20} MB"
                 raise RecordingError(what, file, "is it the right file?")
-        if end and not (place and raw[:end].isspace()):
-            yield _text(raw[:end], place, file)
-        rest, place = raw[end:], place + end
+        piece, rest = raw[:end], raw[end:]
+        if piece and not (place and piece.isspace()):
+            yield _text(piece, place, file)
+        place += end
         if not block:
             return
 
@@ -64,11 +70,21 @@ def _end(raw: bytes) -> int:
     # A carriage return at the very end may be half of a line's end.
     last = max(raw.rfind(one, 0, len(raw) - 1) for one in (b"\r", b"\n")) + 1
     last = len(raw) if raw.endswith(b"\n") else last
-    filled = len(raw[:last].rstrip(b" " + _BREAKS))
+    filled = _filled(raw, last)
     if not filled:
         return 0
     end = filled + len(raw[filled:last]) - len(raw[filled:last].lstrip(b" ")) + 1
     return end + 1 if raw[end - 1 : end + 1] == _BREAKS else end
+
+
+def _filled(raw: bytes, last: int) -> int:
+    """Where what is no blank ends before `last`, which is looked for without a copy of it all."""
+    while last:
+        start = max(0, last - _TAIL)
+        if kept := len(raw[start:last].rstrip(b" " + _BREAKS)):
+            return start + kept
+        last = start
+    return 0
 
 
 def _text(raw: bytes, place: int, file: str) -> bytes:
