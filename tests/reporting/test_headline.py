@@ -6,6 +6,7 @@ from itertools import product
 import pytest
 
 from dynident.diagnosis.details import Withdrawn
+from dynident.diagnosis.nuisances.sampling_time import SamplingTime
 from dynident.reporting.content import step_groups
 from dynident.reporting.glossary import glossary
 from dynident.reporting.headline import headline
@@ -132,3 +133,15 @@ def test_every_word_is_defined_once_and_every_symbol_of_the_model_is(six):
     text = Elements(page(six)).text
     for one in terms:
         assert text.count(one.meaning) == 1
+
+
+@pytest.mark.parametrize("steps", [True, False])
+def test_a_torque_of_another_moment_is_the_first_to_be_mended(steps):
+    found = of_kind("explained" if steps else "nothing_missing", steps, noise=True)
+    sampled = SamplingTime(
+        later_s=2e-3, sigma_s=1e-4, step_s=4e-3, joint="", mend='torque = "held_command"'
+    )
+    told = next_steps(replace(found, sampled=sampled))
+    assert sampled.mend in told[0].what and "2 ms later" in told[0].why
+    assert not any("use the model as it is" in one.what for one in told)
+    assert not any("held_command" in one.what for one in next_steps(found))

@@ -6,15 +6,17 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from diagnosis.test_verdict_in_words import along
 from dynident.diagnosis import Diagnosis
 from dynident.diagnosis.advice.geometry_doubt import with_geometry_doubt
 from dynident.fitting.estimate import ShapeValue
-from dynident.reporting.intervals import parameter_table
+from dynident.model import Model
+from dynident.reporting.intervals import parameter_table, printed_parameters
 from dynident.reporting.next_steps import next_steps
-from reporting.fabricated import diagnosis
+from reporting.fabricated import diagnosis, effect, fitted, motion
 
 
 @pytest.fixture(scope="module")
@@ -85,3 +87,28 @@ def test_a_stated_coupling_is_not_doubted_by_what_is_left_there(found: Diagnosis
     coupled = found.before.model + "joint_coupling@elbow:shoulder"
     stated = replace(open_, before=replace(found.before, model=coupled))
     assert not any("coupled_motors" in note for note in with_geometry_doubt(stated).notes)
+
+
+def test_explain_says_above_its_parameters_that_a_model_is_rejected() -> None:
+    fine = diagnosis(("shoulder", "elbow"), samples=100)
+    worse = tuple(replace(joint, ratio_after=2.0) for joint in fine.joints)
+    above, *rest = printed_parameters(replace(fine, verdict="unexplained", joints=worse))
+    above = str(above)
+    assert "rejected" in above and "sigma holds noise only" in above and len(above) < 100
+    assert "rejected" not in "".join(str(part) for part in printed_parameters(fine))
+    assert [str(one) for one in rest] == [str(one) for one in printed_parameters(fine)]
+
+
+def test_explain_prints_what_is_inside_effects_with_sigma_where_it_is_known() -> None:
+    found = diagnosis(("shoulder", "elbow"), samples=100)
+    model = Model(found.after.model.robot) + effect("thermal_friction", "elbow", shape=(240.0,))
+    block = model.block(*motion(model.robot, 1, 400))
+    after = fitted(model, np.random.default_rng(1).normal(size=block.q.shape), block)
+    for sigma, said in ((3.0, "3"), (None, "-")):
+        shapes = (
+            ()
+            if sigma is None
+            else (ShapeValue(name="T@elbow", value=240.0, sigma=sigma, unit="s"),)
+        )
+        *_, table = printed_parameters(replace(found, after=replace(after, shapes=shapes)))
+        assert ["T@elbow", "240", said, "s"] in [line.split() for line in str(table).splitlines()]

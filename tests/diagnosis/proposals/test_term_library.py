@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+from chains import chain
 from dynident.diagnosis.proposals.term_library import Factor, LibraryTerm, extended, library
 from dynident.effects import law_effect
 from synthetic import arm
@@ -27,6 +28,18 @@ def test_every_term_is_once_a_law_with_units_at_its_joint() -> None:
         units = [one.unit for one in effect.parameters(robot)]
         assert len(units) == term.size
         assert all(units)
+
+
+def test_speeds_of_two_other_joints_are_multiplied_each_pair_once() -> None:
+    robot = chain(4)
+    pairs = [
+        frozenset(one.joint for one in term.factors)
+        for term in library(robot, "j2")
+        if len(term.factors) == 2
+        and all(one.joint and one.texts == ("{v}",) for one in term.factors)
+    ]
+    assert len(pairs) == 3
+    assert set(pairs) == {frozenset(one) for one in (("j0", "j1"), ("j0", "j3"), ("j1", "j3"))}
 
 
 def test_a_third_factor_is_of_another_sort_or_joint_and_each_product_is_there_once() -> None:

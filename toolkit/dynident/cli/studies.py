@@ -62,6 +62,8 @@ def explain(
 
     Example: dynident explain study.toml --report report.html
     """
+    from dynident.reporting.intervals import printed_parameters
+
     if next_ is not None:
         files.require_folder(next_)
     require_places(study, report, laws)
@@ -82,7 +84,7 @@ def explain(
         },
         parts=lambda: (
             *diagnosis.tables(),
-            diagnosis.after.parameter_table(),
+            *printed_parameters(diagnosis),
             *following.parts(),
         ),
     )

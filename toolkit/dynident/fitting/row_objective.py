@@ -73,7 +73,10 @@ def refine_shapes(model: Model, dataset: Dataset) -> Shaped:
     for effect in shaped_effects(model):
         if effect.found_by == "repetition":
             what = "happened once, and a fit does not look for when"
-            remedy = "leave it out; `dynident explain` finds it in what repetitions do not share"
+            remedy = (
+                "leave it out of the effects, and its moment out of the recording: its window in "
+                "the study is what is used of it (`dynident explain` leaves it out by itself)"
+            )
             raise FitError(what, effect.label, remedy)
     samples = [sample(recording, dataset.filter) for recording in dataset.recordings]
     if not model.needs_values:

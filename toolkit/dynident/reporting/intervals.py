@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from dynident.diagnosis.result import Diagnosis
-from dynident.effects import Effect
-from dynident.fitting.estimate import Estimate
+from dynident.effects import Effect, ShapeParameter
+from dynident.fitting.estimate import Estimate, ShapeValue
 from dynident.inertia.parameters import MEANINGS, PARAMETERS
 from dynident.recording.dataset import NoiseSource
 from dynident.tables import Table, number, percent
 
 _QUANTILE = 1.959964
 """Half width of a 95 % interval, in standard errors."""
+_REJECTED = (
+    "The model is rejected: a residual beyond the noise remains, and sigma holds noise only."
+)
 
 
 @dataclass(frozen=True)
@@ -137,17 +141,40 @@ def _placed(means: str, effect: Effect) -> str:
 
 
 def _shape_rows(estimate: Estimate, widening: Widening | None) -> list[tuple[str, ...]]:
-    model, found = estimate.model, {one.name: one.sigma for one in estimate.shapes}
     rows = []
-    for effect in model.effects:
+    for effect, one, found in _shapes(estimate):
         factor = 1.0 if widening is None else widening.of(effect.joint)
+        x, half = found.value, _QUANTILE * factor * found.sigma
+        relative = percent(float(half / abs(x)) if x and np.isfinite(half) else None, 1)
+        words, between = _placed(one.means, effect), _interval(x, half)
+        rows.append((found.name, words, number(x, 4), between, relative, one.unit, ""))
+    return rows
+
+
+def _shapes(estimate: Estimate) -> Iterator[tuple[Effect, ShapeParameter, ShapeValue]]:
+    """Every parameter inside an effect; its sigma is NaN where it is not known."""
+    model, sigma = estimate.model, {one.name: one.sigma for one in estimate.shapes}
+    for effect in model.effects:
         names, parameters = model.shape_names[effect.label], effect.shape_parameters(model.robot)
         for name, one, x in zip(names, parameters, effect.shape, strict=False):
-            half = _QUANTILE * factor * found.get(name, float("nan"))
-            relative = percent(float(half / abs(x)) if x and np.isfinite(half) else None, 1)
-            words, between = _placed(one.means, effect), _interval(x, half)
-            rows.append((name, words, number(x, 4), between, relative, one.unit, ""))
-    return rows
+            known = sigma.get(name, float("nan"))
+            yield effect, one, ShapeValue(name=name, value=x, sigma=known, unit=one.unit)
+
+
+def printed_parameters(diagnosis: Diagnosis) -> tuple[Table | str, ...]:
+    """Parameters of the final model as text: with sigma, those inside effects too.
+
+    Where the model is rejected by a noise that is known, that is said above them: sigma is not
+    widened.
+    """
+    rejected = widening_after(diagnosis) is not None
+    estimate = diagnosis.after
+    inside = replace(estimate, shapes=tuple(found for *_, found in _shapes(estimate)))
+    return (
+        *((_REJECTED,) if rejected else ()),
+        estimate.parameter_table(),
+        *((inside.shape_table(),) if inside.shapes else ()),
+    )
 
 
 def _interval(value: float, half: float) -> str:

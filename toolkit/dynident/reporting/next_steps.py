@@ -34,7 +34,8 @@ def next_steps(diagnosis: Diagnosis) -> tuple[Advice, ...]:
     """What to do, the most useful first."""
     if diagnosis.wiring:
         return tuple(_to_mend(fault) for fault in diagnosis.wiring)
-    found = _to_add(diagnosis)
+    # Friction and inertia have taken up a wrong moment: whatever is added comes after that.
+    found = [*_to_time(diagnosis), *_to_add(diagnosis)]
     if diagnosis.limit is not None:
         what = "Allow the search more additions (--most)."
         found.append(Advice(what, f"{diagnosis.limit_in_words}."))
@@ -71,6 +72,14 @@ def next_steps(diagnosis: Diagnosis) -> tuple[Advice, ...]:
 def _to_mend(fault: Fault) -> Advice:
     what = f"Mend the study: {fault.what}. {fault.where}."
     return Advice(what, f"{fault.evidence[0].upper()}{fault.evidence[1:]}.", fault.mend)
+
+
+def _to_time(diagnosis: Diagnosis) -> list[Advice]:
+    """That the study says when the torque acts, where it says another moment."""
+    if diagnosis.sampled is None:
+        return []
+    what = f"Try {diagnosis.sampled.mend} in the study."
+    return [Advice(what, diagnosis.sampled.sentence, ("dynident explain STUDY",))]
 
 
 def _to_add(diagnosis: Diagnosis) -> list[Advice]:

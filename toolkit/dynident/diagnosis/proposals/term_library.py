@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import combinations, product
 from typing import Literal
 
 from dynident.effects import Law
@@ -151,6 +151,7 @@ def library(robot: Robot, joint: str, slowest: float = _SLOWEST) -> tuple[Librar
         ]
         terms += _products(far, far)
         terms += [LibraryTerm((one, other)) for one, other in product(far, load) if _plain(one)]
+    terms += [LibraryTerm(pair) for pair in combinations(map(_speed, others), 2)]
     return tuple(terms)
 
 
@@ -212,6 +213,11 @@ def _motion(joint: str | None, slowest: float) -> Iterator[Factor]:
     for speed in (one for one in _DECAY if one > lower):
         shape = ("w", speed, lower, _FASTEST)
         yield Factor("motion", ("sign({v})*exp(-abs({v})/{shape})",), joint, shape)
+
+
+def _speed(joint: str) -> Factor:
+    """Two of them are a product that Coriolis torques are made of; of others there are too many."""
+    return Factor("motion", ("{v}",), joint)
 
 
 def _load() -> Iterator[Factor]:
