@@ -9,6 +9,7 @@ import pytest
 
 from dynident.diagnosis.nuisances.friction_width import friction_width_notes
 from dynident.diagnosis.nuisances.quantisation import rounding_power
+from dynident.criteria import DEFAULTS
 from dynident.effects import effects_of
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
@@ -76,7 +77,9 @@ def test_steps_of_encoders_count_where_the_residual_does() -> None:
     data = Dataset((one.replace(q=np.round(one.q / 2e-4) * 2e-4),))
     (run,) = gather(data)
     slow = np.abs(run.replicates[0].v) < 0.3
-    of = Evidence(model, (replace(run, uncertain=slow),))
+    # The mean over the places between two steps: what one recording has is one of them.
+    mean = replace(DEFAULTS, nuisances=replace(DEFAULTS.nuisances, rounding_deviations=0.0))
+    of = Evidence(model, (replace(run, uncertain=slow),), criteria=mean)
     fitted = fit_evidence(of, model)
     seen = on_recordings(of, fitted)
     assert seen.ratio is not None and seen.noise_std is not None
