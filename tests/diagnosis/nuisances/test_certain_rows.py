@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dynident.criteria import DEFAULTS
 from dynident.diagnosis.nuisances.friction_width import friction_width_notes
 from dynident.diagnosis.nuisances.quantisation import rounding_power
-from dynident.criteria import DEFAULTS
 from dynident.effects import effects_of
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
