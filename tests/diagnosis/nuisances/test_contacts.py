@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from dynident import diagnose
 from dynident.criteria import DEFAULTS
 from dynident.diagnosis.nuisances.changes import Repeated, changes_of, scanned
 from dynident.diagnosis.nuisances.pulse_search import (
@@ -214,3 +216,23 @@ def test_repetitions_that_are_alike_to_rounding_hold_no_contact() -> None:
     fitted = fit_evidence(evidence, model)
     assert evidence.runs[0].kind == "repeated"
     assert find_contacts(evidence, fitted) == ()
+
+
+@pytest.mark.slow
+def test_a_push_is_told_on_the_clock_of_its_recording() -> None:
+    """Later in a session the clock of a file begins anew, and `window` is on that one."""
+    model = true_model()
+    truth = true_values(model)
+    each = []
+    for seed in range(3):
+        one = synthetic(model, truth, seed, rate_hz=200.0, torque_std=0.05)
+        if seed == 1:
+            push = 2.0 * np.exp(-(((one.t - 5.0) / 0.1) ** 2) / 2)
+            one = one.replace(tau=one.tau + push[:, None] * np.array([0.0, 1.0]))
+        each.append(one.replace(start=100.0 * seed, name=f"run{seed}"))
+    found = diagnose(model, Dataset(tuple(each)), propose="never")
+    assert [step.effect.label for step in found.steps] == ["contact@elbow"]
+    (said,) = (note for note in found.notes if note.startswith("Contact at elbow"))
+    first, last = (float(x) for x in re.findall(r"t = (\S+) to (\S+) s", said)[0])
+    assert "N m in run1," in said
+    assert (first + last) / 2 == pytest.approx(5.0, abs=0.1) and last - first < 2.0

@@ -137,6 +137,7 @@ def assemble(
         maps=residual_maps(given, before, after, evidence.criteria),
         traces=_traces(given, before, after),
         notes=(
+            *(one.sentence(given) for one in helping),
             *notes_on(evidence, held, stages[-1], source, search.doubtful),
             *_differing_recordings(trained, after, evidence, held, stages[-1]),
             *_noise_doubts(evidence, source, rounded, after),

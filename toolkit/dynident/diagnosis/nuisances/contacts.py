@@ -14,15 +14,32 @@ from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.runs import Run
 from dynident.model import Model
+from dynident.recording import Recording
+from dynident.tables import number
+
+_REACH = 2.0
+"""Standard deviations of a pulse on either side, within which it is said to be."""
 
 
 @dataclass(frozen=True)
 class Disturbance:
-    """A contact, with the held-out error before and after it is left out."""
+    """A contact, with the held-out error before and after it is left out, and where it was."""
 
     pulse: DisturbancePulse
     error_before: float
     error_after: float
+    recording: Recording
+
+    def sentence(self, model: Model) -> str:
+        """Where the push is, on the clock of its recording, and how strong, in plain words."""
+        pulse, robot = self.pulse, model.robot
+        unit = robot.torque_units[robot.names.index(pulse.joint)]
+        at, reach = pulse.time - self.recording.start, _REACH * pulse.width
+        return (
+            f"Contact at {pulse.joint}: a push of {number(pulse.amplitude, 2)} {unit} in "
+            f"{self.recording.where}, from t = {at - reach:.2f} to {at + reach:.2f} s. What "
+            "is around it is left out."
+        )
 
     def effect(self, model: Model) -> Effect:
         """Return it as the effect of the catalogue that was found in repetitions."""
@@ -131,9 +148,11 @@ class Contacts:
             judged, whole, pulses = held, self.whole_held, self.pulses_held
         before = on_recordings(_without(judged, whole, ()), fitted).error
         after = on_recordings(_without(judged, whole, pulses), fitted).error
+        every = (run.recording for run in (*self.whole, *self.whole_held))
+        recordings = {one.number: one for one in every}
         found = []
         for pulse in clearest.values():
-            found.append(Disturbance(pulse, before, after))
+            found.append(Disturbance(pulse, before, after, recordings[pulse.number]))
             before = after
         return tuple(found)
 
