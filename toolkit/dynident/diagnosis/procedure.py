@@ -230,7 +230,8 @@ def _extend(stage: Stage, task: DiagnosisTask) -> Stage:
             continue
         if laws:
             why = as_much(laws, label)
-            noted = replace(stage, notes=(*stage.notes, f"{why}."))
+            earlier = (one for one in stage.notes if not one.startswith(f"{label} "))
+            noted = replace(stage, notes=(*earlier, f"{why}."))
             stage = _refusing(noted, {label: why})
             continue
         wider, why = _tried(stage, best, task)
