@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import pytest
 
@@ -73,9 +75,17 @@ def test_only_the_joint_that_stands_sticks() -> None:
         assert without_sticking(without, None, fitted)[0] is without
 
 
-@pytest.mark.parametrize(("rate_hz", "sticks"), [(100.0, True), (1000.0, False), (4000.0, False)])
+@pytest.mark.parametrize(
+    ("rate_hz", "torque", "sticks"),
+    [
+        (100.0, "held_command", True),
+        (100.0, "measured", False),
+        (1000.0, "held_command", False),
+        (4000.0, "measured", False),
+    ],
+)
 def test_reversals_that_are_sampled_count_however_fine_the_encoder(
-    rate_hz: float, sticks: bool
+    rate_hz: float, torque: Literal["measured", "held_command"], sticks: bool
 ) -> None:
     """One sample within the noise of the speed is no standing; none within the width is coarse."""
     model, each = given(), []
@@ -83,7 +93,7 @@ def test_reversals_that_are_sampled_count_however_fine_the_encoder(
     for seed in range(2):
         noise = 1e-7 * np.random.default_rng(seed).normal(size=(round(16 * rate_hz) + 1, 2))
         one = synthetic(model, truth, seed, rate_hz=rate_hz, torque_std=0.05)
-        each.append(one.replace(q=one.q + noise))
+        each.append(one.replace(q=one.q + noise, torque=torque))
     of = Evidence(model, gather(Dataset(tuple(each))))
     assert bool(sticking_joints(of, fit_evidence(of, model))) == sticks
 

@@ -185,8 +185,8 @@ class StickingCriteria(CriteriaGroup):
     coarse: float = criterion(
         1.0,
         "1",
-        "change of speed from one sample to the next, over the friction width, above which a "
-        "reversal falls between the samples: its friction is off by some 6 % of the Coulomb level",
+        "change of speed while a command is held, over the friction width, above which a reversal "
+        "falls between two samples: its friction is off by some 6 % of the Coulomb level",
         over=0,
     )
     resolved: float = criterion(

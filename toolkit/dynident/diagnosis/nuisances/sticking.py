@@ -8,8 +8,8 @@ nothing, of the model or of what it lacks.
 
 A joint counts as sticking if it is seen to stand (within the noise of its speed, for longer than it
 takes to pass through zero), if the friction width that the data call for is below that noise, or if
-many of its reversals fall between two samples: the mean of a friction that reverses there is not
-the friction of the mean speed.
+commands are held and many of its reversals fall between two samples: what a held command meets
+until the next one is the mean of a friction that reverses there, and no friction of the mean speed.
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ def sticking_notes(evidence: Evidence, others: Collection[str] = ()) -> tuple[st
     """
     return tuple(
         f"{joint} stands still at many of its stops, or its dry friction reverses within the noise "
-        "of its speed or between two samples: no data tell that friction, and "
+        "of its speed or within a held command: no data tell that friction, and "
         f"{percent(share, 0)} of the joint's rows, those around its stops, count neither in the "
         "fit nor in the errors."
         for joint, share in shares_left_out(evidence).items()
@@ -202,8 +202,11 @@ def _stands(evidence: Evidence, j: int, criteria: StickingCriteria) -> bool:
 
 
 def _between_samples(evidence: Evidence, j: int, width: float, criteria: StickingCriteria) -> bool:
-    """Whether many of a joint's reversals are over from one sample to the next."""
-    speeds = [run.replicates[0].motion.v[_used(run.replicates[0]), j] for run in evidence.runs]
+    """Whether many of a joint's reversals are over while one command is held."""
+    held = [run.replicates[0] for run in evidence.runs if run.recording.torque == "held_command"]
+    if not held:
+        return False
+    speeds = [one.motion.v[_used(one), j] for one in held]
     steps = [np.abs(np.diff(v))[v[1:] * v[:-1] < 0] for v in speeds]
     quick = np.concatenate(steps) > criteria.coarse * width
     return bool(np.sum(quick) >= max(criteria.stops, criteria.stops_share * len(quick)))
