@@ -153,7 +153,8 @@ def assemble(
         rows=rows_of_recordings(train if test is None else train + test),
         limit=search.limit,
         detection_limits=limits,
-        sampled=sampling_time(evidence, rounds[-1]),
+        # Where a law is missing, a delay may be no more than a part of it.
+        sampled=None if verdict == "unexplained" else sampling_time(evidence, rounds[-1]),
         training_only=_training_only(verdict, trained, after, evidence),
         reversals_left_out={joint: left[joint] for joint in search.doubtful},
     )
