@@ -121,6 +121,8 @@ def assemble(
     limits = ()
     if complete and not path.withdrawn:  # what was found, and withdrawn, is no limit
         limits = detection_limits(evidence, held, stages[-1], rounds[-1], trained)
+    # Where a law is missing, a delay may be no more than a part of it.
+    most_of_it = evidence.criteria.verdict.most_explained if verdict == "unexplained" else 0.0
     pushed = contact_candidates(given, evidence, search.disturbances)
     gains, last_gains = _gains(search, held, before.error, after.error)
     first = _merged(_candidates(rounds[0], gains), pushed)
@@ -153,8 +155,7 @@ def assemble(
         rows=rows_of_recordings(train if test is None else train + test),
         limit=search.limit,
         detection_limits=limits,
-        # Where a law is missing, a delay may be no more than a part of it.
-        sampled=None if verdict == "unexplained" else sampling_time(evidence, rounds[-1]),
+        sampled=sampling_time(evidence, stages[-1], rounds[-1], least_share=most_of_it),
         training_only=_training_only(verdict, trained, after, evidence),
         reversals_left_out={joint: left[joint] for joint in search.doubtful},
     )

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.tables import number
 
 _NEAR_HALF = (0.25, 0.75)
@@ -50,20 +51,26 @@ class SamplingTime:
         )
 
 
-def sampling_time(evidence: Evidence, ranking: Ranking) -> SamplingTime | None:
+def sampling_time(
+    evidence: Evidence, fitted: EvidenceFit, ranking: Ranking, *, least_share: float
+) -> SamplingTime | None:
     """Return when the torque acts, where that is half a sample from when the study says.
 
     Parameters
     ----------
     evidence : the training recordings.
-    ranking : of the candidates on the final model.
+    fitted : the final model as it fits them.
+    ranking : of the candidates on that model.
+    least_share : of the squared systematic residual, that a delay must explain.
     """
+    least = least_share * fitted.error_signal
     step = max(1.0 / run.recording.rate_hz for run in evidence.runs)
     held = evidence.runs[0].recording.torque == "held_command"
     found = [
         score
         for score, refusal in zip(ranking.scores, ranking.refusals, strict=True)
         if refusal and score.values and refusal == score.effect.unresolved(score.values, step)
+        if score.drop >= least
     ]
     for score in sorted(found, key=lambda one: one.effect.joint is not None):
         later = -score.values[0]  # what is recorded late has acted before
