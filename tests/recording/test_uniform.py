@@ -110,9 +110,10 @@ def test_a_recording_is_resampled_once_and_shared_by_its_windows():
         assert uniform(recording.replace(period=0.7)).rate_hz != even.rate_hz
 
 
-def test_samples_that_are_missing_leave_the_rate_as_it_is():
+@pytest.mark.parametrize("period", [None, 1.0])
+def test_samples_that_are_missing_leave_the_rate_as_it_is(period):
     """A log that loses 2 % of its samples is no slower clock."""
-    whole = jittered().replace(t=np.arange(4000) / 500.0)
+    whole = jittered().replace(t=np.arange(4000) / 500.0, period=period)
     rng = np.random.default_rng(4)
     kept = np.sort(rng.choice(np.arange(1, 3999), 3920, replace=False))
     kept = np.concatenate([[0], kept, [3999]])
@@ -133,3 +134,23 @@ def test_readings_that_come_late_are_not_missing():
     with pytest.warns(DynidentWarning, match="are jittered by 90 % of a step"):
         even = uniform(whole.replace(t=t))
     assert even.rate_hz == pytest.approx(500.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "steps",
+    [
+        [0.1, 0.1, 2.8],  # bursts of three
+        [0.05, 9.95],  # stamped in pairs
+        [1.0, 1.0, 1.0, 2.0],  # 800 Hz in whole ms
+        [1.0] * 300 + [20.0] * 100,  # slower at rest
+    ],
+    ids=["bursts", "pairs", "whole ms", "slower at rest"],
+)
+@pytest.mark.parametrize("shift", [0, 1])
+def test_long_steps_that_are_the_rule_are_no_missing_samples(steps, shift):
+    t = 1e-3 * np.cumsum(np.roll(np.resize(steps, 4000), shift))
+    recording = jittered().replace(t=t)
+    with pytest.warns(DynidentWarning, match="run: the time stamps are jittered"):
+        even = uniform(recording)
+    assert even.rate_hz == pytest.approx(recording.rate_hz, rel=1e-6)
+    assert even.samples <= 4000

@@ -55,8 +55,13 @@ def test_a_part_below_the_noise_is_told_with_every_verdict(steps):
     for left, told in ((0.4, False), (0.7, True), (1.1, True)):
         joints = tuple(replace(joint, ratio_after=left) for joint in found.joints)
         one = replace(found, joints=joints)
-        assert ("though not nothing" in headline(one).sentence) == told
-        size = {0.4: "within", 0.7: "smaller than the noise (0.7 of it)", 1.1: "as large as the"}
+        assert ("though not nothing" in headline(one).sentence) == (left == 0.7)
+        assert ("steps of the encoders" in headline(one).sentence) == (left == 1.1)
+        size = {
+            0.4: "within",
+            0.7: "smaller than the noise (0.7 of it)",
+            1.1: "1.1 times the noise",
+        }
         assert size[left] in one.sentence
         assert ("smaller" in headline(one).sentence) == ("smaller" in one.sentence)
         assert ("Nothing is missing" in one.sentence) == (not steps and not told)
@@ -70,7 +75,7 @@ def test_what_was_found_and_withdrawn_is_not_said_to_be_nothing():
         effect=effect("drive_gain", "shoulder"), why="raises the error", with_it=alike
     )
     one = replace(found, withdrawn=(taken,))
-    assert "drive gain at shoulder or drive gain at elbow, which is withdrawn" in one.sentence
+    assert "drive gain at shoulder or drive gain at elbow: withdrawn" in one.sentence
     assert "Nothing is missing:" not in one.sentence + headline(one).sentence
     assert headline(one).mark == "?"
 

@@ -220,10 +220,15 @@ class Diagnosis(Shown):
         left = max((j.ratio_after or 0.0 for j in self.joints), default=0.0)
         if self.verdict != "unexplained" and left > self.criteria.verdict.not_nothing:
             found = f"Explained: {effects} added, and" if effects else "No missing effect is found:"
-            size = f"smaller than the noise ({left:.2g} of it)"
-            if left >= 1.0:
-                size = f"as large as the noise ({left:.2g} times it)"
-            return f"{found} what remains is {size}, though not nothing."
+            if left >= 1.0:  # encoders' steps alone excuse so much
+                size = (
+                    f"{left:.2g} times the noise, and may be what the steps of the encoders leave"
+                )
+                return f"{found} what remains is {size}."
+            return (
+                f"{found} what remains is smaller than the noise ({left:.2g} of it), though not "
+                "nothing."
+            )
         if self.verdict == "unexplained" and effects:
             before, after = percent(self.test_error.before), percent(self.test_error.after)
             return (
@@ -234,7 +239,7 @@ class Diagnosis(Shown):
         if self.verdict == "nothing_missing" and self.withdrawn:
             return (
                 "Nothing is missing that held-out data confirm: what remains is within the noise. "
-                f"Training recordings call for {self._withdrawn_titles}, which is withdrawn."
+                f"Training recordings call for {self._withdrawn_titles}: withdrawn."
             )
         return _VERDICTS[self.verdict].format(effects=effects)
 

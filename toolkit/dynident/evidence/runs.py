@@ -259,8 +259,8 @@ def gather(
             count = criteria.copies if simulated is None else criteria.copies_beside_simulation
             # Windows of one recording have the same noise on their copies: each is evaluated once.
             windows = [k for k, run in enumerate(runs) if run.replicates[0].motion is first.motion]
-            stream = np.random.default_rng(streams[min(windows, default=number)])
-            known = [one for k in windows for one in runs[k].replicates]
+            stream = np.random.default_rng(streams[windows[0] if windows else number])
+            known = runs[windows[0]].replicates if windows else ()
             copies = (noisy(recording, dataset.noise, stream) for _ in range(count))
             replicates = (
                 first,

@@ -17,6 +17,8 @@ _LONGEST_GAP = (20, 0.05)
 """A gap is too long to be bridged if it exceeds both so many samples and so many s."""
 _LONG = 1.5
 """Of the usual time step, above which a step has left samples out."""
+_EXCEPTIONS = 0.05
+"""Share of the steps that may have left samples out: more are how the clock goes."""
 _UNEXPLAINED = 0.2
 """Share of the missing samples by which the length of the record may say otherwise."""
 _LONGEST_STALE = 5
@@ -56,8 +58,8 @@ def uniform(recording: Recording) -> Recording:
     Returns
     -------
     Recording
-        At the mean rate of what was sampled, single samples that are missing filled in, or at the
-        nearest at which the period is a whole number of samples.
+        At the mean rate, that of a clock without gaps where few samples are missing, which are
+        filled in; or at the nearest at which the period is a whole number of samples.
 
     Raises
     ------
@@ -144,11 +146,16 @@ def _missing(t: np.ndarray) -> int:
     """Samples that a clock (T,) has left out: their steps are longer, and no others are shorter."""
     steps = np.diff(t)
     usual = float(np.median(steps))
+    if not usual > 0:
+        return 0
     long = steps > _LONG * usual
-    missing = int(np.sum(np.round(steps[long] / usual) - 1))
+    lost = np.sum(np.round(steps[long] / usual) - 1)
+    # A clock of bursts, of rounded stamps or of events has long steps as a rule: none is missing.
+    if np.mean(long) > _EXCEPTIONS or lost > 2 * _EXCEPTIONS * len(steps):
+        return 0
     # Where readings come late, the next steps are short: nothing is missing then.
     surplus = (t[-1] - t[0]) / usual - len(steps)
-    return missing if abs(surplus - missing) <= 1.0 + _UNEXPLAINED * missing else 0
+    return int(lost) if abs(surplus - lost) <= 1.0 + _UNEXPLAINED * lost else 0
 
 
 def _irregular(t: np.ndarray, missing: int) -> str:
@@ -179,7 +186,9 @@ def _step(recording: Recording) -> float | None:
     """Time step that makes the period a whole number of samples; None if it is one, or none."""
     if recording.period is None:
         return None
-    exact = recording.period * recording.rate_hz
+    missing = _missing(recording.t) if recording.jitter > TOLERANCE else 0
+    sampled = (recording.samples - 1 + missing) / recording.duration
+    exact = recording.period * sampled
     whole = max(1, round(exact))
     repetitions = recording.duration / recording.period
     in_step = abs(exact - whole) * repetitions <= 0.25

@@ -16,7 +16,7 @@ Mark = Literal["\u2713", "!", "?"]
 
 _COLOURS: dict[Mark, str] = {"\u2713": "nothing_missing", "!": "unexplained", "?": "unknown"}
 _WITHIN, _SMALLER = "within the noise", "smaller than the noise, though not nothing"
-_AS_LARGE = "as large as the noise, though not nothing"
+_LARGER = "larger than the noise, and may be what the steps of the encoders leave"
 _MOST_NAMED = 2
 """Effects that the sentence names."""
 _NOT_KNOWN = "The noise is unknown, so more may be missing."
@@ -107,7 +107,7 @@ def _rest(diagnosis: Diagnosis) -> str:
     left = max((joint.ratio_after or 0.0 for joint in diagnosis.joints), default=0.0)
     if left <= diagnosis.criteria.verdict.not_nothing:
         return _WITHIN
-    return _SMALLER if left < 1.0 else _AS_LARGE
+    return _SMALLER if left < 1.0 else _LARGER
 
 
 def _followed(diagnosis: Diagnosis) -> str:

@@ -51,8 +51,8 @@ def widening_before(diagnosis: Diagnosis) -> Widening | None:
 
 def widening_after(diagnosis: Diagnosis) -> Widening | None:
     """Of the final model; None where it is not rejected, or the noise is unknown."""
-    if diagnosis.verdict != "unexplained":
-        return None
+    if diagnosis.verdict != "unexplained" or diagnosis.impossible or diagnosis.training_only:
+        return None  # nothing is left of the held-out data, or that is not why
     return _widening({j.name: j.ratio_after for j in diagnosis.joints})
 
 

@@ -14,8 +14,10 @@ from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.tables import number
 
-_NEAR_HALF = (0.25, 0.75)
-"""Of a sample: what may be the half one by which a held command acts later than it is logged."""
+_DEVIATIONS = 3.0
+"""Standard deviations within which a delay may be half a sample."""
+_ROUND = 0.1
+"""Of a sample, by which it may be off besides."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,24 +29,19 @@ class SamplingTime:
     Attributes
     ----------
     later_s, sigma_s : by how much later than the study says, s.
-    step_s : from one sample to the next, s.
-    joint : at which; empty for all of them alike.
     mend : the line of the study that mends it.
     """
 
     later_s: float
     sigma_s: float
-    step_s: float
-    joint: str
     mend: str
 
     @property
     def sentence(self) -> str:
         """What was found, and what mends it, in plain words."""
-        where = f" at {self.joint}" if self.joint else ""
         when = "later" if self.later_s > 0 else "earlier"
         return (
-            f"The torque{where} acts {number(1e3 * abs(self.later_s), 2)} ms {when} than the study "
+            f"The torque acts {number(1e3 * abs(self.later_s), 2)} ms {when} than the study "
             f"says (sigma {number(1e3 * self.sigma_s, 2)} ms), about half a sample, which is what "
             f"a held command makes: try {self.mend} in the study. Until then friction and inertia "
             "take it up."
@@ -70,16 +67,17 @@ def sampling_time(
         score
         for score, refusal in zip(ranking.scores, ranking.refusals, strict=True)
         if refusal and score.values and refusal == score.effect.unresolved(score.values, step)
+        # The study says one thing of all joints: a delay of one of them is no evidence against it.
+        if score.effect.joint is None or fitted.model.robot.n == 1
         if score.drop >= least
     ]
-    for score in sorted(found, key=lambda one: one.effect.joint is not None):
+    for score in found:
         later = -score.values[0]  # what is recorded late has acted before
-        if _NEAR_HALF[0] <= (-later if held else later) / step <= _NEAR_HALF[1]:
+        off = abs((-later if held else later) - 0.5 * step)
+        if off <= _DEVIATIONS * score.sigma[0] + _ROUND * step:
             return SamplingTime(
                 later_s=later,
                 sigma_s=score.sigma[0],
-                step_s=step,
-                joint=str(score.effect.joint or ""),
                 mend='torque = "measured"' if held else 'torque = "held_command"',
             )
     return None
