@@ -143,9 +143,7 @@ def test_every_word_is_defined_once_and_every_symbol_of_the_model_is(six):
 @pytest.mark.parametrize("steps", [True, False])
 def test_a_torque_of_another_moment_is_the_first_to_be_mended(steps):
     found = of_kind("explained" if steps else "nothing_missing", steps, noise=True)
-    sampled = SamplingTime(
-        later_s=2e-3, sigma_s=1e-4, step_s=4e-3, joint="", mend='torque = "held_command"'
-    )
+    sampled = SamplingTime(later_s=2e-3, sigma_s=1e-4, mend='torque = "held_command"')
     told = next_steps(replace(found, sampled=sampled))
     assert sampled.mend in told[0].what and "2 ms later" in told[0].why
     assert not any("use the model as it is" in one.what for one in told)
