@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter, sosfiltfilt
 
 from dynident import diagnose
 from dynident.criteria import DEFAULTS
@@ -168,13 +168,39 @@ def test_friction_that_falls_is_no_contact() -> None:
     assert pulses_in(warming, DEFAULTS) == ()
 
 
-def test_the_scan_is_the_fit_at_every_row() -> None:
-    series = [s for s in data(2, "coloured slow") if s.joint == "elbow"]
+@pytest.mark.parametrize("lost", [0, 3, 40])
+def test_the_scan_is_the_fit_at_every_row(lost: int) -> None:
+    series = uncertain(data(2, "coloured slow"), 2, 100, 100 + lost)
+    series = [s for s in series if s.joint == "elbow"]
     prepared = changes_of(series, [np.zeros(INSTANTS, dtype=bool)] * len(series), DEFAULTS)[0]
     rows = np.arange(100.0, 600.0)
     for width in (0.025 / STEP, 0.32 / STEP):
         exact = prepared.match(prepared.change, rows, width)[0]
         np.testing.assert_allclose(scanned(prepared, width)[100:600], exact, atol=0.01)
+
+
+def test_noise_behind_a_low_pass_stands_out_nowhere_around_instants_that_do_not_count() -> None:
+    """Smooth noise is foretold by the samples before it: where these are missing it is not."""
+    stops, low_pass = np.arange(20, INSTANTS - 20, 40), butter(4, 0.5, output="sos")
+    certain = np.ones(INSTANTS, dtype=bool)
+    for stop in stops:
+        certain[stop : stop + 3] = False
+        certain[stop + 4] = False
+    sizes = []
+    for seed in range(40):
+        rng = np.random.default_rng([seed, 9])
+        smooth = [
+            replace(s, residual=smoothed.reshape(s.residual.shape), certain=certain)
+            for s in data(seed)
+            for smoothed in [sosfiltfilt(low_pass, rng.normal(size=s.residual.size))]
+            if s.joint == "elbow"
+        ]
+        nothing = [np.zeros(INSTANTS, dtype=bool)] * len(smooth)
+        for one in changes_of(smooth, nothing, DEFAULTS):
+            z = scanned(one, 1.5).reshape(one.of.residual.shape)
+            sizes.append(np.stack([z[1:, stops + 3 + k].ravel() for k in range(12)]))
+    rms = np.sqrt(np.mean(np.concatenate(sizes, axis=1) ** 2, axis=1))
+    assert rms.max() < 1.6 * np.median(rms[rms > 0])
 
 
 def test_instants_of_a_bump_are_left_out_of_all_repetitions() -> None:

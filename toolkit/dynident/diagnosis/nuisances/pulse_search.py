@@ -272,7 +272,7 @@ def _tried(prepared: Sequence[Changes], width: float, criteria: ContactCriteria)
         if rows_wide > criteria.widest_share * instants:
             continue
         rows = np.arange(0, repetitions * instants, max(1, int(criteria.stride * rows_wide)))
-        rows = rows[one.of.certain[rows % instants]]
+        rows = rows[one.whole[rows]]
         if len(np.unique(rows // instants)) < repetitions:
             continue
         z = np.abs(scanned(one, rows_wide)[rows])
