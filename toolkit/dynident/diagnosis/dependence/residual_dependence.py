@@ -238,9 +238,9 @@ def dependence_table(found: Sequence[JointDependence]) -> Table:
         ("joint", *asked, "none of these"),
         rows,
         (
-            f"{noise} Each with its standard error over the blocks; in brackets what cannot be told "
-            "from nothing, at the level of 5 % over all sets of inputs, and is not taken off what "
-            "none of these explains.",
+            f"{noise} Each with its standard error over the blocks. In brackets: what cannot be "
+            "told from nothing, at the level of 5 % over all sets of inputs, and is not taken off "
+            "what none of these explains.",
             "Each share is what inputs add to those before them that are told: what two sets "
             "explain alike counts for the earlier. The past (elasticity, hysteresis) comes before "
             "acceleration and load where it explains more. Negative shares are shown as 0.",
