@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from dynident.diagnosis.answer import Answer
@@ -12,11 +12,35 @@ from dynident.diagnosis.detection_limits import limit_table
 from dynident.diagnosis.effect_groups import hidden_effects
 from dynident.fitting.drive_gains import anew_tables
 from dynident.tables import Shown, Table, finite, mostly_noise, number, p_value, percent, points
+from dynident.wiring import Fault
 
 
 @dataclass(frozen=True, kw_only=True)
 class Diagnosis(Answer, Shown):
     """The answer of `diagnose`: see `Answer` for what it holds."""
+
+    def answered_by(self, faults: tuple[Fault, ...]) -> Diagnosis:
+        """Return the diagnosis with its verdict withheld where columns or data are not as said.
+
+        Parameters
+        ----------
+        faults : of the wiring, from `check_wiring`; where there are any, nothing was added.
+
+        Returns
+        -------
+        As it is where there are none.
+        """
+        if not faults:
+            return self
+        return replace(
+            self,
+            wiring=faults,
+            verdict="unexplained",
+            impossible=(),
+            steps=(),
+            candidates=(),
+            remaining=(),
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON of `diagnose --json` and `explain --json`."""

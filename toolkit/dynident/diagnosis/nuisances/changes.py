@@ -53,6 +53,10 @@ class Repeated:
 class Changes:
     """Differences of one series, in the order of time, with their noise.
 
+    The filter looks back. Behind instants that do not count, the noise that it expects is not
+    known, and what it leaves there is larger than elsewhere, the smoother the noise the more: these
+    rows say nothing of a pulse.
+
     Attributes
     ----------
     of : the series.
@@ -61,10 +65,6 @@ class Changes:
     colour : (order + 1,) whitening filter.
     kept : (S,) instants to which the slow changes were fitted.
     reach : widths on either side beyond which a pulse is nothing.
-
-    The filter looks back. Behind instants that do not count, the noise that it expects is not
-    known, and what it leaves there is larger than elsewhere, the smoother the noise the more: these
-    rows say nothing of a pulse.
     """
 
     of: Repeated

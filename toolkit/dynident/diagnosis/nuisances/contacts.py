@@ -21,7 +21,7 @@ _REACH = 2.0
 """Standard deviations of a pulse on either side, within which it is said to be."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Disturbance:
     """The clearest contact at a joint, with the held-out error before and after it is left out.
 
@@ -165,8 +165,14 @@ class Contacts:
         recordings = {one.number: one for one in every}
         found = []
         for pulse, *others in clearest.values():
-            where = recordings[pulse.number]
-            found.append(Disturbance(pulse, before, after, where, more=len(others)))
+            one = Disturbance(
+                pulse=pulse,
+                error_before=before,
+                error_after=after,
+                recording=recordings[pulse.number],
+                more=len(others),
+            )
+            found.append(one)
             before = after
         return tuple(found)
 
