@@ -39,7 +39,8 @@ class Provenance:
     record : which recording of a file that holds several; empty if it holds one.
     columns : (ours, the file's name of it, scale) of each column that was read; empty likewise.
     skipped : what else the file holds that was not read, in words each.
-    first_line : line of the first sample in a text file, from 1.
+    first_line : line of the first sample in a text file, from 1; 0 where lines are not counted.
+    comment_lines : lines of comment below that one, ascending.
     place : where the samples were put if they were too many for the memory, in words.
     """
 
@@ -51,6 +52,7 @@ class Provenance:
     columns: tuple[tuple[str, str, float], ...] = ()
     skipped: tuple[str, ...] = ()
     first_line: int = 2
+    comment_lines: tuple[int, ...] = ()
     place: str = ""
 
 
@@ -179,11 +181,12 @@ class Recording:
 
     def row(self, index: int) -> str:
         """How messages call a sample, given its index from 0: file and row (and line, in CSV)."""
-        line = (
-            f" (line {index + self.provenance.first_line})"
-            if self.where.lower().endswith(TEXTS)
-            else ""
-        )
+        source, line = self.provenance, ""
+        if source.first_line and self.where.lower().endswith(TEXTS):
+            number = index + source.first_line
+            for comment in source.comment_lines:
+                number += comment <= number
+            line = f" (line {number})"
         return f"{self.where}, row {index + 1}{line}"
 
     def __repr__(self) -> str:

@@ -112,6 +112,10 @@ class FileLayout:
         return tuple("" if name in UNWANTED else name for name in self.names)
 
 
+def _no_lines() -> tuple[int, tuple[int, ...]]:
+    return 0, ()
+
+
 def _nothing_more(_: Sequence[str]) -> tuple[str, ...]:
     return ()
 
@@ -130,7 +134,8 @@ class ColumnTable:
     skipped : (names) -> what else the file holds that is not read with them, in words each; what
         is skipped of the columns themselves, `left_of` says.
     sha256 : hexadecimal digits of the file's content.
-    first_line : line of the first sample in a text file, from 1; 0 in any other.
+    lines : () -> line of the first sample in a text file, from 1, and the lines of comment below
+        it as far as it has been read; 0 for the first where there are too many, or no lines.
     texts : columns of a text file without a number or a date in the first samples.
     joints : "prefixed" where the names of joints may have a prefix that the robot's have not, or
         be without one that they have, as on topics of ROS; "exact" anywhere else.
@@ -143,7 +148,7 @@ class ColumnTable:
     parts: Callable[[Sequence[str]], Iterator[dict[str, np.ndarray]]] | None = None
     skipped: Callable[[Sequence[str]], tuple[str, ...]] = _nothing_more
     sha256: str = ""
-    first_line: int = 0
+    lines: Callable[[], tuple[int, tuple[int, ...]]] = _no_lines
     texts: frozenset[str] = frozenset()
     joints: Literal["exact", "prefixed"] = "exact"
 

@@ -20,6 +20,7 @@ import numpy as np
 
 from dynident.errors import RecordingError
 from dynident.recording.formats.column_table import ColumnTable, FileLayout, joined
+from dynident.recording.formats.comment_lines import CommentLines
 from dynident.recording.formats.file_source import FileSource
 from dynident.recording.formats.limits import TEXT, require_distinct, require_unpacked
 from dynident.recording.formats.text_head import head_of, is_comment, is_number
@@ -69,8 +70,10 @@ def open_csv(source: FileSource, file: str, layout: FileLayout) -> ColumnTable:
     require_distinct([name for name in names if name], "column", where)
     places = {name: place for place, name in reversed([*enumerate(names)])}
     names_in = "header" if head.names else "first line"
+    comments = CommentLines()
 
     def parts(wanted: Sequence[str]) -> Iterator[dict[str, np.ndarray]]:
+        comments.clear()
         numbers = [name for name in wanted if places[name] not in head.dates]
         at, above = [places[name] for name in numbers], 0
         with source.open() as stream:
@@ -78,11 +81,12 @@ def open_csv(source: FileSource, file: str, layout: FileLayout) -> ColumnTable:
                 body = piece if above else _below(piece, head.above)
                 above = above or head.above
                 lines = _Lines(head.plain(body), head.mark, names, file, above, names_in)
-                columns = _fast(lines.data, head.mark, len(names), at) if at else []
+                fast = not comments.found_in(body, above) and bool(at)
+                columns = _fast(lines.data, head.mark, len(names), at) if fast else None
                 if columns:
                     above += len(columns[0])
                 else:
-                    columns = lines.numbers(at).T if columns is None else columns
+                    columns = lines.numbers(at).T if at else []
                     above += body.count(b"\n")  # a cell in quotation marks may hold some
                 found = dict(zip(numbers, columns, strict=True))
                 found |= {one: lines.dates(places[one]) for one in wanted if one not in found}
@@ -96,8 +100,8 @@ def open_csv(source: FileSource, file: str, layout: FileLayout) -> ColumnTable:
         names,
         load,
         parts=parts,
-        skipped=lambda _: head.skipped,
-        first_line=head.above + 1,
+        skipped=lambda _: (*head.skipped, *comments.words),
+        lines=lambda: comments.numbered(head.above + 1),
         texts=frozenset(names[place] for place in head.texts) - {""},
     )
 
@@ -226,7 +230,7 @@ class _Lines:
         try:
             for cells in reader:
                 line = reader.line_num + self.above
-                if is_comment(cells):
+                if cells and is_comment(cells[0]):
                     continue
                 yield self._complete(cells, f"{self.file}, line {line}")
         except csv.Error as error:

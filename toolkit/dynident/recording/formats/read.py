@@ -87,6 +87,7 @@ def read(
         raise RecordingError(f"{len(kinds)} kinds for {len(names)} joints", where)
     located = resolve(table, names, named_otherwise(table, names, columns, layout))
     found, place = gather(table, located, lambda part: _signals(part, names))
+    first_line, comment_lines = table.lines()
     used = [term.name for one in located.values() for term in one.terms]
     recording = Recording(
         joints=names,
@@ -97,7 +98,8 @@ def read(
             record=record or "",
             columns=tuple((ours, one.name, one.scale) for ours, one in located.items()),
             skipped=left_of(table, used),
-            first_line=table.first_line,
+            first_line=first_line,
+            comment_lines=comment_lines,
             place=place,
         ),
         **found,

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from dynident.recording.formats.column_names import Column, locate
-from dynident.recording.formats.column_table import FileLayout
+from dynident.recording.formats.column_table import FileLayout, left_of
 from dynident.recording.formats.column_values import gather
 from dynident.recording.formats.open_table import DEFAULT_LAYOUT, open_table
 from dynident.recording.formats.read import named_otherwise
@@ -109,6 +109,7 @@ def read_wrench(
         return {"t": part["t"], "q": np.hstack([q, np.zeros_like(wrench)]), "tau": tau}
 
     found, place = gather(table, located, signals)
+    first_line, comment_lines = table.lines()
     return Recording(
         joints=(*joints, *names),
         name=record or path.stem,
@@ -117,7 +118,9 @@ def read_wrench(
             table.sha256,
             record=record or "",
             columns=tuple((ours, one.name, one.scale) for ours, one in located.items()),
-            first_line=table.first_line,
+            skipped=left_of(table, [term.name for one in located.values() for term in one.terms]),
+            first_line=first_line,
+            comment_lines=comment_lines,
             place=place,
         ),
         **found,
