@@ -45,6 +45,7 @@ from dynident.recording.plausibility import (
     warn_of_missing_torque,
 )
 from dynident.recording.recording import SIGNALS, LeftOut, Provenance, Recording
+from dynident.recording.sound_stretch import sound_part
 from dynident.recording.uniform import uniform
 from dynident.recording.usable_rows import (
     RowCount,
@@ -98,6 +99,7 @@ __all__ = [
     "resolution",
     "rows_in_words",
     "sensed_frames",
+    "sound_part",
     "uniform",
     "usable",
     "usable_rows",

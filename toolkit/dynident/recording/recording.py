@@ -55,6 +55,13 @@ class Provenance:
     comment_lines: tuple[int, ...] = ()
     place: str = ""
 
+    def line(self, index: int) -> int:
+        """Return the line of a sample in a text file, given its index from 0; 0 if unknown."""
+        number = index + self.first_line
+        for comment in self.comment_lines:
+            number += comment <= number
+        return number if self.first_line else 0
+
 
 @dataclass(frozen=True, kw_only=True)
 class LeftOut:
@@ -181,12 +188,8 @@ class Recording:
 
     def row(self, index: int) -> str:
         """How messages call a sample, given its index from 0: file and row (and line, in CSV)."""
-        source, line = self.provenance, ""
-        if source.first_line and self.where.lower().endswith(TEXTS):
-            number = index + source.first_line
-            for comment in source.comment_lines:
-                number += comment <= number
-            line = f" (line {number})"
+        number = self.provenance.line(index) if self.where.lower().endswith(TEXTS) else 0
+        line = f" (line {number})" if number else ""
         return f"{self.where}, row {index + 1}{line}"
 
     def __repr__(self) -> str:
@@ -238,7 +241,8 @@ class Recording:
         RecordingError
             If there are fewer than 2.
         """
-        return self.replace(t=self.t[rows], **self._mapped(lambda x: x[rows]))
+        source = _replace(self.provenance, first_line=self.provenance.line(rows.start or 0))
+        return self.replace(t=self.t[rows], **self._mapped(lambda x: x[rows]), provenance=source)
 
     def _mapped(self, change: Callable[[np.ndarray], np.ndarray]) -> dict[str, Any]:
         """Each signal changed alike, those that are absent left absent."""
