@@ -67,6 +67,17 @@ def test_units_that_are_not_ours_stand_behind_the_names(tmp_path: Path) -> None:
     np.testing.assert_allclose(read(path, ["a"], columns).q[:, 0], np.deg2rad(Q))
 
 
+@pytest.mark.parametrize("encoding", ["latin-1", "cp1252", "utf-8"])
+def test_umlauts_and_units_of_windows_are_read(tmp_path: Path, encoding: str) -> None:
+    text = PLAIN.replace("q.a", "Rückführung [°/s²]").replace("\n", "\r\n")
+    (path := tmp_path / "run.csv").write_bytes(
+        f"# Prüfstand, Wärme in °C\r\n{text}".encode(encoding)
+    )
+    table = open_table(path)
+    assert table.names == ("t", "Rückführung [°/s²]", "tau.a")
+    np.testing.assert_array_equal(table.load(["Rückführung [°/s²]"])["Rückführung [°/s²]"], Q)
+
+
 DATES = {
     "of Greenwich": "2026-03-05T10:11:12.{:03d}",
     "marked": "2026-03-05T10:11:12.{:03d}Z",
