@@ -22,7 +22,8 @@ from dynident.recording import (
     spooled,
     write,
 )
-from dynident.recording.formats import file_source, text_pieces
+from dynident.recording.formats import file_source
+from dynident.recording.formats.text import text_pieces
 
 SUFFIXES = (".csv", ".npy", ".npz", ".parquet", ".h5")
 SIGNALS = ("t", "q", "tau", "v", "q_ref")

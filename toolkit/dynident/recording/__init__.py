@@ -25,6 +25,7 @@ from dynident.recording.formats.column_names import Column
 from dynident.recording.formats.column_table import ColumnTable, FileLayout
 from dynident.recording.formats.open_table import READABLE, open_table
 from dynident.recording.formats.read import SUFFIXES, read
+from dynident.recording.formats.sound_stretch import sound_part
 from dynident.recording.formats.wrench_file import (
     COMPONENTS,
     WrenchColumns,
@@ -45,7 +46,6 @@ from dynident.recording.plausibility import (
     warn_of_missing_torque,
 )
 from dynident.recording.recording import SIGNALS, LeftOut, Provenance, Recording
-from dynident.recording.sound_stretch import sound_part
 from dynident.recording.uniform import uniform
 from dynident.recording.usable_rows import (
     RowCount,

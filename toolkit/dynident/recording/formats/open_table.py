@@ -16,11 +16,11 @@ from dynident.recording.formats.arrays.npz_file import open_npz
 from dynident.recording.formats.arrays.parquet_file import open_parquet
 from dynident.recording.formats.arrays.records import pick
 from dynident.recording.formats.column_table import ColumnTable, FileLayout
-from dynident.recording.formats.csv_file import open_csv
 from dynident.recording.formats.file_source import FileSource, open_source
 from dynident.recording.formats.limits import CUT, STREAMED
 from dynident.recording.formats.ros_bag import SUFFIXES as BAGS
 from dynident.recording.formats.ros_bag import is_bag, open_bag
+from dynident.recording.formats.text.csv_file import open_csv
 from dynident.recording.recording import TEXTS
 
 DEFAULT_LAYOUT = FileLayout()

@@ -13,8 +13,8 @@ from dynident.errors import RecordingError
 from dynident.recording.formats.column_names import LocatedColumn
 from dynident.recording.formats.column_table import ColumnTable, left_of
 from dynident.recording.formats.column_values import gather
+from dynident.recording.formats.sound_stretch import said_of, sound_part, sound_stretch
 from dynident.recording.recording import Provenance, Recording
-from dynident.recording.sound_stretch import said_of, sound_part, sound_stretch
 
 Window = tuple[float, float]
 

@@ -31,7 +31,8 @@ _SHARES = (0.5, 0.25)
 _ENOUGH = 5
 """Independent equations for each parameter behind the lower cut-offs, without which the usual ones
 stay: with fewer, noise of the torque may move parameters by more than that of positions did. With 5
-and more the lower ones were nearer to the truth in all of 90 simulated robots that got them."""
+and more the lower ones were nearer to the truth in all simulated arms that got them
+(`benchmarks/draft_filters.py`)."""
 _WORSE = 1.15
 """Relative error over that of values found behind the lower cut-off, from which that is taken: of
 simulated and measured arms in six without such noise it is 1.00 to 1.03, in two with some 1.1, on a

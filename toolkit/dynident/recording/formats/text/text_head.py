@@ -12,8 +12,8 @@ from typing import Literal
 
 from dynident.errors import RecordingError
 from dynident.recording.formats.column_table import FileLayout
-from dynident.recording.formats.column_titles import are_names, are_units, with_unit
 from dynident.recording.formats.limits import require_few
+from dynident.recording.formats.text.column_titles import are_names, are_units, with_unit
 
 _COMMENT = re.compile(r"\s*(#|%|//)+\s*")
 _SEPARATOR_OF_EXCEL = re.compile(r'\s*"?sep=.?"?\s*')

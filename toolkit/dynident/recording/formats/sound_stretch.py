@@ -80,7 +80,14 @@ def sound_part(recording: Recording, window: tuple[float, float] | None) -> Reco
 
 
 def said_of(rows: slice, samples: int, window: tuple[float, float]) -> str:
-    """Return what is left out of so many samples, in words."""
+    """Return what is left out of a file, in words.
+
+    Parameters
+    ----------
+    rows : that are kept.
+    samples : of the file.
+    window : (t0, t1) s, which was asked for.
+    """
     before, after = rows.start, samples - rows.stop
     return (
         f"{before + after} samples beyond faults outside the window [{window[0]:g}, "

@@ -20,11 +20,11 @@ import numpy as np
 
 from dynident.errors import RecordingError
 from dynident.recording.formats.column_table import ColumnTable, FileLayout, joined
-from dynident.recording.formats.comment_lines import CommentLines
 from dynident.recording.formats.file_source import FileSource
 from dynident.recording.formats.limits import TEXT, require_distinct, require_unpacked
-from dynident.recording.formats.text_head import head_of, is_comment, is_number
-from dynident.recording.formats.text_pieces import text_pieces
+from dynident.recording.formats.text.comment_lines import CommentLines
+from dynident.recording.formats.text.text_head import head_of, is_comment, is_number
+from dynident.recording.formats.text.text_pieces import text_pieces
 
 _HEADER = "write a header line: t, q.<joint>, tau.<joint> ..."
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
