@@ -51,7 +51,7 @@ def in_small_parts(monkeypatch, tmp_path):
 
 
 def read_at_once(monkeypatch, size: int) -> None:
-    for name in ("text_pieces", "column_table", "arrays.npz_file", "arrays.hdf5_file"):
+    for name in ("text.text_pieces", "column_table", "arrays.npz_file", "arrays.hdf5_file"):
         monkeypatch.setattr(f"dynident.recording.formats.{name}.AT_ONCE", size)
 
 
