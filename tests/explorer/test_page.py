@@ -104,7 +104,12 @@ def demo(tmp_path) -> Iterator[tuple[Path, str, subprocess.Popen]]:
     folder = tmp_path / "demo"
     shutil.copytree(DEMO, folder)
     command = [sys.executable, "-m", "dynident.cli", "open", "study.toml", "--no-browser"]
-    server = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True)
+    # A shell's background job ignores SIGINT, and its children would too.
+    inherited = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        server = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True)
+    finally:
+        signal.signal(signal.SIGINT, inherited)
     assert server.stdout is not None
     line = server.stdout.readline()
     found = re.fullmatch(

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from dynident.errors import RecordingError
 from dynident.recording import read, write
-from dynident.recording.formats import csv_file
+from dynident.recording.formats.text import csv_file
 
 REGULAR = {
     "point": "t,q.a,tau.a\n0,1,3\n.01,2,4\n",

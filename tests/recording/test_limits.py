@@ -10,8 +10,9 @@ from scipy.io import savemat
 from dynident import files
 from dynident.errors import DynidentError, FileError, RecordingError
 from dynident.recording import SUFFIXES, open_table, read
-from dynident.recording.formats import csv_file, limits
+from dynident.recording.formats import limits
 from dynident.recording.formats.arrays import mat_file
+from dynident.recording.formats.text import csv_file
 from dynident.robot import Robot
 from dynident.settings import SettingsTable, read_toml
 

@@ -22,7 +22,8 @@ from dynident.recording import (
     spooled,
     write,
 )
-from dynident.recording.formats import file_source, text_pieces
+from dynident.recording.formats import file_source
+from dynident.recording.formats.text import text_pieces
 
 SUFFIXES = (".csv", ".npy", ".npz", ".parquet", ".h5")
 SIGNALS = ("t", "q", "tau", "v", "q_ref")
@@ -50,7 +51,7 @@ def in_small_parts(monkeypatch, tmp_path):
 
 
 def read_at_once(monkeypatch, size: int) -> None:
-    for name in ("text_pieces", "column_table", "arrays.npz_file", "arrays.hdf5_file"):
+    for name in ("text.text_pieces", "column_table", "arrays.npz_file", "arrays.hdf5_file"):
         monkeypatch.setattr(f"dynident.recording.formats.{name}.AT_ONCE", size)
 
 

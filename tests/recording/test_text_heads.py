@@ -67,6 +67,17 @@ def test_units_that_are_not_ours_stand_behind_the_names(tmp_path: Path) -> None:
     np.testing.assert_allclose(read(path, ["a"], columns).q[:, 0], np.deg2rad(Q))
 
 
+@pytest.mark.parametrize("encoding", ["latin-1", "cp1252", "utf-8"])
+def test_umlauts_and_units_of_windows_are_read(tmp_path: Path, encoding: str) -> None:
+    text = PLAIN.replace("q.a", "Rückführung [°/s²]").replace("\n", "\r\n")
+    (path := tmp_path / "run.csv").write_bytes(
+        f"# Prüfstand, Wärme in °C\r\n{text}".encode(encoding)
+    )
+    table = open_table(path)
+    assert table.names == ("t", "Rückführung [°/s²]", "tau.a")
+    np.testing.assert_array_equal(table.load(["Rückführung [°/s²]"])["Rückführung [°/s²]"], Q)
+
+
 DATES = {
     "of Greenwich": "2026-03-05T10:11:12.{:03d}",
     "marked": "2026-03-05T10:11:12.{:03d}Z",
@@ -146,3 +157,103 @@ def test_a_date_that_is_none_is_told_by_its_row(tmp_path: Path) -> None:
     np.savez(path := tmp_path / "run.npz", t=t, **{"q.a": Q, "tau.a": TAU})  # pyright: ignore
     with pytest.raises(RecordingError, match=r"row 3, column t: .*nan"):
         read(path, ["a"])
+
+
+@pytest.mark.parametrize("names", ["t,q.a,tau.a", "# t,q.a,tau.a"])
+def test_comments_among_the_samples_are_counted(tmp_path: Path, names: str) -> None:
+    rows = [names, "# of the head", "s,rad,Nm", ROWS[0], "# paused", "// 0.02,1,2", *ROWS[1:], "%"]
+    if names.startswith("#"):
+        del rows[1:3]
+    (path := tmp_path / "run.csv").write_text("\n".join(rows) + "\n")
+    one = read(path, ["a"])
+    np.testing.assert_array_equal(one.q[:, 0], Q)
+    assert "3 lines of comment among the samples" in one.provenance.skipped
+    assert ("1 line of comment" in one.provenance.skipped) == (not names.startswith("#"))
+
+
+def test_a_row_that_was_commented_out_is_none_where_its_clock_is_not_read(tmp_path: Path) -> None:
+    (path := tmp_path / "run.csv").write_text(PLAIN.replace("\n0.02", "\n#0.015,7,7\n0.02"))
+    np.testing.assert_array_equal(open_table(path).load(["q.a"])["q.a"], Q)
+
+
+FAULTS = {
+    "a number": ("0.03,?,0", r"line {}, column q.a: '\?' is not a number"),
+    "a column": ("0.03,1", r"line {}: 2 columns"),
+    "the clock": ("0.01,1,1", r"row 4 \(line {}\), column t: time goes back"),
+}
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+@pytest.mark.parametrize("before_units", [0, 2])
+@pytest.mark.parametrize("within", [0, 3])
+def test_lines_are_counted_with_all_comments(
+    tmp_path: Path, kind: str, before_units: int, within: int
+) -> None:
+    row, words = FAULTS[kind]
+    head = ["# log", "", "t,q.a,tau.a", *["# of the units"] * before_units, "[s],[rad],[Nm]"]
+    lines = [*head, *ROWS[:2], *["# paused"] * within, ROWS[2], row, "# end"]
+    (path := tmp_path / "run.csv").write_text("\n".join(lines) + "\n")
+    with pytest.raises(RecordingError, match=words.format(lines.index(row) + 1)):
+        read(path, ["a"])
+
+
+HEADS = {
+    "savetxt": ("# t q.a tau.a\n", " ", ("t", "q.a", "tau.a")),
+    "savetxt with commas over blanks": ("# t, q.a, tau.a\n", " ", ("t", "q.a", "tau.a")),
+    "blanks over commas": ("% t q.a tau.a\n", ",", ("t", "q.a", "tau.a")),
+    "MATLAB": (
+        "% Time Joint1Position [rad] Torque_1\n%-----\n".replace(" [rad]", "[rad]"),
+        "\t",
+        ("Time", "Joint1Position[rad]", "Torque_1"),
+    ),
+    "ROS": (
+        "%time,field.position0,field.effort0\n",
+        ",",
+        ("time", "field.position0", "field.effort0"),
+    ),
+    "with units": ("# t,q.a,tau.a\n# ms,deg,Nm\n", ",", ("t [ms]", "q.a [deg]", "tau.a")),
+    "words": ("# time, position, torque\n", ",", ("time", "position", "torque")),
+}
+PROSE = (
+    "# made on monday\n",
+    "# log of UR10e\n",
+    "# made, by hand, today\n",
+    "# t,q.a,tau.a\n# made, by hand, today\n",
+    "# at 10:11:12 2026-03-05\n",
+    "# 0,1,2\n",
+    "# a, b c, I\n",
+)
+
+
+@pytest.mark.parametrize("kind", HEADS)
+def test_the_last_comment_names_the_columns(tmp_path: Path, kind: str) -> None:
+    head, mark, names = HEADS[kind]
+    (path := tmp_path / "run.csv").write_text(head + "\n".join(ROWS).replace(",", mark))
+    assert open_table(path).names == names
+
+
+@pytest.mark.parametrize("comment", PROSE)
+def test_a_sentence_above_names_no_columns(tmp_path: Path, comment: str) -> None:
+    (path := tmp_path / "run.csv").write_text(comment + "\n".join(ROWS))
+    with pytest.raises(RecordingError, match="holds numbers, not the names of columns"):
+        open_table(path)
+    path.write_text(comment + PLAIN)
+    assert open_table(path).names == ("t", "q.a", "tau.a")
+
+
+@pytest.mark.parametrize("mark", [";", "\t"])
+def test_commas_that_may_be_of_thousands_are_asked_for(tmp_path: Path, mark: str) -> None:
+    rows = ["t;q.a;tau.a", "1;1,234;9,876", "2;-5,678;7"]
+    (path := tmp_path / "run.csv").write_text("\n".join(rows).replace(";", mark))
+    with pytest.raises(RecordingError, match=r"'1,234' may be 1\.234 or 1234\. write decimal poi"):
+        open_table(path)
+
+
+@pytest.mark.parametrize("telling", ["0,500", "1,2345", "12,5", ",500", "1000,500"])
+def test_one_comma_that_can_be_of_decimals_alone_tells_what_all_are(
+    tmp_path: Path, telling: str
+) -> None:
+    (path := tmp_path / "run.csv").write_text(f"t;q.a;tau.a\n1;1,234;9,876\n2;-5,678;{telling}\n")
+    found = open_table(path).load(["q.a", "tau.a"])
+    np.testing.assert_array_equal(found["q.a"], [1.234, -5.678])
+    assert found["tau.a"][1] == float(telling.replace(",", "."))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
+import os
+import sys
 import webbrowser
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from dynident.cli.work import STUDY, load_study, permission_given
 @commands.command("open")
 @STUDY
 @click.option("--no-browser", is_flag=True, help="Print the address, and open nothing.")
-def open_study(study: Path, no_browser: bool) -> int:
+def open_study(study: Path, no_browser: bool) -> None:
     """Do the loop by hand on a page in the browser: see, switch on, refit, write.
 
     Measured against predicted torque, residual maps, and what the diagnosis finds missing, with a
@@ -39,7 +40,9 @@ def open_study(study: Path, no_browser: bool) -> int:
     say(f"{study} is open at {server.url} (Ctrl-C ends it)")
     if not no_browser:
         webbrowser.open(server.url)
-    with contextlib.suppress(KeyboardInterrupt):
-        server.serve()
+    server.serve()
     say("closed; what was not written is gone")
-    return 0
+    # Requests and the search may still be at work, inside libraries that an interpreter which is
+    # taken down under them aborts or waits for. What they make is gone anyway.
+    sys.stderr.flush()
+    os._exit(0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+import time
 from html import escape
 from threading import Thread
 
@@ -14,6 +16,7 @@ from dynident.explorer.opened_study import StudyVersions
 from dynident.explorer.page import page
 
 _HEIGHT = 900  # pixels of the frame in a notebook
+_LOOK = 0.2  # s between two looks at whether it is to end
 
 
 class _Quiet(WSGIRequestHandler):
@@ -59,17 +62,36 @@ class LocalServer:
         return f"http://{ADDRESS}:{self.port}/{self.token}/"
 
     def serve(self) -> None:
-        """Answer until somebody interrupts."""
+        """Answer until Ctrl-C.
+
+        What Ctrl-C raises is lost where it arrives while an object is finalised, as that of a
+        request is in the thread that starts the requests. So it is noted here, and looked at.
+        A shell's background job ignores Ctrl-C, and goes on.
+        """
+        noted: list[int] = []  # an Event has a lock, for which a second Ctrl-C would wait for ever
+        before = signal.getsignal(signal.SIGINT)
+        if callable(before):
+            signal.signal(signal.SIGINT, lambda number, _: noted.append(number))
         try:
-            self._server.serve_forever(poll_interval=0.2)
+            serving = self.start()
+            while serving.is_alive() and not noted:
+                time.sleep(_LOOK)
+        finally:
+            signal.signal(signal.SIGINT, before)
+            self.stop()
+
+    def start(self) -> Thread:
+        """Answer beside whatever else goes on; in the thread that is returned."""
+        self._thread = Thread(target=self._answer, daemon=True)
+        self._thread.start()
+        return self._thread
+
+    def _answer(self) -> None:
+        try:
+            self._server.serve_forever(poll_interval=_LOOK)
         finally:
             self.versions.stop()
             self._server.server_close()
-
-    def start(self) -> None:
-        """Answer beside whatever else goes on."""
-        self._thread = Thread(target=self.serve, daemon=True)
-        self._thread.start()
 
     def stop(self) -> None:
         """End it; what was not written is lost."""

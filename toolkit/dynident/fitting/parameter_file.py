@@ -21,7 +21,7 @@ from dynident import files
 from dynident.errors import DynidentWarning, FileError
 from dynident.inertia import LARGEST, PAPER_ORDER, PARAMETERS
 from dynident.model import Model
-from dynident.recording.formats.text_head import is_number
+from dynident.recording.formats.text.text_head import is_number
 from dynident.robot import Robot
 from dynident.robot.formats.xmltree import closest
 

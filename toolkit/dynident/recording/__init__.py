@@ -25,6 +25,7 @@ from dynident.recording.formats.column_names import Column
 from dynident.recording.formats.column_table import ColumnTable, FileLayout
 from dynident.recording.formats.open_table import READABLE, open_table
 from dynident.recording.formats.read import SUFFIXES, read
+from dynident.recording.formats.sound_stretch import sound_part
 from dynident.recording.formats.wrench_file import (
     COMPONENTS,
     WrenchColumns,
@@ -98,6 +99,7 @@ __all__ = [
     "resolution",
     "rows_in_words",
     "sensed_frames",
+    "sound_part",
     "uniform",
     "usable",
     "usable_rows",

@@ -39,7 +39,8 @@ class Provenance:
     record : which recording of a file that holds several; empty if it holds one.
     columns : (ours, the file's name of it, scale) of each column that was read; empty likewise.
     skipped : what else the file holds that was not read, in words each.
-    first_line : line of the first sample in a text file, from 1.
+    first_line : line of the first sample in a text file, from 1; 0 where lines are not counted.
+    comment_lines : lines of comment below that one, ascending.
     place : where the samples were put if they were too many for the memory, in words.
     """
 
@@ -51,7 +52,15 @@ class Provenance:
     columns: tuple[tuple[str, str, float], ...] = ()
     skipped: tuple[str, ...] = ()
     first_line: int = 2
+    comment_lines: tuple[int, ...] = ()
     place: str = ""
+
+    def line(self, index: int) -> int:
+        """Return the line of a sample in a text file, given its index from 0; 0 if unknown."""
+        number = index + self.first_line
+        for comment in self.comment_lines:
+            number += comment <= number
+        return number if self.first_line else 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -179,11 +188,8 @@ class Recording:
 
     def row(self, index: int) -> str:
         """How messages call a sample, given its index from 0: file and row (and line, in CSV)."""
-        line = (
-            f" (line {index + self.provenance.first_line})"
-            if self.where.lower().endswith(TEXTS)
-            else ""
-        )
+        number = self.provenance.line(index) if self.where.lower().endswith(TEXTS) else 0
+        line = f" (line {number})" if number else ""
         return f"{self.where}, row {index + 1}{line}"
 
     def __repr__(self) -> str:
@@ -235,7 +241,8 @@ class Recording:
         RecordingError
             If there are fewer than 2.
         """
-        return self.replace(t=self.t[rows], **self._mapped(lambda x: x[rows]))
+        source = _replace(self.provenance, first_line=self.provenance.line(rows.start or 0))
+        return self.replace(t=self.t[rows], **self._mapped(lambda x: x[rows]), provenance=source)
 
     def _mapped(self, change: Callable[[np.ndarray], np.ndarray]) -> dict[str, Any]:
         """Each signal changed alike, those that are absent left absent."""

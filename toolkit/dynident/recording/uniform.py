@@ -211,13 +211,23 @@ def _fresh(recording: Recording) -> np.ndarray:
     return ~same
 
 
+def is_gap(steps: np.ndarray, rate_hz: float) -> np.ndarray:
+    """Which time steps, s, are gaps that cannot be bridged."""
+    return (steps * rate_hz > _LONGEST_GAP[0]) & (steps > _LONGEST_GAP[1])
+
+
+def may_have_gaps(recording: Recording) -> bool:
+    """Whether any step is so far from the mean one that it may be a gap."""
+    return recording.jitter > _LONGEST_GAP[0] - 1
+
+
 def _refuse_gaps(recording: Recording, rows: np.ndarray) -> None:
     gaps = np.diff(recording.t[rows])
     longest = int(np.argmax(gaps))
-    samples = gaps[longest] * recording.rate_hz
-    if samples > _LONGEST_GAP[0] and gaps[longest] > _LONGEST_GAP[1]:
+    if is_gap(gaps[longest], recording.rate_hz):
+        missing = gaps[longest] * recording.rate_hz
         raise RecordingError(
-            f"{gaps[longest]:.3g} s without samples follow (about {samples:.0f} are missing)",
+            f"{gaps[longest]:.3g} s without samples follow (about {missing:.0f} are missing)",
             recording.row(int(rows[longest])),
             "split the recording there in two",
         )

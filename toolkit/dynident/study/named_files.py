@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from dynident.data_files import find_all
-from dynident.errors import DynidentError, RobotError, StudyError
+from dynident.errors import DynidentError, RecordingError, RobotError, StudyError
 from dynident.fitting.loads import Load, loads_of
 from dynident.recording import (
     Column,
@@ -21,6 +21,7 @@ from dynident.recording import (
     default_position_cutoff,
     frame_of,
     read,
+    sound_part,
 )
 from dynident.robot import Robot
 from dynident.study.study_file import FilterEntry, RecordingEntry, StudyFile
@@ -108,17 +109,33 @@ def recordings_of(
     if "unknown" in payloads and any(isinstance(one, bool) for one in payloads):
         remedy = 'state true or false for every recording, or "unknown" for all of them'
         raise StudyError("a payload is known and unknown", f"{path}: recordings", remedy)
+
+    def read_file(one: NamedFile, sound_in: tuple[float, float] | None = None) -> Recording:
+        return read(
+            one.file,
+            robot.names,
+            columns,
+            robot.kinds,
+            one.record,
+            layout=one.layout,
+            sound_in=sound_in,
+        )
+
     known: dict[NamedFile, Recording] = {}
     found: list[Recording] = []
     for number, one in enumerate(named_files(said, path), start=1):
-        key = replace(one, place=0)
-        if key not in known:
-            known[key] = read(
-                one.file, robot.names, columns, robot.kinds, one.record, layout=one.layout
-            )
-        entry = said.recordings[one.place]
+        key, entry = replace(one, place=0), said.recordings[one.place]
+        try:
+            # Entries with windows of one file share its samples where all of it is sound.
+            if key not in known:
+                known[key] = read_file(one)
+            recording = sound_part(known[key], entry.window)
+        except RecordingError:
+            if entry.window is None:
+                raise
+            recording = read_file(one, entry.window)
         found.append(
-            known[key].replace(
+            recording.replace(
                 name=entry.record or one.name,
                 use=entry.use,
                 period=entry.period,

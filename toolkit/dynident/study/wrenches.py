@@ -71,7 +71,7 @@ def load_wrenches(path: str | Path) -> tuple[WrenchProblem, ...]:
                 continue
             entry = said.recordings[one.place]
             recordings.append(
-                _read(one, wanted).replace(
+                _read(one, wanted, entry.window).replace(
                     name=entry.record or one.name,
                     period=entry.period,
                     window=entry.window,
@@ -91,5 +91,5 @@ def _own_frames(one: NamedFile) -> tuple[str, ...]:
     return sensed_frames(one.file, one.record, layout=one.layout)
 
 
-def _read(one: NamedFile, wanted: WrenchColumns) -> Recording:
-    return read_wrench(one.file, wanted, one.record, layout=one.layout)
+def _read(one: NamedFile, wanted: WrenchColumns, window: tuple[float, float] | None) -> Recording:
+    return read_wrench(one.file, wanted, one.record, layout=one.layout, sound_in=window)

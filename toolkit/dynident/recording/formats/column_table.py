@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from typing import Literal, Protocol
 
@@ -112,6 +112,14 @@ class FileLayout:
         return tuple("" if name in UNWANTED else name for name in self.names)
 
 
+Parts = Callable[[Sequence[str]], Iterator[dict[str, np.ndarray]]]
+"""(names) -> arrays of these names, some rows at a time."""
+
+
+def _no_lines() -> tuple[int, tuple[int, ...]]:
+    return 0, ()
+
+
 def _nothing_more(_: Sequence[str]) -> tuple[str, ...]:
     return ()
 
@@ -127,10 +135,13 @@ class ColumnTable:
     load : (names) -> arrays of these names, as they are in the file, whole.
     parts : (names) -> the same some rows at a time, each part a row or more and with as many rows
         under each name; None where the file can only be loaded.
+    forgiving : parts, of a text file, with NaN where it has no number, and a row of them for a line
+        that has too few columns, or too many; None in any other.
     skipped : (names) -> what else the file holds that is not read with them, in words each; what
         is skipped of the columns themselves, `left_of` says.
     sha256 : hexadecimal digits of the file's content.
-    first_line : line of the first sample in a text file, from 1; 0 in any other.
+    lines : () -> line of the first sample in a text file, from 1, and the lines of comment below
+        it as far as it has been read; 0 for the first where there are too many, or no lines.
     texts : columns of a text file without a number or a date in the first samples.
     joints : "prefixed" where the names of joints may have a prefix that the robot's have not, or
         be without one that they have, as on topics of ROS; "exact" anywhere else.
@@ -140,10 +151,11 @@ class ColumnTable:
     names: tuple[str, ...]
     load: Callable[[Sequence[str]], dict[str, np.ndarray]]
     _: KW_ONLY
-    parts: Callable[[Sequence[str]], Iterator[dict[str, np.ndarray]]] | None = None
+    parts: Parts | None = None
+    forgiving: Parts | None = None
     skipped: Callable[[Sequence[str]], tuple[str, ...]] = _nothing_more
     sha256: str = ""
-    first_line: int = 0
+    lines: Callable[[], tuple[int, tuple[int, ...]]] = _no_lines
     texts: frozenset[str] = frozenset()
     joints: Literal["exact", "prefixed"] = "exact"
 
@@ -151,6 +163,11 @@ class ColumnTable:
     def there(self) -> frozenset[str]:
         """The names, for looking them up."""
         return frozenset(self.names)
+
+    @property
+    def forgiven(self) -> ColumnTable:
+        """The table with NaN where a text file is at fault."""
+        return self if self.forgiving is None else replace(self, parts=self.forgiving)
 
     def in_parts(self, names: Sequence[str]) -> Iterator[dict[str, np.ndarray]]:
         """Yield arrays of these names some rows at a time; as one part if it cannot be otherwise.

@@ -16,11 +16,11 @@ from dynident.recording.formats.arrays.npz_file import open_npz
 from dynident.recording.formats.arrays.parquet_file import open_parquet
 from dynident.recording.formats.arrays.records import pick
 from dynident.recording.formats.column_table import ColumnTable, FileLayout
-from dynident.recording.formats.csv_file import open_csv
 from dynident.recording.formats.file_source import FileSource, open_source
 from dynident.recording.formats.limits import CUT, STREAMED
 from dynident.recording.formats.ros_bag import SUFFIXES as BAGS
 from dynident.recording.formats.ros_bag import is_bag, open_bag
+from dynident.recording.formats.text.csv_file import open_csv
 from dynident.recording.recording import TEXTS
 
 DEFAULT_LAYOUT = FileLayout()
@@ -111,7 +111,7 @@ def _with_clock(table: ColumnTable, rate_hz: float) -> ColumnTable:
             return found
         return _clocked(found, others, range(_samples(found)))
 
-    def parts(wanted: Sequence[str]) -> Iterator[dict[str, np.ndarray]]:
+    def with_clock(table: ColumnTable, wanted: Sequence[str]) -> Iterator[dict[str, np.ndarray]]:
         others = [name for name in wanted if name != "t"]
         seen = 0
         for found in table.in_parts(others or table.names[:1]):
@@ -125,7 +125,13 @@ def _with_clock(table: ColumnTable, rate_hz: float) -> ColumnTable:
         t = np.arange(rows.start, rows.stop) / rate_hz
         return {**{name: found[name] for name in others}, "t": t}
 
-    return replace(table, names=("t", *table.names), load=load, parts=parts)
+    return replace(
+        table,
+        names=("t", *table.names),
+        load=load,
+        parts=lambda wanted: with_clock(table, wanted),
+        forgiving=lambda wanted: with_clock(table.forgiven, wanted),
+    )
 
 
 def _samples(found: Mapping[str, np.ndarray]) -> int:

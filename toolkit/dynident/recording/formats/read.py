@@ -18,12 +18,12 @@ from dynident.recording.formats.column_names import (
     joints_in,
     resolve,
 )
-from dynident.recording.formats.column_table import ColumnTable, FileLayout, left_of
-from dynident.recording.formats.column_values import gather
+from dynident.recording.formats.column_table import ColumnTable, FileLayout
 from dynident.recording.formats.joint_state_table import prefixed
 from dynident.recording.formats.open_table import DEFAULT_LAYOUT, open_table
+from dynident.recording.formats.recorded import Wanted, recorded
 from dynident.recording.plausibility import warn_of_units
-from dynident.recording.recording import Provenance, Recording, _joint_names
+from dynident.recording.recording import Recording, _joint_names
 
 SUFFIXES = (".csv", ".npz", ".mat", ".parquet")
 """Suffixes of the files that are read and written; more are read, see `open_table.READABLE`."""
@@ -38,6 +38,7 @@ def read(
     record: str | None = None,
     *,
     layout: FileLayout = DEFAULT_LAYOUT,
+    sound_in: tuple[float, float] | None = None,
 ) -> Recording:
     """Read a recording; the file's suffix says its format.
 
@@ -57,6 +58,9 @@ def read(
         a sample, and one array of text, `columns`, that names the columns of all.
     layout : what the file does not say of itself: names of columns without a header line, the rate
         where there is no column of time, the topic of a bag.
+    sound_in : (t0, t1) s. The file may then have faults (what is no number, a clock that goes back,
+        a long gap) outside that window, and what is beyond them is not kept, which the provenance
+        says. A recording without faults is kept as a whole.
 
     Returns
     -------
@@ -86,22 +90,14 @@ def read(
     if kinds is not None and len(kinds) != len(names):
         raise RecordingError(f"{len(kinds)} kinds for {len(names)} joints", where)
     located = resolve(table, names, named_otherwise(table, names, columns, layout))
-    found, place = gather(table, located, lambda part: _signals(part, names))
-    used = [term.name for one in located.values() for term in one.terms]
-    recording = Recording(
+    wanted = Wanted(
+        columns=located,
+        signals=lambda part: _signals(part, names),
         joints=names,
-        name=record or path.stem,
-        provenance=Provenance(
-            where,
-            table.sha256,
-            record=record or "",
-            columns=tuple((ours, one.name, one.scale) for ours, one in located.items()),
-            skipped=left_of(table, used),
-            first_line=table.first_line,
-            place=place,
-        ),
-        **found,
+        path=path,
+        record=record or "",
     )
+    recording = recorded(table, wanted, sound_in)
     warn_of_units(recording, kinds)
     return recording
 

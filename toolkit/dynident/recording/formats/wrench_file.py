@@ -11,10 +11,10 @@ import numpy as np
 
 from dynident.recording.formats.column_names import Column, locate
 from dynident.recording.formats.column_table import FileLayout
-from dynident.recording.formats.column_values import gather
 from dynident.recording.formats.open_table import DEFAULT_LAYOUT, open_table
 from dynident.recording.formats.read import named_otherwise
-from dynident.recording.recording import Provenance, Recording
+from dynident.recording.formats.recorded import Wanted, recorded
+from dynident.recording.recording import Recording
 
 COMPONENTS = ("fx", "fy", "fz", "tx", "ty", "tz")
 """Force (N) and torque (N m) along the axes of the sensor: `wrench.<frame>.fx` and so on."""
@@ -76,12 +76,13 @@ def read_wrench(
     record: str | None = None,
     *,
     layout: FileLayout = DEFAULT_LAYOUT,
+    sound_in: tuple[float, float] | None = None,
 ) -> Recording:
     """Read the motion of a robot and what a wrench sensor on it records; no torques of joints.
 
     Parameters
     ----------
-    path, record, layout : as of `read`.
+    path, record, layout, sound_in : as of `read`.
     wanted : the sensor, and names of columns.
 
     Returns
@@ -108,17 +109,14 @@ def read_wrench(
         tau = np.hstack([np.zeros_like(q), wrench])
         return {"t": part["t"], "q": np.hstack([q, np.zeros_like(wrench)]), "tau": tau}
 
-    found, place = gather(table, located, signals)
-    return Recording(
-        joints=(*joints, *names),
-        name=record or path.stem,
-        provenance=Provenance(
-            str(path),
-            table.sha256,
+    return recorded(
+        table,
+        Wanted(
+            columns=located,
+            signals=signals,
+            joints=(*joints, *names),
+            path=path,
             record=record or "",
-            columns=tuple((ours, one.name, one.scale) for ours, one in located.items()),
-            first_line=table.first_line,
-            place=place,
         ),
-        **found,
+        sound_in,
     )

@@ -7,24 +7,23 @@ import io
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Literal
 
 from dynident.errors import RecordingError
 from dynident.recording.formats.column_table import FileLayout
 from dynident.recording.formats.limits import require_few
+from dynident.recording.formats.text.column_titles import are_names, are_units, with_unit
 
 _COMMENT = re.compile(r"\s*(#|%|//)+\s*")
 _SEPARATOR_OF_EXCEL = re.compile(r'\s*"?sep=.?"?\s*')
 _DATE = re.compile(r"\s*\d{4}-\d\d-\d\d[T ]\d\d:\d\d")
+_WORD = re.compile(r"\w")
+_BETWEEN = re.compile(r"[,;\s]+")
 _SAMPLES = 100
 """Lines of samples that are looked at."""
-_OURS = re.compile(r"|-|s|sec|(rad|m)(/s(\^?2|²)?)?|n|n[*·.]?m")
-"""Units that need no word, without blanks and in small letters."""
-_OTHERS = re.compile(
-    r"[muµn]s(ec)?|(deg|°|grad|mm)(/s(\^?2|²)?)?|rpm|1/min|mn[*·.]?m|n[*·.]?mm|m?[av]|%|°?c|degc|w|hz"
-    r"|kg|counts?|inc|ticks"
-)
-_BRACKETED = re.compile(r"\[.*\]|\(.*\)|<.*>")
+_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+"""A number whose comma may stand before decimals, or at thousands."""
 _Signs = Literal[",", ";", "\t", " "]
 
 
@@ -70,8 +69,12 @@ class TextHead:
 def head_of(start: bytes, file: str, layout: FileLayout) -> TextHead:
     """Read the head of a text file.
 
-    Lines of comment (`#`, `%`, `//`) come first; the last of them names the columns if the line
-    below holds numbers, and as many. Below the names there may be a line of units.
+    Lines of comment (`#`, `%`, `//`) come first. Where the first line below them holds numbers, the
+    last of them names the columns if it has as many words, and they look like names; a sentence
+    does not. Below the names there may be a line of units.
+
+    A comma in numbers that it does not separate stands before decimals. Where every one of them may
+    as well stand at thousands ("1,234"), and there is no point, that is asked.
 
     Parameters
     ----------
@@ -86,41 +89,50 @@ def head_of(start: bytes, file: str, layout: FileLayout) -> TextHead:
     Raises
     ------
     RecordingError
-        If it has too many columns, the line that names them cannot be read, or all are comments.
+        If it has too many columns, the line that names them cannot be read, all are comments, or
+        commas may be of decimals or of thousands.
     """
-    stream = io.BytesIO(start)
-    comments, above = [], 0
-    for first in _lines(stream):
-        if first.strip() and not _is_comment(first):
+    lines = enumerate(_lines(io.BytesIO(start)), start=1)
+    comments: list[tuple[int, str]] = []
+    number = 0
+    for number, first in lines:
+        if first.strip() and not is_comment(first):
             break
-        comments += [first] if first.strip() else []
-        above += 1
+        comments += [(number, first)] if first.strip() else []
     else:
-        what = f"begins with {above} lines of comment, and no samples"
+        what = f"begins with {number} lines of comment, and no samples"
         raise RecordingError(what, file, "is it the right file?")
-    rest = [line for _, line in zip(range(_SAMPLES), _lines(stream), strict=False)]
-    separator = _separator(first, next(iter(rest), ""))
+    every = list(islice(lines, _SAMPLES))
+    rest = [one for one in every if not is_comment(one[1])]
+    separator = _separator(first, rest[0][1] if rest else "")
     require_few(1 + first.count(separator), "columns", file)
-    cells = _cells(first, separator, f"{file}, line {above + 1}")
-    below = [_split(line, separator) for line in rest if not _is_comment(line)]
-    titles, samples, units = (), [cells, *below], ()
+    cells = _cells(first, separator, f"{file}, line {number}")
+    below = [_split(line, separator) for _, line in rest]
+    titles, units, samples = (), (), [cells, *below]
+    named, above = number, number - 1
     if not _is_sample(cells, below, separator):
-        titles, samples, above = cells, below, above + 1
-        if len(below) > 1 and len(below[0]) == len(cells) and _are_units(below[0], below[1]):
-            units, samples, above = below[0], below[1:], above + 1
-    elif comments and layout.names in ((), "numbered"):
-        titles = _cells(_COMMENT.sub("", comments[-1], count=1), separator, f"{file}, line {above}")
-        titles = titles if len(titles) == len(cells) > 1 else ()
-        comments = comments[: -1 if titles else None]
+        titles, samples, above = cells, below, number
+        if len(below) > 1 and len(below[0]) == len(cells) and _above_numbers(below[0], below[1]):
+            units, samples, above = below[0], below[1:], rest[0][0]
+        comments += [one for one in every if one[0] < above and is_comment(one[1])]
+    elif layout.names in ((), "numbered"):
+        told = [(k, _COMMENT.sub("", line, count=1)) for k, line in comments]
+        told = [(k, line) for k, line in told if _WORD.search(line)][-2:]
+        if told and (last := _as_units(told[-1][1], separator, cells)):
+            units, told = last, told[:-1]
+        titles = _as_names(told[-1][1], separator, len(cells)) if told else ()
+        named = told[-1][0] if titles else number
+        units = units if titles else ()
+        comments = comments[: len(comments) - bool(titles) - bool(units)]
     said = [f"{len(comments)} line{'s' * (len(comments) != 1)} of comment"] if comments else []
     plain = [[_with_point(cell, separator) for cell in line] for line in samples]
     return TextHead(
         separator=separator,
-        decimal="," if _has_commas(samples, separator) else ".",
-        names=tuple(map(_with_unit, titles, units or [""] * len(titles))),
+        decimal=_decimal(samples, separator, file),
+        names=tuple(map(with_unit, titles, units or [""] * len(titles))),
         columns=len(cells),
         above=above,
-        line=above - bool(units) + (not titles),
+        line=named,
         dates=frozenset(k for k, cell in enumerate(plain[0] if plain else ()) if is_date(cell)),
         texts=frozenset(
             k for k in range(len(cells)) if _is_text(line[k : k + 1] for line in plain)
@@ -144,17 +156,13 @@ def is_date(text: str) -> bool:
     return bool(_DATE.match(text))
 
 
-def is_comment(cells: Sequence[str]) -> bool:
-    """Whether the cells of a line are those of a comment."""
-    return bool(cells) and _is_comment(cells[0])
+def is_comment(line: str) -> bool:
+    """Whether a line, or its first cell, is a comment; what Excel says of separators is one."""
+    return bool(_COMMENT.match(line) or _SEPARATOR_OF_EXCEL.fullmatch(line))
 
 
 def _lines(stream: io.BytesIO) -> Iterator[str]:
     return (line.decode().rstrip("\n") for line in stream)
-
-
-def _is_comment(line: str) -> bool:
-    return bool(_COMMENT.match(line) or _SEPARATOR_OF_EXCEL.fullmatch(line))
 
 
 def _separator(first: str, second: str) -> _Signs:
@@ -198,11 +206,16 @@ def _are_values(cells: Sequence[str], separator: str) -> bool:
     return all(is_number(_with_point(cell, separator)) for cell in cells)
 
 
-def _has_commas(samples: Sequence[Sequence[str]], separator: str) -> bool:
-    """Whether numbers have decimal commas, and none a point."""
+def _decimal(samples: Sequence[Sequence[str]], separator: str, file: str) -> Literal[".", ","]:
+    """What stands before decimals: a comma where numbers have one, and none a point."""
     cells = [cell for line in samples for cell in line]
-    commas = any(not is_number(x) and is_number(_with_point(x, separator)) for x in cells)
-    return commas and not any("." in x and is_number(x) for x in cells)
+    commas = [x for x in cells if not is_number(x) and is_number(_with_point(x, separator))]
+    if not commas or any("." in x and is_number(x) for x in cells):
+        return "."
+    if all(_GROUPED.fullmatch(x) for x in commas):
+        what = f"'{commas[0]}' may be {commas[0].replace(',', '.')} or {commas[0].replace(',', '')}"
+        raise RecordingError(what, file, "write decimal points, and no commas at thousands")
+    return ","
 
 
 def _kind(cell: str, separator: str) -> str:
@@ -219,24 +232,23 @@ def _is_sample(cells: Sequence[str], below: Sequence[Sequence[str]], separator: 
     return same and "number" in kinds
 
 
-def _are_units(cells: Sequence[str], below: Sequence[str]) -> bool:
+def _above_numbers(cells: Sequence[str], below: Sequence[str]) -> bool:
     """Whether cells are units, and a sample stands below them."""
-    known = all(_BRACKETED.fullmatch(cell) or _is_unit(_bare(cell).lower()) for cell in cells)
-    return known and any(cells) and any(is_number(cell.replace(",", ".")) for cell in below)
+    return are_units(cells) and any(is_number(cell.replace(",", ".")) for cell in below)
 
 
-def _is_unit(text: str) -> bool:
-    return bool(_OURS.fullmatch(text) or _OTHERS.fullmatch(text))
+def _as_units(comment: str, separator: str, sample: Sequence[str]) -> tuple[str, ...]:
+    """Units in a comment above a sample; () where it has none."""
+    cells = _split(comment, separator)
+    return tuple(cells) if len(cells) == len(sample) and _above_numbers(cells, sample) else ()
 
 
-def _bare(unit: str) -> str:
-    return re.sub(r"[\[\]()<>\s]", "", unit)
-
-
-def _with_unit(name: str, unit: str) -> str:
-    """A name with the unit that stands below it, if that is another one than ours."""
-    unit = _bare(unit)
-    return name if _OURS.fullmatch(unit.lower()) else f"{name} [{unit}]"
+def _as_names(comment: str, separator: str, count: int) -> tuple[str, ...]:
+    """Names of so many columns in a comment, which may separate them by commas or blanks."""
+    for cells in (_split(comment, separator), _BETWEEN.split(comment.strip())):
+        if len(cells) == count > 1 and are_names(cells):
+            return tuple(cells)
+    return ()
 
 
 def _is_text(cells: Iterable[Sequence[str]]) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import re
 from collections.abc import Iterator
 from typing import BinaryIO
 
@@ -18,8 +19,16 @@ _TAIL = 1 << 12
 """Bytes in which the end of the last line is looked for at a time."""
 
 
+_LATIN = re.compile(rb"[\t\n\r -~\xb0\xb2\xb3\xb5\xb7\xc0-\xd6\xd8-\xf6\xf8-\xfd]*")
+"""ISO 8859-1 with no more than its letters and the signs of units, of which hardly any other bytes
+consist."""
+
+
 def text_pieces(stream: BinaryIO, file: str) -> Iterator[bytes]:
     """Yield UTF-8 text in pieces of whole lines, with line feeds between the lines.
+
+    Text in ISO 8859-1 (Latin-1), as programs of Windows write umlauts and degree signs, is made
+    UTF-8 where it is letters and units.
 
     Empty lines are at the beginning of a piece, and in it, but not at its end; those at the end of
     a long text are left out. Quotation marks are closed in the piece in which they are opened.
@@ -32,7 +41,7 @@ def text_pieces(stream: BinaryIO, file: str) -> Iterator[bytes]:
     Raises
     ------
     FileError
-        If it is no UTF-8 text, or cannot be read.
+        If it is neither, or cannot be read.
     RecordingError
         If a line is longer than any of numbers.
     """
@@ -93,6 +102,8 @@ def _text(raw: bytes, place: int, file: str) -> bytes:
         if not raw.isascii():
             raw.decode()
     except UnicodeDecodeError as error:
+        if _LATIN.fullmatch(raw):
+            return _text(raw.decode("latin-1").encode(), place, file)
         what = f"is not UTF-8 text (byte {place + error.start})"
         raise FileError(what, file, "is it the right file?") from None
     if b"\0" in raw:
