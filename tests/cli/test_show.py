@@ -26,6 +26,18 @@ def test_several_entries_of_one_file_are_one_line(run, study):
     assert one["duration"] == 16.0 and one["period"] is None
 
 
+def test_what_a_file_holds_and_is_not_read_is_said(run, study, tmp_path):
+    path = study()
+    lines = (tmp_path / "train.csv").read_text().splitlines()
+    (tmp_path / "train.csv").write_text("\n".join([*lines[:9], "# a pause", *lines[9:], ""]))
+    done = run("show", path)
+    said = "Not read of train.csv: 1 line of comment among the samples."
+    assert said in " ".join(done.out.split())
+    first, second = run("show", path, "--json").json["recordings"]
+    assert first["not_read"] == ["1 line of comment among the samples"]
+    assert second["not_read"] == []
+
+
 def test_bad_places_are_refused_before_anything_is_read(run, study, tmp_path):
     path = study()
     before = listing(tmp_path)

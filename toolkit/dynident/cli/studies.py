@@ -98,7 +98,8 @@ def explain(
 def show(study: Path, to: Path) -> CommandAnswer:
     """Draw what a study has read: positions and torques, what is fitted and what is left out.
 
-    The picture is a PNG, SVG or PDF file; rates, jitter, gaps and repetitions are printed.
+    The picture is a PNG, SVG or PDF file; rates, jitter, gaps, repetitions and what was not
+    read are printed.
 
     Example: dynident show study.toml --to recordings.png
     """

@@ -33,6 +33,7 @@ class RecordFacts:
     repeats_to : difference of positions a period apart, relative to the motion; None likewise.
     left_out : stretches that are not used, and why.
     rows : that pass the filter and count, of all entries.
+    not_read : what else the file holds, in words each.
     """
 
     name: str
@@ -45,6 +46,7 @@ class RecordFacts:
     repeats_to: float | None
     left_out: tuple[str, ...]
     rows: int
+    not_read: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """The facts as JSON has them."""
@@ -78,6 +80,7 @@ def record_facts(study: Study) -> tuple[RecordFacts, ...]:
                 repeats_to=_repeats_to(one),
                 left_out=tuple(gone),
                 rows=sum(rows),
+                not_read=one.provenance.skipped,
             )
         )
     return tuple(found)
@@ -108,7 +111,10 @@ def recordings_table(facts: Sequence[RecordFacts]) -> Table:
         )
         for one in facts
     )
-    notes = ("Rows are those that pass the filter; jitter is the largest of a time step.",)
+    notes = (
+        "Rows are those that pass the filter; jitter is the largest of a time step.",
+        *(f"Not read of {one.name}: {'; '.join(one.not_read)}." for one in facts if one.not_read),
+    )
     return Table("Recordings as they were read", columns, rows, notes)
 
 
