@@ -17,6 +17,7 @@ from dynident.effects import Block, Effect, Needs
 from dynident.evidence.column_cache import ColumnCache, FirstLook, Kept
 from dynident.evidence.joint_columns import RigidColumns
 from dynident.evidence.runs import Run, Signals
+from dynident.evidence.stacks import Stack
 from dynident.evidence.windows import Source, sources
 from dynident.fitting.sampling import Sampled, decimate_each
 from dynident.model import Model
@@ -58,6 +59,11 @@ class Evidence:
     def with_runs(self, runs: tuple[Run, ...]) -> Evidence:
         """Return the evidence of other runs: what is known of their motions is still known."""
         return replace(self, runs=runs)
+
+    @cached_property
+    def stacks(self) -> tuple[Stack, ...]:
+        """The recordings, those that are cut alike together."""
+        return Stack.of(self.runs)
 
     @cached_property
     def torque_peaks(self) -> np.ndarray:

@@ -85,40 +85,47 @@ class NoiseModel:
         speed : (T,)
             Velocity of the joint, rad/s or m/s.
         """
-        return self.whitened([signals], self.weights(speed)).T
+        return self.whitened([[[signals]]], self.weights(speed)[None])[0, 0].T
 
-    def whitened(self, parts: Sequence[np.ndarray], weights: np.ndarray) -> np.ndarray:
-        """Whiten signals in several parts.
+    def whitened(
+        self, signals: Sequence[Sequence[Sequence[np.ndarray]]], weights: np.ndarray
+    ) -> np.ndarray:
+        """Whiten signals of several recordings, in several parts.
 
         Parameters
         ----------
-        parts : (T, k) each, in the order of time.
-        weights : (T,) by which they are multiplied first, see `weights`.
+        signals : for each of R recordings, for each of M replicates, parts (T, k) in the order of
+            time.
+        weights : (R, T) by which they are multiplied first, see `weights`.
 
         Returns
         -------
-        (k of all, T), the samples of a signal side by side.
+        (R, M, k of all, T), the samples of a signal side by side.
         """
-        order, samples = len(self.colour) - 1, len(weights)
+        order, samples = len(self.colour) - 1, weights.shape[1]
         if order == 0:
             weights = weights * self.colour[0]
+        columns = sum(part.shape[1] for part in signals[0][0])
         # Zeros before each signal: one correlation of many in a row mixes none with the next.
-        scaled = np.empty((sum(part.shape[1] for part in parts), order + samples))
-        scaled[:, :order] = 0.0
-        first = 0
-        for part in parts:
-            last = first + part.shape[1]
-            np.multiply(part.T, weights, out=scaled[first:last, order:])
-            first = last
+        scaled = np.empty((len(signals), len(signals[0]), columns, order + samples))
+        scaled[..., :order] = 0.0
+        for each, weight, here in zip(signals, weights, scaled, strict=True):
+            for parts, rows in zip(each, here, strict=True):
+                first = 0
+                for part in parts:
+                    last = first + part.shape[1]
+                    np.multiply(part.T, weight, out=rows[first:last, order:])
+                    first = last
         if order == 0:
             return scaled
-        white, some = np.empty((len(scaled), samples)), max(1, _AT_ONCE // max(1, samples))
-        for first in range(0, len(scaled), some):
-            rows = scaled[first : first + some]
+        every = scaled.reshape(-1, order + samples)
+        white, some = np.empty((len(every), samples)), max(1, _AT_ONCE // max(1, samples))
+        for first in range(0, len(every), some):
+            rows = every[first : first + some]
             found = np.correlate(rows.ravel(), self.colour[::-1], "valid")
             apart = (rows.strides[0], found.itemsize)
             white[first : first + some] = as_strided(found, (len(rows), samples), apart)
-        return white
+        return white.reshape(*scaled.shape[:3], samples)
 
 
 def flat_noise(std: float) -> NoiseModel:
