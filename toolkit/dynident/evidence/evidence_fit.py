@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
+from operator import add
 
 import numpy as np
 
@@ -136,7 +137,7 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
                 for r in range(len(evidence.runs))
             ]
         white = _whiten(evidence, columns, noise, values, white)
-        values = regression_values(_moments(evidence, model, noise, white).pooled(), reliable)
+        values = regression_values(_pooled(evidence, model, noise, white), reliable)
         if round == 0 and near is None:
             # Along a robot without bodies their columns are rounding errors, and any value fits.
             values = _keeping_dependent(model, at, values)
@@ -355,6 +356,13 @@ def _moments(evidence: Evidence, model: Model, noise, white: White) -> SecondMom
             here = here.where(time_varying[:, None] | time_varying[None, :], other)
         found.append(here)
     return SecondMoments.stacked(found)
+
+
+def _pooled(evidence: Evidence, model: Model, noise, white: White) -> SecondMoments:
+    """The moments of all blocks together, in less time where nothing depends on the time."""
+    if time_varying_mask(model).any():
+        return _moments(evidence, model, noise, white).pooled()
+    return reduce(add, (WhiteColumns.pooled(joints) for joints in white))
 
 
 def _signal(evidence: Evidence, white: White, values: np.ndarray) -> float:

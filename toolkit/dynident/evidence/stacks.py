@@ -93,7 +93,8 @@ class Stack:
             signals = [each[-1:] for each in signals]
         elif self.kind == "repeated":
             signals = [each[:1] for each in signals]
-        weights, told = noise.weights(self._speeds[joint]), self._told(joint)
+        weights = noise.weights(self._speeds[joint])
+        told = None if self._told is None else self._told[joint]
         if told is not None:
             weights = weights * told
         white = noise.whitened(signals, weights)
@@ -123,12 +124,18 @@ class Stack:
         place = -1 if self._simulated else 0
         return np.stack([run.replicates[place].v.T for run in self.runs], axis=1)
 
-    def _told(self, joint: int) -> np.ndarray | None:
-        """Rows whose dry friction is known at a joint, (R, T) mask; None for all of them."""
+    @cached_property
+    def _told(self) -> np.ndarray | None:
+        """Rows whose dry friction is known at each joint, (n, R, T) mask; None for all of them."""
         if all(run.uncertain is None for run in self.runs):
             return None
-        told = [run.told(joint) for run in self.runs]
-        return np.array([np.ones(len(self._speeds[0, 0])) if t is None else t for t in told])
+        told = np.ones(self._speeds.shape, dtype=bool)
+        for joint, joints_rows in enumerate(told):
+            for run, rows in zip(self.runs, joints_rows, strict=True):
+                known = run.told(joint)
+                if known is not None:
+                    rows[:] = known
+        return told
 
     @cached_property
     def _repetitions(self) -> tuple[np.ndarray | slice, ...]:

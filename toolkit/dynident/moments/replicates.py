@@ -80,9 +80,9 @@ def replicate_moments(
         return SecondMoments(total, counts, None, total - noise / (replicates - 1))
     total, free = _products(left, right), None
     if kind == "repeated":
-        one = left.sum(axis=-2, keepdims=True)
-        two = one if right is left else right.sum(axis=-2, keepdims=True)
-        free = (_products(one, two) - total) / (replicates - 1)
+        one = np.einsum("...pl->...l", left)
+        two = one if right is left else np.einsum("...pl->...l", right)
+        free = (one @ np.swapaxes(two, -1, -2) - total) / (replicates - 1)
     return SecondMoments(total, counts * replicates, None, free)
 
 
