@@ -89,6 +89,14 @@ class Run:
         told[self.index[:, ~self.certain(joint)]] = False
         return told
 
+    def noisy_speeds(self, joint: int) -> list[np.ndarray]:
+        """Velocity of a joint (S,) in each replicate whose noise the others tell."""
+        certain = self.certain(joint)
+        if self.kind == "single" or not certain.any():
+            return []
+        told = self.index if self.kind == "repeated" else self.index[1:]
+        return list(self.replicates[0].v[:, joint][told][:, certain])
+
     def known(self, signals: np.ndarray, joint: int) -> np.ndarray:
         """Signals (T, k) of a joint, zero in rows whose dry friction nothing tells."""
         told = self.told(joint)
