@@ -179,6 +179,14 @@ def test_where_nothing_is_told_no_share_is_named() -> None:
     one = shares(position_and_velocity=(0.05, 0.04), time=(-0.1, 0.05))
     assert one.sentence.endswith("by position and velocity of this joint or time.")
     assert "%" not in one.sentence
+    (row,) = dependence_table((one,)).rows
+    assert row == ("elbow", "(5 \u00b1 4)", "(0 \u00b1 5)", "100")
+
+
+def test_the_table_sets_what_is_not_told_in_brackets() -> None:
+    one = shares(position_and_velocity=(0.62, 0.04), past=(0.2, 0.03), time=(0.05, 0.05))
+    (row,) = dependence_table((one,)).rows
+    assert row == ("elbow", "62 \u00b1 4", "20 \u00b1 3", "(5 \u00b1 5)", "18 \u00b1 5")
 
 
 def test_joints_of_which_the_same_is_to_be_said_share_a_sentence() -> None:

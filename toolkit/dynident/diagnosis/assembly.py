@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from dynident.diagnosis.advice.experiments import Adviser
+from dynident.diagnosis.answer import Verdict
 from dynident.diagnosis.candidate_gains import candidate_gains
 from dynident.diagnosis.details import Candidate, JointResult, Status, Step, TestError, Trace
 from dynident.diagnosis.detection_limits import detection_limits
@@ -23,7 +24,7 @@ from dynident.diagnosis.nuisances.sampling_time import sampling_time
 from dynident.diagnosis.nuisances.stated_noise import stated_noise_notes
 from dynident.diagnosis.nuisances.sticking import shares_left_out
 from dynident.diagnosis.nuisances.unlike_recordings import training_notes, unlike_notes
-from dynident.diagnosis.result import Diagnosis, Verdict
+from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.paired_falls import fall_standard_error
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.search.refusal import impossible_joints_of

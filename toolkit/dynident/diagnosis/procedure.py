@@ -64,7 +64,6 @@ from dynident.diagnosis.search.shaped_fit import refitted, shaped
 from dynident.diagnosis.search.withdrawal import Path, path_of
 from dynident.diagnosis.stage import AskedSwitches, DiagnosisTask, Propose, Stage
 from dynident.diagnosis.switches import switches_of
-from dynident.diagnosis.wiring_answer import answered_by
 from dynident.effects import Effect
 from dynident.errors import FitError
 from dynident.evidence.columns import Evidence
@@ -150,7 +149,7 @@ def diagnose(
     start = _compare(given, controller, criteria, task)
     extended = _extend(_rank(start, task), task)
     settled, path = _settle(_search_globally(start, extended, task), task)
-    found = answered_by(faults, _judge(settled, path, task))
+    found = _judge(settled, path, task).answered_by(faults)
     # The data that judge a regression, or a law, show nothing of what only training leaves.
     left = found.verdict == "unexplained" and not found.training_only
     asked = left or propose == "always"

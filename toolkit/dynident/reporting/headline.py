@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from dynident.diagnosis.answer import Rest
 from dynident.diagnosis.effect_groups import in_words
 from dynident.diagnosis.leading_effects import LeadingEffects
 from dynident.diagnosis.result import Diagnosis
@@ -15,8 +16,12 @@ Mark = Literal["\u2713", "!", "?"]
 """Nothing is left but noise; something is to be mended or remains; it cannot be said."""
 
 _COLOURS: dict[Mark, str] = {"\u2713": "nothing_missing", "!": "unexplained", "?": "unknown"}
-_WITHIN, _SMALLER = "within the noise", "smaller than the noise, though not nothing"
-_LARGER = "larger than the noise, and may be what the steps of the encoders leave"
+_MORE: dict[Rest, str] = {
+    "within the noise": "",
+    "smaller than the noise": ", though not nothing",
+    "larger than the noise": ", and may be what the steps of the encoders leave",
+}
+"""What is to be said beside the size of what remains."""
 _MOST_NAMED = 2
 """Effects that the sentence names."""
 _NOT_KNOWN = "The noise is unknown, so more may be missing."
@@ -89,7 +94,8 @@ def _of_verdict(diagnosis: Diagnosis) -> Headline:
         none = "" if stopped else " unexplained"
         said = f"{added} {fall}, and a residual beyond the noise remains{none}."
         return Headline("!", f"{title}, a residual remains", said)
-    return Headline("\u2713", title, f"{added} {fall}; what remains is {_rest(diagnosis)}.")
+    remains = f"what remains is {diagnosis.rest}{_MORE[diagnosis.rest]}"
+    return Headline("\u2713", title, f"{added} {fall}; {remains}.")
 
 
 def _title(diagnosis: Diagnosis) -> str:
@@ -101,13 +107,6 @@ def _title(diagnosis: Diagnosis) -> str:
         return f"{count} effects found"
     main = len(found.leading)
     return f"{in_words(main)} main effect{'s' if main > 1 else ''} found"
-
-
-def _rest(diagnosis: Diagnosis) -> str:
-    left = max((joint.ratio_after or 0.0 for joint in diagnosis.joints), default=0.0)
-    if left <= diagnosis.criteria.verdict.not_nothing:
-        return _WITHIN
-    return _SMALLER if left < 1.0 else _LARGER
 
 
 def _followed(diagnosis: Diagnosis) -> str:
@@ -138,9 +137,10 @@ def _nothing_added(diagnosis: Diagnosis, known: bool) -> Headline:
         said = f"Effects are significant, and none was added. {_NOT_KNOWN}"
         return Headline("?", "nothing added, noise unknown", said)
     if known:
-        rest = _rest(diagnosis)
-        if rest != _WITHIN:
-            return Headline("?", "no missing effect is found", f"What remains is {rest}.")
+        rest = diagnosis.rest
+        if rest != "within the noise":
+            said = f"What remains is {rest}{_MORE[rest]}."
+            return Headline("?", "no missing effect is found", said)
         if diagnosis.withdrawn:
             said = f"Held-out data confirm nothing that is missing, and what remains is {rest}."
             return Headline("?", "no missing effect is confirmed", said)

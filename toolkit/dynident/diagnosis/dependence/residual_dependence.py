@@ -224,7 +224,7 @@ def dependence_table(found: Sequence[JointDependence]) -> Table:
         (
             one.joint,
             *(_cell(one.shares.by.get(name) if one.shares else None) for name in asked),
-            _cell(one.shares.rest if one.shares else None),
+            _rest(one),
         )
         for one in found
     )
@@ -234,15 +234,16 @@ def dependence_table(found: Sequence[JointDependence]) -> Table:
         else "Shares are of all that is left, noise included: nothing tells it from the rest."
     )
     return Table(
-        "What is left, by what a flexible regression explains on held-out blocks of time",
+        "Percent of what is left that a flexible regression explains on held-out blocks of time",
         ("joint", *asked, "none of these"),
         rows,
         (
-            f"{noise} Each with its standard error over the blocks; told from nothing at the level "
-            "of 5 % over all sets of inputs.",
+            f"{noise} Each with its standard error over the blocks. In brackets: what cannot be "
+            "told from nothing, at the level of 5 % over all sets of inputs, and is not taken off "
+            "what none of these explains.",
             "Each share is what inputs add to those before them that are told: what two sets "
             "explain alike counts for the earlier. The past (elasticity, hysteresis) comes before "
-            "acceleration and load where it explains more. Negative shares are shown as 0 %.",
+            "acceleration and load where it explains more. Negative shares are shown as 0.",
             "An estimate of what laws in these quantities could explain. A regression on more data "
             "may explain more; that it explains something does not say that the cause is there.",
         ),
@@ -252,7 +253,15 @@ def dependence_table(found: Sequence[JointDependence]) -> Table:
 def _cell(share: Share | None) -> str:
     if share is None:
         return "-"
-    return f"{_rounded(max(share.value, 0.0))} \u00b1 {_rounded(share.error)}"
+    both = f"{100 * max(share.value, 0.0):.0f} \u00b1 {100 * share.error:.0f}"
+    return both if share.told else f"({both})"
+
+
+def _rest(one: JointDependence) -> str:
+    """What none of the inputs explains: all of it where none is told, which is no measurement."""
+    if one.shares is None:
+        return "-"
+    return _cell(one.shares.rest) if one.told else "100"
 
 
 def _rounded(value: float) -> str:

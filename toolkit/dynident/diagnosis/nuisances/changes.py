@@ -53,6 +53,10 @@ class Repeated:
 class Changes:
     """Differences of one series, in the order of time, with their noise.
 
+    The filter looks back. Behind instants that do not count, the noise that it expects is not
+    known, and what it leaves there is larger than elsewhere, the smoother the noise the more: these
+    rows say nothing of a pulse.
+
     Attributes
     ----------
     of : the series.
@@ -71,24 +75,43 @@ class Changes:
     reach: float
 
     @cached_property
-    def spectra(self) -> tuple[int, np.ndarray, np.ndarray]:
+    def whole(self) -> np.ndarray:
+        """Rows (P S,) before which all that the whitening filter looks back to counts, a mask."""
+        counts = (self.still > 0).astype(float)
+        lost = len(self.colour) - _filtered(np.ones(len(self.colour)), counts)
+        return lost < 0.5
+
+    def whitened(self, x: np.ndarray, whole: np.ndarray) -> np.ndarray:
+        """Samples (T, ...) over the noise; zero where that is not known.
+
+        Parameters
+        ----------
+        x : over the noise's local standard deviation.
+        whole : (T, ...) of these samples.
+        """
+        return _filtered(self.colour, x) * whole
+
+    @cached_property
+    def spectra(self) -> tuple[int, np.ndarray]:
         """What pulses of all widths are convolved with, transformed: see `scanned`.
 
         Returns
         -------
-        Samples of the transform; the transforms (1 + lags, ...) of the whitened series, filtered
-        backward, and of the scales' products at each lag; and the filter's own products (lags,).
+        Samples of the transform; and the transforms (1 + lags, ...) of the whitened series,
+        filtered backward, and of the scales' products at each lag with what the filter makes of
+        them in rows that count.
         """
         rows, lags = len(self.change), range(min(len(self.colour), len(self.change)))
         size = int(scipy.fft.next_fast_len(2 * rows, real=True))
-        white = _filtered(self.colour, self.change * self.still)
+        white = self.whitened(self.change * self.still, self.whole)
         signals = np.zeros((1 + len(lags), rows))
         back = _filtered(self.colour, white[::-1])[::-1]
         signals[0] = back * self.still
         for lag in lags:
-            signals[1 + lag, : rows - lag] = self.still[: rows - lag] * self.still[lag:]
-        mixed = [self.colour[: len(self.colour) - lag] @ self.colour[lag:] for lag in lags]
-        return size, scipy.fft.rfft(signals, size, axis=1), np.array(mixed)
+            both = self.colour[: len(self.colour) - lag] * self.colour[lag:]
+            seen = _filtered(both, self.whole[::-1])[::-1][lag:]
+            signals[1 + lag, : rows - lag] = self.still[: rows - lag] * self.still[lag:] * seen
+        return size, scipy.fft.rfft(signals, size, axis=1)
 
     def certainty(self, row: float, width: float) -> float:
         """Share of a pulse's z value that is left for two doubts.
@@ -106,7 +129,7 @@ class Changes:
         pulse = np.exp(-(((np.arange(own.start, own.stop) - row) / width) ** 2) / 2)
         columns = np.column_stack([self.change[own], pulse, *_slow(self.of.speed[p]).T])
         columns = columns * self.still[own, None]
-        white = _filtered(self.colour, columns)
+        white = self.whitened(columns, self.whole[own, None])
         change, pulse, slow = white[:, 0], white[:, 1], white[:, 2:]
         power = max(float(pulse @ pulse), 1e-300)
         along = slow.T @ pulse
@@ -140,8 +163,8 @@ class Changes:
         inside = (around >= 0) & (around < length)
         at = np.clip(around, 0, length - 1)
         pulse = np.exp(-(((around - rows[:, None]) / width) ** 2) / 2) * inside
-        template = _filtered(self.colour, (pulse * self.still[at]).T).T * inside
-        white = _filtered(self.colour, signal * self.still)
+        template = self.whitened((pulse * self.still[at]).T, (self.whole[at] * inside).T).T
+        white = self.whitened(signal * self.still, self.whole)
         product = np.sum(template * white[at], axis=1)
         power = np.maximum(np.sum(template**2, axis=1), 1e-300)
         return np.stack([product / np.sqrt(power), product / power])
@@ -161,14 +184,14 @@ def scanned(one: Changes, width: float) -> np.ndarray:
     All of them circular, over twice the rows, so that nothing comes round: what does not depend on
     the width is transformed once.
     """
-    rows, (size, spectra, mixed) = len(one.change), one.spectra
+    rows, (size, spectra) = len(one.change), one.spectra
     half = min(int(np.ceil(one.reach * width)), rows - 1)
     pulse = np.exp(-((np.arange(-half, half + 1) / width) ** 2) / 2)
     kernels = np.zeros((len(spectra), size))
     kernels[0, np.arange(-half, half + 1)] = pulse
     # The whitened pulse's square: over the lags that the filter mixes.
-    for lag, both in enumerate(mixed[: len(pulse)]):
-        product = (1.0 if lag == 0 else 2.0) * both * pulse[: len(pulse) - lag] * pulse[lag:]
+    for lag in range(min(len(spectra) - 1, len(pulse))):
+        product = (1.0 if lag == 0 else 2.0) * pulse[: len(pulse) - lag] * pulse[lag:]
         kernels[1 + lag, np.arange(lag - half, half + 1)] = product[::-1]
     turned = spectra * scipy.fft.rfft(kernels, axis=1)
     product, power = scipy.fft.irfft([turned[0], turned[1:].sum(axis=0)], size, axis=1)[:, :rows]

@@ -21,24 +21,35 @@ _REACH = 2.0
 """Standard deviations of a pulse on either side, within which it is said to be."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Disturbance:
-    """A contact, with the held-out error before and after it is left out, and where it was."""
+    """The clearest contact at a joint, with the held-out error before and after it is left out.
+
+    Attributes
+    ----------
+    pulse : the contact.
+    error_before, error_after : the held-out error.
+    recording : where it is.
+    more : other contacts at the same joint, in whichever recording; left out, too.
+    """
 
     pulse: DisturbancePulse
     error_before: float
     error_after: float
     recording: Recording
+    more: int = 0
 
     def sentence(self, model: Model) -> str:
         """Where the push is, on the clock of its recording, and how strong, in plain words."""
         pulse, robot = self.pulse, model.robot
         unit = robot.torque_units[robot.names.index(pulse.joint)]
         at, reach = pulse.time - self.recording.start, _REACH * pulse.width
+        others = f", and {self.more} more pushes that are less clear" if self.more > 1 else ""
+        others = ", and one more push that is less clear" if self.more == 1 else others
         return (
             f"Contact at {pulse.joint}: a push of {number(pulse.amplitude, 2)} {unit} in "
-            f"{self.recording.where}, from t = {at - reach:.2f} to {at + reach:.2f} s. What "
-            "is around it is left out."
+            f"{self.recording.where}, from t = {at - reach:.2f} to {at + reach:.2f} s{others}. "
+            f"What is around {'them' if self.more else 'it'} is left out."
         )
 
     def effect(self, model: Model) -> Effect:
@@ -138,9 +149,11 @@ class Contacts:
         One for each joint where a pulse was found, the clearest first. All pulses are left out at
         once: the first stands for what that changes, the others for no further change.
         """
-        clearest: dict[str, DisturbancePulse] = {}
+        clearest: dict[str, list[DisturbancePulse]] = {}
         for pulse in sorted((*self.pulses, *self.pulses_held), key=lambda one: one.p_value):
-            clearest.setdefault(pulse.joint, pulse)
+            known = clearest.setdefault(pulse.joint, [])
+            if not _common((pulse,), known, evidence.criteria.contacts.same_place):
+                known.append(pulse)
         if not clearest:
             return ()
         judged, whole, pulses = evidence, self.whole, self.pulses
@@ -151,8 +164,15 @@ class Contacts:
         every = (run.recording for run in (*self.whole, *self.whole_held))
         recordings = {one.number: one for one in every}
         found = []
-        for pulse in clearest.values():
-            found.append(Disturbance(pulse, before, after, recordings[pulse.number]))
+        for pulse, *others in clearest.values():
+            one = Disturbance(
+                pulse=pulse,
+                error_before=before,
+                error_after=after,
+                recording=recordings[pulse.number],
+                more=len(others),
+            )
+            found.append(one)
             before = after
         return tuple(found)
 
@@ -198,7 +218,7 @@ def _common(
         one
         for one in pulses
         if any(
-            (one.run, one.joint, one.repetition) == (two.run, two.joint, two.repetition)
+            (one.number, one.joint, one.repetition) == (two.number, two.joint, two.repetition)
             and abs(one.time - two.time) <= reach * (one.width + two.width)
             for two in others
         )

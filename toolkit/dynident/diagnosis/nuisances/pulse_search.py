@@ -181,6 +181,7 @@ class _PulsePlace:
     Attributes
     ----------
     chance : probability of its like there under noise alone.
+    short_of : minus its z value, which tells places apart whose chance is too small for a number.
     series : whose it is, among those of its joint.
     row, width : in rows.
     tried : number of places of that width.
@@ -188,6 +189,7 @@ class _PulsePlace:
     """
 
     chance: float
+    short_of: float
     series: int
     row: float
     width: float
@@ -220,7 +222,7 @@ def _places(prepared: Sequence[Changes], criteria: ContactCriteria) -> list[_Pul
         degrees = degrees_of_freedom(single.own[away if away.any() else witnesses], criteria)
         z = float(tried.z[best]) * prepared[k].certainty(row, rows)
         chance = chance_of(z, degrees, rows)
-        found.append(_PulsePlace(chance, k, row, rows, len(tried.z), prepared[k]))
+        found.append(_PulsePlace(chance, -z, k, row, rows, len(tried.z), prepared[k]))
     return found
 
 
@@ -272,7 +274,7 @@ def _tried(prepared: Sequence[Changes], width: float, criteria: ContactCriteria)
         if rows_wide > criteria.widest_share * instants:
             continue
         rows = np.arange(0, repetitions * instants, max(1, int(criteria.stride * rows_wide)))
-        rows = rows[one.of.certain[rows % instants]]
+        rows = rows[one.whole[rows]]
         if len(np.unique(rows // instants)) < repetitions:
             continue
         z = np.abs(scanned(one, rows_wide)[rows])
@@ -293,9 +295,15 @@ def _usual(z: np.ndarray, rows: np.ndarray, reach: float) -> float:
 
 def _refined(place: _PulsePlace, p_value: float, criteria: ContactCriteria) -> DisturbancePulse:
     """The pulse with its best time and width, in the repetition where it is."""
-    one, row, width = place.of, place.row, place.width
+    one = place.of
     least = criteria.narrowest / one.of.step
     most = criteria.widest_share * one.of.residual.shape[1]
+    # The width that is least probable under noise alone need not be the one that fits best.
+    near = place.row + place.width * np.linspace(-2.0, 2.0, 17)
+    widths = [w for w in np.array(_widths(criteria)) / one.of.step if w <= max(most, least)]
+    fits = np.abs([one.match(one.change, near, w)[0] for w in (place.width, *widths)])
+    best = np.unravel_index(int(np.argmax(fits)), fits.shape)
+    row, width = float(near[best[1]]), (place.width, *widths)[best[0]]
 
     def misfit(x: np.ndarray) -> float:
         wide = width * np.exp(np.clip(x[1], -0.7, 0.7))
