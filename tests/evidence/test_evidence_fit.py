@@ -46,7 +46,7 @@ def test_what_changes_at_one_joint_leaves_the_columns_of_the_others() -> None:
         fit_evidence(one, model, fitted) for one in (evidence, Evidence(study.model, runs))
     )
     same = [
-        all(a is b for a, b in zip(one.parts[0], two.parts[0], strict=False))
+        all(a is b for a, b in zip(one.parts[0][0], two.parts[0][0], strict=False))
         for one, two in _joints(fitted, wider)
     ]
     assert same == [True, False]  # shoulder, elbow

@@ -8,6 +8,7 @@ from scipy.signal import lfilter
 
 from dynident.criteria import NoiseCriteria
 from dynident.evidence.noise_model import (
+    SpeedClasses,
     differences,
     flat_noise,
     inflation,
@@ -31,7 +32,7 @@ def speed(count: int = SAMPLES) -> np.ndarray:
 
 
 def white_after(noise: np.ndarray, probe: np.ndarray) -> np.ndarray:
-    model = measure_noise([noise], [speed(len(noise))], CRITERIA)
+    model = measure_noise([noise], SpeedClasses.of([speed(len(noise))], CRITERIA), CRITERIA)
     return model.whiten(probe[:, None], speed(len(probe)))[CRITERIA.order :, 0]
 
 
@@ -52,8 +53,8 @@ def test_units_do_not_matter(factor: float) -> None:
 
 def test_the_sign_of_the_noise_and_of_the_speed_do_not_matter() -> None:
     noise = coloured(0.6, 4)
-    one = measure_noise([noise], [speed()], CRITERIA)
-    other = measure_noise([-noise], [-speed()], CRITERIA)
+    one = measure_noise([noise], SpeedClasses.of([speed()], CRITERIA), CRITERIA)
+    other = measure_noise([-noise], SpeedClasses.of([-speed()], CRITERIA), CRITERIA)
     assert other.std == one.std
     assert np.array_equal(other.colour, one.colour)
     assert np.array_equal(other.scales, one.scales)
@@ -62,8 +63,8 @@ def test_the_sign_of_the_noise_and_of_the_speed_do_not_matter() -> None:
 def test_stretches_in_any_order_say_the_same() -> None:
     parts = [coloured(0.6, seed, 1000) for seed in range(4)]
     speeds = [speed(1000) * (k + 1) for k in range(4)]
-    one = measure_noise(parts, speeds, CRITERIA)
-    other = measure_noise(parts[::-1], speeds[::-1], CRITERIA)
+    one = measure_noise(parts, SpeedClasses.of(speeds, CRITERIA), CRITERIA)
+    other = measure_noise(parts[::-1], SpeedClasses.of(speeds[::-1], CRITERIA), CRITERIA)
     assert other.std == pytest.approx(one.std, rel=1e-12)
     assert other.colour == pytest.approx(one.colour, rel=1e-9)
     assert other.scales == pytest.approx(one.scales, rel=1e-9)
@@ -73,7 +74,9 @@ def test_noise_that_grows_at_rest_is_seen_where_it_does() -> None:
     rng = np.random.default_rng(5)
     v = speed()
     local = np.where(np.abs(v) < 0.2, 3.0, 1.0)
-    model = measure_noise([local * rng.normal(size=SAMPLES)], [v], CRITERIA)
+    model = measure_noise(
+        [local * rng.normal(size=SAMPLES)], SpeedClasses.of([v], CRITERIA), CRITERIA
+    )
     at_rest, moving = np.interp([0.05, 0.8], model.speeds, model.scales) * model.std
     assert at_rest == pytest.approx(3.0, rel=0.15)
     assert moving == pytest.approx(1.0, rel=0.15)
@@ -83,14 +86,16 @@ def test_scales_stay_within_their_limits() -> None:
     v = speed()
     local = np.where(np.abs(v) < 0.05, 1000.0, 1.0)
     noise = local * np.random.default_rng(6).normal(size=SAMPLES)
-    model = measure_noise([noise], [v], CRITERIA)
+    model = measure_noise([noise], SpeedClasses.of([v], CRITERIA), CRITERIA)
     assert np.all(model.scales >= CRITERIA.least_scale)
     assert np.all(model.scales <= CRITERIA.largest_scale)
 
 
 @pytest.mark.parametrize("misfit", [0.0, 2.5])
 def test_no_noise_is_flat_noise_of_the_size_of_what_is_missing(misfit: float) -> None:
-    model = measure_noise([np.zeros(100)], [speed(100)], CRITERIA, misfit)
+    model = measure_noise(
+        [np.zeros(100)], SpeedClasses.of([speed(100)], CRITERIA), CRITERIA, misfit
+    )
     flat = flat_noise(misfit or 1.0)
     probe = np.arange(20.0)[:, None]
     assert np.array_equal(model.whiten(probe, speed(20)), flat.whiten(probe, speed(20)))
@@ -102,7 +107,7 @@ def test_flat_noise_divides_by_its_size() -> None:
 
 
 def test_whitening_is_linear_and_column_by_column() -> None:
-    model = measure_noise([coloured(0.7, 8)], [speed()], CRITERIA)
+    model = measure_noise([coloured(0.7, 8)], SpeedClasses.of([speed()], CRITERIA), CRITERIA)
     one, two = np.random.default_rng(9).normal(size=(2, 200, 2))
     v = speed(200)
     together = model.whiten(2.0 * one - two, v)
@@ -112,14 +117,14 @@ def test_whitening_is_linear_and_column_by_column() -> None:
 
 @pytest.mark.parametrize("coloured_noise", [True, False])
 def test_signals_without_samples_stay_without(coloured_noise: bool) -> None:
-    model = measure_noise([coloured(0.7, 8)], [speed()], CRITERIA)
+    model = measure_noise([coloured(0.7, 8)], SpeedClasses.of([speed()], CRITERIA), CRITERIA)
     assert len(model.colour) > 1
     found = (model if coloured_noise else flat_noise(2.0)).whiten(np.zeros((0, 3)), np.zeros(0))
     assert found.shape == (0, 3)
 
 
 def test_few_samples_make_a_model_without_colour() -> None:
-    model = measure_noise([coloured(0.9, 10, 12)], [speed(12)], CRITERIA)
+    model = measure_noise([coloured(0.9, 10, 12)], SpeedClasses.of([speed(12)], CRITERIA), CRITERIA)
     assert len(model.colour) == 1
     assert np.all(np.isfinite(model.whiten(np.ones((12, 1)), speed(12))))
 

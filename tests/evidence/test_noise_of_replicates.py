@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from dynident.criteria import DEFAULTS
-from dynident.evidence.noise_model import differences, measure_noise, systematic_square
+from dynident.evidence.noise_model import (
+    SpeedClasses,
+    differences,
+    measure_noise,
+    systematic_square,
+)
 
 RNG = np.random.default_rng(11)
 
@@ -30,7 +35,7 @@ def test_whitened_noise_is_white_and_of_unit_variance() -> None:
         white = RNG.normal(size=3000)
         coloured = np.convolve(white, [1.0, 0.8, 0.4])[:3000]
         shaped.append(0.2 * coloured * (1.0 + 1.5 * np.exp(-((v / 0.2) ** 2))))
-    model = measure_noise(shaped, speed, DEFAULTS.noise)
+    model = measure_noise(shaped, SpeedClasses.of(speed, DEFAULTS.noise), DEFAULTS.noise)
     for noise, v in zip(shaped, speed, strict=True):
         e = model.whiten(noise[:, None], v)[20:, 0]
         assert np.mean(e**2) == pytest.approx(1.0, rel=0.15)
@@ -41,8 +46,10 @@ def test_whitened_noise_is_white_and_of_unit_variance() -> None:
 
 def test_what_is_missing_counts_as_white_noise_on_top() -> None:
     noise = [RNG.normal(size=2000)]
-    speed = [np.ones(2000)]
-    plain, missing = (measure_noise(noise, speed, DEFAULTS.noise, misfit) for misfit in (0.0, 3.0))
+    classes = SpeedClasses.of([np.ones(2000)], DEFAULTS.noise)
+    plain, missing = (
+        measure_noise(noise, classes, DEFAULTS.noise, misfit) for misfit in (0.0, 3.0)
+    )
     probe = RNG.normal(size=(500, 1))
     ratio = np.std(plain.whiten(probe, np.ones(500))) / np.std(missing.whiten(probe, np.ones(500)))
     assert ratio == pytest.approx(np.sqrt(10.0), rel=0.05)

@@ -35,8 +35,9 @@ def test_a_ramp_is_its_own_instrument_under_noise_of_any_colour() -> None:
     assert len(found.noise[0].colour) > 1
     ramp = at_shoulder("torque_drift", evidence.model)
     columns = evidence.of(ramp, 0, evidence.model, None)[0][:, 0]
-    white = evidence.runs[0].whitened([columns], 0, found.noise[0])
-    made = time_varying_variants(evidence, [ramp], 0, 0, found.noise[0], ([columns], white))
+    (stack,) = evidence.stacks
+    white = stack.unfolded(stack.whitened([[[columns]]], 0, found.noise[0]))
+    made = time_varying_variants(evidence, [ramp], stack, 0, found.noise[0], ([[columns]], white))
     np.testing.assert_allclose(made.instruments, white, rtol=1e-6)
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dynident.moments.replicates import replicate_moments
 from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import regress, regression_values
+from row_moments import row_moments
 
 RELIABLE = 0.05
 
@@ -25,7 +25,7 @@ def moments(noise: float, dependence: float) -> SecondMoments:
     rows = np.repeat(np.column_stack([columns, output])[None], 3, axis=0)
     rows[:, :, 5] += noise * 1e6 * rng.standard_normal(rows.shape[:2])
     rows[:, :, 6] += 0.1 * rng.standard_normal(rows.shape[:2])
-    return replicate_moments(rows, rows, np.array([0, 400]), "repeated").pooled()
+    return row_moments(rows, rows, np.array([0, 400]), "repeated").pooled()
 
 
 @pytest.mark.parametrize("dependence", [1.0, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 0.0])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dynident.criteria import DEFAULTS
-from dynident.moments.replicates import replicate_moments
 from dynident.moments.solution import regress
+from row_moments import row_moments
 
 RELIABLE = DEFAULTS.noise.reliable
 RNG = np.random.default_rng(11)
@@ -25,7 +25,7 @@ def test_signal_moments_are_free_of_noise_in_the_mean(replicates: int) -> None:
     trials = 2000
     for _ in range(trials):
         noisy = repeated(signal, replicates, 0.5, RNG)
-        total += replicate_moments(noisy, noisy, edges, "repeated").signal.sum(axis=0)
+        total += row_moments(noisy, noisy, edges, "repeated").signal.sum(axis=0)
     expected = replicates * signal.T @ signal
     # One trial's standard deviation is about 0.5 * 2 * sqrt(60) * versions at most.
     tolerance = 5 * 8.0 * replicates / np.sqrt(trials)
@@ -39,14 +39,14 @@ def test_moments_of_noisy_copies_are_corrected_in_the_mean() -> None:
     for _ in range(trials):
         measured = signal + 0.5 * RNG.normal(size=signal.shape)
         copies = np.stack([measured, *(measured + 0.5 * RNG.normal(size=(3, 80, 2)))])
-        total += replicate_moments(copies, copies, np.array([0, 80]), "noise_augmented").signal[0]
+        total += row_moments(copies, copies, np.array([0, 80]), "noise_augmented").signal[0]
     assert np.allclose(total / trials, signal.T @ signal, atol=5 * 12.0 / np.sqrt(trials))
 
 
 def test_blocks_add_up_and_the_moments_are_symmetric() -> None:
     data = RNG.normal(size=(3, 40, 4))
-    whole = replicate_moments(data, data, np.array([0, 40]), "repeated")
-    parts = replicate_moments(data, data, np.array([0, 7, 29, 40]), "repeated")
+    whole = row_moments(data, data, np.array([0, 40]), "repeated")
+    parts = row_moments(data, data, np.array([0, 7, 29, 40]), "repeated")
     assert np.allclose(whole.signal[0], parts.signal.sum(axis=0))
     assert np.allclose(whole.signal, whole.signal.transpose(0, 2, 1))
     assert np.allclose(whole.total[0], data.reshape(-1, 4).T @ data.reshape(-1, 4))
@@ -61,7 +61,7 @@ def test_instruments_do_not_shrink_what_least_squares_shrinks() -> None:
         columns = repeated(clean, 2, 0.7, RNG)
         torque = np.repeat((clean @ truth)[None, :, None], 2, axis=0)
         data = np.concatenate([columns, torque], axis=2)
-        summed = replicate_moments(data, data, np.array([0, 200]), "repeated")
+        summed = row_moments(data, data, np.array([0, 200]), "repeated")
         pooled = summed.pooled()
         found.append(regress(pooled, RELIABLE).values)
         plain.append(np.linalg.solve(pooled.gram, pooled.cross))
@@ -74,9 +74,7 @@ def test_directions_without_signal_are_left_out() -> None:
     columns = np.stack([np.hstack([clean, RNG.normal(size=(300, 1))]) for _ in range(2)])
     torque = np.repeat(3.0 * clean[None], 2, axis=0)
     data = np.concatenate([columns, torque], axis=2)
-    solution = regress(
-        replicate_moments(data, data, np.array([0, 300]), "repeated").pooled(), RELIABLE
-    )
+    solution = regress(row_moments(data, data, np.array([0, 300]), "repeated").pooled(), RELIABLE)
     assert solution.rank == 1
     assert np.allclose(solution.values, [3.0, 0.0], atol=0.1)
 
@@ -84,8 +82,6 @@ def test_directions_without_signal_are_left_out() -> None:
 def test_dependent_columns_get_the_smallest_answer_and_no_explosion() -> None:
     clean = RNG.normal(size=(2, 300, 1))
     data = np.concatenate([clean, 2 * clean, 5 * clean], axis=2)
-    solution = regress(
-        replicate_moments(data, data, np.array([0, 300]), "single").pooled(), RELIABLE
-    )
+    solution = regress(row_moments(data, data, np.array([0, 300]), "single").pooled(), RELIABLE)
     assert solution.rank == 1
     assert np.allclose(solution.values @ [1.0, 2.0], 5.0)

@@ -17,6 +17,7 @@ from dynident.evidence.held_out import HeldOut, on_recordings, with_noise_of
 from dynident.evidence.maps import residual_maps
 from dynident.evidence.noise_model import NoiseModel
 from dynident.evidence.runs import Run, gather
+from dynident.evidence.stacks import Stack
 from dynident.fitting.uncertainty.row_errors import row_covariance
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
@@ -168,12 +169,17 @@ def test_whitening_carries_nothing_out_of_rows_that_do_not_count(
     signals = rng.standard_normal((len(run.replicates[0].t), 3))
     off_rows = (~run.certain_rows[:, 1])[:, None]
     assert np.any(off_rows) and not np.all(off_rows)
-    found = [run.whitened([signals + wrong * off_rows], 1, noise) for wrong in (0.0, WRONG)]
+
+    def white(of: Run, joint: int, wrong: float = 0.0) -> np.ndarray:
+        stack = Stack((of,))
+        return stack.unfolded(stack.whitened([[[signals + wrong * off_rows]]], joint, noise))
+
+    found = [white(run, 1, wrong) for wrong in (0.0, WRONG)]
     assert np.array_equal(found[0], found[1])
-    plain = [run.whitened([signals + wrong * off_rows], 0, noise) for wrong in (0.0, WRONG)]
+    plain = [white(run, 0, wrong) for wrong in (0.0, WRONG)]
     assert not np.allclose(plain[0], plain[1])
     # Far from these rows all is as it is elsewhere.
-    whole = replace(run, uncertain=None).whitened([signals], 1, noise)
+    whole = white(replace(run, uncertain=None), 1)
     assert np.mean(np.all(found[0] == whole, axis=-1)) > 0.5
 
 

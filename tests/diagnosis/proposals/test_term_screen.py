@@ -43,12 +43,15 @@ def test_the_drop_is_that_of_least_squares_with_the_columns(made) -> None:
     }
     for term, drop in found.items():
         x, y, c = [], [], []
-        for r, run in enumerate(search.evidence.runs):
-            columns = [np.stack(of_q_and_v[term](one.q, one.v), axis=1) for one in run.replicates]
+        for stack, known in zip(search.evidence.stacks, fitted.white, strict=True):
+            columns = [
+                [[np.stack(of_q_and_v[term](one.q, one.v), axis=1)] for one in run.replicates]
+                for run in stack.runs
+            ]
             for joint in range(2):
-                rows = fitted.white[r][joint].dense().reshape(-1, len(fitted.values) + 1)
+                rows = known[joint].dense().reshape(-1, len(fitted.values) + 1)
                 x, y = [*x, rows[:, :-1]], [*y, rows[:, -1]]
-                white = run.whitened(columns, joint, fitted.noise[joint])
+                white = stack.unfolded(stack.whitened(columns, joint, fitted.noise[joint]))
                 c.append((joint == ELBOW) * white.reshape(len(rows), -1))
         x, y, c = np.concatenate(x), np.concatenate(y), np.concatenate(c)
         without, with_ = (_left(one, y) for one in (x, np.hstack([x, c])))

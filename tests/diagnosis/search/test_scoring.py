@@ -26,10 +26,10 @@ from dynident.diagnosis.search.scoring import (
 from dynident.effects import Effect, effects_of
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.model import Model
-from dynident.moments.replicates import replicate_moments
 from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import regress
 from dynident.recording import Dataset
+from row_moments import row_moments
 from synthetic import arm, synthetic, true_values
 
 RELIABLE = Criteria().noise.reliable
@@ -50,7 +50,7 @@ def replicated(signal: np.ndarray, std: float, rng: np.random.Generator) -> np.n
 
 
 def products(left: np.ndarray, right: np.ndarray, edges: np.ndarray = EDGES) -> SecondMoments:
-    return replicate_moments(left, right, edges, "repeated")
+    return row_moments(left, right, edges, "repeated")
 
 
 class Rows:
@@ -189,8 +189,8 @@ def test_a_column_whose_squares_overflow_is_not_identifiable() -> None:
     known = np.concatenate(
         [np.tile(rows.x, (REPLICATES, 1, 1)), np.ones((REPLICATES, INSTANTS, 1))], axis=2
     )
-    with_self = replicate_moments(columns, columns, EDGES, "single")
-    with_model = replicate_moments(known, columns, EDGES, "single")
+    with_self = row_moments(columns, columns, EDGES, "single")
+    with_model = row_moments(known, columns, EDGES, "single")
     said = score(rows.fitted, effect(), with_model, with_self, 1)
     assert said.not_identifiable
 

@@ -25,6 +25,7 @@ from dynident.diagnosis.nuisances.stated_noise import stated_noise_notes
 from dynident.diagnosis.nuisances.sticking import shares_left_out
 from dynident.diagnosis.nuisances.unlike_recordings import training_notes, unlike_notes
 from dynident.diagnosis.result import Diagnosis
+from dynident.diagnosis.search.paired_falls import fall_standard_error
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.search.refusal import impossible_joints_of
 from dynident.diagnosis.search.withdrawal import Path
@@ -42,7 +43,6 @@ from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import HeldOut, on_recordings
 from dynident.evidence.maps import residual_maps
 from dynident.evidence.model_columns import rows_of_run
-from dynident.evidence.paired_falls import fall_standard_error
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import rows_of_recordings, sources_of
 from dynident.fitting.uncertainty.row_errors import row_covariance

@@ -62,7 +62,7 @@ class Step:
     p_value : as in `Candidate`.
     advice : the experiment that would distinguish it from those; empty where there are none.
     fall_standard_error : of the fall from `test_error_before` to `test_error_after`, over blocks of
-        time, see `dynident.evidence.paired_falls`; None where it is not known.
+        time, see `dynident.diagnosis.search.paired_falls`; None where it is not known.
     """
 
     effect: Effect

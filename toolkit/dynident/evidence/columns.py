@@ -16,7 +16,9 @@ from dynident.criteria import DEFAULTS, Criteria
 from dynident.effects import Block, Effect, Needs
 from dynident.evidence.column_cache import ColumnCache, FirstLook, Kept
 from dynident.evidence.joint_columns import RigidColumns
+from dynident.evidence.noise_model import SpeedClasses
 from dynident.evidence.runs import Run, Signals
+from dynident.evidence.stacks import Stack
 from dynident.evidence.windows import Source, sources
 from dynident.fitting.sampling import Sampled, decimate_each
 from dynident.model import Model
@@ -60,6 +62,11 @@ class Evidence:
         return replace(self, runs=runs)
 
     @cached_property
+    def stacks(self) -> tuple[Stack, ...]:
+        """The recordings, those that are cut alike together."""
+        return Stack.of(self.runs)
+
+    @cached_property
     def torque_peaks(self) -> np.ndarray:
         """Largest torque that was measured at each joint, (n,) N m or N."""
         every = (one.tau for run in self.runs for one in run.replicates)
@@ -68,6 +75,17 @@ class Evidence:
     def looked_at_anew(self) -> Evidence:
         """Return the evidence without a first look: the model has become another one."""
         return replace(self, look=FirstLook())
+
+    def speed_classes(self, joint: int) -> SpeedClasses:
+        """Classes of a joint's speed wherever replicates tell its noise."""
+        if joint not in self._speed_classes:
+            speed = [one for run in self.runs for one in run.noisy_speeds(joint)]
+            self._speed_classes[joint] = SpeedClasses.of(speed, self.criteria.noise)
+        return self._speed_classes[joint]
+
+    @cached_property
+    def _speed_classes(self) -> dict[int, SpeedClasses]:
+        return {}
 
     # --- columns --------------------------------------------------------------------------------
 

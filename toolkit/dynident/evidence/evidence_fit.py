@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
+from operator import add
 
 import numpy as np
 
@@ -26,7 +27,7 @@ _LEAST = 1e-13
 """Noise over the largest joint's torque: one without torque would be fitted ever more closely."""
 
 White = tuple[tuple[WhiteColumns, ...], ...]
-"""Whitened columns of each run, of each joint."""
+"""Whitened columns of each stack of runs, of each joint."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +43,7 @@ class EvidenceFit:
     solution : of the regression behind the values.
     noise : per joint.
     noise_known : whether `noise` was measured or given; otherwise it is the residual.
-    white : per run and joint, whitened columns and torque.
+    white : per stack of runs and joint, whitened columns and torque.
     moments : (B, p + 1, p + 1) of columns and torque, over all joints.
     error_signal : squared systematic residual, whitened: what no noise explains, in this metric.
     squares : (n,) mean systematic square of the residual, (N m)^2 or N^2.
@@ -136,7 +137,7 @@ def fit_evidence(evidence: Evidence, model: Model, near: EvidenceFit | None = No
                 for r in range(len(evidence.runs))
             ]
         white = _whiten(evidence, columns, noise, values, white)
-        values = regression_values(_moments(evidence, model, noise, white).pooled(), reliable)
+        values = regression_values(_pooled(evidence, model, noise, white), reliable)
         if round == 0 and near is None:
             # Along a robot without bodies their columns are rounding errors, and any value fits.
             values = _keeping_dependent(model, at, values)
@@ -303,13 +304,17 @@ def _whiten(evidence: Evidence, columns, noise, values, before: White | None = N
     before : of an earlier round, or of the fit of a like model.
     """
     found = []
-    for r, (run, joints) in enumerate(zip(evidence.runs, columns, strict=True)):
+    for s, stack in enumerate(evidence.stacks):
         here = []
-        for j, signals in enumerate(joints):
-            known = None
-            if before is not None and r < len(before):
-                known = before[r][j].again(run, noise[j], signals)
-            here.append(known or WhiteColumns.of(run, j, noise[j], _moved(run, signals, values)))
+        for j, own in enumerate(noise):
+            known, signals = None, [columns[r][j] for r in stack.numbers]
+            if before is not None and s < len(before):
+                known = before[s][j].again(stack, own, signals)
+            if known is None:
+                pairs = zip(stack.runs, signals, strict=True)
+                moved = [_moved(run, one, values) for run, one in pairs]
+                known = WhiteColumns.of(stack, j, own, moved)
+            here.append(known)
         found.append(tuple(here))
     return tuple(found)
 
@@ -339,24 +344,32 @@ def _moved(run: Run, signals: Sequence[JointColumns], values: np.ndarray) -> Seq
 
 def _moments(evidence: Evidence, model: Model, noise, white: White) -> SecondMoments:
     found, time_varying = [], time_varying_mask(model)
-    for r, (run, joints) in enumerate(zip(evidence.runs, white, strict=True)):
+    for stack, joints in zip(evidence.stacks, white, strict=True):
         here = WhiteColumns.moments(joints)
-        if run.kind == "repeated" and time_varying.any():
+        if stack.kind == "repeated" and time_varying.any():
             own = [
-                time_varying_columns(evidence, model, r, j, noise[j], w.dense())
+                time_varying_columns(evidence, model, stack, j, noise[j], w.dense())
                 for j, w in enumerate(joints)
             ]
-            other = np.sum([time_varying_products(one, one, run.edges) for one in own], axis=0)
+            edges = stack.runs[0].edges
+            other = np.sum([time_varying_products(one, one, edges) for one in own], axis=0)
             here = here.where(time_varying[:, None] | time_varying[None, :], other)
         found.append(here)
     return SecondMoments.stacked(found)
 
 
+def _pooled(evidence: Evidence, model: Model, noise, white: White) -> SecondMoments:
+    """The moments of all blocks together, in less time where nothing depends on the time."""
+    if time_varying_mask(model).any():
+        return _moments(evidence, model, noise, white).pooled()
+    return reduce(add, (WhiteColumns.pooled(joints) for joints in white))
+
+
 def _signal(evidence: Evidence, white: White, values: np.ndarray) -> float:
     """Squared whitened residual, of what the replicates have in common."""
     combination, found = np.append(-values, 1.0), 0.0
-    for run, joints in zip(evidence.runs, white, strict=True):
+    for stack, joints in zip(evidence.stacks, white, strict=True):
         for one in joints:
             left = one.times(combination)
-            found += float(run.moments(left, left).signal.sum())
+            found += float(stack.moments(left, left).signal.sum())
     return found

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from dynident.evidence.noise_model import NoiseModel
-from dynident.evidence.runs import Run
+from dynident.evidence.stacks import Stack
 from dynident.moments.second_moments import SecondMoments
 from dynident.robot import Robot
 
@@ -128,119 +128,138 @@ class JointColumns:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WhiteColumns:
-    """Columns of a model and the torque at one joint in one run, whitened and folded.
+    """Columns of a model and the torque at one joint in runs that are alike, whitened and folded.
 
     Attributes
     ----------
-    run : whose rows they are.
+    stack : whose rows they are.
     noise : by which the rows are whitened.
     size, places : as of `JointColumns`.
-    parts : of each replicate, the columns that were whitened.
-    rows : (P, S, u) whitened, but for a factor.
+    parts : of each run, of each replicate, the columns that were whitened.
+    rows : (B, u, P, L) whitened, but for a factor.
     squares : (B, u, u) moments of these rows.
     factor : by which the rows are to be multiplied.
     """
 
-    run: Run
+    stack: Stack
     noise: NoiseModel
     size: int
     places: np.ndarray
-    parts: tuple[tuple[np.ndarray, ...], ...]
+    parts: tuple[tuple[tuple[np.ndarray, ...], ...], ...]
     rows: np.ndarray
     squares: SecondMoments
     factor: float = 1.0
 
     @classmethod
     def of(
-        cls, run: Run, joint: int, noise: NoiseModel, columns: Sequence[JointColumns]
+        cls,
+        stack: Stack,
+        joint: int,
+        noise: NoiseModel,
+        columns: Sequence[Sequence[JointColumns]],
     ) -> WhiteColumns:
-        """Whiten the columns of each replicate of a run.
+        """Whiten the columns of each replicate of some runs.
 
         Parameters
         ----------
-        run, joint : where they are columns.
+        stack, joint : where they are columns.
         noise : of that joint.
-        columns : of each replicate.
+        columns : of each run, of each replicate.
 
         Returns
         -------
         With their moments.
         """
-        one, parts = columns[0], tuple(each.parts for each in columns)
-        rows = run.whitened_parts(parts, joint, noise)
+        one = columns[0][0]
+        parts = tuple(tuple(each.parts for each in some) for some in columns)
+        rows = stack.whitened(parts, joint, noise)
         return cls(
-            run=run,
+            stack=stack,
             noise=noise,
             size=one.size,
             places=one.places,
             parts=parts,
             rows=rows,
-            squares=run.moments(rows, rows),
+            squares=stack.moments(rows, rows),
         )
 
     def again(
-        self, run: Run, noise: NoiseModel, columns: Sequence[JointColumns]
+        self, stack: Stack, noise: NoiseModel, columns: Sequence[Sequence[JointColumns]]
     ) -> WhiteColumns | None:
         """Return columns that are these, maybe of another model, whitened by another noise.
 
         Parameters
         ----------
-        run, noise, columns : as for `of`.
+        stack, noise, columns : as for `of`.
 
         Returns
         -------
         None where they are others, or the other noise is more than a factor.
         """
-        if run is not self.run or not self._are_of(columns):
+        if not (stack.are(self.stack) and self._are_of(columns)):
             return None
-        one, factor = columns[0], 1.0
+        one, factor = columns[0][0], 1.0
         if noise is not self.noise:
             if not (self.noise.is_flat and noise.is_flat):
                 return None
             factor = _flat_weight(noise) / _flat_weight(self.noise)
         return replace(self, size=one.size, places=one.places, factor=factor)
 
-    def _are_of(self, columns: Sequence[JointColumns]) -> bool:
+    def _are_of(self, columns: Sequence[Sequence[JointColumns]]) -> bool:
         """Whether these are the very arrays that were whitened."""
-        return len(columns) == len(self.parts) and all(
+        return all(
             len(one.parts) == len(parts)
             and all(new is old for new, old in zip(one.parts, parts, strict=True))
-            for one, parts in zip(columns, self.parts, strict=True)
+            for some, known in zip(columns, self.parts, strict=True)
+            for one, parts in zip(some, known, strict=True)
         )
 
     @staticmethod
     def moments(every: Sequence[WhiteColumns]) -> SecondMoments:
-        """Moments of a model's columns and the torque over all joints of a run, (B, p+1, p+1)."""
-        first, size = every[0].squares, every[0].size
-        total = np.zeros((len(first.total), size, size))
-        free = None if first.noise_free is None else np.zeros(total.shape)
-        for one in every:
-            grid = np.ix_(np.arange(len(total)), one.places, one.places)
-            total[grid] += one.factor**2 * one.squares.total
-            if free is not None:
-                free[grid] += one.factor**2 * one.squares.signal
-        return SecondMoments(total, sum(one.squares.counts for one in every), None, free)
+        """Moments of a model's columns and the torque over all joints, (B, p + 1, p + 1)."""
+        return _summed(every, [one.squares for one in every])
+
+    @staticmethod
+    def pooled(every: Sequence[WhiteColumns]) -> SecondMoments:
+        """The same of all blocks together, (p + 1, p + 1), in less time."""
+        return _summed(every, [one.squares.pooled() for one in every])
 
     def moments_with(self, white: np.ndarray) -> SecondMoments:
-        """Moments of the same with other whitened columns (P, S, k), (B, p + 1, k)."""
-        found = self.run.moments(self.rows, white)
-        shape = self.size, white.shape[2]
+        """Moments of the same with other whitened columns (B, k, P, L), (B, p + 1, k)."""
+        found = self.stack.moments(self.rows, white)
+        shape = self.size, white.shape[1]
         return _spread(found, shape, (slice(None), self.places), self.factor)
 
     def times(self, combination: np.ndarray) -> np.ndarray:
-        """Sum of the columns, each times its number of (p + 1,); (P, S, 1)."""
-        return self.rows @ (self.factor * combination[self.places])[:, None]
+        """Sum of the columns, each times its number of (p + 1,); (B, 1, P, L)."""
+        blocks, columns, *shape = self.rows.shape
+        factors = self.factor * combination[self.places]
+        return (factors @ self.rows.reshape(blocks, columns, -1)).reshape(blocks, 1, *shape)
 
     def dense(self) -> np.ndarray:
-        """All columns and the torque, (P, S, p + 1)."""
-        found = np.zeros((*self.rows.shape[:2], self.size))
-        found[:, :, self.places] = self.factor * self.rows
+        """All columns and the torque of each run, (R, P, S, p + 1)."""
+        rows = self.stack.unfolded(self.rows)
+        found = np.zeros((*rows.shape[:3], self.size))
+        found[..., self.places] = self.factor * rows
         return found
 
 
 def _flat_weight(noise: NoiseModel) -> float:
     """What flat noise multiplies a signal by."""
     return float(noise.colour[0] / (noise.scales[0] * noise.std))
+
+
+def _summed(every: Sequence[WhiteColumns], moments: Sequence[SecondMoments]) -> SecondMoments:
+    """Sum moments (..., u, u) of several joints' columns at their places, (..., p + 1, p + 1)."""
+    first, size = moments[0], every[0].size
+    total = np.zeros((*first.total.shape[:-2], size, size))
+    free = None if first.noise_free is None else np.zeros(total.shape)
+    for one, own in zip(every, moments, strict=True):
+        places = ..., one.places[:, None], one.places
+        total[places] += one.factor**2 * own.total
+        if free is not None:
+            free[places] += one.factor**2 * own.signal
+    return SecondMoments(total, sum(own.counts for own in moments), None, free)
 
 
 def _spread(

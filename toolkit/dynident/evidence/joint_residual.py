@@ -12,6 +12,7 @@ from dynident.evidence.columns import Evidence
 from dynident.evidence.joint_columns import JointColumns
 from dynident.evidence.noise_model import (
     NoiseModel,
+    SpeedClasses,
     differences,
     flat_noise,
     measure_noise,
@@ -25,14 +26,14 @@ class JointResidual:
 
     Attributes
     ----------
-    stretches, speeds : of noise in the order of time, and the joint's velocity in them.
+    stretches, classes : of noise in the order of time, and classes of the joint's speed in them.
     plain : residuals of which nothing tells the noise.
     systematic : mean square of what the replicates of a run have in common, for each.
     """
 
     criteria: Criteria
     stretches: list[np.ndarray]
-    speeds: list[np.ndarray]
+    classes: SpeedClasses
     plain: list[np.ndarray]
     systematic: list[float]
 
@@ -58,7 +59,13 @@ class JointResidual:
         Residuals and noise of all runs.
         """
         combination = np.append(-values, 1.0)
-        left = cls(criteria=evidence.criteria, stretches=[], speeds=[], plain=[], systematic=[])
+        left = cls(
+            criteria=evidence.criteria,
+            stretches=[],
+            classes=evidence.speed_classes(joint),
+            plain=[],
+            systematic=[],
+        )
         for run, joints in zip(evidence.runs, columns, strict=True):
             certain = run.certain(joint)
             if not certain.any():
@@ -68,10 +75,7 @@ class JointResidual:
                 left.plain.append(residual[0])
                 continue
             left.systematic.append(systematic_square(residual, run.kind))
-            speed = run.replicates[0].v[:, joint][run.index][:, certain]
-            for stretch, v in zip(differences(residual, run.kind), speed, strict=False):
-                left.stretches.append(stretch)
-                left.speeds.append(v)
+            left.stretches.extend(differences(residual, run.kind))
         return left
 
     @property
@@ -94,5 +98,5 @@ class JointResidual:
         """The noise; the residual itself, where nothing tells them from each other."""
         root = float(np.sqrt(self.square))
         if self.stretches:
-            return measure_noise(self.stretches, self.speeds, self.criteria.noise, root)
+            return measure_noise(self.stretches, self.classes, self.criteria.noise, root)
         return flat_noise(root or 1.0)

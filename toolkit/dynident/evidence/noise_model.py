@@ -85,40 +85,47 @@ class NoiseModel:
         speed : (T,)
             Velocity of the joint, rad/s or m/s.
         """
-        return self.whitened([signals], self.weights(speed)).T
+        return self.whitened([[[signals]]], self.weights(speed)[None])[0, 0].T
 
-    def whitened(self, parts: Sequence[np.ndarray], weights: np.ndarray) -> np.ndarray:
-        """Whiten signals in several parts.
+    def whitened(
+        self, signals: Sequence[Sequence[Sequence[np.ndarray]]], weights: np.ndarray
+    ) -> np.ndarray:
+        """Whiten signals of several recordings, in several parts.
 
         Parameters
         ----------
-        parts : (T, k) each, in the order of time.
-        weights : (T,) by which they are multiplied first, see `weights`.
+        signals : for each of R recordings, for each of M replicates, parts (T, k) in the order of
+            time.
+        weights : (R, T) by which they are multiplied first, see `weights`.
 
         Returns
         -------
-        (k of all, T), the samples of a signal side by side.
+        (R, M, k of all, T), the samples of a signal side by side.
         """
-        order, samples = len(self.colour) - 1, len(weights)
+        order, samples = len(self.colour) - 1, weights.shape[1]
         if order == 0:
             weights = weights * self.colour[0]
+        columns = sum(part.shape[1] for part in signals[0][0])
         # Zeros before each signal: one correlation of many in a row mixes none with the next.
-        scaled = np.empty((sum(part.shape[1] for part in parts), order + samples))
-        scaled[:, :order] = 0.0
-        first = 0
-        for part in parts:
-            last = first + part.shape[1]
-            np.multiply(part.T, weights, out=scaled[first:last, order:])
-            first = last
+        scaled = np.empty((len(signals), len(signals[0]), columns, order + samples))
+        scaled[..., :order] = 0.0
+        for each, weight, here in zip(signals, weights, scaled, strict=True):
+            for parts, rows in zip(each, here, strict=True):
+                first = 0
+                for part in parts:
+                    last = first + part.shape[1]
+                    np.multiply(part.T, weight, out=rows[first:last, order:])
+                    first = last
         if order == 0:
             return scaled
-        white, some = np.empty((len(scaled), samples)), max(1, _AT_ONCE // max(1, samples))
-        for first in range(0, len(scaled), some):
-            rows = scaled[first : first + some]
+        every = scaled.reshape(-1, order + samples)
+        white, some = np.empty((len(every), samples)), max(1, _AT_ONCE // max(1, samples))
+        for first in range(0, len(every), some):
+            rows = every[first : first + some]
             found = np.correlate(rows.ravel(), self.colour[::-1], "valid")
             apart = (rows.strides[0], found.itemsize)
             white[first : first + some] = as_strided(found, (len(rows), samples), apart)
-        return white
+        return white.reshape(*scaled.shape[:3], samples)
 
 
 def flat_noise(std: float) -> NoiseModel:
@@ -126,9 +133,44 @@ def flat_noise(std: float) -> NoiseModel:
     return NoiseModel(std, np.zeros(1), np.ones(1), np.array([1.0]))
 
 
+@dataclass(frozen=True, eq=False)
+class SpeedClasses:
+    """Classes of a joint's speed, each with enough samples to tell how large the noise is in it.
+
+    Attributes
+    ----------
+    speeds : (T,) rad/s or m/s, absolute, of each stretch of noise.
+    centres : (C,) mean speed of each class.
+    members : which samples of all stretches, one after the other, are in each class.
+    """
+
+    speeds: tuple[np.ndarray, ...]
+    centres: np.ndarray
+    members: tuple[np.ndarray, ...]
+
+    @classmethod
+    def of(cls, speed: Sequence[np.ndarray], criteria: NoiseCriteria) -> SpeedClasses:
+        """Sort samples by their speed.
+
+        Parameters
+        ----------
+        speed : (T,) of each stretch, in the order of time.
+        criteria : number of classes, and of samples in each.
+        """
+        speeds, count = tuple(np.abs(one) for one in speed), criteria.speed_bins
+        every = np.concatenate([*speeds, np.zeros(0)])
+        if not len(every):
+            return cls(speeds, np.zeros(0), ())
+        edges = np.quantile(every, np.linspace(0.0, 1.0, count + 1))
+        bins = np.clip(np.searchsorted(edges, every, side="right") - 1, 0, count - 1)
+        each = (np.flatnonzero(bins == b) for b in range(count))
+        members = tuple(one for one in each if len(one) >= criteria.samples_per_bin)
+        return cls(speeds, np.array([every[inside].mean() for inside in members]), members)
+
+
 def measure_noise(
     noise: list[np.ndarray],
-    speed: list[np.ndarray],
+    classes: SpeedClasses,
     criteria: NoiseCriteria,
     misfit: float = 0.0,
 ) -> NoiseModel:
@@ -140,10 +182,12 @@ def measure_noise(
 
     Parameters
     ----------
-    noise, speed : lists of (T,)
-        Stretches of noise in the order of time, and the joint's velocity in them.
+    noise : list of (T,)
+        Stretches of noise in the order of time.
+    classes : SpeedClasses
+        Of the joint's velocity in them.
     criteria : NoiseCriteria
-        Order, classes of speed, limits.
+        Order, limits.
     misfit : N m or N
         Root mean square of the systematic residual.
 
@@ -151,28 +195,19 @@ def measure_noise(
     -------
     Standard deviation, colour, and scale by classes of speed.
     """
-    everything, speeds = np.concatenate(noise), np.abs(np.concatenate(speed))
+    everything = np.concatenate(noise)
     std = float(np.sqrt(np.mean(everything**2)))
     if not std > 0:
         return flat_noise(misfit or 1.0)
-    count = criteria.speed_bins
-    edges = np.quantile(speeds, np.linspace(0.0, 1.0, count + 1))
-    bins = np.clip(np.searchsorted(edges, speeds, side="right") - 1, 0, count - 1)
-    centres, scales = [], []
-    for b in range(count):
-        inside = bins == b
-        if inside.sum() >= criteria.samples_per_bin:
-            centres.append(speeds[inside].mean())
-            scales.append(np.sqrt(np.mean(everything[inside] ** 2)) / std)
-    if not centres:
-        centres, scales = [0.0], [1.0]
+    at, scales = classes.centres, [np.sqrt(np.mean(everything[m] ** 2)) for m in classes.members]
+    if not scales:
+        at, scales = np.zeros(1), [std]
     more = (misfit / std) ** 2
-    at = np.array(centres)
-    within = np.clip(scales, criteria.least_scale, criteria.largest_scale)
+    within = np.clip(np.array(scales) / std, criteria.least_scale, criteria.largest_scale)
     limited = np.sqrt(within**2 + more)
     scaled = [
-        stretch / (np.interp(np.abs(v), at, limited) * std)
-        for stretch, v in zip(noise, speed, strict=True)
+        stretch / (np.interp(v, at, limited) * std)
+        for stretch, v in zip(noise, classes.speeds, strict=True)
     ]
     return NoiseModel(std, at, limited, _whitening_filter(scaled, more / (1.0 + more), criteria))
 

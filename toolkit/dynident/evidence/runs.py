@@ -16,12 +16,10 @@ import numpy as np
 
 from dynident.criteria import DEFAULTS, NoiseCriteria
 from dynident.effects import Block
-from dynident.evidence.noise_model import NoiseModel
 from dynident.evidence.windows import shared_motion
 from dynident.fitting.sampling import Sampled, flagged, sample
 from dynident.model import Model
-from dynident.moments.replicates import Kind, replicate_moments
-from dynident.moments.second_moments import SecondMoments
+from dynident.moments.replicates import Kind
 from dynident.recording import (
     Dataset,
     Noise,
@@ -91,20 +89,18 @@ class Run:
         told[self.index[:, ~self.certain(joint)]] = False
         return told
 
+    def noisy_speeds(self, joint: int) -> list[np.ndarray]:
+        """Velocity of a joint (S,) in each replicate whose noise the others tell."""
+        certain = self.certain(joint)
+        if self.kind == "single" or not certain.any():
+            return []
+        told = self.index if self.kind == "repeated" else self.index[1:]
+        return list(self.replicates[0].v[:, joint][told][:, certain])
+
     def known(self, signals: np.ndarray, joint: int) -> np.ndarray:
         """Signals (T, k) of a joint, zero in rows whose dry friction nothing tells."""
         told = self.told(joint)
         return signals if told is None else signals * told[:, None]
-
-    @cached_property
-    def _repetitions(self) -> tuple[np.ndarray | slice, ...]:
-        """The rows of `index`, as slices where nothing is left out of them."""
-        return tuple(
-            slice(int(rows[0]), int(rows[-1]) + 1)
-            if len(rows) and np.all(np.diff(rows) == 1)
-            else rows
-            for rows in self.index
-        )
 
     @property
     def kept(self) -> np.ndarray:
@@ -148,67 +144,6 @@ class Run:
         if self.kind == "repeated":
             return signals[0][self.index]
         return np.stack([one[rows] for one, rows in zip(signals, self.index, strict=False)])
-
-    def whitened(self, signals: Sequence[np.ndarray], joint: int, noise: NoiseModel) -> np.ndarray:
-        """Whiten columns of a joint, and fold them.
-
-        Parameters
-        ----------
-        signals : (T, k) for each replicate
-            Columns of one joint, of rows at a constant rate.
-        joint : whose they are.
-        noise : of that joint.
-
-        Returns
-        -------
-        (P, S, k), zero where the joint's dry friction is not known; of a simulated motion P = 1:
-        there is one replicate, without noise.
-        """
-        return self.whitened_parts([[one] for one in signals], joint, noise)
-
-    def whitened_parts(
-        self, signals: Sequence[Sequence[np.ndarray]], joint: int, noise: NoiseModel
-    ) -> np.ndarray:
-        """As `whitened`, of columns in several parts.
-
-        Parameters
-        ----------
-        signals : for each replicate, parts (T, k_i) of the columns of one joint.
-        joint, noise : as for `whitened`.
-
-        Returns
-        -------
-        (P, S, k of all).
-        """
-        simulated = self.columns_from == "simulation"
-        speed = self.replicates[-1 if simulated else 0].v[:, joint]
-        weights, told = noise.weights(speed), self.told(joint)
-        if told is not None:
-            weights = weights * told
-        repetitions = self._repetitions[:1] if simulated else self._repetitions
-        if simulated:
-            signals = signals[-1:]
-        elif self.kind == "repeated":
-            signals = signals[:1]
-        each = [
-            noise.whitened(parts, weights) for parts, _ in zip(signals, repetitions, strict=False)
-        ]
-        if len(each) < len(repetitions):
-            each = each * len(repetitions)
-        if len(repetitions) == 1:
-            found = each[0][None, :, repetitions[0]]
-        else:
-            found = np.empty((len(repetitions), len(each[0]), self.index.shape[1]))
-            for one, white, rows in zip(found, each, repetitions, strict=True):
-                one[:] = white[:, rows]
-        if told is not None and not noise.is_flat:  # flat noise is whitened without looking back
-            found *= self.certain(joint)
-        return found.transpose(0, 2, 1)
-
-    def moments(self, left: np.ndarray, right: np.ndarray) -> SecondMoments:
-        """Second moments of whitened columns, (P, S, a) and (P, S, b)."""
-        plain = self.columns_from == "simulation"
-        return replicate_moments(left, right, self.edges, "single" if plain else self.kind)
 
 
 def gather(

@@ -14,6 +14,7 @@ import numpy as np
 from dynident.effects import Effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.noise_model import NoiseModel
+from dynident.evidence.stacks import Stack
 from dynident.model import Model
 from dynident.moments.replicates import TimeVarying
 
@@ -30,61 +31,64 @@ def time_varying_mask(model: Model) -> np.ndarray:
 
 
 def time_varying_columns(
-    evidence: Evidence, model: Model, run: int, joint: int, noise: NoiseModel, white: np.ndarray
+    evidence: Evidence, model: Model, stack: Stack, joint: int, noise: NoiseModel, white: np.ndarray
 ) -> TimeVarying:
     """Columns of a model and the torque at one joint with their instruments.
 
     Parameters
     ----------
-    evidence, run : recordings, and which one of them.
+    evidence, stack : recordings, and which of them.
     model : with its effects.
     joint, noise : column of the joint, and its noise.
-    white : (P, S, p + 1) whitened columns and torque.
+    white : (R, P, S, p + 1) whitened columns and torque.
 
     Returns
     -------
     The columns, and what the next repetition has in their place.
     """
-    instruments = np.roll(white, -1, axis=0)
+    instruments = np.roll(white, -1, axis=1)
     for effect in model.effects:
         joints = effect.acting_at(model.robot)
         if effect.time_varying and joint in joints:
-            measured = evidence.of(effect, run, model, None)[0][:, joints.index(joint)]
-            found = _at_this_time(evidence, effect, run, joint, noise, measured)
-            instruments[:, :, model.slices[effect.label]] = found
-    return TimeVarying(white, instruments, np.arange(white.shape[2]) == model.size)
+            for r, found in zip(stack.numbers, instruments, strict=True):
+                measured = evidence.of(effect, r, model, None)[0][:, joints.index(joint)]
+                moved = _at_this_time(evidence, effect, r, joint, noise, measured)
+                found[..., model.slices[effect.label]] = moved
+    return TimeVarying(white, instruments, np.arange(white.shape[3]) == model.size)
 
 
 def time_varying_variants(
     evidence: Evidence,
     variants: Sequence[Effect],
-    run: int,
+    stack: Stack,
     joint: int,
     noise: NoiseModel,
-    columns: tuple[Sequence[np.ndarray], np.ndarray],
+    columns: tuple[Sequence[Sequence[np.ndarray]], np.ndarray],
 ) -> TimeVarying:
     """Columns of an effect with several shapes at one joint with their instruments.
 
     Parameters
     ----------
-    evidence, run : recordings, and which one of them.
+    evidence, stack : recordings, and which of them.
     variants : one effect at one place.
     joint, noise : column of the joint, and its noise.
-    columns : (T, k) of each variant as they are, and (P, S, k of all) whitened.
+    columns : of each recording (T, k) of each variant as they are, and (R, P, S, k of all)
+        whitened.
 
     Returns
     -------
     The columns of all variants, and what the next repetition has in their place.
     """
     measured, white = columns
-    instruments = np.roll(white, -1, axis=0)
+    instruments = np.roll(white, -1, axis=1)
     if variants[0].time_varying:
-        found = [
-            _at_this_time(evidence, effect, run, joint, noise, one)
-            for effect, one in zip(variants, measured, strict=True)
-        ]
-        instruments = np.concatenate(found, axis=2)
-    return TimeVarying(white, instruments, np.zeros(white.shape[2], dtype=bool))
+        for r, each, found in zip(stack.numbers, measured, instruments, strict=True):
+            moved = [
+                _at_this_time(evidence, effect, r, joint, noise, one)
+                for effect, one in zip(variants, each, strict=True)
+            ]
+            found[...] = np.concatenate(moved, axis=2)
+    return TimeVarying(white, instruments, np.zeros(white.shape[3], dtype=bool))
 
 
 def _at_this_time(

@@ -170,10 +170,12 @@ class Model(ParametrisedRobot):
         for effect in self.effects:
             if effect.needs_torque or effect.is_payload:
                 continue
-            own = (known or {}).get(effect.label)
+            own, at = (known or {}).get(effect.label), values[self.slices[effect.label]]
             if own is None:
-                own = effect.columns(self.ready(effect, block, values))
-            torque = torque + own @ values[self.slices[effect.label]]
+                acting = list(effect.acting_at(self.robot))
+                torque[:, acting] += effect.acting_columns(self.ready(effect, block, values)) @ at
+            else:
+                torque += own @ at
         return torque
 
     # --- in which order columns can be evaluated ------------------------------------------------

@@ -7,6 +7,7 @@ say what the noise does to the squares.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -20,17 +21,50 @@ Kind = Literal["repeated", "noise_augmented", "single"]
 by copies to which the stated noise was added once more; or one record, of unknown noise."""
 
 
-def replicate_moments(
-    left: np.ndarray, right: np.ndarray, edges: np.ndarray, kind: Kind
-) -> SecondMoments:
-    """Second moments of columns of one recording, about zero.
+def in_blocks(replicates: Sequence[np.ndarray], edges: np.ndarray) -> np.ndarray:
+    """Arrange columns of several recordings that are cut alike, block by block.
 
     Parameters
     ----------
-    left, right : (P, ..., S, a) and (P, ..., S, b)
-        Columns at S instants in P replicates.
+    replicates : P of (R, k, S)
+        Columns at S instants of R recordings.
     edges : (B + 1,)
         First instant of each block, and S.
+
+    Returns
+    -------
+    (R B, k, P, L), of the longest block's length; after a shorter one there are zeros
+    """
+    recordings, columns, _ = replicates[0].shape
+    lengths = np.diff(edges)
+    shape = len(lengths), columns, len(replicates), lengths.max(initial=0)
+    found = np.zeros((recordings, *shape))
+    for p, one in enumerate(replicates):
+        for b, (start, stop) in enumerate(pairwise(edges.tolist())):
+            found[:, b, :, p, : stop - start] = one[..., start:stop]
+    return found.reshape(-1, *shape[1:])
+
+
+def out_of_blocks(rows: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Columns (R, P, S, k) that `in_blocks` has arranged."""
+    lengths = np.diff(edges)
+    _, *shape = rows.shape
+    each = rows.reshape(-1, len(lengths), *shape)
+    pieces = [each[:, b, ..., :length] for b, length in enumerate(lengths)]
+    return np.moveaxis(np.concatenate(pieces, axis=-1), 1, -1)
+
+
+def replicate_moments(
+    left: np.ndarray, right: np.ndarray, counts: np.ndarray, kind: Kind
+) -> SecondMoments:
+    """Second moments of columns, about zero.
+
+    Parameters
+    ----------
+    left, right : (B, ..., a, P, L) and (B, ..., b, P, L)
+        Columns in P replicates, arranged by `in_blocks`.
+    counts : (B,)
+        Instants of each block.
     kind : Kind
         What the replicates are.
 
@@ -38,40 +72,34 @@ def replicate_moments(
     -------
     (B, ..., a, b); noisy copies do not count as rows
     """
-    blocks = [slice(start, stop) for start, stop in pairwise(edges.tolist())]
+    replicates = left.shape[-2]
     if kind == "noise_augmented":
-        total = _block_products(left[:1], right[:1], blocks)
-        noise = _block_products(left[1:] - left[0], right[1:] - right[0], blocks)
-        free = total - noise / (len(left) - 1)
-        return SecondMoments(total, np.diff(edges), None, free)
-    total, free = _block_products(left, right, blocks), None
+        first, other = left[..., :1, :], right[..., :1, :]
+        total = _products(first, other)
+        noise = _products(left[..., 1:, :] - first, right[..., 1:, :] - other)
+        return SecondMoments(total, counts, None, total - noise / (replicates - 1))
+    total, free = _products(left, right), None
     if kind == "repeated":
-        one = left.sum(axis=0, keepdims=True)
-        two = one if right is left else right.sum(axis=0, keepdims=True)
-        free = (_block_products(one, two, blocks) - total) / (len(left) - 1)
-    return SecondMoments(total, np.diff(edges) * len(left), None, free)
+        one = np.einsum("...pl->...l", left)
+        two = one if right is left else np.einsum("...pl->...l", right)
+        free = (one @ np.swapaxes(two, -1, -2) - total) / (replicates - 1)
+    return SecondMoments(total, counts * replicates, None, free)
 
 
-def _block_products(left: np.ndarray, right: np.ndarray, blocks: list[slice]) -> np.ndarray:
-    """Products of columns over instants and replicates, block by block, (B, ..., a, b)."""
-    turned = np.swapaxes(left, -1, -2)
-    found = np.empty((len(blocks), *left.shape[1:-2], left.shape[-1], right.shape[-1]))
-    for one, some in zip(found, blocks, strict=True):
-        if len(left) == 1:
-            np.matmul(turned[0, ..., some], right[0, ..., some, :], out=one)
-        else:
-            np.add.reduce(turned[..., some] @ right[..., some, :], axis=0, out=one)
-    return found
+def _products(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Products of columns over instants and replicates, (B, ..., a, b)."""
+    one, two = (each.reshape(*each.shape[:-2], -1) for each in (left, right))
+    return one @ np.swapaxes(two, -1, -2)
 
 
 @dataclass(frozen=True)
 class TimeVarying:
-    """Columns of a recording that repeats, some of which the time of the session changes.
+    """Columns of recordings that repeat, some of which the time of the session changes.
 
     Attributes
     ----------
-    columns : (P, S, k)
-    instruments : (P, S, k) the same of the next repetition's motion at this one's time.
+    columns : (R, P, S, k)
+    instruments : (R, P, S, k) the same of the next repetition's motion at this one's time.
     is_torque : (k,) mask.
     """
 
@@ -81,28 +109,30 @@ class TimeVarying:
 
 
 def time_varying_products(left: TimeVarying, right: TimeVarying, edges: np.ndarray) -> np.ndarray:
-    """Products, free of noise, of columns of which some depend on the time, (B, a, b).
+    """Products, free of noise, of columns of which some depend on the time, (R B, a, b).
 
     Such a column is another one in each repetition, and products of repetitions are not its
     square. Its instrument is the motion of the next repetition at the time of this one.
 
     Parameters
     ----------
-    left, right : columns of the same recording, (P, S, a) and (P, S, b).
+    left, right : columns of the same recordings, (R, P, S, a) and (R, P, S, b).
     edges : (B + 1,) first instant of each block, and S.
 
     Returns
     -------
-    (B, a, b)
+    (R B, a, b)
     """
+    # The torque has no instrument: what it holds of the time is its own.
+    weight = np.where(left.is_torque, 0.0, 0.5)[:, None]
+    weight = np.where(right.is_torque[None, :] & ~left.is_torque[:, None], 1.0, weight)
     found = []
     for start, stop in pairwise(edges):
-        one, two = left.columns[:, start:stop], right.columns[:, start:stop]
-        for_one, for_two = left.instruments[:, start:stop], right.instruments[:, start:stop]
-        there = np.einsum("psa,psb->ab", one, for_two, optimize=True)
-        back = np.einsum("psa,psb->ab", for_one, two, optimize=True)
-        # The torque has no instrument: what it holds of the time is its own.
-        weight = np.where(left.is_torque, 0.0, 0.5)[:, None]
-        weight = np.where(right.is_torque[None, :] & ~left.is_torque[:, None], 1.0, weight)
+        one, for_one, two, for_two = (
+            each[:, :, start:stop].reshape(len(each), -1, each.shape[3])
+            for each in (left.columns, left.instruments, right.columns, right.instruments)
+        )
+        there = np.swapaxes(one, 1, 2) @ for_two
+        back = np.swapaxes(for_one, 1, 2) @ two
         found.append((1.0 - weight) * there + weight * back)
-    return np.array(found)
+    return np.stack(found, axis=1).reshape(-1, *weight.shape)

@@ -16,7 +16,7 @@ from scipy.special import stdtr, stdtrit
 
 from dynident.criteria import ContactCriteria, Criteria
 from dynident.effects import FRICTION_WIDTH
-from dynident.evidence.noise_model import measure_noise
+from dynident.evidence.noise_model import SpeedClasses, measure_noise
 
 QUARTER = 0.6745
 """Median of the absolute value of a standard normal variable."""
@@ -242,8 +242,8 @@ def changes_of(
         return []  # a joint that sticks, of which no stretch is long enough to show its noise
     # The scale is in `still` already: of this model only the colour is used.
     size = float(np.sqrt(np.mean(np.concatenate(stretches) ** 2)))
-    no_speed = [np.zeros(len(part)) for part in stretches]
-    noise = measure_noise(stretches, no_speed, criteria.noise, own_criteria.white_share * size)
+    at_rest = SpeedClasses.of([np.zeros(len(part)) for part in stretches], criteria.noise)
+    noise = measure_noise(stretches, at_rest, criteria.noise, own_criteria.white_share * size)
     colour = noise.colour / (noise.std * noise.scales[0])
     return [
         Changes(

@@ -13,11 +13,9 @@ import numpy as np
 
 from dynident.criteria import VerdictCriteria
 from dynident.diagnosis.verdict import within_noise
-from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut, HeldOutRun
-from dynident.evidence.model_columns import model_columns
-from dynident.evidence.runs import gather
+from dynident.evidence.windows import shared_motion
 from dynident.fitting.sampling import sample
 from dynident.recording import Dataset, Recording, resolution, uniform
 
@@ -135,14 +133,12 @@ def _predicted(
     fitted: EvidenceFit, dataset: Dataset, recordings: list[Recording]
 ) -> tuple[np.ndarray, list[np.ndarray]]:
     """Times (T,) s, and the torque that the model predicts along each recording, (T, n)."""
-    runs = gather(Dataset(tuple(recordings), dataset.filter), fitted.criteria.noise)
-    evidence = Evidence(fitted.model, runs, criteria=fitted.criteria)
-    joints = range(fitted.model.robot.n)
-    each = []
-    for r in range(len(recordings)):
-        columns = [model_columns(evidence, fitted.model, r, j, fitted.values)[0] for j in joints]
-        each.append(np.stack([c[:, :-1] @ fitted.values for c in columns], axis=1))
-    return runs[0].replicates[0].t, each
+    each = [shared_motion(sample(one, dataset.filter)) for one in recordings]
+    predicted = []
+    for one in each:
+        parts = one.residuals(fitted.model, fitted.values)
+        predicted.append(np.concatenate([measured - left for left, measured in parts]))
+    return each[0].t, predicted
 
 
 def rounding_notes(

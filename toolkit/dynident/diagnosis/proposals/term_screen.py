@@ -158,11 +158,11 @@ def _drops(
 ) -> np.ndarray:
     """What each of some terms takes off, (m,)."""
     with_model, with_self = [], []
-    for r, (run, replicates) in enumerate(zip(evidence.runs, rows, strict=True)):
-        signals = [[terms.columns(one)] for one in replicates]
-        white = run.whitened_parts(signals, joint, fitted.noise[joint])
-        with_model.append(fitted.white[r][joint].moments_with(white))
-        with_self.append(run.moments(white, white))
+    for stack, known in zip(evidence.stacks, fitted.white, strict=True):
+        signals = [[[terms.columns(one)] for one in rows[r]] for r in stack.numbers]
+        white = stack.whitened(signals, joint, fitted.noise[joint])
+        with_model.append(known[joint].moments_with(white))
+        with_self.append(stack.moments(white, white))
     beside = SecondMoments.stacked(with_model).pooled().signal
     own = SecondMoments.stacked(with_self).pooled().signal
     p = len(fitted.values)

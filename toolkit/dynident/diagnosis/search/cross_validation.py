@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import regression_values
 
 _SAME = 1e-9
+_FEW = 50  # blocks, of which every sum of ranks is counted
 
 
 def cross_validate(
@@ -52,13 +54,26 @@ def signed_rank(losses: np.ndarray, least: np.ndarray) -> float:
     ----------
     losses, least : (B,) of the same blocks, in the same metric, by two models.
     """
-    from scipy.stats import wilcoxon
-
     worse = losses - least
-    if np.abs(worse).max() <= _SAME * np.abs(least).max():
+    size = np.abs(worse)
+    if size.max() <= _SAME * np.abs(least).max():
         return 1.0
-    told: Any = wilcoxon(worse, alternative="greater")
-    return float(told.pvalue)
+    if len(size) > _FEW or not np.all(np.diff(np.sort(np.append(size, 0.0))) > 0):
+        from scipy.stats import wilcoxon  # takes long to load
+
+        told: Any = wilcoxon(worse, alternative="greater")
+        return float(told.pvalue)
+    ranks = np.flatnonzero(worse[np.argsort(size)] > 0) + 1
+    return float(_chances(len(size))[ranks.sum() :].sum())
+
+
+@lru_cache
+def _chances(blocks: int) -> np.ndarray:
+    """How often ranks, each of which counts or not by chance, sum to 0, 1, 2 ..."""
+    found = np.ones(1)
+    for rank in range(1, blocks + 1):
+        found = (np.pad(found, (0, rank)) + np.pad(found, (rank, 0))) / 2.0
+    return found
 
 
 def _losses(summed: SecondMoments, values: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:

@@ -101,30 +101,31 @@ def candidate_moments(
     joints = variants[0].acting_at(fitted.model.robot)
     time_varying = time_varying_mask(fitted.model)
     mixed = variants[0].time_varying or time_varying.any()
-    with_model, with_self, width = [], [], 0
     columns = (columns_of or evidence.columns)(variants, fitted.model, fitted.values)
-    for r, (run, each) in enumerate(zip(evidence.runs, columns, strict=True)):
-        width = each[0][0].shape[2]
+    with_model, with_self, width = [], [], columns[0][0][0].shape[2]
+    for stack, white_of_model in zip(evidence.stacks, fitted.white, strict=True):
         one, two = [], []
         for position, joint in enumerate(joints):
-            parts = [[s[:, position] for s in shapes] for shapes in zip(*each, strict=True)]
-            white = run.whitened_parts(parts, joint, fitted.noise[joint])
-            known = fitted.white[r][joint]
+            parts = [
+                [[s[:, position] for s in shapes] for shapes in zip(*columns[r], strict=True)]
+                for r in stack.numbers
+            ]
+            known, noise = white_of_model[joint], fitted.noise[joint]
+            white = stack.whitened(parts, joint, noise)
             one.append(known.moments_with(white))
             # Of each variant with itself: what two of them have in common is not asked for.
-            apart = white.transpose(0, 2, 1).reshape(len(white), len(variants), width, -1)
-            apart = np.swapaxes(apart, 2, 3)
-            two.append(run.moments(apart, apart))
-            if run.kind == "repeated" and mixed:
-                measured = [shape[0][:, position] for shape in each]
-                noise = fitted.noise[joint]
-                new = time_varying_variants(evidence, variants, r, joint, noise, (measured, white))
+            apart = white.reshape(len(white), len(variants), width, *white.shape[2:])
+            two.append(stack.moments(apart, apart))
+            if stack.kind == "repeated" and mixed:
+                edges = stack.runs[0].edges
+                measured = [each[0] for each in parts], stack.unfolded(white)
+                new = time_varying_variants(evidence, variants, stack, joint, noise, measured)
                 dense = known.dense()
-                old = time_varying_columns(evidence, fitted.model, r, joint, noise, dense)
-                chosen = time_varying[:, None] | np.full(white.shape[2], variants[0].time_varying)
-                one[-1] = one[-1].where(chosen, time_varying_products(old, new, run.edges))
+                old = time_varying_columns(evidence, fitted.model, stack, joint, noise, dense)
+                chosen = time_varying[:, None] | np.full(white.shape[1], variants[0].time_varying)
+                one[-1] = one[-1].where(chosen, time_varying_products(old, new, edges))
                 if variants[0].time_varying:
-                    products = time_varying_products(new, new, run.edges)
+                    products = time_varying_products(new, new, edges)
                     apart = products.reshape(-1, len(variants), width, len(variants), width)
                     of_each = np.einsum("bvivj->bvij", apart)
                     two[-1] = two[-1].where(np.array(True), of_each)

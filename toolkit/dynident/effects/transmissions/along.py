@@ -36,8 +36,8 @@ class Along:
         self.torque = robot.inverse_dynamics(block.q, block.v, block.a)
         step, self._samples = float(np.mean(np.diff(block.t))), len(block.t)
         every = max(1, min(int(1.0 / (_RATE * step)), self._samples // 4))
-        rows = np.arange(0, self._samples, every)
-        self._rows = np.unique(np.append(rows, self._samples - 1))
+        last = self._samples - 1
+        self._rows = np.append(np.arange(0, last, every), last)
         # Copies: what is kept as long as the positions live must not keep them alive.
         motion = (x[self._rows] for x in (block.q, block.v, block.a))
         self._derivatives = JointDerivatives(robot, *motion)

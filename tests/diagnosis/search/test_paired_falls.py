@@ -7,8 +7,8 @@ import pytest
 from scipy.signal import lfilter
 
 from dynident.criteria import DEFAULTS
+from dynident.diagnosis.search.paired_falls import fall_standard_error
 from dynident.evidence.held_out import HeldOut, HeldOutRun
-from dynident.evidence.paired_falls import fall_standard_error
 from dynident.evidence.runs import gather
 from dynident.model import Model
 from dynident.recording import Dataset
