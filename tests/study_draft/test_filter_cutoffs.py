@@ -46,7 +46,7 @@ def test_noise_of_positions_asks_for_lower_cutoffs_which_bring_parameters_back(
 ) -> None:
     study, decisions = drafted(tmp_path, bad)
     (reason,) = (one.reason for one in decisions if one.subject == "filter")
-    assert "may make them too small" in reason
+    assert "may make the former too small" in reason
     usual, found = default_filter(100.0), study.train.filter
     assert found is not None and found.cutoff_hz and usual.cutoff_hz
     assert found.cutoff_hz <= usual.cutoff_hz / 2

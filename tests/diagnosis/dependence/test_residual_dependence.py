@@ -180,7 +180,7 @@ def test_where_nothing_is_told_no_share_is_named() -> None:
     assert one.sentence.endswith("by position and velocity of this joint or time.")
     assert "%" not in one.sentence
     (row,) = dependence_table((one,)).rows
-    assert row == ("elbow", "(5 \u00b1 4)", "(0 \u00b1 5)", "100")
+    assert row == ("elbow", "(5 \u00b1 4)", "(0 \u00b1 5)", "all")
 
 
 def test_the_table_sets_what_is_not_told_in_brackets() -> None:

@@ -77,8 +77,9 @@ class LocalServer:
             while serving.is_alive() and not noted:
                 time.sleep(_LOOK)
         finally:
-            signal.signal(signal.SIGINT, before)
             self.stop()
+            if callable(before):  # after the end: a second Ctrl-C would break it off
+                signal.signal(signal.SIGINT, before)
 
     def start(self) -> Thread:
         """Answer beside whatever else goes on; in the thread that is returned."""

@@ -239,8 +239,8 @@ def dependence_table(found: Sequence[JointDependence]) -> Table:
         rows,
         (
             f"{noise} Each with its standard error over the blocks. In brackets: what cannot be "
-            "told from nothing, at the level of 5 % over all sets of inputs, and is not taken off "
-            "what none of these explains.",
+            "told from nothing, at the level of 5 % over all sets of inputs, or is below 1 %; it is "
+            "not taken off what none of these explains, which is all where nothing is told.",
             "Each share is what inputs add to those before them that are told: what two sets "
             "explain alike counts for the earlier. The past (elasticity, hysteresis) comes before "
             "acceleration and load where it explains more. Negative shares are shown as 0.",
@@ -261,7 +261,7 @@ def _rest(one: JointDependence) -> str:
     """What none of the inputs explains: all of it where none is told, which is no measurement."""
     if one.shares is None:
         return "-"
-    return _cell(one.shares.rest) if one.told else "100"
+    return _cell(one.shares.rest) if one.told else "all"
 
 
 def _rounded(value: float) -> str:

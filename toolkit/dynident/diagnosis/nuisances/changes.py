@@ -76,10 +76,15 @@ class Changes:
 
     @cached_property
     def whole(self) -> np.ndarray:
-        """Rows (P S,) before which all that the whitening filter looks back to counts, a mask."""
+        """Rows (P S,) before which all that the whitening filter looks back to counts, a mask.
+
+        Not the first instants, before which one repetition has none.
+        """
         counts = (self.still > 0).astype(float)
         lost = len(self.colour) - _filtered(np.ones(len(self.colour)), counts)
-        return lost < 0.5
+        known = (lost < 0.5).reshape(self.of.residual.shape)
+        # Alike in all repetitions: what one shows is seen, the other way round, in the others.
+        return np.tile(known.all(axis=0), len(known))
 
     def whitened(self, x: np.ndarray, whole: np.ndarray) -> np.ndarray:
         """Samples (T, ...) over the noise; zero where that is not known.
@@ -179,7 +184,7 @@ def _filtered(colour: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def scanned(one: Changes, width: float) -> np.ndarray:
-    """The z value of `Changes.match` at every row, (P S,), by convolutions.
+    """The z value of `Changes.match` at every row that is whole, (P S,), by convolutions.
 
     All of them circular, over twice the rows, so that nothing comes round: what does not depend on
     the width is transformed once.
@@ -195,7 +200,7 @@ def scanned(one: Changes, width: float) -> np.ndarray:
         kernels[1 + lag, np.arange(lag - half, half + 1)] = product[::-1]
     turned = spectra * scipy.fft.rfft(kernels, axis=1)
     product, power = scipy.fft.irfft([turned[0], turned[1:].sum(axis=0)], size, axis=1)[:, :rows]
-    return product / np.sqrt(np.maximum(power, 1e-300))
+    return np.where(one.whole, product / np.sqrt(np.maximum(power, 1e-300)), 0.0)
 
 
 def changes_of(

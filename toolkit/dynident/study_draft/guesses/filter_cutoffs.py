@@ -67,13 +67,13 @@ def suitable_filter(
             before, after = (
                 narrow.relative(narrow.residual_norms(x)) for x in (values, own.values)
             )
-            after /= np.sqrt(1.0 - rank / independent)
-            if before < _WORSE * after:
+            if before < _WORSE * after / np.sqrt(1.0 - rank / independent):
                 break
             reason = (
                 f"values fitted behind {_words(chosen)} leave {number(100 * before, 3)} % of the "
                 f"torque below {lower.cutoff_hz:g} Hz, values fitted there "
-                f"{number(100 * after, 3)} %: noise of positions or clock may make them too small"
+                f"{number(100 * after, 3)} %, which is less by more than their fit to it makes: "
+                "noise of positions or clock may make the former too small"
             )
             found, chosen = narrow, lower
     except DynidentError:  # too little is left behind the lower filter
