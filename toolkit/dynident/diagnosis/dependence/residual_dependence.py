@@ -239,8 +239,8 @@ def dependence_table(found: Sequence[JointDependence]) -> Table:
         rows,
         (
             f"{noise} Each with its standard error over the blocks. In brackets: what cannot be "
-            "told from nothing, at the level of 5 % over all sets of inputs, or is below 1 %; it is "
-            "not taken off what none of these explains, which is all where nothing is told.",
+            "told from nothing, at the level of 5 % over all sets of inputs, or is below 1 %; it "
+            "is not taken off what none of these explains: all of it, where nothing is told.",
             "Each share is what inputs add to those before them that are told: what two sets "
             "explain alike counts for the earlier. The past (elasticity, hysteresis) comes before "
             "acceleration and load where it explains more. Negative shares are shown as 0.",
