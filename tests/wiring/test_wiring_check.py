@@ -36,10 +36,17 @@ def test_nothing_is_said_where_nothing_is_wrong() -> None:
     assert check_wiring(true_model(), data(), Dataset((recording(2),))) == ()
 
 
+def drag(one: Recording) -> np.ndarray:
+    """(rad/s)^2 with the sign of the speed."""
+    v = np.gradient(one.q, one.t, axis=0)
+    return v * np.abs(v)
+
+
 def test_missing_physics_is_no_fault() -> None:
     """Large effects that the model lacks: springs, drag, a delay, another gain."""
     for change in (
         lambda r: r.replace(tau=r.tau + 20.0 * r.q),
+        lambda r: r.replace(tau=r.tau + np.array([0.0, 20.0]) * drag(r)),
         lambda r: r.replace(tau=r.tau * np.array([1.0, 0.7])),
         lambda r: r.replace(tau=np.roll(r.tau, 1, axis=0)),
         lambda r: r.replace(tau=r.tau + 2.0 * np.sin(7 * r.q)),

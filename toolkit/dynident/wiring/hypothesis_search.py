@@ -81,12 +81,11 @@ def search(model: Model, rows: WiringRows, criteria: WiringCriteria) -> SearchRe
         here = _Fits(model, rows, now)
         if len(accepted) == criteria.most_faults:
             break
-        tried = here.all_plain()
+        tried = here.but_excused(here.all_plain(), criteria)
         best = _best(tried, here.start, criteria.tie)
         if not _settled(best, here, criteria):
             gears = motor_side_hypotheses(model, rows, now, here.start, criteria)
-            tried = [*_but_degrees_of_all(tried, gears), *gears]
-            tried = [one for one in tried if not here.stands_still(*one, criteria.tie)]
+            tried = here.but_excused([*_but_degrees_of_all(tried, gears), *gears], criteria)
             best = _best(tried, here.start, criteria.tie)
         if best is None or not _wins(best, here.start, rows, criteria):
             break
@@ -108,7 +107,6 @@ class _Fits:
         self.model, self.rows, self.now = model, rows, now
         self.regression = WiringRegression.of(model, rows.moved(now.change))
         self.start = self.regression.fit(now.torque_of, now.torque_scale)
-        self._at_rest: dict[int, float] = {}
 
     def all_plain(self) -> list[tuple[Hypothesis, TorqueFit]]:
         """Hypotheses with their fits, the plainest first."""
@@ -123,25 +121,56 @@ class _Fits:
         scales = torque_scale_hypotheses(self.regression, self.now, self.start)
         return [*found, *(one for one in scales if _is_no_gain(one[0], self.model))]
 
-    def stands_still(self, one: Hypothesis, fit: TorqueFit, tie: float) -> bool:
-        """Whether a smaller position fits better only as a position that stays where it is does.
-
-        Of a joint at rest the position is noise, and any scale that makes it smaller helps.
+    def but_excused(
+        self, tried: list[tuple[Hypothesis, TorqueFit]], criteria: WiringCriteria
+    ) -> list[tuple[Hypothesis, TorqueFit]]:
+        """Leave out smaller positions that fit better only as something else does.
 
         Parameters
         ----------
-        one, fit : a hypothesis with its fit.
-        tie : share of a gain within which two are alike.
+        tried : hypotheses with their fits.
+        criteria : by how much they must win, and within which share of a gain two are alike.
         """
-        gain = fit.score - self.start.score
-        if one.kind not in _SMALLER or len(one.joints) != 1 or gain <= 0:
-            return False
-        if one.joints[0] not in self._at_rest:
-            rows = self.rows.moved(self.now.change).held(one.joints[0])
-            still = WiringRegression.of(self.model, rows)
-            fitted = still.fit(self.now.torque_of, self.now.torque_scale)
-            self._at_rest[one.joints[0]] = fitted.score - self.start.score
-        return self._at_rest[one.joints[0]] >= (1.0 - tie) * gain
+        found = []
+        for one, fit in tried:
+            gain = fit.score - self.start.score
+            wins = one.kind in _SMALLER and gain >= criteria.gain
+            alike = (1.0 - criteria.tie) * gain
+            if not (
+                wins and (self._at_rest(one) >= alike or self._friction(one, criteria) >= alike)
+            ):
+                found.append((one, fit))
+        return found
+
+    def _at_rest(self, one: Hypothesis) -> float:
+        """Gain of a position that stays where it is.
+
+        Of a joint at rest the position is noise, and any scale that makes it smaller helps.
+        """
+        if len(one.joints) != 1:
+            return -np.inf
+        return self._gain(self.model, self.rows.moved(self.now.change).held(one.joints[0]))
+
+    def _friction(self, one: Hypothesis, criteria: WiringCriteria) -> float:
+        """Gain of the positions as they are, with the law of friction that smaller ones would have.
+
+        Dry friction that reverses over a wide range of speeds makes viscous friction a curve: drag
+        that the model lacks would be taken for degrees. Of a joint that turns farther than it can
+        the position is too large anyhow.
+        """
+        wider = self.model
+        for j in one.joints:
+            if turns_too_far(self.model, self.rows, self.now, j, criteria):
+                return -np.inf
+            times = abs(float(self.now.position_scale[j] / one.mended.position_scale[j]))
+            width = times * float(self.model.friction_widths[j])
+            wider = wider.with_friction_width(self.model.robot.names[j], width)
+        return self._gain(wider, self.rows.moved(self.now.change))
+
+    def _gain(self, model: Model, rows: WiringRows) -> float:
+        """By how much another motion, or another law of friction, fits better."""
+        fitted = WiringRegression.of(model, rows).fit(self.now.torque_of, self.now.torque_scale)
+        return fitted.score - self.start.score
 
 
 def _is_no_gain(one: Hypothesis, model: Model) -> bool:
