@@ -91,6 +91,41 @@ def test_a_fault_within_is_told_though_there_is_another_outside(tmp_path: Path, 
         read(written(tmp_path, lines), ["a"], sound_in=WINDOW)
 
 
+def with_garbage(start: int, stop: int) -> list[str]:
+    """Lines of which some rows are no samples."""
+    return LINES[: start + 1] + ["lost"] * (stop - start) + LINES[stop + 1 :]
+
+
+def without(start: int, stop: int) -> list[str]:
+    """Lines without some rows."""
+    return LINES[: start + 1] + LINES[stop + 1 :]
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        (with_garbage(280, 320), r"\(line 282\).* from 2\.79 s on.* end at 2\.79 s"),
+        (with_garbage(80, 120), r"\(line 121\).* up to 1\.2 s.* begin at 1\.2 s"),
+        (without(280, 320), r"\(line 282\).* from 2\.79 s on"),
+        (without(80, 120), r"\(line 81\).* up to 1\.2 s"),
+    ],
+)
+def test_a_fault_across_the_edge_of_the_window_is_told(
+    tmp_path: Path, lines: list[str], said: str
+) -> None:
+    with pytest.raises(RecordingError, match=said):
+        read(written(tmp_path, lines), ["a"], sound_in=WINDOW)
+
+
+@pytest.mark.parametrize("window", [(-1.0, 3.0), (1.0, 9.0)])
+def test_a_file_may_begin_or_end_within_the_window(
+    tmp_path: Path, window: tuple[float, float]
+) -> None:
+    row = 350 if window[0] < 0 else 50
+    one = read(written(tmp_path, FAULTS["text"](row)), ["a"], sound_in=window)
+    assert one.samples == (350 if row == 350 else COUNT - 51)
+
+
 def test_a_sound_file_is_kept_as_a_whole(tmp_path: Path) -> None:
     one = read(written(tmp_path, LINES), ["a"], sound_in=WINDOW)
     assert one.samples == COUNT and one.provenance.skipped == ()

@@ -62,6 +62,18 @@ class Provenance:
             number += comment <= number
         return number if self.first_line else 0
 
+    def row(self, index: int, where: str) -> str:
+        """How messages call a sample, given its index from 0: row, and line in a text file.
+
+        Parameters
+        ----------
+        index : of the sample.
+        where : how they call the recording.
+        """
+        number = self.line(index) if where.lower().endswith(TEXTS) else 0
+        line = f" (line {number})" if number else ""
+        return f"{where}, row {index + 1}{line}"
+
 
 @dataclass(frozen=True, kw_only=True)
 class LeftOut:
@@ -188,9 +200,7 @@ class Recording:
 
     def row(self, index: int) -> str:
         """How messages call a sample, given its index from 0: file and row (and line, in CSV)."""
-        number = self.provenance.line(index) if self.where.lower().endswith(TEXTS) else 0
-        line = f" (line {number})" if number else ""
-        return f"{self.where}, row {index + 1}{line}"
+        return self.provenance.row(index, self.where)
 
     def __repr__(self) -> str:
         joints = ", ".join(self.joints)

@@ -78,7 +78,7 @@ def _recording(table: ColumnTable, wanted: Wanted, sound_in: Window | None) -> R
     )
     changes: dict[str, Any] = {}
     if sound_in is not None:
-        rows, samples = _stretch(found, sound_in, table.file), len(found["t"])
+        rows, samples = _stretch(found, sound_in, source), len(found["t"])
         if rows != slice(0, samples):
             skipped = (*skipped, said_of(rows, samples, sound_in))
         found = {signal: x[rows] for signal, x in found.items()}
@@ -91,8 +91,9 @@ def _recording(table: ColumnTable, wanted: Wanted, sound_in: Window | None) -> R
     )
 
 
-def _stretch(found: Mapping[str, np.ndarray], window: Window, file: str) -> slice:
+def _stretch(found: Mapping[str, np.ndarray], window: Window, source: Provenance) -> slice:
     # At a joint without a temperature there is none in any row.
     given = {"temperature": lambda x: x[:, ~np.isnan(x).all(axis=0)]}
     signals = [given.get(name, lambda x: x)(x) for name, x in found.items() if name != "t"]
-    return sound_stretch(found["t"], signals, window, file)
+    file = source.file
+    return sound_stretch(found["t"], signals, window, file, lambda k: source.row(k, file))
