@@ -117,6 +117,27 @@ def test_a_fault_across_the_edge_of_the_window_is_told(
         read(written(tmp_path, lines), ["a"], sound_in=WINDOW)
 
 
+@pytest.mark.parametrize("place", [51, 351])
+def test_a_second_header_with_other_columns_is_told(tmp_path: Path, place: int) -> None:
+    other = [",".join([t, x, q]) for t, q, x in (line.split(",") for line in LINES)]
+    lines = LINES[:place] + other[:1] + other[place:]
+    with pytest.raises(
+        RecordingError, match=rf"line {place + 1}: .*t, tau\.a, q\.a.*split the file"
+    ):
+        read(written(tmp_path, lines), ["a"], sound_in=WINDOW)
+
+
+@pytest.mark.parametrize("head", [["t,q.a,tau.a"], ["t;q.a;tau,a", "s;rad;Nm"], ["t q.a tau.a"]])
+def test_the_same_header_again_is_a_fault_like_any_other(tmp_path: Path, head: list[str]) -> None:
+    mark = ";" if ";" in head[0] else "," if "," in head[0] else " "
+    body = [line.replace(",", mark) for line in LINES[1:]]
+    body = [line.replace(".", ",") if mark == ";" else line for line in body]
+    path = written(tmp_path, [*head, *body[:50], *head, *body[50:]])
+    columns = {"tau.a": "tau,a"} if mark == ";" else None
+    one = read(path, ["a"], columns, sound_in=WINDOW)
+    np.testing.assert_array_equal(one.tau[:, 0], TAU[50:])
+
+
 @pytest.mark.parametrize("window", [(-1.0, 3.0), (1.0, 9.0)])
 def test_a_file_may_begin_or_end_within_the_window(
     tmp_path: Path, window: tuple[float, float]

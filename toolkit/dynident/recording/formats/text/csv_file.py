@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -23,11 +24,12 @@ from dynident.recording.formats.column_table import ColumnTable, FileLayout, joi
 from dynident.recording.formats.file_source import FileSource
 from dynident.recording.formats.limits import TEXT, require_distinct, require_unpacked
 from dynident.recording.formats.text.comment_lines import CommentLines
-from dynident.recording.formats.text.text_head import head_of, is_comment, is_number
+from dynident.recording.formats.text.text_head import head_of, is_comment, is_date, is_number
 from dynident.recording.formats.text.text_pieces import text_pieces
 
 _HEADER = "write a header line: t, q.<joint>, tau.<joint> ..."
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_LETTER = re.compile(r"[^\W\d_]")
 _NO_DATE = int(np.datetime64("NaT", "us").astype(np.int64))
 _SMALL = 1 << 18
 """Bytes that NumPy has read sooner than pandas is loaded, which takes a third of a second."""
@@ -72,6 +74,11 @@ def open_csv(source: FileSource, file: str, layout: FileLayout) -> ColumnTable:
     places = {name: place for place, name in reversed([*enumerate(names)])}
     names_in = "header" if head.names else "first line"
     comments = CommentLines()
+    # In lines that were made plain, a decimal comma is a point, in titles too.
+    commas = {",": "."} if head.decimal == "," else {}
+    headings = tuple(
+        tuple(cell.translate(str.maketrans(commas)) for cell in line) for line in head.headings
+    )
 
     def read_by(reader: type[_Lines], wanted: Sequence[str]) -> Iterator[dict[str, np.ndarray]]:
         comments.clear()
@@ -81,7 +88,8 @@ def open_csv(source: FileSource, file: str, layout: FileLayout) -> ColumnTable:
             for piece in text_pieces(stream, file):
                 body = piece if above else _below(piece, head.above)
                 above = above or head.above
-                lines = reader(head.plain(body), head.mark, names, file, above, names_in)
+                plain = head.plain(body)
+                lines = reader(plain, head.mark, names, file, above, names_in, headings)
                 fast = not comments.found_in(body, above) and bool(at)
                 columns = _fast(lines.data, head.mark, len(names), at) if fast else None
                 if columns:
@@ -197,6 +205,7 @@ class _Lines:
     file : for messages.
     above : lines above the first of them.
     names_in : what says how many columns there are, in words.
+    headings : cells of the lines that name the columns, and their units.
     """
 
     data: bytes
@@ -205,6 +214,7 @@ class _Lines:
     file: str
     above: int = 1
     names_in: str = "header"
+    headings: tuple[tuple[str, ...], ...] = ()
 
     def numbers(self, places: Sequence[int]) -> np.ndarray:
         """Return the numbers (T, k) of k columns."""
@@ -281,7 +291,15 @@ class _ForgivingLines(_Lines):
     """Lines of which those at fault are rows of what is no number, and no date."""
 
     def _complete(self, cells: list[str], where: str) -> tuple[str, list[str]]:
-        return where, cells if len(cells) == len(self.names) else [""] * len(self.names)
+        if len(cells) != len(self.names):
+            return where, [""] * len(self.names)
+        stripped = tuple(cell.strip() for cell in cells)
+        if _are_words(stripped) and stripped not in self.headings:
+            # Columns below it may be others, in the places of the first ones.
+            what = f"a line of words among the samples: {_short(', '.join(stripped))}"
+            remedy = "split the file there in two if it names other columns, else remove the line"
+            raise RecordingError(what, where, remedy)
+        return where, cells
 
     @staticmethod
     def _number(text: str, where: str) -> float:
@@ -296,6 +314,13 @@ class _ForgivingLines(_Lines):
             return _Lines._microseconds(text, where)
         except RecordingError:
             return _NO_DATE
+
+
+def _are_words(cells: Sequence[str]) -> bool:
+    """Whether no cell is a number or a date, and one has a letter, as a header line's have."""
+    return not any(map(is_number, cells)) and (
+        any(map(_LETTER.search, cells)) and not any(map(is_date, cells))
+    )
 
 
 def _short(text: str) -> str:

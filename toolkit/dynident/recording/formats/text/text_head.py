@@ -36,6 +36,8 @@ class TextHead:
     separator : of columns, in the file.
     decimal : what stands before the decimals of numbers.
     names : of the columns, with units that are not ours behind them; () where nothing names them.
+    headings : cells of the lines that tell names and units, as they stand there; those in comments
+        are none.
     columns : how many there are.
     above : lines above the first sample.
     line : that names the columns, or the first one, from 1.
@@ -47,6 +49,7 @@ class TextHead:
     separator: _Signs
     decimal: Literal[".", ","]
     names: tuple[str, ...]
+    headings: tuple[tuple[str, ...], ...]
     columns: int
     above: int
     line: int
@@ -109,11 +112,13 @@ def head_of(start: bytes, file: str, layout: FileLayout) -> TextHead:
     cells = _cells(first, separator, f"{file}, line {number}")
     below = [_split(line, separator) for _, line in rest]
     titles, units, samples = (), (), [cells, *below]
+    headings: list[tuple[str, ...]] = []
     named, above = number, number - 1
     if not _is_sample(cells, below, separator):
         titles, samples, above = cells, below, number
         if len(below) > 1 and len(below[0]) == len(cells) and _above_numbers(below[0], below[1]):
             units, samples, above = below[0], below[1:], rest[0][0]
+        headings = [tuple(one) for one in (titles, units) if one]
         comments += [one for one in every if one[0] < above and is_comment(one[1])]
     elif layout.names in ((), "numbered"):
         told = [(k, _COMMENT.sub("", line, count=1)) for k, line in comments]
@@ -130,6 +135,7 @@ def head_of(start: bytes, file: str, layout: FileLayout) -> TextHead:
         separator=separator,
         decimal=_decimal(samples, separator, file),
         names=tuple(map(with_unit, titles, units or [""] * len(titles))),
+        headings=tuple(headings),
         columns=len(cells),
         above=above,
         line=named,
