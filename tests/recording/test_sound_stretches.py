@@ -138,6 +138,15 @@ def test_the_same_header_again_is_a_fault_like_any_other(tmp_path: Path, head: l
     np.testing.assert_array_equal(one.tau[:, 0], TAU[50:])
 
 
+def test_no_quotation_mark_swallows_lines(tmp_path: Path) -> None:
+    lines = LINES[:]
+    lines[31], lines[41] = f'"{lines[31]}', lines[41].replace(",", '",', 1)
+    path = written(tmp_path, lines)
+    for window in (None, WINDOW):
+        with pytest.raises(RecordingError, match=r"line 32: a quotation mark .* to line 42"):
+            read(path, ["a"], sound_in=window)
+
+
 @pytest.mark.parametrize("window", [(-1.0, 3.0), (1.0, 9.0)])
 def test_a_file_may_begin_or_end_within_the_window(
     tmp_path: Path, window: tuple[float, float]

@@ -171,6 +171,21 @@ def test_comments_among_the_samples_are_counted(tmp_path: Path, names: str) -> N
     assert ("1 line of comment" in one.provenance.skipped) == (not names.startswith("#"))
 
 
+@pytest.mark.parametrize("mark", [",", " "])
+@pytest.mark.parametrize("added", [{500: '# note, "begin of motion'}, {500: '#a,"b', 900: ' % "d'}])
+def test_a_quotation_mark_in_a_comment_opens_no_cell(
+    tmp_path: Path, mark: str, added: dict[int, str]
+) -> None:
+    lines = ["t,q.a,tau.a", *(f"{k / 100:.2f},{k % 7},{k % 5}" for k in range(1500))]
+    lines = [line.replace(",", mark) for line in lines]
+    for place, comment in sorted(added.items(), reverse=True):
+        lines.insert(place, comment)
+    (path := tmp_path / "run.csv").write_text("\n".join(lines) + "\n")
+    one = read(path, ["a"])
+    np.testing.assert_array_equal(one.q[:, 0], np.arange(1500) % 7)
+    assert lines[one.provenance.line(1499) - 1] == lines[-1]
+
+
 def test_a_row_that_was_commented_out_is_none_where_its_clock_is_not_read(tmp_path: Path) -> None:
     (path := tmp_path / "run.csv").write_text(PLAIN.replace("\n0.02", "\n#0.015,7,7\n0.02"))
     np.testing.assert_array_equal(open_table(path).load(["q.a"])["q.a"], Q)

@@ -23,7 +23,7 @@ from dynident.errors import RecordingError
 from dynident.recording.formats.column_table import ColumnTable, FileLayout, joined
 from dynident.recording.formats.file_source import FileSource
 from dynident.recording.formats.limits import TEXT, require_distinct, require_unpacked
-from dynident.recording.formats.text.comment_lines import CommentLines
+from dynident.recording.formats.text.comment_lines import CommentLines, without_words
 from dynident.recording.formats.text.text_head import head_of, is_comment, is_date, is_number
 from dynident.recording.formats.text.text_pieces import text_pieces
 
@@ -88,15 +88,17 @@ def open_csv(source: FileSource, file: str, layout: FileLayout) -> ColumnTable:
             for piece in text_pieces(stream, file):
                 body = piece if above else _below(piece, head.above)
                 above = above or head.above
-                plain = head.plain(body)
+                has_comments = comments.found_in(body, above)
+                # A quotation mark in a comment opens no cell.
+                plain = head.plain(without_words(body) if has_comments else body)
                 lines = reader(plain, head.mark, names, file, above, names_in, headings)
-                fast = not comments.found_in(body, above) and bool(at)
+                fast = bool(at) and not has_comments
                 columns = _fast(lines.data, head.mark, len(names), at) if fast else None
                 if columns:
                     above += len(columns[0])
                 else:
                     columns = lines.numbers(at).T if at else []
-                    above += body.count(b"\n")  # a cell in quotation marks may hold some
+                    above += body.count(b"\n")  # some may be comments
                 found = dict(zip(numbers, columns, strict=True))
                 found |= {one: lines.dates(places[one]) for one in wanted if one not in found}
                 yield {name: found[name] for name in wanted}
@@ -244,7 +246,11 @@ class _Lines:
         line = self.above
         try:
             for cells in reader:
-                line = reader.line_num + self.above
+                before, line = line, reader.line_num + self.above
+                if line > before + 1:
+                    what = f"a quotation mark opens a cell that goes on to line {line}"
+                    where = f"{self.file}, line {before + 1}"
+                    raise RecordingError(what, where, "close it in its line, or remove it")
                 if cells and is_comment(cells[0]):
                     continue
                 yield self._complete(cells, f"{self.file}, line {line}")
