@@ -171,6 +171,22 @@ def test_comments_among_the_samples_are_counted(tmp_path: Path, names: str) -> N
     assert ("1 line of comment" in one.provenance.skipped) == (not names.startswith("#"))
 
 
+def test_comments_above_a_part_are_counted_once(tmp_path: Path) -> None:
+    lines = ["t,q.a,tau.a", *(f"{k / 100:.2f},{k % 7},{k % 5}" for k in range(900))]
+    for place in (600, 300, 200, 100):
+        lines.insert(place, "# a note")
+    (path := tmp_path / "run.csv").write_text("\n".join(lines) + "\n")
+    part = read(path, ["a"]).part(slice(400, 800)).part(slice(10, 350))
+    for index in (0, 100, 339):
+        assert lines[part.provenance.line(index) - 1].startswith(f"{part.t[index]:.2f},")
+    lines[410] = "lost"
+    path.write_text("\n".join(lines) + "\n")
+    one = read(path, ["a"], sound_in=(5.0, 7.0))
+    assert one.t[0] > 4
+    for index in (0, 300):
+        assert lines[one.provenance.line(index) - 1].startswith(f"{one.t[index]:.2f},")
+
+
 @pytest.mark.parametrize("mark", [",", " "])
 @pytest.mark.parametrize("added", [{500: '# note, "begin of motion'}, {500: '#a,"b', 900: ' % "d'}])
 def test_a_quotation_mark_in_a_comment_opens_no_cell(

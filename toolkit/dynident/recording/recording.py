@@ -40,7 +40,7 @@ class Provenance:
     columns : (ours, the file's name of it, scale) of each column that was read; empty likewise.
     skipped : what else the file holds that was not read, in words each.
     first_line : line of the first sample in a text file, from 1; 0 where lines are not counted.
-    comment_lines : lines of comment below that one, ascending.
+    comment_lines : lines of comment, ascending; those above that one do not count.
     place : where the samples were put if they were too many for the memory, in words.
     """
 
@@ -59,7 +59,7 @@ class Provenance:
         """Return the line of a sample in a text file, given its index from 0; 0 if unknown."""
         number = index + self.first_line
         for comment in self.comment_lines:
-            number += comment <= number
+            number += self.first_line <= comment <= number
         return number if self.first_line else 0
 
     def row(self, index: int, where: str) -> str:
