@@ -174,6 +174,26 @@ def test_a_window_beside_the_clock_is_refused(tmp_path: Path) -> None:
         read(written(tmp_path, lines), ["a"], sound_in=(7.0, 8.0))
 
 
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ([LINES[0], *(f"{x},0" for x in LINES[1:])], "line 2: 4 columns where the header has 3"),
+        (LINES[:80] + [f"{x},0" for x in LINES[80:]], "line 81: 4 columns where the header has 3"),
+        ([LINES[0], *(f"at {x}" for x in LINES[1:])], "line 2, column t: 'at 0' is not a number"),
+    ],
+)
+def test_where_all_of_the_window_is_at_fault_the_fault_is_told(
+    tmp_path: Path, lines: list[str], said: str
+) -> None:
+    with pytest.raises(RecordingError, match=said):
+        read(written(tmp_path, lines), ["a"], sound_in=WINDOW)
+
+
+def test_one_sample_that_is_left_out_is_one(tmp_path: Path) -> None:
+    one = read(written(tmp_path, FAULTS["text"](COUNT - 1)), ["a"], sound_in=WINDOW)
+    assert one.provenance.skipped[-1].startswith("1 sample beyond faults")
+
+
 def test_a_rate_in_place_of_a_clock_counts_rows_at_fault(tmp_path: Path) -> None:
     lines = [line.partition(",")[2] for line in FAULTS["text"](50)]
     one = read(written(tmp_path, lines), ["a"], layout=FileLayout(rate_hz=RATE), sound_in=WINDOW)

@@ -109,7 +109,8 @@ def said_of(rows: slice, samples: int, window: tuple[float, float]) -> str:
     window : (t0, t1) s, which was asked for.
     """
     before, after = rows.start, samples - rows.stop
+    count = before + after
     return (
-        f"{before + after} samples beyond faults outside the window [{window[0]:g}, "
+        f"{count} sample{'s' * (count != 1)} beyond faults outside the window [{window[0]:g}, "
         f"{window[1]:g}] s: {before} before it, {after} after it"
     )
