@@ -231,6 +231,11 @@ def test_lines_are_counted_with_all_comments(
 HEADS = {
     "savetxt": ("# t q.a tau.a\n", " ", ("t", "q.a", "tau.a")),
     "savetxt with commas over blanks": ("# t, q.a, tau.a\n", " ", ("t", "q.a", "tau.a")),
+    "savetxt with commas over blanks, every word a name's": (
+        "# t_1, q.a, tau.a\n",
+        " ",
+        ("t_1", "q.a", "tau.a"),
+    ),
     "blanks over commas": ("% t q.a tau.a\n", ",", ("t", "q.a", "tau.a")),
     "MATLAB": (
         "% Time Joint1Position [rad] Torque_1\n%-----\n".replace(" [rad]", "[rad]"),
@@ -261,6 +266,23 @@ def test_the_last_comment_names_the_columns(tmp_path: Path, kind: str) -> None:
     head, mark, names = HEADS[kind]
     (path := tmp_path / "run.csv").write_text(head + "\n".join(ROWS).replace(",", mark))
     assert open_table(path).names == names
+
+
+@pytest.mark.parametrize("mark", [" ", ","])
+def test_names_of_joints_may_be_plain_words(tmp_path: Path, mark: str) -> None:
+    row = "0 1 2 3 4\n".replace(" ", mark)
+    (path := tmp_path / "run.csv").write_text(
+        "# t shoulder elbow tau_shoulder tau_elbow\n" + 3 * row
+    )
+    assert open_table(path).names == ("t", "shoulder", "elbow", "tau_shoulder", "tau_elbow")
+
+
+def test_a_sentence_of_as_many_words_names_no_columns(tmp_path: Path) -> None:
+    (path := tmp_path / "run.csv").write_text(
+        "# this log was made on monday morning\n" + 3 * "0,1,2,3,4,5,6\n"
+    )
+    with pytest.raises(RecordingError, match="holds numbers, not the names of columns"):
+        open_table(path)
 
 
 @pytest.mark.parametrize("comment", PROSE)

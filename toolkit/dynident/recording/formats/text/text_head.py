@@ -252,7 +252,8 @@ def _as_units(comment: str, separator: str, sample: Sequence[str]) -> tuple[str,
 def _as_names(comment: str, separator: str, count: int) -> tuple[str, ...]:
     """Names of so many columns in a comment, which may separate them by commas or blanks."""
     for cells in (_split(comment, separator), _BETWEEN.split(comment.strip())):
-        if len(cells) == count > 1 and are_names(cells):
+        cut_elsewhere = any(cell.endswith((",", ";")) for cell in cells)
+        if len(cells) == count > 1 and not cut_elsewhere and are_names(cells):
             return tuple(cells)
     return ()
 
