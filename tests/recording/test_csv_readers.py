@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from dynident.errors import RecordingError
 from dynident.recording import read, write
-from dynident.recording.formats.text import csv_file
+from dynident.recording.formats.text import careful_lines, csv_file
 
 REGULAR = {
     "point": "t,q.a,tau.a\n0,1,3\n.01,2,4\n",
@@ -39,7 +39,7 @@ def no_careful_reader(monkeypatch):
     def fail(*_):
         pytest.fail("the careful reader was asked")
 
-    monkeypatch.setattr(csv_file._Lines, "numbers", fail)
+    monkeypatch.setattr(careful_lines.CarefulLines, "numbers", fail)
 
 
 @pytest.fixture(params=[0, csv_file._SMALL], ids=["pandas", "NumPy"])
@@ -93,7 +93,7 @@ def test_both_readers_agree(read_by, rows, end):
         patch.setattr(csv_file, "_SMALL", len(body) if read_by is csv_file._by_numpy else 0)
         fast = csv_file._fast(body, ";", 3, [2, 0])
     try:
-        careful = csv_file._Lines(body, ";", ("a", "b", "c"), "run.csv").numbers([2, 0])
+        careful = careful_lines.CarefulLines(body, ";", ("a", "b", "c"), "run.csv").numbers([2, 0])
     except RecordingError:
         assert fast is None
     else:

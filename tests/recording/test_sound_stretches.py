@@ -117,6 +117,12 @@ def test_a_fault_across_the_edge_of_the_window_is_told(
         read(written(tmp_path, lines), ["a"], sound_in=WINDOW)
 
 
+def test_a_second_header_of_other_width_is_told(tmp_path: Path) -> None:
+    lines = [*LINES[:51], "t,tau.a", *LINES[51:]]
+    with pytest.raises(RecordingError, match=r"line 52: a line of words .* t, tau\.a"):
+        read(written(tmp_path, lines), ["a"], sound_in=WINDOW)
+
+
 @pytest.mark.parametrize("place", [51, 351])
 def test_a_second_header_with_other_columns_is_told(tmp_path: Path, place: int) -> None:
     other = [",".join([t, x, q]) for t, q, x in (line.split(",") for line in LINES)]
@@ -138,13 +144,27 @@ def test_the_same_header_again_is_a_fault_like_any_other(tmp_path: Path, head: l
     np.testing.assert_array_equal(one.tau[:, 0], TAU[50:])
 
 
-def test_no_quotation_mark_swallows_lines(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("cells", "last"), [(0, 41), (1, 41), (2, 41), (0, 31), (1, 31), (2, 31)])
+def test_no_quotation_mark_swallows_lines(tmp_path: Path, cells: int, last: int) -> None:
     lines = LINES[:]
-    lines[31], lines[41] = f'"{lines[31]}', lines[41].replace(",", '",', 1)
-    path = written(tmp_path, lines)
+    for row, before, after in ((30, '"', ""), (last, "", '"')):
+        parts = lines[row].split(",")
+        parts[cells] = before + parts[cells] + after
+        lines[row] = ",".join(parts)
+    path = written(tmp_path, [f"{x},{'note' * (k == 0)}" for k, x in enumerate(lines)])
+    columns = {name: name for name in ("t", "q.a", "tau.a")}
     for window in (None, WINDOW):
-        with pytest.raises(RecordingError, match=r"line 32: a quotation mark .* to line 42"):
-            read(path, ["a"], sound_in=window)
+        with pytest.raises(
+            RecordingError, match=rf"line 31: a quotation mark .* to line {last + 1}"
+        ):
+            read(path, ["a"], columns, sound_in=window)
+
+
+def test_text_may_go_on_over_lines(tmp_path: Path) -> None:
+    noted = [f'{x},"a note,\n\nof 3, say"' for x in FAULTS["NaN"](50)]
+    noted[0] = f"{LINES[0]},note"
+    one = read(written(tmp_path, noted), ["a"], sound_in=WINDOW)
+    np.testing.assert_array_equal(one.q[:, 0], Q[51:])
 
 
 @pytest.mark.parametrize("window", [(-1.0, 3.0), (1.0, 9.0)])
