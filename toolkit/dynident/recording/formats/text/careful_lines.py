@@ -13,35 +13,31 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 
 from dynident.errors import RecordingError
-from dynident.recording.formats.text.text_head import is_comment, is_date, is_number
+from dynident.recording.formats.text.text_head import TextHead, is_comment, is_date, is_number
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _LETTER = re.compile(r"[^\W\d_]")
 _NO_DATE = int(np.datetime64("NaT", "us").astype(np.int64))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class CarefulLines:
     """Lines that are read one by one, with errors that name the line and the column.
 
     Attributes
     ----------
-    data : the lines.
-    separator : of the columns.
+    data : the lines, made plain.
+    head : of their file.
     names : of the columns; "" for one without.
     file : for messages.
     above : lines above the first of them.
-    names_in : what says how many columns there are, in words.
-    headings : cells of the lines that name the columns, and their units.
     """
 
     data: bytes
-    separator: str
+    head: TextHead
     names: tuple[str, ...]
     file: str
-    above: int = 1
-    names_in: str = "header"
-    headings: tuple[tuple[str, ...], ...] = ()
+    above: int
 
     def numbers(self, places: Sequence[int]) -> np.ndarray:
         """Return the numbers (T, k) of k columns."""
@@ -67,7 +63,7 @@ class CarefulLines:
             remedy = "is the file complete?"
             raise RecordingError("holds a header but no samples", self.file, remedy)
         text = io.StringIO(body, newline="")
-        reader = csv.reader(text, delimiter=self.separator, skipinitialspace=True)
+        reader = csv.reader(text, delimiter=self.head.mark, skipinitialspace=True)
         line = self.above
         try:
             for cells in reader:
@@ -87,7 +83,7 @@ class CarefulLines:
     def _holds_samples(self, cells: list[str]) -> bool:
         """Whether a row of several lines has others in it; text in a column may go on over some."""
         lines = [
-            one.split(self.separator) for cell in cells if "\n" in cell for one in cell.split("\n")
+            one.split(self.head.mark) for cell in cells if "\n" in cell for one in cell.split("\n")
         ]
         whole = len(cells) == len(self.names)
         return not whole or any(sum(is_number(x.strip()) for x in line) > 1 for line in lines)
@@ -97,7 +93,8 @@ class CarefulLines:
         if not any(cell.strip() for cell in cells):
             raise RecordingError("the line is empty", where, "remove it")
         if count != wanted:
-            what = f"{count} column{'s' * (count != 1)} where the {self.names_in} has {wanted}"
+            names_in = "header" if self.head.names else "first line"
+            what = f"{count} column{'s' * (count != 1)} where the {names_in} has {wanted}"
             remedy = "is the file complete?" if count < wanted else "name every column"
             raise RecordingError(what, where, remedy)
         return where, cells
@@ -133,9 +130,10 @@ class ForgivingLines(CarefulLines):
     def _complete(self, cells: list[str], where: str) -> tuple[str, list[str]]:
         fits = len(cells) == len(self.names)
         stripped = tuple(cell.strip() for cell in cells)
-        known = self.headings[0] if self.headings else ()
+        headings = self.head.plain_headings
+        known = headings[0] if headings else ()
         names_some = fits or not set(known).isdisjoint(stripped)
-        if names_some and _are_words(stripped) and stripped not in self.headings:
+        if names_some and _are_words(stripped) and stripped not in headings:
             # Columns below it may be others, in the places of the first ones.
             what = f"a line of words among the samples: {_short(', '.join(stripped))}"
             remedy = "split the file there in two if it names other columns, else remove the line"

@@ -65,13 +65,7 @@ def open_csv(source: FileSource, file: str, layout: FileLayout) -> ColumnTable:
         names = layout.by_position(head.columns, where, what, _HEADER)
     require_distinct([name for name in names if name], "column", where)
     places = {name: place for place, name in reversed([*enumerate(names)])}
-    names_in = "header" if head.names else "first line"
     comments = CommentLines()
-    # In lines that were made plain, a decimal comma is a point, in titles too.
-    commas = {",": "."} if head.decimal == "," else {}
-    headings = tuple(
-        tuple(cell.translate(str.maketrans(commas)) for cell in line) for line in head.headings
-    )
 
     def read_by(
         reader: type[CarefulLines], wanted: Sequence[str]
@@ -86,9 +80,9 @@ def open_csv(source: FileSource, file: str, layout: FileLayout) -> ColumnTable:
                 has_comments = comments.found_in(body, above)
                 # A quotation mark in a comment opens no cell.
                 plain = head.plain(without_words(body) if has_comments else body)
-                lines = reader(plain, head.mark, names, file, above, names_in, headings)
                 fast = bool(at) and not has_comments
-                columns = _fast(lines.data, head.mark, len(names), at) if fast else None
+                columns = _fast(plain, head.mark, len(names), at) if fast else None
+                lines = reader(data=plain, head=head, names=names, file=file, above=above)
                 if columns:
                     above += len(columns[0])
                 else:

@@ -62,6 +62,13 @@ class TextHead:
         """What separates the columns of lines that were made plain."""
         return "," if self.separator == " " else self.separator
 
+    @property
+    def plain_headings(self) -> tuple[tuple[str, ...], ...]:
+        """Cells of the lines that tell names and units, as they are in lines made plain."""
+        if self.decimal == ".":
+            return self.headings
+        return tuple(tuple(cell.replace(",", ".") for cell in line) for line in self.headings)
+
     def plain(self, lines: bytes) -> bytes:
         """Return lines of samples with one mark between columns, and decimal points."""
         if self.separator == " ":
