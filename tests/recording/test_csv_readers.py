@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynident.errors import RecordingError
-from dynident.recording import read, write
-from dynident.recording.formats.text import csv_file
+from dynident.recording import FileLayout, read, write
+from dynident.recording.formats.text import careful_lines, csv_file
+from dynident.recording.formats.text.text_head import head_of
 
 REGULAR = {
     "point": "t,q.a,tau.a\n0,1,3\n.01,2,4\n",
@@ -39,7 +40,7 @@ def no_careful_reader(monkeypatch):
     def fail(*_):
         pytest.fail("the careful reader was asked")
 
-    monkeypatch.setattr(csv_file._Lines, "numbers", fail)
+    monkeypatch.setattr(careful_lines.CarefulLines, "numbers", fail)
 
 
 @pytest.fixture(params=[0, csv_file._SMALL], ids=["pandas", "NumPy"])
@@ -92,8 +93,12 @@ def test_both_readers_agree(read_by, rows, end):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(csv_file, "_SMALL", len(body) if read_by is csv_file._by_numpy else 0)
         fast = csv_file._fast(body, ";", 3, [2, 0])
+    head = head_of(b"a;b;c\n1;2;3\n", "run.csv", FileLayout())
     try:
-        careful = csv_file._Lines(body, ";", ("a", "b", "c"), "run.csv").numbers([2, 0])
+        lines = careful_lines.CarefulLines(
+            data=body, head=head, names=head.names, file="run.csv", above=1
+        )
+        careful = lines.numbers([2, 0])
     except RecordingError:
         assert fast is None
     else:

@@ -91,6 +91,91 @@ def test_a_fault_within_is_told_though_there_is_another_outside(tmp_path: Path, 
         read(written(tmp_path, lines), ["a"], sound_in=WINDOW)
 
 
+def with_garbage(start: int, stop: int) -> list[str]:
+    """Lines of which some rows are no samples."""
+    return LINES[: start + 1] + ["lost"] * (stop - start) + LINES[stop + 1 :]
+
+
+def without(start: int, stop: int) -> list[str]:
+    """Lines without some rows."""
+    return LINES[: start + 1] + LINES[stop + 1 :]
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        (with_garbage(280, 320), r"\(line 282\).* from 2\.79 s on.* end at 2\.79 s"),
+        (with_garbage(80, 120), r"\(line 121\).* up to 1\.2 s.* begin at 1\.2 s"),
+        (without(280, 320), r"\(line 282\).* from 2\.79 s on"),
+        (without(80, 120), r"\(line 81\).* up to 1\.2 s"),
+    ],
+)
+def test_a_fault_across_the_edge_of_the_window_is_told(
+    tmp_path: Path, lines: list[str], said: str
+) -> None:
+    with pytest.raises(RecordingError, match=said):
+        read(written(tmp_path, lines), ["a"], sound_in=WINDOW)
+
+
+def test_a_second_header_of_other_width_is_told(tmp_path: Path) -> None:
+    lines = [*LINES[:51], "t,tau.a", *LINES[51:]]
+    with pytest.raises(RecordingError, match=r"line 52: a line of words .* t, tau\.a"):
+        read(written(tmp_path, lines), ["a"], sound_in=WINDOW)
+
+
+@pytest.mark.parametrize("place", [51, 351])
+def test_a_second_header_with_other_columns_is_told(tmp_path: Path, place: int) -> None:
+    other = [",".join([t, x, q]) for t, q, x in (line.split(",") for line in LINES)]
+    lines = LINES[:place] + other[:1] + other[place:]
+    with pytest.raises(
+        RecordingError, match=rf"line {place + 1}: .*t, tau\.a, q\.a.*split the file"
+    ):
+        read(written(tmp_path, lines), ["a"], sound_in=WINDOW)
+
+
+@pytest.mark.parametrize("head", [["t,q.a,tau.a"], ["t;q.a;tau,a", "s;rad;Nm"], ["t q.a tau.a"]])
+def test_the_same_header_again_is_a_fault_like_any_other(tmp_path: Path, head: list[str]) -> None:
+    mark = ";" if ";" in head[0] else "," if "," in head[0] else " "
+    body = [line.replace(",", mark) for line in LINES[1:]]
+    body = [line.replace(".", ",") if mark == ";" else line for line in body]
+    path = written(tmp_path, [*head, *body[:50], *head, *body[50:]])
+    columns = {"tau.a": "tau,a"} if mark == ";" else None
+    one = read(path, ["a"], columns, sound_in=WINDOW)
+    np.testing.assert_array_equal(one.tau[:, 0], TAU[50:])
+
+
+@pytest.mark.parametrize(("cells", "last"), [(0, 41), (1, 41), (2, 41), (0, 31), (1, 31), (2, 31)])
+def test_no_quotation_mark_swallows_lines(tmp_path: Path, cells: int, last: int) -> None:
+    lines = LINES[:]
+    for row, before, after in ((30, '"', ""), (last, "", '"')):
+        parts = lines[row].split(",")
+        parts[cells] = before + parts[cells] + after
+        lines[row] = ",".join(parts)
+    path = written(tmp_path, [f"{x},{'note' * (k == 0)}" for k, x in enumerate(lines)])
+    columns = {name: name for name in ("t", "q.a", "tau.a")}
+    for window in (None, WINDOW):
+        with pytest.raises(
+            RecordingError, match=rf"line 31: a quotation mark .* to line {last + 1}"
+        ):
+            read(path, ["a"], columns, sound_in=window)
+
+
+def test_text_may_go_on_over_lines(tmp_path: Path) -> None:
+    noted = [f'{x},"a note,\n\nof 3, say"' for x in FAULTS["NaN"](50)]
+    noted[0] = f"{LINES[0]},note"
+    one = read(written(tmp_path, noted), ["a"], sound_in=WINDOW)
+    np.testing.assert_array_equal(one.q[:, 0], Q[51:])
+
+
+@pytest.mark.parametrize("window", [(-1.0, 3.0), (1.0, 9.0)])
+def test_a_file_may_begin_or_end_within_the_window(
+    tmp_path: Path, window: tuple[float, float]
+) -> None:
+    row = 350 if window[0] < 0 else 50
+    one = read(written(tmp_path, FAULTS["text"](row)), ["a"], sound_in=window)
+    assert one.samples == (350 if row == 350 else COUNT - 51)
+
+
 def test_a_sound_file_is_kept_as_a_whole(tmp_path: Path) -> None:
     one = read(written(tmp_path, LINES), ["a"], sound_in=WINDOW)
     assert one.samples == COUNT and one.provenance.skipped == ()
@@ -107,6 +192,26 @@ def test_a_window_beside_the_clock_is_refused(tmp_path: Path) -> None:
     lines = FAULTS["NaN"](50)
     with pytest.raises(RecordingError, match=r"the window \[7, 8\] s holds no samples"):
         read(written(tmp_path, lines), ["a"], sound_in=(7.0, 8.0))
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ([LINES[0], *(f"{x},0" for x in LINES[1:])], "line 2: 4 columns where the header has 3"),
+        (LINES[:80] + [f"{x},0" for x in LINES[80:]], "line 81: 4 columns where the header has 3"),
+        ([LINES[0], *(f"at {x}" for x in LINES[1:])], "line 2, column t: 'at 0' is not a number"),
+    ],
+)
+def test_where_all_of_the_window_is_at_fault_the_fault_is_told(
+    tmp_path: Path, lines: list[str], said: str
+) -> None:
+    with pytest.raises(RecordingError, match=said):
+        read(written(tmp_path, lines), ["a"], sound_in=WINDOW)
+
+
+def test_one_sample_that_is_left_out_is_one(tmp_path: Path) -> None:
+    one = read(written(tmp_path, FAULTS["text"](COUNT - 1)), ["a"], sound_in=WINDOW)
+    assert one.provenance.skipped[-1].startswith("1 sample beyond faults")
 
 
 def test_a_rate_in_place_of_a_clock_counts_rows_at_fault(tmp_path: Path) -> None:

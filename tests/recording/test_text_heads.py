@@ -171,6 +171,37 @@ def test_comments_among_the_samples_are_counted(tmp_path: Path, names: str) -> N
     assert ("1 line of comment" in one.provenance.skipped) == (not names.startswith("#"))
 
 
+def test_comments_above_a_part_are_counted_once(tmp_path: Path) -> None:
+    lines = ["t,q.a,tau.a", *(f"{k / 100:.2f},{k % 7},{k % 5}" for k in range(900))]
+    for place in (600, 300, 200, 100):
+        lines.insert(place, "# a note")
+    (path := tmp_path / "run.csv").write_text("\n".join(lines) + "\n")
+    part = read(path, ["a"]).part(slice(400, 800)).part(slice(10, 350))
+    for index in (0, 100, 339):
+        assert lines[part.provenance.line(index) - 1].startswith(f"{part.t[index]:.2f},")
+    lines[410] = "lost"
+    path.write_text("\n".join(lines) + "\n")
+    one = read(path, ["a"], sound_in=(5.0, 7.0))
+    assert one.t[0] > 4
+    for index in (0, 300):
+        assert lines[one.provenance.line(index) - 1].startswith(f"{one.t[index]:.2f},")
+
+
+@pytest.mark.parametrize("mark", [",", " "])
+@pytest.mark.parametrize("added", [{500: '# note, "begin of motion'}, {500: '#a,"b', 900: ' % "d'}])
+def test_a_quotation_mark_in_a_comment_opens_no_cell(
+    tmp_path: Path, mark: str, added: dict[int, str]
+) -> None:
+    lines = ["t,q.a,tau.a", *(f"{k / 100:.2f},{k % 7},{k % 5}" for k in range(1500))]
+    lines = [line.replace(",", mark) for line in lines]
+    for place, comment in sorted(added.items(), reverse=True):
+        lines.insert(place, comment)
+    (path := tmp_path / "run.csv").write_text("\n".join(lines) + "\n")
+    one = read(path, ["a"])
+    np.testing.assert_array_equal(one.q[:, 0], np.arange(1500) % 7)
+    assert lines[one.provenance.line(1499) - 1] == lines[-1]
+
+
 def test_a_row_that_was_commented_out_is_none_where_its_clock_is_not_read(tmp_path: Path) -> None:
     (path := tmp_path / "run.csv").write_text(PLAIN.replace("\n0.02", "\n#0.015,7,7\n0.02"))
     np.testing.assert_array_equal(open_table(path).load(["q.a"])["q.a"], Q)
@@ -200,6 +231,11 @@ def test_lines_are_counted_with_all_comments(
 HEADS = {
     "savetxt": ("# t q.a tau.a\n", " ", ("t", "q.a", "tau.a")),
     "savetxt with commas over blanks": ("# t, q.a, tau.a\n", " ", ("t", "q.a", "tau.a")),
+    "savetxt with commas over blanks, every word a name's": (
+        "# t_1, q.a, tau.a\n",
+        " ",
+        ("t_1", "q.a", "tau.a"),
+    ),
     "blanks over commas": ("% t q.a tau.a\n", ",", ("t", "q.a", "tau.a")),
     "MATLAB": (
         "% Time Joint1Position [rad] Torque_1\n%-----\n".replace(" [rad]", "[rad]"),
@@ -230,6 +266,23 @@ def test_the_last_comment_names_the_columns(tmp_path: Path, kind: str) -> None:
     head, mark, names = HEADS[kind]
     (path := tmp_path / "run.csv").write_text(head + "\n".join(ROWS).replace(",", mark))
     assert open_table(path).names == names
+
+
+@pytest.mark.parametrize("mark", [" ", ","])
+def test_names_of_joints_may_be_plain_words(tmp_path: Path, mark: str) -> None:
+    row = "0 1 2 3 4\n".replace(" ", mark)
+    (path := tmp_path / "run.csv").write_text(
+        "# t shoulder elbow tau_shoulder tau_elbow\n" + 3 * row
+    )
+    assert open_table(path).names == ("t", "shoulder", "elbow", "tau_shoulder", "tau_elbow")
+
+
+def test_a_sentence_of_as_many_words_names_no_columns(tmp_path: Path) -> None:
+    (path := tmp_path / "run.csv").write_text(
+        "# this log was made on monday morning\n" + 3 * "0,1,2,3,4,5,6\n"
+    )
+    with pytest.raises(RecordingError, match="holds numbers, not the names of columns"):
+        open_table(path)
 
 
 @pytest.mark.parametrize("comment", PROSE)

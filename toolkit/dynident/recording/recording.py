@@ -40,7 +40,7 @@ class Provenance:
     columns : (ours, the file's name of it, scale) of each column that was read; empty likewise.
     skipped : what else the file holds that was not read, in words each.
     first_line : line of the first sample in a text file, from 1; 0 where lines are not counted.
-    comment_lines : lines of comment below that one, ascending.
+    comment_lines : lines of comment, ascending; those above that one do not count.
     place : where the samples were put if they were too many for the memory, in words.
     """
 
@@ -59,8 +59,20 @@ class Provenance:
         """Return the line of a sample in a text file, given its index from 0; 0 if unknown."""
         number = index + self.first_line
         for comment in self.comment_lines:
-            number += comment <= number
+            number += self.first_line <= comment <= number
         return number if self.first_line else 0
+
+    def row(self, index: int, where: str) -> str:
+        """How messages call a sample, given its index from 0: row, and line in a text file.
+
+        Parameters
+        ----------
+        index : of the sample.
+        where : how they call the recording.
+        """
+        number = self.line(index) if where.lower().endswith(TEXTS) else 0
+        line = f" (line {number})" if number else ""
+        return f"{where}, row {index + 1}{line}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,9 +200,7 @@ class Recording:
 
     def row(self, index: int) -> str:
         """How messages call a sample, given its index from 0: file and row (and line, in CSV)."""
-        number = self.provenance.line(index) if self.where.lower().endswith(TEXTS) else 0
-        line = f" (line {number})" if number else ""
-        return f"{self.where}, row {index + 1}{line}"
+        return self.provenance.row(index, self.where)
 
     def __repr__(self) -> str:
         joints = ", ".join(self.joints)

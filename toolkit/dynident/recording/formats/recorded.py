@@ -54,45 +54,56 @@ def recorded(table: ColumnTable, wanted: Wanted, sound_in: Window | None) -> Rec
         If they cannot be read, or are no recording.
     """
     try:
-        whole = _recording(table, wanted, None)
+        found, source = _read(table, wanted)
+        whole = _recording(found, source, wanted)
     except RecordingError:
         if sound_in is None:
             raise
-        return _recording(table.forgiven, wanted, sound_in)
+        found, source = _read(table.forgiven, wanted)
+        if _is_lost(found["t"], sound_in):
+            raise  # the first error says more than that the window holds no samples
+        return _recording(*_sound(found, source, sound_in), wanted)
     return sound_part(whole, sound_in)
 
 
-def _recording(table: ColumnTable, wanted: Wanted, sound_in: Window | None) -> Recording:
+def _read(table: ColumnTable, wanted: Wanted) -> tuple[dict[str, Any], Provenance]:
+    """Signals of all rows, and where they are from."""
     found, place = gather(table, wanted.columns, wanted.signals)
     first_line, comment_lines = table.lines()
     used = [term.name for one in wanted.columns.values() for term in one.terms]
-    skipped = left_of(table, used)
-    source = Provenance(
+    return found, Provenance(
         str(wanted.path),
         table.sha256,
         record=wanted.record,
         columns=tuple((ours, one.name, one.scale) for ours, one in wanted.columns.items()),
+        skipped=left_of(table, used),
         first_line=first_line,
         comment_lines=comment_lines,
         place=place,
     )
-    changes: dict[str, Any] = {}
-    if sound_in is not None:
-        rows, samples = _stretch(found, sound_in, table.file), len(found["t"])
-        if rows != slice(0, samples):
-            skipped = (*skipped, said_of(rows, samples, sound_in))
-        found = {signal: x[rows] for signal, x in found.items()}
-        changes = {"first_line": source.line(rows.start)}
-    return Recording(
-        joints=tuple(wanted.joints),
-        name=wanted.record or wanted.path.stem,
-        provenance=replace(source, skipped=skipped, **changes),
-        **found,
-    )
 
 
-def _stretch(found: Mapping[str, np.ndarray], window: Window, file: str) -> slice:
+def _recording(found: Mapping[str, Any], source: Provenance, wanted: Wanted) -> Recording:
+    name = wanted.record or wanted.path.stem
+    return Recording(joints=tuple(wanted.joints), name=name, provenance=source, **found)
+
+
+def _is_lost(t: np.ndarray, window: Window) -> bool:
+    """Whether a window may be among the rows whose time is unknown: no other is in it."""
+    known = np.isfinite(t)
+    return not known.all() and not (known & (t >= window[0]) & (t < window[1])).any()
+
+
+def _sound(
+    found: Mapping[str, Any], source: Provenance, window: Window
+) -> tuple[dict[str, Any], Provenance]:
+    """Signals of the sound stretch around a window, and where they are from."""
     # At a joint without a temperature there is none in any row.
     given = {"temperature": lambda x: x[:, ~np.isnan(x).all(axis=0)]}
     signals = [given.get(name, lambda x: x)(x) for name, x in found.items() if name != "t"]
-    return sound_stretch(found["t"], signals, window, file)
+    t, file = found["t"], source.file
+    rows = sound_stretch(t, signals, window, file, lambda k: source.row(k, file))
+    said = (said_of(rows, len(t), window),) if rows != slice(0, len(t)) else ()
+    return {signal: x[rows] for signal, x in found.items()}, replace(
+        source, skipped=(*source.skipped, *said), first_line=source.line(rows.start)
+    )

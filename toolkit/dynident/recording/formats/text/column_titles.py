@@ -22,15 +22,15 @@ _WORDS = re.compile(
     r"|acc(el|eleration)?s?|tau|torques?|efforts?|forces?|currents?|temp(erature)?s?|voltages?"
     r"|ref(erence)?|target|desired|actual|measured|command|cmd|dq|ddq|qd|qdd"
 )
-_MOST = 2 / 3
-"""Share of words that are no names, perhaps: of a sentence they are nearly all."""
+_MOST = 1 / 2
+"""Share of words that look like names above which all are; those of joints may be plain words."""
 
 
 def are_names(cells: Sequence[str]) -> bool:
     """Whether the words of a comment are the names of columns, and not those of a sentence.
 
     Names have digits, underscores, points or brackets in them, are single letters, or words for
-    what is measured; more than two in three of them do.
+    what is measured; more than half of them do.
 
     Parameters
     ----------

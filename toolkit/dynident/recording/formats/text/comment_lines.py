@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 _COMMENTS = re.compile(rb'^[ \t]*"?[ \t]*(?:#|%|//)', re.MULTILINE)
+_WORDS = re.compile(_COMMENTS.pattern + rb".*", re.MULTILINE)
 _LISTED = 1000
 """Lines of comment up to which the line of each sample is known once they have been read."""
 
@@ -42,3 +43,8 @@ class CommentLines:
         if not self._count:
             return ()
         return (f"{self._count} line{'s' * (self._count != 1)} of comment among the samples",)
+
+
+def without_words(body: bytes) -> bytes:
+    """Return lines with nothing in those of comment but the mark that they are some."""
+    return _WORDS.sub(b"#", body)

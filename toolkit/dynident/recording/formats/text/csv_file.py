@@ -8,12 +8,8 @@ names line and column.
 
 from __future__ import annotations
 
-import csv
 import io
-from array import array
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import numpy as np
@@ -22,13 +18,12 @@ from dynident.errors import RecordingError
 from dynident.recording.formats.column_table import ColumnTable, FileLayout, joined
 from dynident.recording.formats.file_source import FileSource
 from dynident.recording.formats.limits import TEXT, require_distinct, require_unpacked
-from dynident.recording.formats.text.comment_lines import CommentLines
-from dynident.recording.formats.text.text_head import head_of, is_comment, is_number
+from dynident.recording.formats.text.careful_lines import CarefulLines, ForgivingLines
+from dynident.recording.formats.text.comment_lines import CommentLines, without_words
+from dynident.recording.formats.text.text_head import head_of
 from dynident.recording.formats.text.text_pieces import text_pieces
 
 _HEADER = "write a header line: t, q.<joint>, tau.<joint> ..."
-_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-_NO_DATE = int(np.datetime64("NaT", "us").astype(np.int64))
 _SMALL = 1 << 18
 """Bytes that NumPy has read sooner than pandas is loaded, which takes a third of a second."""
 
@@ -70,10 +65,11 @@ def open_csv(source: FileSource, file: str, layout: FileLayout) -> ColumnTable:
         names = layout.by_position(head.columns, where, what, _HEADER)
     require_distinct([name for name in names if name], "column", where)
     places = {name: place for place, name in reversed([*enumerate(names)])}
-    names_in = "header" if head.names else "first line"
     comments = CommentLines()
 
-    def read_by(reader: type[_Lines], wanted: Sequence[str]) -> Iterator[dict[str, np.ndarray]]:
+    def read_by(
+        reader: type[CarefulLines], wanted: Sequence[str]
+    ) -> Iterator[dict[str, np.ndarray]]:
         comments.clear()
         numbers = [name for name in wanted if places[name] not in head.dates]
         at, above = [places[name] for name in numbers], 0
@@ -81,20 +77,23 @@ def open_csv(source: FileSource, file: str, layout: FileLayout) -> ColumnTable:
             for piece in text_pieces(stream, file):
                 body = piece if above else _below(piece, head.above)
                 above = above or head.above
-                lines = reader(head.plain(body), head.mark, names, file, above, names_in)
-                fast = not comments.found_in(body, above) and bool(at)
-                columns = _fast(lines.data, head.mark, len(names), at) if fast else None
+                has_comments = comments.found_in(body, above)
+                # A quotation mark in a comment opens no cell.
+                plain = head.plain(without_words(body) if has_comments else body)
+                fast = bool(at) and not has_comments
+                columns = _fast(plain, head.mark, len(names), at) if fast else None
+                lines = reader(data=plain, head=head, names=names, file=file, above=above)
                 if columns:
                     above += len(columns[0])
                 else:
                     columns = lines.numbers(at).T if at else []
-                    above += body.count(b"\n")  # a cell in quotation marks may hold some
+                    above += body.count(b"\n")  # some may be comments
                 found = dict(zip(numbers, columns, strict=True))
                 found |= {one: lines.dates(places[one]) for one in wanted if one not in found}
                 yield {name: found[name] for name in wanted}
 
     def parts(wanted: Sequence[str]) -> Iterator[dict[str, np.ndarray]]:
-        return read_by(_Lines, wanted)
+        return read_by(CarefulLines, wanted)
 
     def load(wanted: Sequence[str]) -> dict[str, np.ndarray]:
         return joined(_few_enough(parts(wanted), file))
@@ -104,7 +103,7 @@ def open_csv(source: FileSource, file: str, layout: FileLayout) -> ColumnTable:
         names,
         load,
         parts=parts,
-        forgiving=lambda wanted: read_by(_ForgivingLines, wanted),
+        forgiving=lambda wanted: read_by(ForgivingLines, wanted),
         skipped=lambda _: (*head.skipped, *comments.words),
         lines=lambda: comments.numbered(head.above + 1),
         texts=frozenset(names[place] for place in head.texts) - {""},
@@ -183,120 +182,3 @@ def _regular_rows(body: bytes, separator: str, width: int) -> int | None:
     marks = body.translate(None, others).rstrip(b"\n") + b"\n"
     rows = len(marks) // width
     return rows if marks == (mark * (width - 1) + b"\n") * rows else None
-
-
-@dataclass(frozen=True, eq=False)
-class _Lines:
-    """Lines that are read one by one, with errors that name the line and the column.
-
-    Attributes
-    ----------
-    data : the lines.
-    separator : of the columns.
-    names : of the columns; "" for one without.
-    file : for messages.
-    above : lines above the first of them.
-    names_in : what says how many columns there are, in words.
-    """
-
-    data: bytes
-    separator: str
-    names: tuple[str, ...]
-    file: str
-    above: int = 1
-    names_in: str = "header"
-
-    def numbers(self, places: Sequence[int]) -> np.ndarray:
-        """Return the numbers (T, k) of k columns."""
-        found = array("d")
-        for where, cells in self._rows():
-            found.extend(self._number(cells[i], f"{where}, {self._column(i)}") for i in places)
-        return np.frombuffer(found, dtype=np.float64).reshape(-1, len(places))
-
-    def dates(self, place: int) -> np.ndarray:
-        """Return the dates (T,) of a column."""
-        found = array("q")
-        for where, cells in self._rows():
-            found.append(self._microseconds(cells[place], f"{where}, {self._column(place)}"))
-        return np.frombuffer(found, dtype="datetime64[us]")
-
-    def _column(self, place: int) -> str:
-        return f"column {self.names[place] or place + 1}"
-
-    def _rows(self) -> Iterator[tuple[str, list[str]]]:
-        """Where each line is, and its cells, as many as there are columns."""
-        body = self.data.decode().rstrip("\n ")
-        if not body.strip():
-            remedy = "is the file complete?"
-            raise RecordingError("holds a header but no samples", self.file, remedy)
-        text = io.StringIO(body, newline="")
-        reader = csv.reader(text, delimiter=self.separator, skipinitialspace=True)
-        line = self.above
-        try:
-            for cells in reader:
-                line = reader.line_num + self.above
-                if cells and is_comment(cells[0]):
-                    continue
-                yield self._complete(cells, f"{self.file}, line {line}")
-        except csv.Error as error:
-            where = f"{self.file}, after line {line}"
-            raise RecordingError(f"cannot be read ({error})", where) from None
-
-    def _complete(self, cells: list[str], where: str) -> tuple[str, list[str]]:
-        count, wanted = len(cells), len(self.names)
-        if not any(cell.strip() for cell in cells):
-            raise RecordingError("the line is empty", where, "remove it")
-        if count != wanted:
-            what = f"{count} column{'s' * (count != 1)} where the {self.names_in} has {wanted}"
-            remedy = "is the file complete?" if count < wanted else "name every column"
-            raise RecordingError(what, where, remedy)
-        return where, cells
-
-    @staticmethod
-    def _number(text: str, where: str) -> float:
-        text = text.strip()
-        if not text:
-            raise RecordingError("the cell is empty", where, "every cell holds a number")
-        if not is_number(text):
-            comma = text.count(",") == 1 and is_number(text.replace(",", "."))
-            remedy = "write a decimal point" if comma else "every cell holds a number"
-            raise RecordingError(f"'{_short(text)}' is not a number", where, remedy)
-        if not np.isfinite(value := float(text)):
-            raise RecordingError(f"'{text}' is not a finite number", where, "repair or cut the gap")
-        return value
-
-    @staticmethod
-    def _microseconds(text: str, where: str) -> int:
-        """Time since 1970 of a date of ISO 8601; without a zone it is that of Greenwich."""
-        try:
-            date = datetime.fromisoformat(text.strip())
-        except ValueError:
-            what = f"'{_short(text)}' is not a date and a time"
-            raise RecordingError(what, where, "write 2026-03-05T10:11:12.345") from None
-        date = date if date.tzinfo else date.replace(tzinfo=UTC)
-        return (date - _EPOCH) // timedelta(microseconds=1)
-
-
-class _ForgivingLines(_Lines):
-    """Lines of which those at fault are rows of what is no number, and no date."""
-
-    def _complete(self, cells: list[str], where: str) -> tuple[str, list[str]]:
-        return where, cells if len(cells) == len(self.names) else [""] * len(self.names)
-
-    @staticmethod
-    def _number(text: str, where: str) -> float:
-        try:
-            return _Lines._number(text, where)
-        except RecordingError:
-            return np.nan
-
-    @staticmethod
-    def _microseconds(text: str, where: str) -> int:
-        try:
-            return _Lines._microseconds(text, where)
-        except RecordingError:
-            return _NO_DATE
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= 30 else text[:27] + "..."

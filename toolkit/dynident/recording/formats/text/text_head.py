@@ -36,6 +36,8 @@ class TextHead:
     separator : of columns, in the file.
     decimal : what stands before the decimals of numbers.
     names : of the columns, with units that are not ours behind them; () where nothing names them.
+    headings : cells of the lines that tell names and units, as they stand there; those in comments
+        are none.
     columns : how many there are.
     above : lines above the first sample.
     line : that names the columns, or the first one, from 1.
@@ -47,6 +49,7 @@ class TextHead:
     separator: _Signs
     decimal: Literal[".", ","]
     names: tuple[str, ...]
+    headings: tuple[tuple[str, ...], ...]
     columns: int
     above: int
     line: int
@@ -58,6 +61,13 @@ class TextHead:
     def mark(self) -> str:
         """What separates the columns of lines that were made plain."""
         return "," if self.separator == " " else self.separator
+
+    @property
+    def plain_headings(self) -> tuple[tuple[str, ...], ...]:
+        """Cells of the lines that tell names and units, as they are in lines made plain."""
+        if self.decimal == ".":
+            return self.headings
+        return tuple(tuple(cell.replace(",", ".") for cell in line) for line in self.headings)
 
     def plain(self, lines: bytes) -> bytes:
         """Return lines of samples with one mark between columns, and decimal points."""
@@ -109,11 +119,13 @@ def head_of(start: bytes, file: str, layout: FileLayout) -> TextHead:
     cells = _cells(first, separator, f"{file}, line {number}")
     below = [_split(line, separator) for _, line in rest]
     titles, units, samples = (), (), [cells, *below]
+    headings: list[tuple[str, ...]] = []
     named, above = number, number - 1
     if not _is_sample(cells, below, separator):
         titles, samples, above = cells, below, number
         if len(below) > 1 and len(below[0]) == len(cells) and _above_numbers(below[0], below[1]):
             units, samples, above = below[0], below[1:], rest[0][0]
+        headings = [tuple(one) for one in (titles, units) if one]
         comments += [one for one in every if one[0] < above and is_comment(one[1])]
     elif layout.names in ((), "numbered"):
         told = [(k, _COMMENT.sub("", line, count=1)) for k, line in comments]
@@ -130,6 +142,7 @@ def head_of(start: bytes, file: str, layout: FileLayout) -> TextHead:
         separator=separator,
         decimal=_decimal(samples, separator, file),
         names=tuple(map(with_unit, titles, units or [""] * len(titles))),
+        headings=tuple(headings),
         columns=len(cells),
         above=above,
         line=named,
@@ -246,7 +259,8 @@ def _as_units(comment: str, separator: str, sample: Sequence[str]) -> tuple[str,
 def _as_names(comment: str, separator: str, count: int) -> tuple[str, ...]:
     """Names of so many columns in a comment, which may separate them by commas or blanks."""
     for cells in (_split(comment, separator), _BETWEEN.split(comment.strip())):
-        if len(cells) == count > 1 and are_names(cells):
+        cut_elsewhere = any(cell.endswith((",", ";")) for cell in cells)
+        if len(cells) == count > 1 and not cut_elsewhere and are_names(cells):
             return tuple(cells)
     return ()
 
