@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 
@@ -18,4 +19,9 @@ class LateModule:
     name: str
 
     def __getattr__(self, attribute: str) -> Any:
-        return getattr(importlib.import_module(self.name), attribute)
+        return getattr(self._module, attribute)
+
+    @cached_property
+    def _module(self) -> Any:
+        # Kept: to write out a function of a robot asks 1e4 times and more.
+        return importlib.import_module(self.name)

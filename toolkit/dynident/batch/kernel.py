@@ -80,35 +80,33 @@ class Kernel:
         result = out if out is not None and direct else side_by_side(samples, self.shape)
         rows = np.moveaxis(result, 0, -1)
         rows[self._nowhere] = 0.0
-        inputs = [*_signals(q, v, a), *map(float, parameters)]
-        results = [rows[place] for place in self._tape.places]
+        signals, numbers = _signals(q, v, a), np.array(parameters, dtype=float)
         price = Price(look_after=LOOK_AFTER, compile_after=COMPILE_AFTER)
         self._seen += samples
         function = self._choice.function(self._seen, price)
         _used.setdefault(self.evaluation)
         if function is None or samples < LANES:
-            self._tape.replay(inputs, results)
+            results = [rows[place] for place in self._tape.places]
+            self._tape.replay([*signals, *numbers.tolist()], results)
         else:
-            self._run(function, samples, inputs, results)
+            self._run(function, signals, numbers, rows)
         if out is None or direct:
             return result
         np.copyto(out, result)
         return out
 
     def _run(
-        self, function: Any, samples: int, inputs: list[Any], results: list[np.ndarray]
+        self, function: Any, signals: np.ndarray, numbers: np.ndarray, rows: np.ndarray
     ) -> None:
         """Call the compiled function."""
-        steps = (ctypes.c_long * len(inputs))(*(int(np.ndim(one) > 0) for one in inputs))
-        held = [np.ascontiguousarray(one, dtype=float) for one in inputs]
+        steps = np.repeat([1, 0], [len(signals), len(numbers)]).astype(ctypes.c_long)
+        places = np.array(self._tape.places, dtype=int).reshape(-1, len(self.shape))
+        inputs = [_addresses(signals, np.arange(len(signals))[:, None])]
+        inputs.append(_addresses(numbers, np.arange(len(numbers))[:, None]))
+        given, results = np.concatenate(inputs), _addresses(rows, places)
         work = side_by_side(work_size(self._tape), ())
-        function(
-            ctypes.c_long(samples),
-            _pointers(held),
-            steps,
-            ctypes.c_void_p(work.ctypes.data),
-            _pointers(results),
-        )
+        every = (given, steps, work, results)
+        function(ctypes.c_long(signals.shape[1]), *(ctypes.c_void_p(x.ctypes.data) for x in every))
 
 
 @lru_cache(maxsize=_KEPT)
@@ -169,5 +167,8 @@ def _is_side_by_side(out: np.ndarray, shape: tuple[int, ...]) -> bool:
     return fits and out.flags.aligned and out.flags.writeable
 
 
-def _pointers(arrays: Sequence[np.ndarray]) -> Any:
-    return (ctypes.c_void_p * len(arrays))(*(one.ctypes.data for one in arrays))
+def _addresses(array: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Where the parts of an array at places (k, d) begin, (k,): for each of them to be asked, which
+    takes microseconds, is most of what a short recording costs."""
+    strides = np.array(array.strides[: places.shape[1]], dtype=int)
+    return (array.ctypes.data + places @ strides).astype(np.uintp)

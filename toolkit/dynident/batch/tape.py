@@ -177,27 +177,26 @@ class _Values:
 
     def _walk(self, function: Any) -> None:
         held: dict[int, int] = {}  # the value in each of CasADi's slots
+        output, given, constant = ca.OP_OUTPUT, ca.OP_INPUT, ca.OP_CONST
+        operations = {
+            ca.OP_ADD: lambda left, right: self._step(_ADD, left, right),
+            ca.OP_SUB: lambda left, right: self._step(_SUB, left, right),
+            ca.OP_MUL: lambda left, right: self._step(_MUL, left, right),
+            ca.OP_NEG: lambda one: self._step(_MUL, self._constant(-1.0), one),
+            ca.OP_TWICE: lambda one: self._step(_ADD, one, one),
+            ca.OP_SQ: lambda one: self._step(_MUL, one, one),
+        }
         for k in range(function.n_instructions()):
             kind, used = function.instruction_id(k), function.instruction_input(k)
             made = function.instruction_output(k)
-            if kind == ca.OP_OUTPUT:
+            if kind == output:
                 self.results[made[1]] = held[used[0]]
-            elif kind == ca.OP_INPUT:
+            elif kind == given:
                 held[made[0]] = -1 - used[1]
-            elif kind == ca.OP_CONST:
+            elif kind == constant:
                 held[made[0]] = self._constant(function.instruction_constant(k))
             else:
-                held[made[0]] = self._operation(kind, [held[slot] for slot in used])
-
-    def _operation(self, kind: int, of: list[int]) -> int:
-        if kind == ca.OP_NEG:
-            return self._step(_MUL, self._constant(-1.0), of[0])
-        if kind == ca.OP_TWICE:
-            return self._step(_ADD, of[0], of[0])
-        if kind == ca.OP_SQ:
-            return self._step(_MUL, of[0], of[0])
-        codes = {ca.OP_ADD: _ADD, ca.OP_SUB: _SUB, ca.OP_MUL: _MUL}
-        return self._step(codes[kind], of[0], of[1])
+                held[made[0]] = operations[kind](*(held[slot] for slot in used))
 
     def _step(self, code: int, left: int, right: int) -> int:
         if code != _SUB and right < left:

@@ -285,12 +285,25 @@ class Evidence:
     ) -> list[list[np.ndarray]]:
         """Columns that follow from the motion alone, all in one pass through each recording."""
         if effects[0].is_instantaneous:
-            return decimate_each(every, model, lambda block: self._loaded(effects, block))
-        return [one.filtered_each(self._loaded(effects, one.block(model))) for one in every]
+            return decimate_each(
+                every, model, lambda one, raw: self._loaded(effects, one, raw, model)
+            )
+        whole = slice(None)
+        return [one.filtered_each(self._loaded(effects, one, whole, model)) for one in every]
 
-    def _loaded(self, effects: Sequence[Effect], block: Block) -> list[np.ndarray]:
-        """Columns that follow from the motion alone, with the payload on board."""
-        block = replace(block, carries_payload=True)
+    def _loaded(
+        self, effects: Sequence[Effect], sampled: Sampled, raw: slice, model: Model
+    ) -> list[np.ndarray]:
+        """Columns that follow from the motion alone, with the payload on board.
+
+        The latest block of a recording is kept, and the directions of motion in it: whoever seeks
+        a shape asks for the same one again and again.
+        """
+        known, asked = self.cache.rows_of(sampled), (raw.start, raw.stop, *model.friction_widths)
+        if "latest block" not in known or known["latest block"][0] != asked:
+            block = replace(sampled.block(model, raw), carries_payload=True)
+            known["latest block"] = asked, block
+        block = known["latest block"][1]
         return [one.acting_columns(self.model.ready(one, block, None)) for one in effects]
 
     def _rigid(self, sampled: Sampled, model: Model) -> RigidColumns:
@@ -430,9 +443,9 @@ class Evidence:
         """Torque at the full rate without what depends on it, for a model that has such an effect.
 
         Its fit asks again and again: the rigid body's columns are kept, of which the torque is a
-        product, unless effects change the bodies or a recording is long.
+        product, unless a recording is long.
         """
-        if any(one.needs_bodies for one in model.effects) or len(block.t) > _SHARED:
+        if len(block.t) > _SHARED:
             return model.torque_without_loads(block, values)
         base, loads = list(model.base.independent), any(one.is_payload for one in model.effects)
         tip = 10 * (model.robot.tip % model.robot.n)
@@ -449,7 +462,8 @@ class Evidence:
         torque = known[key].times(at)
         for one in model.effects:
             if not (one.is_payload or one.needs_torque):
-                own = one.acting_columns(block) @ values[model.slices[one.label]]
+                columns = one.acting_columns(model.ready(one, block, values))
+                own = columns @ values[model.slices[one.label]]
                 torque[:, list(one.acting_at(model.robot))] += own
         return torque
 

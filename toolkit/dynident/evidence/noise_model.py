@@ -222,9 +222,7 @@ def _whitening_filter(
     longest = max(len(stretch) for stretch in stretches)
     order = min(criteria.order, max(longest // 20, 0))
     total = sum(len(stretch) for stretch in stretches)
-    correlation = np.array(
-        [sum(float(x[: len(x) - k] @ x[k:]) for x in stretches) / total for k in range(order + 1)]
-    )
+    correlation = _lagged_products(stretches, order) / total
     correlation[0] = correlation[0] * (1.0 + criteria.white_share) + white
     if order == 0:
         return np.array([1.0]) / np.sqrt(correlation[0])
@@ -252,6 +250,12 @@ def inflation(noise: list[np.ndarray], criteria: NoiseCriteria, power: int = 1) 
     total = sum(float(x @ x) for x in noise)
     if not total > 0:
         return 1.0
-    lags = range(1, criteria.lags + 1)
-    correlations = [sum(float(x[:-k] @ x[k:]) for x in noise if len(x) > k) / total for k in lags]
-    return max(1.0, 1.0 + 2.0 * sum(c**power for c in correlations))
+    correlations = _lagged_products(noise, criteria.lags)[1:] / total
+    return max(1.0, 1.0 + 2.0 * float(np.sum(correlations**power)))
+
+
+def _lagged_products(stretches: Sequence[np.ndarray], lags: int) -> np.ndarray:
+    """Products of stretches (T,) with themselves so many samples later, summed, (lags + 1,)."""
+    gap = np.zeros(lags)
+    rows = np.concatenate([piece for one in stretches for piece in (one, gap)])
+    return np.correlate(rows, rows[: len(rows) - lags], "valid")

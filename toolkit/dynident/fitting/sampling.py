@@ -239,14 +239,17 @@ class Sampled:
 
 
 def decimate_each(
-    every: Sequence[Sampled], model: Model, evaluate: Evaluate
+    every: Sequence[Sampled],
+    model: Model,
+    evaluate: Callable[[Sampled, slice], list[np.ndarray]],
 ) -> list[list[np.ndarray]]:
     """As `Sampled.decimate`, of several recordings: those of one layout are filtered at once.
 
     Parameters
     ----------
     every : the recordings.
-    model, evaluate : as for `Sampled.decimate`.
+    model : as for `Sampled.decimate`.
+    evaluate : columns of a recording's samples at the full rate, of all that are told.
 
     Returns
     -------
@@ -257,7 +260,7 @@ def decimate_each(
         some = [one for one in every if one.layout == layout]
         first, parts = some[0], []
         for plan in first.plans(model):
-            columns = [evaluate(one.block(model, plan.raw)) for one in some]
+            columns = [evaluate(one, plan.raw) for one in some]
             parts.append(first.parallel.apply_each([x for each in columns for x in each], plan))
         whole = [np.concatenate(pieces) for pieces in zip(*parts, strict=True)]
         count = len(whole) // len(some)

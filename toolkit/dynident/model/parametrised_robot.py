@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -94,7 +94,7 @@ class ParametrisedRobot:
         """Return the model with another friction width, in rad/s or m/s, at one joint."""
         widths = [float(w) for w in self.friction_widths]
         widths[self.robot.names.index(joint)] = float(width)
-        return replace(self, friction_width=tuple(widths))
+        return self._with(friction_width=tuple(widths))
 
     # --- with other effects --------------------------------------------------------------------
 
@@ -103,7 +103,7 @@ class ParametrisedRobot:
         if isinstance(addition, str):
             addition = effects_of(addition, self.robot, self.laws)
         more = addition if isinstance(addition, tuple) else (addition,)
-        return replace(self, effects=(*self.effects, *more))
+        return self._with(effects=(*self.effects, *more))
 
     def __sub__(self, effect: Effect | str) -> Self:
         """Return the model without an effect, given as itself or by its label."""
@@ -111,7 +111,7 @@ class ParametrisedRobot:
         kept = tuple(one for one in self.effects if one.label != label)
         if len(kept) == len(self.effects):
             raise EffectError("is not in the model", label)
-        return replace(self, effects=kept)
+        return self._with(effects=kept)
 
     def __contains__(self, effect: Effect | str) -> bool:
         label = effect if isinstance(effect, str) else effect.label
@@ -124,8 +124,12 @@ class ParametrisedRobot:
     def with_shapes(self, effects: tuple[Effect, ...]) -> Self:
         """Return the model with these effects in place of those of the same labels."""
         by_label = {effect.label: effect for effect in effects}
-        made = replace(self, effects=tuple(by_label.get(e.label, e) for e in self.effects))
-        made.__dict__["base"] = self.base  # the costly part, and the same
+        return self._with(effects=tuple(by_label.get(e.label, e) for e in self.effects))
+
+    def _with(self, **changes: Any) -> Self:
+        made = replace(self, **changes)
+        if "base" in self.__dict__:
+            made.__dict__["base"] = self.base  # the costly part, and the same
         return made
 
     def at(self, values: np.ndarray) -> Self:

@@ -145,12 +145,13 @@ def missed_instead(
     at = fitted.model.slices[f"coulomb_friction@{laws[0].joint}"].start
     known, reliable = fitted.pooled, fitted.criteria.noise.reliable
     found = []
-    for beside, own in candidate_moments(evidence, fitted, laws):
+    for each, alone in candidate_moments(evidence, fitted, laws):
+        beside, own = each.pooled(), alone.pooled()
         products = [
             _widened(whole, cross[:, 0], square[0, 0], at)
             for whole, cross, square in (
-                (known.total, beside.pooled().total, own.pooled().total),
-                (known.signal, beside.pooled().signal, own.pooled().signal),
+                (known.total, beside.total, own.total),
+                (known.signal, beside.signal, own.signal),
             )
         ]
         moments = SecondMoments(products[0], known.counts, None, products[1])
