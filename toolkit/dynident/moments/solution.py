@@ -91,15 +91,16 @@ def regression_values(moments: SecondMoments, least_reliability: float) -> np.nd
         return regress(moments, least_reliability).values
     units = np.outer(scale, scale)
     total, free = moments.gram / units, signal[:-1, :-1] / units
-    _, order, rank, _ = _pstrf(total, tol=_DEPENDENT)
+    pivoted, order, rank, _ = _pstrf(total, tol=_DEPENDENT)
     some, others = order[:rank] - 1, order[rank:] - 1
     among = np.ix_(some, some)
-    factor = _sound_factor(total[among])
-    own = factor
-    if factor is not None and moments.noise_free is not None:
-        reliable = _factor(free[among] - least_reliability * total[among]) is not None
-        own = _factor(free[among]) if reliable else None
-    if factor is None or own is None:
+    whole, factor = total[among], pivoted[:rank, :rank]
+    own = factor if _is_sound(factor, whole) else None
+    if own is not None and moments.noise_free is not None:
+        signal_in = free[among]
+        reliable = _factor(signal_in - least_reliability * whole) is not None
+        own = _factor(signal_in) if reliable else None
+    if own is None:
         return regress(moments, least_reliability).values
     found = np.zeros(len(scale))
     found[some] = _potrs(own, signal[some, -1] / scale[some])[0]
@@ -118,13 +119,10 @@ def _factor(products: np.ndarray) -> np.ndarray | None:
     return None if failed else factor
 
 
-def _sound_factor(products: np.ndarray) -> np.ndarray | None:
-    """The same of columns of norm 1 that are independent, by far beyond the bound of `regress`."""
-    factor = _factor(products)
-    if factor is None:
-        return None
-    least, _ = _pocon(factor, np.abs(products).sum(axis=0).max())
-    return factor if least > _SOUND else None
+def _is_sound(factor: np.ndarray, products: np.ndarray) -> bool:
+    """Whether columns of norm 1 are independent, by far beyond the bound of `regress`."""
+    least, _ = _pocon(factor, np.abs(products).sum(axis=0).max(initial=0.0))
+    return bool(least > _SOUND)
 
 
 def solve_products(

@@ -24,6 +24,7 @@ from dynident.evidence.time_varying import (
 from dynident.model import Model, not_met
 from dynident.moments.replicates import time_varying_products
 from dynident.moments.second_moments import SecondMoments
+from dynident.moments.solution import eigenvectors
 
 Columns = Callable[[Sequence[Effect], Model, np.ndarray], list[list[Signals]]]
 """Columns of variants of an effect, for a model and its values, as `Evidence.columns`."""
@@ -261,9 +262,8 @@ def _block_scores(
     """Each block's moment of cleared columns and the residual with the effect in, (B, k)."""
     p = len(fitted.values)
     combination = np.append(-fitted.values + back @ values, 1.0)
-    plain = np.einsum("i,bik->bk", combination, with_model.signal) - with_self.signal @ values
-    model = np.einsum("i,bij->bj", combination, fitted.moments.signal)[:, :p]
-    model -= np.einsum("bik,k->bi", with_model.signal[:, :p], values)
+    plain = combination @ with_model.signal - with_self.signal @ values
+    model = (combination @ fitted.moments.signal)[:, :p] - with_model.signal[:, :p] @ values
     return plain - model @ back
 
 
@@ -278,7 +278,8 @@ def _block_p_value(moment: np.ndarray, scores: np.ndarray) -> float:
     blocks, k = scores.shape
     if blocks <= k + 1:
         return 1.0
-    spread = scores.T @ scores * blocks / (blocks - 1)
-    statistic = float(moment @ np.linalg.lstsq(spread, moment, rcond=1e-12)[0])
+    size, axes = eigenvectors(scores.T @ scores * blocks / (blocks - 1))
+    seen = size > 1e-12 * size[-1]
+    statistic = float(np.sum((moment @ axes[:, seen]) ** 2 / size[seen]))
     ratio = max(statistic, 0.0) * (blocks - k) / (k * (blocks - 1))
     return float(special.fdtrc(k, blocks - k, ratio))
