@@ -223,7 +223,7 @@ def _shaped(
         options={
             "initial_simplex": start + np.array([[0.0, 0.0], [0.3, 0.0], [0.0, 5e-4]]),
             "maxfev": 40,
-            "xatol": 1e-4,
+            "xatol": 1e-2,  # of its width
             "fatol": 0.5,
         },
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +24,8 @@ from dynident.evidence.noise_model import differences, systematic_square
 from dynident.model import Model
 from dynident.moments.replicates import Kind
 
+_ALIKE = 1e-10
+"""Share of the squared residual by which scores of the same differ, as they are rounded."""
 _NOISY = "plain least squares takes it for the noise in accelerations: record a repeated motion"
 
 
@@ -108,22 +110,43 @@ def rank(
         tried = list(_score_variants(evidence, fitted, effect))
         tests += len(tried)
         best.append(max(tried, key=lambda s: s.penalised))
-    best.sort(key=lambda s: -s.penalised)
-    for i in range(len(only) or min(criteria.search.contenders, len(best))):
+    alike = _ALIKE * fitted.error_total
+    order = best_first([one.penalised for one in best], alike)
+    for i in order[: len(only) or criteria.search.contenders]:
         if best[i].not_identifiable:
             break
         if best[i].p_value * tests > criteria.search.hopeless or best[i].penalised == -np.inf:
             continue
         progress(f"{best[i].effect.label}, cross-validated")
         best[i] = _confirm(evidence, fitted, best[i])
-    best.sort(key=lambda s: -s.penalised)
     if least is None:
         least = criteria.gates.later_share if added else criteria.gates.first_share
-    scores = tuple(best)
+    scores = tuple(best[i] for i in best_first([one.penalised for one in best], alike))
     refusals = tuple(
         _unseen(s, noisy) or _refusal(s, evidence, fitted, tests, least) for s in scores
     )
     return Ranking(scores, tests, refusals)
+
+
+def best_first(values: Sequence[float], alike: float) -> list[int]:
+    """Return the places of values, the largest first; of those that are alike the first one first.
+
+    What two effects do is the same where one is the other's column by another name: which of them
+    is named first must not hang on rounding.
+
+    Parameters
+    ----------
+    values : of the candidates in the order of the catalogue.
+    alike : by how much those that are the same may differ.
+    """
+    found: list[int] = []
+    same: list[int] = []
+    for place in sorted(range(len(values)), key=lambda one: -values[one]):
+        if same and values[same[0]] - values[place] > alike:
+            found += sorted(same)
+            same = []
+        same.append(place)
+    return found + sorted(same)
 
 
 def _unseen(one: Score, noisy: bool) -> str:
