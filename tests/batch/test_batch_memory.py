@@ -69,3 +69,15 @@ def test_no_more_is_kept_than_is_said(monkeypatch):
     held.clear()
     gc.collect()
     assert 0 < sum(map(len, memory._free.values())) <= 2**24
+
+
+def test_blocks_of_another_length_do_not_stand_beside_those_of_before(monkeypatch):
+    monkeypatch.setattr(memory, "_free", {})
+    held = [side_by_side(4 * SAMPLES, SHAPE) for _ in range(3)]
+    held.clear()
+    gc.collect()
+    before = sum(map(len, memory._free.values()))
+    held = [side_by_side(SAMPLES, SHAPE) for _ in range(3)]
+    held.clear()
+    gc.collect()
+    assert 0 < sum(map(len, memory._free.values())) < before / 2
