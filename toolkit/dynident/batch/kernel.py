@@ -168,7 +168,9 @@ def _is_side_by_side(out: np.ndarray, shape: tuple[int, ...]) -> bool:
 
 
 def _addresses(array: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Where the parts of an array at places (k, d) begin, (k,): for each of them to be asked, which
-    takes microseconds, is most of what a short recording costs."""
+    """Where the parts of an array at places (k, d) begin, (k,).
+
+    To ask each of hundreds of parts itself costs as much as to compute a short recording.
+    """
     strides = np.array(array.strides[: places.shape[1]], dtype=int)
     return (array.ctypes.data + places @ strides).astype(np.uintp)

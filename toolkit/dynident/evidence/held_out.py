@@ -224,9 +224,9 @@ def prediction_variance(columns: JointColumns, fitted: EvidenceFit | Estimate) -
     -------
     (N m)^2 or N^2
     """
-    used, places = columns.used[:, :-1], columns.places[:-1]
+    rows, places = columns.used[:, :-1].T, columns.places[:-1]
     doubt = fitted.covariance[np.ix_(places, places)]
-    return float(np.mean(np.sum((used @ doubt) * used, axis=1)))
+    return float(np.vdot(rows, doubt @ rows)) / rows.shape[1]
 
 
 def _variance(residual: np.ndarray, kind: Kind, criteria: NoiseCriteria) -> float:

@@ -152,12 +152,10 @@ class Sampled:
         """
         for plan, block, known, torque in self._blocks(model, values):
             if any(effect.needs_torque or effect.is_payload for effect in model.effects):
-                columns = self.parallel.apply_block(model.columns(block, values, known), plan)
-                measured = self.parallel.apply_block(torque, plan)
-                yield measured - columns @ values, measured
-                continue
-            left = torque - model.torque_without_loads(block, values, known)
-            yield tuple(self.parallel.apply_each([left, torque], plan))
+                predicted = model.torque(block, values, known)
+            else:
+                predicted = model.torque_without_loads(block, values, known)
+            yield tuple(self.parallel.apply_each([torque - predicted, torque], plan))
 
     def _blocks(
         self, model: Model, values: np.ndarray | None

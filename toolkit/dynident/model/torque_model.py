@@ -138,9 +138,11 @@ class Model(ParametrisedRobot):
             whole, block, values, {}, lambda found: self.torque_without_loads(block, values, found)
         )
 
-    def torque(self, block: Block, values: np.ndarray) -> np.ndarray:
-        """Predicted torque, (T, n) in N m or N."""
-        return _product(self.columns(block, values), values)
+    def torque(
+        self, block: Block, values: np.ndarray, known: Mapping[str, np.ndarray] | None = None
+    ) -> np.ndarray:
+        """Predicted torque, (T, n) in N m or N; parameters as for `columns`."""
+        return _product(self.columns(block, values, known), values)
 
     def torque_without_loads(
         self,
