@@ -51,8 +51,7 @@ def _taken(size: int) -> np.ndarray:
         if memory is not None:
             _free[key] = memory
     # Blocks have another length now: what is left of the old ones would only be held besides.
-    for key in list(_free):
-        _free.pop(key, None)
+    _free.clear()
     # A little more than is asked for, so that the next block, a little longer, fits too; what is
     # not written to takes no memory. NumPy asks for huge pages, where there are any.
     return np.empty(size + size // 4, dtype=np.uint8)

@@ -223,7 +223,7 @@ def _shaped(
         options={
             "initial_simplex": start + np.array([[0.0, 0.0], [0.3, 0.0], [0.0, 5e-4]]),
             "maxfev": 40,
-            "xatol": 1e-2,  # of its width
+            "xatol": 1e-2,  # 1 % of the width; of the lead, what is missed decides
             "fatol": 0.5,
         },
     )
