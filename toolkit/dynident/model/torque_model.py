@@ -141,7 +141,16 @@ class Model(ParametrisedRobot):
     def torque(
         self, block: Block, values: np.ndarray, known: Mapping[str, np.ndarray] | None = None
     ) -> np.ndarray:
-        """Predicted torque, (T, n) in N m or N; parameters as for `columns`."""
+        """Predicted torque, in N m or N.
+
+        Parameters
+        ----------
+        block, values, known : as for `columns`.
+
+        Returns
+        -------
+        (T, n)
+        """
         return _product(self.columns(block, values, known), values)
 
     def torque_without_loads(
