@@ -249,6 +249,17 @@ class VerdictCriteria(CriteriaGroup):
     not_nothing: float = criterion(
         0.5, "1", "systematic residual over noise from which a verdict says that something is left"
     )
+    few_rows: float = criterion(
+        0.01, "1", "share of the training rows that is looked at for bursts", over=0, most=0.5
+    )
+    held_by_few: float = criterion(
+        0.5,
+        "1",
+        "share of the residual's square which those rows must hold to be told as bursts; of normal "
+        "noise they hold 0.08",
+        over=0,
+        most=1,
+    )
     unlike: float = criterion(
         2.0,
         "1",

@@ -16,6 +16,7 @@ import numpy as np
 from dynident.diagnosis.advice.experiments import Adviser
 from dynident.diagnosis.answer import Verdict
 from dynident.diagnosis.candidate_gains import candidate_gains
+from dynident.diagnosis.dependence.bursts import burst_notes
 from dynident.diagnosis.details import Candidate, JointResult, Status, Step, TestError, Trace
 from dynident.diagnosis.detection_limits import detection_limits
 from dynident.diagnosis.nuisances.contacts import Disturbance, contact_candidates
@@ -144,6 +145,9 @@ def assemble(
             *notes_on(evidence, held, stages[-1], source, search.doubtful),
             *_differing_recordings(trained, after, evidence, held, stages[-1]),
             *_noise_doubts(evidence, source, rounded, after),
+            *burst_notes(
+                trained, given.robot.names, given.robot.torque_units, evidence.criteria.verdict
+            ),
             *rounding_notes(after, given.robot.names, evidence.criteria.verdict),
             *notes_on_steps(steps, held),
             *path.notes,

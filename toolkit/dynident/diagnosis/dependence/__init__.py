@@ -10,5 +10,6 @@ not seen, as it is given more and more inputs, each with its standard error.
 - `motion_blocks`: what is held out together: blocks of time, their repetitions, and a gap.
 - `block_regression`: kernel regressions, each block predicted from the others.
 - `explained_shares`: the regressions one after another, and what each adds.
+- `bursts`: a few instants that hold most of it.
 - `residual_dependence`: the whole of it, in words, as a table and as JSON.
 """

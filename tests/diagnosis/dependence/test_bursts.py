@@ -1,0 +1,101 @@
+"""A few instants that hold most of a residual are told, with the place of the largest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dynident import diagnose
+from dynident.criteria import VerdictCriteria
+from dynident.diagnosis.dependence.bursts import burst_notes
+from dynident.evidence.held_out import HeldOut, HeldOutRun
+from dynident.model import Model
+from dynident.recording import Dataset, Recording
+from synthetic import arm, synthetic, true_values
+
+ROWS = 800
+
+
+def left(*residuals: np.ndarray, certain: np.ndarray | None = None) -> HeldOut:
+    """A model that leaves (T, n) of recordings at 50 Hz."""
+    still = np.zeros_like(residuals[0])
+    whole = np.ones(still.shape, dtype=bool)
+    runs = tuple(
+        HeldOutRun(
+            name=f"run{k + 1}",
+            certain=whole if certain is None else certain,
+            t=np.arange(len(one)) / 50.0,
+            q=still,
+            v=still,
+            a=still,
+            measured=one,
+            predicted=still,
+        )
+        for k, one in enumerate(residuals)
+    )
+    ones = np.ones(still.shape[1])
+    return HeldOut(runs=runs, noise_std=None, ratio=None, least_ratio=None, inflation=ones)
+
+
+def told(trained: HeldOut) -> tuple[str, ...]:
+    """What is said of joints a and b."""
+    return burst_notes(trained, ["a", "b"], ["N m", "N"], VerdictCriteria())
+
+
+def noise(seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).standard_normal((ROWS, 2))
+
+
+def test_bursts_are_counted_and_the_largest_is_placed() -> None:
+    first, second = noise(1), noise(2)
+    first[100:103, 1] += [20.0, 40.0, 20.0]
+    second[500:503, 1] -= [20.0, 60.0, 20.0]
+    (said,) = told(left(first, second))
+    assert said.startswith("At b ")
+    assert "2 bursts" in said
+    assert "at 10.02 s of run2" in said
+    assert f"the largest of {abs(second[501, 1]):.2g} N " in said
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_noise_is_called_a_burst(seed: int) -> None:
+    """Normal noise of one size or of one that grows fourfold, steps, and heavier tails."""
+    rng = np.random.default_rng(seed)
+    growing = noise(seed) * np.linspace(0.4, 1.6, ROWS)[:, None]
+    heavy = rng.standard_t(5, (ROWS, 2))
+    for one in (noise(seed), growing, heavy, np.round(noise(seed))):
+        assert not told(left(one, one[::-1]))
+
+
+def test_what_does_not_count_is_no_burst() -> None:
+    one, certain = noise(3), np.ones((ROWS, 2), dtype=bool)
+    one[100:103, 0] = 50.0
+    certain[95:110, 0] = False
+    assert told(left(one))
+    assert not told(left(one, certain=certain))
+
+
+def test_few_rows_and_nothing_left_say_nothing() -> None:
+    assert not told(left(np.zeros((ROWS, 2))))
+    assert not told(left(noise(4)[:50]))
+
+
+def test_a_diagnosis_without_a_noise_floor_tells_of_knocks() -> None:
+    """Its test recording shows none, and its residual is as large as noise might be."""
+    model = Model(arm()) + "viscous_friction" + "coulomb_friction"
+    values = {"Fv__shoulder": 1.2, "Fv__elbow": 0.5, "Fc__shoulder": 1.5, "Fc__elbow": 0.6}
+    truth = true_values(model, **values)
+
+    def recorded(seed: int, knocks: tuple[float, ...]) -> Recording:
+        one = synthetic(model, truth, seed, rate_hz=250.0, torque_std=0.1)
+        tau = np.array(one.tau)
+        for at in knocks:
+            tau[:, 1] += 12.0 * np.exp(-(((one.t - at) / 0.02) ** 2))
+        return one.replace(tau=tau, period=None)
+
+    train = Dataset((recorded(0, (3.0, 9.0)), recorded(1, (5.0,))))
+    found = diagnose(model, train, Dataset((recorded(2, ()),)), propose="never")
+    said = [note for note in found.notes if "bursts" in note]
+    assert len(said) == 1
+    assert said[0].startswith("At elbow ")
+    assert "3 bursts" in said[0]

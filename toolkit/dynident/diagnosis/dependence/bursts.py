@@ -1,0 +1,72 @@
+"""Bursts: a few instants that hold most of what a model leaves.
+
+Noise of a torque spreads what is left over the whole recording. A link that knocks against the
+other side of its backlash, an end stop, a touch, or a sensor that drops out does not: a few
+instants hold it, and of how large it is over all rows, or behind which test recordings, little can
+be seen. So they are said where they are, whatever the verdict.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from dynident.criteria import VerdictCriteria
+from dynident.evidence.held_out import HeldOut, HeldOutRun
+from dynident.tables import percent
+
+
+def burst_notes(
+    trained: HeldOut, joints: Sequence[str], units: Sequence[str], criteria: VerdictCriteria
+) -> tuple[str, ...]:
+    """Joints at which a few instants hold most of the residual, in plain words.
+
+    Parameters
+    ----------
+    trained : what a model leaves of the recordings that it was fitted to.
+    joints, units : (n,) names of the joints, and the units of their torques.
+    criteria : of the verdict: which share of the rows is a few, and which share of the square they
+        must hold.
+
+    Returns
+    -------
+    A sentence for each such joint, with the place and the height of the largest burst.
+    """
+    notes = []
+    for j, (joint, unit) in enumerate(zip(joints, units, strict=True)):
+        rows = np.concatenate([run.residual[run.certain[:, j], j] for run in trained.runs])
+        few = int(criteria.few_rows * len(rows))
+        square = np.sort(rows**2)[::-1]
+        if few == 0 or not square[:few].sum() > criteria.held_by_few * square.sum():
+            continue
+        rest = float(np.sqrt(square[few:].mean()))
+        if not rest > 0:
+            continue
+        # Their flanks belong to them: far above the rest, and below the largest.
+        bursts = [one for run in trained.runs for one in _bursts(run, j, np.sqrt(square[few]))]
+        size, where = max(bursts)
+        many = "one burst" if len(bursts) == 1 else f"{len(bursts)} bursts"
+        notes.append(
+            f"At {joint} {percent(criteria.few_rows, 0)} of the training rows hold "
+            f"{percent(square[:few].sum() / square.sum(), 0)} of the square of what the model "
+            f"leaves: {many}, the largest of {size:.2g} {unit} at {where}, {size / rest:.0f} times "
+            "the rms of all other rows. Noise is seldom like that: backlash or a stop that the "
+            "link knocks against, a touch, friction at a reversal, or a fault of the recording is."
+        )
+    return tuple(notes)
+
+
+def _bursts(run: HeldOutRun, j: int, least: float) -> list[tuple[float, str]]:
+    """Size, N m or N, and place of each stretch of rows above a size, across gaps of a few rows."""
+    size = np.where(run.certain[:, j], np.abs(run.residual[:, j]), 0.0)
+    above = np.flatnonzero(size > least)
+    if not len(above):
+        return []
+    stretches = np.split(above, np.flatnonzero(np.diff(above) > _GAP) + 1)
+    peaks = [rows[np.argmax(size[rows])] for rows in stretches]
+    return [(float(size[k]), f"{run.t[k]:.4g} s of {run.name}") for k in peaks]
+
+
+_GAP = 5
+"""Rows between two parts of one burst, which a filter makes ring."""
