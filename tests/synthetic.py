@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from dynident.model import Model
@@ -24,8 +26,9 @@ ARM = """<robot name="arm">
 """Two links in a vertical plane."""
 
 
+@cache
 def arm() -> Robot:
-    """The two-link arm."""
+    """The two-link arm, one for all: what is worked out of its description is kept with it."""
     return Robot.from_text(ARM)
 
 

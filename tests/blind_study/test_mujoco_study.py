@@ -95,9 +95,11 @@ def test_a_healthy_robot_in_mujoco_is_found_healthy(tmp_path: Path, capfd) -> No
         if c.joints == 2
         and c.kind == "healthy"
         and c.circumstances.friction == "tanh"
+        and c.circumstances.rate_hz <= 500  # most of the time goes into steps of MuJoCo
         and c.width == c.stated_width
     ]
     ask = ["run", "--plant", "mujoco", "--seed", "50000", "--count", "100", "--jobs", "1"]
+    ask += ["--runs", "2", "1"]
     ask += ["--out", str(tmp_path), "--numbers", str(cases[0].number), "--filter", "both"]
     main(ask)
     (line,) = (tmp_path / "answers.jsonl").read_text().splitlines()
