@@ -54,23 +54,23 @@ def test_there_is_none_without_steps(model: Model) -> None:
 
 @pytest.mark.slow
 def test_a_healthy_robot_with_a_coarse_encoder_lacks_nothing(model: Model) -> None:
-    runs = recordings(model, STEP, 0.1, 4)
-    found = find(model, Dataset(runs[:3]), Dataset(runs[3:]))
+    runs = recordings(model, STEP, 0.1, 2)
+    found = find(model, Dataset(runs[:1]), Dataset(runs[1:]))
     assert (found.verdict, found.steps) == ("nothing_missing", ())
     assert any("steps of the encoder at shoulder" in note for note in found.notes)
 
 
 @pytest.mark.slow
 def test_the_same_residual_without_steps_is_unexplained(model: Model) -> None:
-    moved = tuple(off_the_lattice(one) for one in recordings(model, STEP, 0.1, 4))
-    judged = find(model, Dataset(moved[:3]), Dataset(moved[3:]), most=0)
+    moved = tuple(off_the_lattice(one) for one in recordings(model, STEP, 0.1, 2))
+    judged = find(model, Dataset(moved[:1]), Dataset(moved[1:]), most=0)
     assert judged.verdict == "unexplained"
 
 
 @pytest.mark.slow
 def test_a_search_takes_the_same_residual_without_steps_for_missing_physics(model: Model) -> None:
-    moved = tuple(off_the_lattice(one) for one in recordings(model, STEP, 0.1, 4))
-    judged = find(model, Dataset(moved[:3]), Dataset(moved[3:]), propose="never")
+    moved = tuple(off_the_lattice(one) for one in recordings(model, STEP, 0.1, 2))
+    judged = find(model, Dataset(moved[:1]), Dataset(moved[1:]), propose="never")
     assert judged.verdict != "nothing_missing"
 
 
