@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import jinja2
@@ -239,6 +240,12 @@ def rendered(name: str, **parts: object) -> str:
 
 
 def _template(name: str) -> jinja2.Template:
+    return _environment().get_template(name)
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    """Where templates are found, and what they can use; it keeps those that it has compiled."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("dynident.reporting"),
         autoescape=True,
@@ -253,7 +260,7 @@ def _template(name: str) -> jinja2.Template:
     }
     words = {"left": left, "seen": seen, "use_of": use_of}
     environment.globals |= {"numeric": _numeric, **words}
-    return environment.get_template(name)
+    return environment
 
 
 def _numeric(table: Table) -> list[bool]:

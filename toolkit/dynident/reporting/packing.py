@@ -11,6 +11,7 @@ import gzip
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import plotly.graph_objects as go
@@ -69,8 +70,14 @@ def packed(figures: Mapping[str, go.Figure]) -> Packed:
     return Packed(
         figures=compressed(_json(parts)),
         shared=compressed(_json(shared.parts)),
-        library=compressed(get_plotlyjs()),
+        library=_library(),
     )
+
+
+@cache
+def _library() -> Markup:
+    """Plotly's library: millions of characters, the same in every page."""
+    return compressed(get_plotlyjs())
 
 
 def compressed(text: str) -> Markup:
