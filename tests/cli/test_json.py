@@ -90,7 +90,7 @@ def check_diagnosis(said: dict[str, Any], source: str) -> None:
         assert said["steps"][-1]["test_error_after"] == errors["after"]
 
 
-@pytest.mark.parametrize("command", ["explain", "diagnose"])
+@pytest.mark.parametrize("command", ["explain", pytest.param("diagnose", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("text", "source"), [(REPEATED, "replicates"), (GIVEN, "given"), (UNKNOWN, "unknown")]
 )

@@ -142,6 +142,7 @@ def test_absorbed_effects_come_with_their_experiment(model: Model) -> None:
     assert "shoulder" in not_identifiable["rotor_inertia@shoulder"].remark
 
 
+@pytest.mark.slow
 def test_without_repetition_or_stated_noise_the_verdict_says_so(model: Model) -> None:
     train, test = recordings(model, "stribeck_friction@elbow", {"Fs__elbow": 0.8}, **NOISE)
     blind = [Dataset(tuple(r.replace(period=None) for r in part)) for part in (train, test)]
@@ -277,6 +278,7 @@ def test_an_estimate_is_fitted_anew_and_the_answer_says_with_what(model: Model) 
     assert any(found.fitted_by in note for note in found.joint_table().notes)
 
 
+@pytest.mark.slow
 def test_the_gain_of_a_candidate_is_the_fall_of_the_step_that_adds_it_alone() -> None:
     """Each joint is weighted by its noise in the search; the error that is shown weights none.
 

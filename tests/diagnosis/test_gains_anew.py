@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,12 @@ import dynident as di
 from dynident.cli import commands
 from dynident.diagnosis.recorded_units import made_up_for, with_gains
 from dynident.effects import effects_of
-from dynident.fitting.drive_gains import GainProblem, fit_drive_gains, in_newton_metres
+from dynident.fitting.drive_gains import (
+    DriveGains,
+    GainProblem,
+    fit_drive_gains,
+    in_newton_metres,
+)
 from dynident.recording import Dataset, Recording, write
 from synthetic import ARM, arm, smooth_motion, true_values
 
@@ -27,6 +33,7 @@ recordings = [{ file = "run*.csv", period = 8.0 }]
 """
 
 
+@cache
 def recordings() -> tuple[di.Model, Dataset]:
     """Currents of an arm whose elbow has Stribeck friction, of which the model knows nothing."""
     model = di.Model(arm()) + "viscous_friction" + "coulomb_friction"
@@ -43,10 +50,18 @@ def recordings() -> tuple[di.Model, Dataset]:
     return model, Dataset(tuple(made))
 
 
-def test_gains_are_fitted_anew_with_what_was_added() -> None:
+@cache
+def first_gains() -> tuple[GainProblem, DriveGains]:
+    """Gains that are fitted before anything is added."""
     model, amperes = recordings()
     problem = GainProblem(model, amperes, {"shoulder": GAINS[0]})
-    drives = fit_drive_gains(problem)
+    return problem, fit_drive_gains(problem)
+
+
+@pytest.mark.slow
+def test_gains_are_fitted_anew_with_what_was_added() -> None:
+    model, amperes = recordings()
+    problem, drives = first_gains()
     newtons = in_newton_metres(amperes, drives, model.robot)
     found = di.diagnose(model, newtons)
     # The gain that was found without the friction is off, which a drive gain may make up for.
@@ -88,8 +103,7 @@ def test_explain_begins_again_where_a_gain_made_up_for_others(tmp_path: Path) ->
 
 def test_gains_stay_where_nothing_was_added() -> None:
     model, amperes = recordings()
-    problem = GainProblem(model, amperes, {"shoulder": GAINS[0]})
-    drives = fit_drive_gains(problem)
+    problem, drives = first_gains()
     found = di.diagnose(model, in_newton_metres(amperes, drives, model.robot), most=0)
     shown = with_gains(found, drives, problem)
     assert shown.drives_anew is None and "drives_anew" not in shown.to_dict()

@@ -24,7 +24,7 @@ def runs():
     return tuple(synthetic(MODEL, truth, seed, rate_hz=250.0, torque_std=0.1) for seed in range(2))
 
 
-@pytest.mark.parametrize("blocks", [True, False])
+@pytest.mark.parametrize("blocks", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_held_out_are_recordings_or_blocks_of_time(runs, blocks: bool) -> None:
     train, test = Dataset(runs if blocks else runs[:1]), Dataset(() if blocks else runs[1:])
     table, *_ = compare_models({"given": MODEL}, train, test).tables()

@@ -65,6 +65,7 @@ def fitted_and_told(right_angle: str) -> tuple[di.Estimate, Diagnosis]:
 
 
 @pytest.mark.parametrize("digits", ["1.5707963", "1.5708"])
+@pytest.mark.slow
 def test_fit_and_diagnosis_say_the_same_whatever_the_digits(digits: str) -> None:
     (of_exact, told_exact), (of_written, told_written) = map(fitted_and_told, (EXACT, digits))
     for exact, written in ((of_exact, of_written), (told_exact.after, told_written.after)):

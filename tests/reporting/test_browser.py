@@ -95,7 +95,9 @@ def assert_readable(one: Visit) -> None:
 
 
 @pytest.mark.parametrize("width", [PHONE, DESK])
-@pytest.mark.parametrize("which", ["two_joints", "seven_joints"])
+@pytest.mark.parametrize(
+    "which", ["two_joints", pytest.param("seven_joints", marks=pytest.mark.slow)]
+)
 def test_it_is_readable(which, width, visit, request):
     one = visit(request.getfixturevalue(which), width)
     assert_readable(one)

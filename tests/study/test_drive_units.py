@@ -160,7 +160,7 @@ def test_sigma_beside_other_effects_takes_the_gains_for_known_and_says_so(study)
     assert "It takes the gains and loads for known" in shown.words_of_sigma
 
 
-@pytest.mark.parametrize("command", ["compare", "diagnose"])
+@pytest.mark.parametrize("command", ["compare", pytest.param("diagnose", marks=pytest.mark.slow)])
 def test_commands_say_up_to_which_scale_things_are_known(tmp_path: Path, command: str) -> None:
     text = STUDY.split("[[recordings]]")[0] + '[[recordings]]\nfile = "empty.csv"\n'
     path = written(tmp_path, edited(("[loads.crate]", ""), text=text))

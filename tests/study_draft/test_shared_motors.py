@@ -114,6 +114,7 @@ def test_what_is_said_wrongly_is_refused(tmp_path: Path, columns, message: str) 
         arm.draft(columns=columns)
 
 
+@pytest.mark.slow
 def test_a_heavy_wrist_shows_that_its_motor_turns_two_joints(tmp_path: Path) -> None:
     for turns, sign in ((-1.0, "less"), (1.0, "plus")):
         arm = written(tmp_path, chain_text(N, 1), turns)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from dynident import diagnose as find
 from dynident.diagnosis import Diagnosis
 from dynident.model import Model
@@ -39,5 +41,6 @@ def test_a_coupling_that_explains_all_but_noise_is_one() -> None:
     assert found.verdict == "explained" and not doubts(found)
 
 
+@pytest.mark.slow
 def test_without_evidence_nothing_is_said() -> None:
     assert not doubts(diagnosed("quadratic_drag@elbow", 0.5, period=None))

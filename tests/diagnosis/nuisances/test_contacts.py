@@ -95,7 +95,7 @@ def test_one_burst_is_found_where_it_is_and_nowhere_else(kind: str, seed: int) -
     assert pulse.p_value < DEFAULTS.contacts.level
 
 
-@pytest.mark.parametrize("repetitions", [2, 4])
+@pytest.mark.parametrize("repetitions", [2, pytest.param(4, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("first", [0, 3, 6, 12])
 def test_a_burst_as_a_recording_begins_is_in_no_other_repetition(
     first: int, repetitions: int
@@ -122,7 +122,7 @@ def test_of_two_repetitions_it_is_the_one_with_the_larger_residual(p: int, heigh
     assert np.sign(pulse.amplitude) == np.sign(height)
 
 
-@pytest.mark.parametrize("kind", ["", "slow"])
+@pytest.mark.parametrize("kind", ["", pytest.param("slow", marks=pytest.mark.slow)])
 def test_a_wide_and_large_burst_does_not_hide_behind_itself(kind: str) -> None:
     """It is the most of what is seen at some speeds, and of what is far out, of two repetitions."""
 

@@ -50,6 +50,7 @@ def test_a_model_without_residual_whose_friction_drives_a_joint_is_not_complete(
     assert found.detection_limits == ()
 
 
+@pytest.mark.slow
 def test_the_same_model_of_a_robot_that_can_be_is_complete() -> None:
     """One negative coefficient is no fault where friction as a whole takes power."""
     found = diagnosed(Fv__elbow=-0.1, Fc__elbow=1.5)

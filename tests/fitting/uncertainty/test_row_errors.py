@@ -125,6 +125,7 @@ def test_a_noise_free_fit_has_next_to_no_sigma(model: Model) -> None:
     assert np.all(found.sigma < 1e-3)
 
 
+@pytest.mark.slow
 def test_a_diagnosis_without_known_noise_has_the_intervals_of_the_same_fit(model: Model) -> None:
     truth = true_values(model, Fv__shoulder=0.5, Fv__elbow=0.2)
     clean = synthetic(model, truth, 3, rate_hz=200.0, duration=16.0, period=None)

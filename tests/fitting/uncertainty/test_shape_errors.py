@@ -63,6 +63,7 @@ def test_a_size_that_its_shape_leaves_open_is_no_number(tmp_path: Path) -> None:
         assert again.trading_off == one.trading_off and again.values == pytest.approx(one.values)
 
 
+@pytest.mark.slow
 def test_what_the_data_show_well_is_told() -> None:
     assert not any(one.trading_off for one in estimates(0.1, 0.8))
 
