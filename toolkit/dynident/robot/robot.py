@@ -177,13 +177,15 @@ class Robot:
     @cached_property
     def driven(self) -> tuple[int, ...]:
         """Index in `links` of the link that each joint drives."""
+        carried: dict[int, list[int]] = {}
+        for index, link in enumerate(self.links):
+            carried.setdefault(link.joint, []).append(index)
         found: list[int] = []
         for number, joint in enumerate(self.joints):
-            carried = [i for i, link in enumerate(self.links) if link.joint == number]
-            if not carried:
+            if number not in carried:
                 raise RobotError("carries no link", f"joint '{joint.name}'")
-            child = [i for i in carried if self.links[i].name == joint.child]
-            found.append((child or carried)[0])
+            child = [i for i in carried[number] if self.links[i].name == joint.child]
+            found.append((child or carried[number])[0])
         return tuple(found)
 
     @property
