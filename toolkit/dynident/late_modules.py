@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import importlib
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 
@@ -19,9 +18,8 @@ class LateModule:
     name: str
 
     def __getattr__(self, attribute: str) -> Any:
-        return getattr(self._module, attribute)
-
-    @cached_property
-    def _module(self) -> Any:
         # Kept: to write out a function of a robot asks 1e4 times and more.
-        return importlib.import_module(self.name)
+        module = self.__dict__.get("_module")
+        if module is None:
+            module = self.__dict__["_module"] = importlib.import_module(self.name)
+        return getattr(module, attribute)

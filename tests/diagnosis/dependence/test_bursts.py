@@ -16,9 +16,14 @@ from synthetic import arm, synthetic, true_values
 ROWS = 800
 
 
-def left(*residuals: np.ndarray, certain: np.ndarray | None = None) -> HeldOut:
+def left(
+    *residuals: np.ndarray,
+    certain: np.ndarray | None = None,
+    predicted: np.ndarray | None = None,
+) -> HeldOut:
     """A model that leaves (T, n) of recordings at 50 Hz."""
     still = np.zeros_like(residuals[0])
+    torque = still if predicted is None else predicted
     whole = np.ones(still.shape, dtype=bool)
     runs = tuple(
         HeldOutRun(
@@ -28,8 +33,8 @@ def left(*residuals: np.ndarray, certain: np.ndarray | None = None) -> HeldOut:
             q=still,
             v=still,
             a=still,
-            measured=one,
-            predicted=still,
+            measured=torque + one,
+            predicted=torque,
         )
         for k, one in enumerate(residuals)
     )
@@ -52,9 +57,29 @@ def test_bursts_are_counted_and_the_largest_is_placed() -> None:
     second[500:503, 1] -= [20.0, 60.0, 20.0]
     (said,) = told(left(first, second))
     assert said.startswith("At b ")
-    assert "2 bursts" in said
+    assert ": 2 bursts, " in said
     assert "at 10.02 s of run2" in said
     assert f"the largest of {abs(second[501, 1]):.2g} N " in said
+
+
+@pytest.mark.parametrize(("knocks", "rows"), [(1, 10_000), (3, 20_000), (40, 20_000)])
+def test_as_many_bursts_are_told_as_there_are(knocks: int, rows: int) -> None:
+    """Few fill no hundredth of the rows: the largest of the noise is no burst beside them."""
+    one = np.random.default_rng(knocks).standard_normal((rows, 2))
+    one[np.linspace(50, rows - 50, knocks).astype(int), 0] = 120.0
+    (said,) = told(left(one))
+    assert (": one burst, " if knocks == 1 else f": {knocks} bursts, ") in said
+
+
+def test_alike_and_tiny_residuals_break_nothing() -> None:
+    """More rows alike than are looked at; and of 1e-6 of the torque nothing is told."""
+    alike = np.zeros((ROWS, 2))
+    alike[::90] = 5.0
+    assert ": 9 bursts, " in told(left(alike))[0]
+    one = noise(6)
+    one[100, 0] = 200.0
+    assert told(left(one))
+    assert not told(left(1e-6 * one, predicted=np.ones_like(one)))
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -95,7 +120,7 @@ def test_a_diagnosis_without_a_noise_floor_tells_of_knocks() -> None:
 
     train = Dataset((recorded(0, (3.0, 9.0)), recorded(1, (5.0,))))
     found = diagnose(model, train, Dataset((recorded(2, ()),)), propose="never")
-    said = [note for note in found.notes if "bursts" in note]
+    said = [note for note in found.notes if "largest of" in note]
     assert len(said) == 1
     assert said[0].startswith("At elbow ")
-    assert "3 bursts" in said[0]
+    assert ": 3 bursts, " in said[0]

@@ -297,13 +297,13 @@ class Evidence:
         """Columns that follow from the motion alone, with the payload on board.
 
         The latest block of a recording is kept, and the directions of motion in it: whoever seeks
-        a shape asks for the same one again and again.
+        a shape asks for it again and again, where the recording is so short that it is one block.
         """
         known, asked = self.cache.rows_of(sampled), (raw.start, raw.stop, *model.friction_widths)
-        if "latest block" not in known or known["latest block"][0] != asked:
+        of, block = known.get("latest block", (None, None))
+        if of != asked:
             block = replace(sampled.block(model, raw), carries_payload=True)
             known["latest block"] = asked, block
-        block = known["latest block"][1]
         return [one.acting_columns(self.model.ready(one, block, None)) for one in effects]
 
     def _rigid(self, sampled: Sampled, model: Model) -> RigidColumns:

@@ -38,21 +38,23 @@ def burst_notes(
         rows = np.concatenate([run.residual[run.certain[:, j], j] for run in trained.runs])
         few = int(criteria.few_rows * len(rows))
         square = np.sort(rows**2)[::-1]
-        if few == 0 or not square[:few].sum() > criteria.held_by_few * square.sum():
+        if not square[:few].sum() > criteria.held_by_few * square.sum():
             continue
+        if not trained.joint_errors[j] > criteria.resolution:
+            continue  # of differentiation and filters, which do worst at ends and reversals
         rest = float(np.sqrt(square[few:].mean()))
-        if not rest > 0:
+        bursts = [one for run in trained.runs for one in _bursts(run, j, _BEYOND * rest)]
+        if not bursts or not rest > 0:
             continue
-        # Their flanks belong to them: far above the rest, and below the largest.
-        bursts = [one for run in trained.runs for one in _bursts(run, j, np.sqrt(square[few]))]
         size, where = max(bursts)
         many = "one burst" if len(bursts) == 1 else f"{len(bursts)} bursts"
         notes.append(
-            f"At {joint} {percent(criteria.few_rows, 0)} of the training rows hold "
+            f"At {joint} the {few} largest of {len(rows)} training rows hold "
             f"{percent(square[:few].sum() / square.sum(), 0)} of the square of what the model "
             f"leaves: {many}, the largest of {size:.2g} {unit} at {where}, {size / rest:.0f} times "
-            "the rms of all other rows. Noise is seldom like that: backlash or a stop that the "
-            "link knocks against, a touch, friction at a reversal, or a fault of the recording is."
+            "the rms of all other rows. Noise of one size is seldom like that. Backlash or a stop "
+            "that the link knocks against is, a touch, friction at a reversal, a fault of the "
+            "recording, or one that is noisier than the others."
         )
     return tuple(notes)
 
@@ -65,8 +67,10 @@ def _bursts(run: HeldOutRun, j: int, least: float) -> list[tuple[float, str]]:
         return []
     stretches = np.split(above, np.flatnonzero(np.diff(above) > _GAP) + 1)
     peaks = [rows[np.argmax(size[rows])] for rows in stretches]
-    return [(float(size[k]), f"{run.t[k]:.4g} s of {run.name}") for k in peaks]
+    return [(float(size[k]), f"{run.t[k]:.2f} s of {run.name}") for k in peaks]
 
 
+_BEYOND = 5.0
+"""Size of a burst over the rms of all rows but the largest: normal noise is not so once in 1e6."""
 _GAP = 5
 """Rows between two parts of one burst, which a filter makes ring."""
