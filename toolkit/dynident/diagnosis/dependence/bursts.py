@@ -2,8 +2,8 @@
 
 Noise of a torque spreads what is left over the whole recording. A link that knocks against the
 other side of its backlash, an end stop, a touch, or a sensor that drops out does not: a few
-instants hold it, and of how large it is over all rows, or behind which test recordings, little can
-be seen. So they are said where they are, whatever the verdict.
+instants hold nearly all of it. The residual of a whole recording may be small in spite of them,
+and recordings that judge may have none. So they are told, whatever the verdict.
 """
 
 from __future__ import annotations
@@ -15,6 +15,11 @@ import numpy as np
 from dynident.criteria import VerdictCriteria
 from dynident.evidence.held_out import HeldOut, HeldOutRun
 from dynident.tables import percent
+
+_BEYOND = 5.0
+"""Size of a burst over the rms of all rows but the largest: normal noise is not so once in 1e6."""
+_GAP = 5
+"""Rows between two parts of one burst, which a filter makes ring."""
 
 
 def burst_notes(
@@ -68,9 +73,3 @@ def _bursts(run: HeldOutRun, j: int, least: float) -> list[tuple[float, str]]:
     stretches = np.split(above, np.flatnonzero(np.diff(above) > _GAP) + 1)
     peaks = [rows[np.argmax(size[rows])] for rows in stretches]
     return [(float(size[k]), f"{run.t[k]:.2f} s of {run.name}") for k in peaks]
-
-
-_BEYOND = 5.0
-"""Size of a burst over the rms of all rows but the largest: normal noise is not so once in 1e6."""
-_GAP = 5
-"""Rows between two parts of one burst, which a filter makes ring."""
