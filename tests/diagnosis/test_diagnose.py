@@ -16,11 +16,12 @@ from dynident.effects import effects_of
 from dynident.errors import FitError, RecordingError
 from dynident.evidence import compare_models
 from dynident.model import Model
-from dynident.recording import Dataset, Noise
+from dynident.recording import Dataset, Noise, Recording
 from synthetic import arm, synthetic, true_values
 
 FRICTION = {"Fv__shoulder": 1.2, "Fv__elbow": 0.5, "Fc__shoulder": 1.5, "Fc__elbow": 0.6}
 NOISE = {"position_std": 2e-5, "torque_std": 0.3}
+PAYLOAD = {"payload.mass": 0.3, "payload.mx": 0.06, "payload.Izz": 0.02}
 KNOWN: dict[object, Diagnosis] = {}
 """Diagnoses of this file's model, by what was hidden."""
 STATED = Noise(np.array([2e-5, 2e-5]), np.array([0.3, 0.3]))
@@ -70,7 +71,7 @@ def diagnosed(model: Model, hidden: str | None, values: dict[str, float]) -> Dia
         in_full("joint_spring@shoulder", {"k__shoulder": 0.8, "c__shoulder": -0.2}),
         in_full("torque_ripple@elbow", {"As__elbow": 0.2, "Ac__elbow": 0.1}),
         in_full("rotor_inertia@elbow", {"Ia__elbow": 0.1}),
-        ("payload", {"payload.mass": 0.3, "payload.mx": 0.06, "payload.Izz": 0.02}),
+        ("payload", PAYLOAD),
         in_full("drive_gain@shoulder", {"e__shoulder": 0.1}),
         in_full("joint_coupling@elbow:shoulder", {"cv__elbow:shoulder": 0.3}),
     ],
@@ -104,9 +105,7 @@ def test_plain_friction_is_found_where_the_model_has_none(model: Model, name: st
 
 
 def test_which_recordings_carry_the_payload_is_found_too(model: Model) -> None:
-    found = diagnosed(
-        model, "payload", {"payload.mass": 0.3, "payload.mx": 0.06, "payload.Izz": 0.02}
-    )
+    found = diagnosed(model, "payload", PAYLOAD)
     assert any("Payload carried in: synthetic 1, synthetic 3" in note for note in found.notes)
 
 
@@ -117,21 +116,29 @@ def test_nothing_is_found_where_nothing_is_missing(model: Model) -> None:
     assert not any(c.status == "material" for c in found.candidates)
 
 
+def strange(recording: Recording) -> Recording:
+    """A viscosity that varies with the position of the other joint."""
+    v = np.gradient(recording.q, 1 / 250.0, axis=0)
+    extra = np.zeros_like(v)
+    extra[:, 1] = 0.8 * v[:, 1] * np.sin(3 * recording.q[:, 0]) * np.sin(5 * recording.q[:, 1])
+    return recording.replace(tau=recording.tau + extra)
+
+
 @pytest.mark.slow
 def test_an_effect_outside_the_catalogue_is_called_unknown(model: Model) -> None:
-    """A viscosity that varies with the position of the other joint."""
     train, test = recordings(model, None, {}, **NOISE)
-
-    def strange(recording):
-        v = np.gradient(recording.q, 1 / 250.0, axis=0)
-        extra = np.zeros_like(v)
-        extra[:, 1] = 0.8 * v[:, 1] * np.sin(3 * recording.q[:, 0]) * np.sin(5 * recording.q[:, 1])
-        return recording.replace(tau=recording.tau + extra)
-
     train, test = (Dataset(tuple(map(strange, part))) for part in (train, test))
     found = find(model, train, test, propose="never")
     assert found.verdict == "unexplained"
     assert "beyond the noise" in found.sentence
+
+
+def test_beside_a_payload_that_was_found_the_search_for_what_is_left_goes_on(model: Model) -> None:
+    train, test = recordings(model, "payload", PAYLOAD, **NOISE)
+    train, test = (Dataset(tuple(map(strange, part))) for part in (train, test))
+    found = find(model, train, test)
+    assert found.verdict == "unexplained"
+    assert [one.effect.label for one in found.steps] == ["payload"]
 
 
 def test_absorbed_effects_come_with_their_experiment(model: Model) -> None:

@@ -61,8 +61,8 @@ def test_joints_where_only_noise_is_left_are_not_asked() -> None:
     assert (found.joint, found.whole) == ("shoulder", "systematic")
     shares = found.shares
     assert shares is not None and shares.by["position and velocity"].value > 0.7
-    assert "of what is left beyond the noise by position and velocity of this joint" in (
-        found.sentence
+    assert found.sentence.startswith(
+        "What is left at shoulder, beyond the noise: position and velocity of this joint explain "
     )
 
 
@@ -73,7 +73,7 @@ def test_without_a_noise_floor_shares_are_of_everything_and_it_says_so() -> None
     assert shares is not None
     assert 0.4 < shares.by["position and velocity"].value < 0.65
     assert first.whole == "all" and "noise included" in first.sentence
-    assert second.told == {} and "nothing that can be told" in second.sentence
+    assert second.told == {} and "no share that any input explains" in second.sentence
     assert "noise included" in " ".join(str(dependence_table((first, second))).split())
 
 
@@ -150,7 +150,7 @@ def shares(**by: tuple[float, float]) -> JointDependence:
     return JointDependence(joint="elbow", whole="systematic", shares=of_elbow)
 
 
-def test_the_sentence_names_what_is_told_and_what_is_not() -> None:
+def test_the_sentence_names_what_is_told_and_what_no_input_explains() -> None:
     one = shares(
         position_and_velocity=(0.62, 0.04),
         past=(0.2, 0.03),
@@ -159,10 +159,8 @@ def test_the_sentence_names_what_is_told_and_what_is_not() -> None:
         time=(0.004, 0.001),
     )
     assert one.sentence == (
-        "At elbow, on blocks of time that it was not fitted to, a flexible regression explains "
-        "62 % (standard error 4 %) of what is left beyond the noise by position and velocity of "
-        "this joint and 20 % (3 %) more by its past. Of its acceleration and load, the other "
-        "joints and time nothing can be told. 18 % (5 %) is explained by none of them."
+        "What is left at elbow, beyond the noise: position and velocity of this joint explain 62 % "
+        "of it (standard error 4 %) and its past 20 % (3 %) more; no input explains 18 % (5 %)."
     )
     said = one.to_dict()
     assert [x["distinguishable"] for x in said["inputs"]] == [True, True, False, False, False]
@@ -177,7 +175,7 @@ def test_the_sentence_names_what_is_told_and_what_is_not() -> None:
 
 def test_where_nothing_is_told_no_share_is_named() -> None:
     one = shares(position_and_velocity=(0.05, 0.04), time=(-0.1, 0.05))
-    assert one.sentence.endswith("by position and velocity of this joint or time.")
+    assert one.sentence.endswith("no share that any input explains can be told from nothing.")
     assert "%" not in one.sentence
     (row,) = dependence_table((one,)).rows
     assert row == ("elbow", "(5 \u00b1 4)", "(0 \u00b1 5)", "all")
@@ -192,6 +190,9 @@ def test_the_table_sets_what_is_not_told_in_brackets() -> None:
 def test_joints_of_which_the_same_is_to_be_said_share_a_sentence() -> None:
     nothing = shares(position_and_velocity=(0.05, 0.04), time=(-0.1, 0.05))
     more = shares(position_and_velocity=(0.62, 0.04), time=(-0.1, 0.05))
-    two = dependence_sentences((nothing, more, replace(nothing, joint="wrist")))
-    assert [one[: one.index(",")] for one in two] == ["At elbow and wrist", "At elbow"]
+    # Which inputs were asked, and in which order, is in the table.
+    other = replace(shares(past=(0.02, 0.05), other_joints=(0.1, 0.1)), joint="wrist")
+    two = dependence_sentences((nothing, more, other))
+    heads = ["What is left at elbow and wrist", "What is left at elbow"]
+    assert [one[: one.index(",")] for one in two] == heads
     assert "62 %" in two[1]

@@ -314,7 +314,7 @@ class GlobalSearchCriteria(CriteriaGroup):
         24, "shapes", "shapes about which the other recordings are asked", least=1
     )
     patience: int = criterion(
-        6, "generations", "generations after which a search that explains nothing ends", least=1
+        9, "generations", "generations after which a search that explains nothing ends", least=1
     )
 
 

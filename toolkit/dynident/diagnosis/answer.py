@@ -35,7 +35,8 @@ _VERDICTS: dict[Verdict, str] = {
 
 _VERDICTS_WITHOUT_NOISE: dict[Verdict, str] = {
     "nothing_missing": "No effect in the catalogue is significant, relevant and of use on held-out "
-    "blocks of time; the noise is unknown, so whether something else is missing cannot be said.",
+    "blocks of time. The torque error is {error}; the noise is unknown, so whether something else "
+    "is missing cannot be said.",
     "explained": "Added: {effects}. No further effect is significant and relevant; the noise is "
     "unknown, so whether something else is missing cannot be said.",
     "unexplained": "Added: {effects}. More effects are significant and relevant; the noise is "
@@ -193,16 +194,21 @@ class Answer:
                 "blocks of time that they were not fitted to. How much of it is noise is unknown."
             )
         if self.training_only:
-            added = f"Added: {effects}." if effects else "No effect in the catalogue explains it:"
-            return (
-                f"{added} {'T' if effects else 't'}he training recordings leave more than their "
-                f"noise at {' and '.join(self.training_only)}, and the held-out recordings do not "
-                "show it."
+            left = (
+                f"he training recordings leave more than their noise at "
+                f"{' and '.join(self.training_only)}, and the held-out recordings do not show it."
             )
+            if self.withdrawn:
+                added = f" Added: {effects}." if effects else ""
+                return f"T{left}{added} They call for {self._withdrawn_titles}: withdrawn."
+            if effects:
+                return f"Added: {effects}. T{left}"
+            return f"No effect in the catalogue explains it: t{left}"
         if self.noise_source == "unknown" and self.verdict == "unexplained" and not effects:
             return "Effects are significant and relevant, and none was added; the noise is unknown."
         if self.noise_source == "unknown":
-            return _VERDICTS_WITHOUT_NOISE[self.verdict].format(effects=effects)
+            error = percent(self.test_error.after)
+            return _VERDICTS_WITHOUT_NOISE[self.verdict].format(effects=effects, error=error)
         if self.verdict != "unexplained" and self.rest != "within the noise":
             found = f"Explained: {effects} added, and" if effects else "No missing effect is found:"
             size = "smaller than the noise ({} of it), though not nothing"
@@ -297,6 +303,12 @@ class Answer:
             *(one.sentence for one in self.withdrawn),
             *self.notes,
         )
+
+    @property
+    def without_noise(self) -> tuple[str, ...]:
+        """The verdict in words, where its name alone says more than is known without a noise."""
+        named = self.verdict != "unexplained" and self.noise_source == "unknown"
+        return (self._verdict_in_words,) if named else ()
 
     @property
     def silent_maps(self) -> str:

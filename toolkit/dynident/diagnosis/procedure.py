@@ -169,7 +169,12 @@ def _compare(
     evidence = Evidence(given, runs, criteria=criteria, candidates=_variants(given))
     held = None
     if task.test is not None and len(task.test):
-        held = Evidence(given, gather(task.test, criteria.noise), criteria=criteria)
+        held = Evidence(
+            given,
+            gather(task.test, criteria.noise),
+            criteria=criteria,
+            simulator=loop.simulator(task.test),
+        )
     task.progress("evaluating every effect")
     start = with_friction_width(evidence, shaped(evidence, given))
     whole = evidence
@@ -265,13 +270,16 @@ def _behind_lower_filters(stage: Stage, evidence: Evidence) -> tuple[Evidence, .
 def _add_and_refit(stage: Stage, best: AddedEffect, task: DiagnosisTask) -> Stage:
     """Return the model with one effect more, all of it fitted anew."""
     task.progress(f"adding {best.score.effect.label}")
-    evidence, before = with_payload(stage.evidence, best.score), stage.fitted
+    evidence, before, start = with_payload(stage.evidence, best.score), stage.fitted, stage.start
+    if evidence is not stage.evidence:
+        start = fit_evidence(evidence, start.model, start)
     others = at_other_joints(evidence, before, best, len(stage.found))
     others = tuple(one for one in others if one.score.effect.label not in stage.refused)
     added = (best, *others)
     model = before.model + tuple(one.score.effect for one in added)
     fitted = with_friction_width(evidence, refitted(evidence, model, before))
-    return replace(stage, evidence=evidence, fitted=fitted, found=(*stage.found, *added))
+    found = (*stage.found, *added)
+    return replace(stage, evidence=evidence, start=start, fitted=fitted, found=found)
 
 
 def _seen_anew(stage: Stage, added: Stage) -> Stage:
@@ -299,7 +307,7 @@ def _search_globally(start: Stage, extended: Stage, task: DiagnosisTask) -> Stag
     if extended.doubtful:  # both branches are to be judged on the same rows
         start = left_out(start, extended.doubtful)
         first = _rank(replace(start, rounds=()), task)
-    missed = global_search(extended.evidence, first.ranked, extended.ranked, task.progress)
+    missed = global_search(first.ranked, extended.ranked, task.progress)
     if missed is None:
         return extended
     base = extended
@@ -347,9 +355,17 @@ def _pruned(stage: Stage, task: DiagnosisTask) -> tuple[Stage, Path]:
         start = fit_evidence(evidence, start.model, start)
         final = fit_evidence(evidence, final.model, final)
     path = path_of(evidence, held, start, final, tuple(kept.found), task.progress)
-    path = replace(path, withdrawn=(*kept.unhelpful, *path.withdrawn))
-    if not any(effect.is_payload for effect in path.final.model.effects):
-        evidence = marked(evidence, [one.payload for one in task.train.recordings])
+    withdrawn = (*kept.unhelpful, *path.withdrawn)
+    said = [one.payload for one in task.train.recordings]
+    marks = [run.recording.payload for run in evidence.runs]
+    if marks != said and not any(effect.is_payload for effect in path.final.model.effects):
+        # Nobody knows any more who carries it: every fit is to recordings as the study has them.
+        evidence = marked(evidence, said)
+        start = fit_evidence(evidence, start.model, start)
+        final = fit_evidence(evidence, path.final.model, path.final)
+        path = path_of(evidence, held, start, final, path.found, task.progress)
+        withdrawn = (*withdrawn, *path.withdrawn)
+    path = replace(path, withdrawn=withdrawn)
     pruned = replace(
         stage,
         evidence=evidence,

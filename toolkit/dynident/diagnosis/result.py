@@ -93,7 +93,7 @@ class Diagnosis(Answer, Shown):
             **({"drives_anew": self.drives_anew.to_dict()} if self.drives_anew else {}),
             **self._dependence(),
             "proposals": [one.to_dict() for one in self.proposals],
-            "notes": [*self.caveats, *self.when_sampled],
+            "notes": [*self.without_noise, *self.caveats, *self.when_sampled],
             **({"criteria": self._changed_criteria()} if self.criteria.changed else {}),
         }
 

@@ -85,4 +85,4 @@ class Stage:
     @property
     def ranked(self) -> RankedModel:
         """The model with its latest ranking."""
-        return RankedModel(self.fitted, self.rounds[-1])
+        return RankedModel(evidence=self.evidence, fitted=self.fitted, ranking=self.rounds[-1])

@@ -12,7 +12,7 @@ from dynident.criteria import NoiseCriteria
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.joint_columns import JointColumns
-from dynident.evidence.model_columns import joint_columns
+from dynident.evidence.model_columns import predicting_columns
 from dynident.evidence.noise_model import differences, inflation, systematic_square
 from dynident.fitting.estimate import Estimate
 from dynident.moments.replicates import Kind
@@ -111,12 +111,13 @@ class HeldOut:
 
 def on_recordings(evidence: Evidence, fitted: EvidenceFit | Estimate) -> HeldOut:
     """Judge a fitted model on the recordings of the evidence, which it has not seen."""
+    evidence = evidence.predicted_by(fitted.model, fitted.values)
     combination = np.append(-fitted.values, 1.0)
     n = fitted.model.robot.n
     runs, folded, doubt = [], [], []
     for r, run in enumerate(evidence.runs):
         first = run.replicates[0]
-        joints = [joint_columns(evidence, fitted.model, r, j, fitted.values) for j in range(n)]
+        joints = [predicting_columns(evidence, fitted.model, r, j, fitted.values) for j in range(n)]
         left = [[one.times(combination) for one in each] for each in joints]
         residual = np.stack([one[0] for one in left], axis=-1)
         kept, predicted = run.kept, first.tau - residual
@@ -143,7 +144,7 @@ def on_blocks(evidence: Evidence, fitted: EvidenceFit) -> HeldOut:
     n = fitted.model.robot.n
     runs, folded, doubt, block = [], [], [], 0
     for r, run in enumerate(evidence.runs):
-        joints = [joint_columns(evidence, fitted.model, r, j, fitted.values) for j in range(n)]
+        joints = [predicting_columns(evidence, fitted.model, r, j, fitted.values) for j in range(n)]
         columns = [run.fold([one.used for one in each]) for each in joints]
         residual = np.empty((*columns[0].shape[:2], n))
         for start, stop in zip(run.edges[:-1], run.edges[1:], strict=True):

@@ -243,7 +243,6 @@ class Evolution:
     generations : at most.
     enough : loss below which it ends.
     hope : loss that must be reached within `patience` generations.
-    worst : loss beyond which it does not matter how wrong a wrong trial is.
     finalists : number of the best trials that are kept.
     """
 
@@ -252,7 +251,6 @@ class Evolution:
     enough: float = -np.inf
     hope: float = np.inf
     patience: int = 1
-    worst: float = np.inf
     finalists: int = 1
 
     def run(self, problem: ShapeProblem[Any], log: _Log[Any]) -> OptimizeResult:
@@ -266,7 +264,7 @@ class Evolution:
             return (count >= self.patience and best > self.hope) or best < self.enough
 
         return differential_evolution(
-            lambda points: np.array([min(one.loss, self.worst) for one in log.many(points.T)]),
+            lambda points: np.array([one.loss for one in log.many(points.T)]),
             np.column_stack([problem.lower, problem.upper]),
             popsize=self.population,
             maxiter=self.generations,

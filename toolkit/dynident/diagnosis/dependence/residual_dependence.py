@@ -50,6 +50,8 @@ _WORDS = {
     "other joints": "the other joints",
     "time": "time",
 }
+_ONE = {"past", "time"}
+"""Inputs that are a singular."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,29 +94,20 @@ class JointDependence:
         """Return the sentence with names of all joints of which the same is to be said."""
         if self.shares is None:
             return f"What is left at {joints} is not asked what it depends on: {self.why}."
-        what = "what is left beyond the noise"
-        if self.whole == "all":
-            what = "what is left, noise included,"
-        told, others = self.told, [_WORDS[k] for k, s in self.shares.by.items() if not s.told]
+        noise = "noise included" if self.whole == "all" else "beyond the noise"
+        what, told = f"What is left at {joints}, {noise}", self.told
         if not told:
-            return (
-                f"At {joints}, on blocks of time that it was not fitted to, a flexible "
-                f"regression explains nothing that can be told of {what} by "
-                f"{_listed(others, 'or')}."
-            )
+            return f"{what}: no share that any input explains can be told from nothing."
         (first, share), *more = told.items()
+        explain = "explains" if first in _ONE else "explain"
         parts = [
-            f"{_rounded(share.value)} (standard error {_rounded(share.error)}) of {what} by "
-            f"{_WORDS[first]}",
-            *(f"{_rounded(s.value)} ({_rounded(s.error)}) more by {_WORDS[k]}" for k, s in more),
+            f"{_WORDS[first]} {explain} {_rounded(share.value)} of it (standard error "
+            f"{_rounded(share.error)})",
+            *(f"{_WORDS[k]} {_rounded(s.value)} ({_rounded(s.error)}) more" for k, s in more),
         ]
-        nothing = f" Of {_listed(others, 'and')} nothing can be told." if others else ""
         rest = self.shares.rest
-        left = f" {_rounded(rest.value)} ({_rounded(rest.error)}) is explained by none of them."
-        return (
-            f"At {joints}, on blocks of time that it was not fitted to, a flexible regression "
-            f"explains {_listed(parts, 'and')}.{nothing}{left if rest.told else ''}"
-        )
+        left = f"; no input explains {_rounded(rest.value)} ({_rounded(rest.error)})"
+        return f"{what}: {_listed(parts, 'and')}{left if rest.told else ''}."
 
     def to_dict(self) -> dict[str, Any]:
         """As `--json` has it."""
@@ -231,7 +224,9 @@ def dependence_table(found: Sequence[JointDependence]) -> Table:
     noise = (
         "Shares are of the systematic residual: the noise is taken off."
         if all(one.whole == "systematic" for one in found)
-        else "Shares are of all that is left, noise included: nothing tells it from the rest."
+        else "Shares are of all that is left, noise included: nothing tells it from the rest. The "
+        "verdict calls it no noise where such a share is large for certain, also behind lower "
+        "cut-offs of the filter."
     )
     return Table(
         "Percent of what is left that a flexible regression explains on held-out blocks of time",

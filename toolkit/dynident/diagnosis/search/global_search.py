@@ -10,7 +10,7 @@ brings about.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,16 +27,22 @@ from dynident.fitting.shape_search import Evolution, ShapeProblem, ShapeSolution
 from dynident.model import Model
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class RankedModel:
-    """A model, and what is missing from it by the ranking or the global search."""
+    """A model, and what is missing from it by the ranking or the global search.
 
+    Attributes
+    ----------
+    evidence : that it is fitted to: who carries a payload may be known of one model alone.
+    fitted, ranking : the fit, and candidates for it.
+    """
+
+    evidence: Evidence
     fitted: EvidenceFit
     ranking: Ranking
 
 
 def global_search(
-    evidence: Evidence,
     start: RankedModel,
     last: RankedModel,
     progress: Callable[[str], None] = lambda _: None,
@@ -47,7 +53,6 @@ def global_search(
 
     Parameters
     ----------
-    evidence : recordings and their columns.
     start, last : the model before anything was added, and with all that was added.
     progress : called with what is being done, for a progress display.
 
@@ -55,24 +60,25 @@ def global_search(
     -------
     That of the two of whose residual it explains the larger share; None for none, or no need.
     """
+    criteria = last.evidence.criteria
     if not last.fitted.noise_known or within_noise(
-        on_recordings(evidence, last.fitted), evidence.criteria.verdict
+        on_recordings(last.evidence, last.fitted), criteria.verdict
     ):
         return None
-    sought = _sought(evidence, start.fitted.model, last.fitted)
+    sought = _sought(last.evidence, start.fitted.model, last.fitted)
     if not sought:
         return None
     # An effect that is in the last model with a wrong shape is missing from the first one.
     wrong = sought[0] in last.fitted.model or last.fitted is start.fitted
     bases = (start,) if wrong else (last, start)
-    part, searches = _worst_recording(evidence, bases[0].fitted), []
+    part, searches = _worst_recording(bases[0].evidence, bases[0].fitted), []
     if not part[1].error_signal > 0:
         return None
     for effect in sought:
         progress(f"{effect.label}, the global search")
         searches.append(_shapes_on(*part, effect))
     finals = [
-        _final(evidence, one.fitted, searches) if one.fitted.error_signal > 0 else None
+        _final(one.evidence, one.fitted, searches) if one.fitted.error_signal > 0 else None
         for one in bases
     ]
     found = [(one, base) for one, base in zip(finals, bases, strict=True) if one is not None]
@@ -80,14 +86,10 @@ def global_search(
         return None
     one, base = max(found, key=lambda pair: pair[0].fall / pair[1].fitted.error_signal)
     tests = base.ranking.tests + sum(found.evaluations for found in searches)
-    best, refusal = judged(evidence, base.fitted, one, tests)
-    return (
-        None
-        if refusal
-        else RankedModel(
-            base.fitted, _headed(base.ranking, best, tests, evidence.criteria.search.alike)
-        )
-    )
+    best, refusal = judged(base.evidence, base.fitted, one, tests)
+    if refusal:
+        return None
+    return replace(base, ranking=_headed(base.ranking, best, tests, criteria.search.alike))
 
 
 def _sought(evidence: Evidence, model: Model, last: EvidenceFit) -> list[Effect]:
@@ -161,7 +163,6 @@ def _shapes_on(
         enough=-criteria.enough * systematic,
         hope=-criteria.least * systematic,
         patience=criteria.patience,
-        worst=systematic,
         finalists=criteria.finalists,
     )
     problem = ShapeProblem(lower=lower, upper=upper, start=(lower + upper) / 2, evaluate=evaluate)

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 
-from dynident.effects.effect import Block, Parameter, ShapeParameter, motion_unit
+from dynident.effects.effect import Block, Parameter, motion_unit
 from dynident.effects.transmissions.along import mean_inertia
 from dynident.effects.transmissions.dead_zone import Transmitting
 from dynident.effects.transmissions.flexible import DAMPING, RESONANCE, ROTOR_SHARE, FlexibleJoint
 from dynident.effects.transmissions.link_response import responses
 
-_GAPS = (0.0015, 0.004, 0.01, 0.025)
+_GAPS = (0.0005, 0.0015, 0.004, 0.01, 0.025)
 """rad (a tenth of it in m): gaps that are screened."""
-_SOUGHT = ((8.0, 60.0), (0.02, 0.5), (0.05, 0.7))
-"""Hz, 1 and 1: shapes that are searched through."""
-_SOUGHT_GAPS = (8e-4, 6e-2)
-"""rad (a tenth of it in m)."""
+_USUAL, _LEAST = 0.004, 1.5e-5
+"""rad or m: the gap of an effect without a value, and the least at which a column is taken."""
+_SOUGHT = ((8.0, 150.0), (0.02, 1.2), (0.05, 0.9))
+"""Hz, 1 and 1: shapes that are searched through, from teeth that bounce to teeth that do not."""
+_SOUGHT_GAPS = (1e-4, 6e-2)
+"""rad (a tenth of it in m): from a third of an arc minute, as in precise gears."""
 
 
 class Backlash(FlexibleJoint):
@@ -36,6 +39,7 @@ class Backlash(FlexibleJoint):
         "little before the link follows"
     )
     confounded_with = ("joint_elasticity", "presliding", "coulomb_friction")
+    stands_in_for = ("joint_elasticity",)  # whose sides bend far more than its gap is wide
     shown_by = "load"
     experiment = "move {joint} so that its load changes sign slowly, many times"
     nonlinear = True
@@ -46,15 +50,11 @@ class Backlash(FlexibleJoint):
         )
 
     def shape_parameters(self, robot):
-        sides = ShapeParameter(
-            "resonance",
-            "Hz",
-            (15.0, 30.0),
-            lower=RESONANCE.lower,
-            upper=RESONANCE.upper,
-            means=RESONANCE.means,
+        return (
+            replace(RESONANCE, grid=(15.0, 30.0)),
+            replace(DAMPING, grid=(0.1, 0.7)),
+            ROTOR_SHARE,
         )
-        return (sides, DAMPING, ROTOR_SHARE)
 
     def variants(self, robot) -> Iterator[Backlash]:
         scale = 0.1 if motion_unit(robot, self.joint) == "m" else 1.0
@@ -70,7 +70,7 @@ class Backlash(FlexibleJoint):
     def gap(self) -> float:
         """The gap at which the column is taken."""
         given = self.point[0] if self.point else 0.0
-        return max(given, _GAPS[0] / 100.0) if given > 0 else _GAPS[1]
+        return max(given, _LEAST) if given > 0 else _USUAL
 
     def family(
         self, variants: Sequence[Backlash], blocks: Sequence[Block]

@@ -27,7 +27,7 @@ RESONANCE = ShapeParameter(
 )
 """Of the link against the locked motor, at the mean of its inertia."""
 DAMPING = ShapeParameter(
-    "damping", "1", (0.1,), lower=0.002, upper=2.0, means="damping ratio of that resonance"
+    "damping", "1", (0.1, 0.35), lower=0.002, upper=2.0, means="damping ratio of that resonance"
 )
 ROTOR_SHARE = ShapeParameter(
     "rotor_share",
