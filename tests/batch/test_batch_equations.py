@@ -10,6 +10,7 @@ from random_trees import joint_names, random_tree, urdf
 from chains import chain
 from dynident.batch import (
     joint_space_tape,
+    kernel,
     regressor_kernel,
     tape,
     torque_derivative_kernel,
@@ -174,3 +175,38 @@ def test_many_samples_take_any_parameters():
     assert np.abs(robot.inverse_dynamics(*motion, theta) - want).max() < 1e-13 * abs(want).max()
     theta[3] = np.nan
     assert np.all(np.isnan(robot.inverse_dynamics(*motion, theta)))
+
+
+def test_motions_met_before_are_as_those_that_are_new():
+    """Cosines are kept: of joints that stand where they stood, and of arrays as they were then."""
+    robot = chain(3)
+    made = torque_kernel(robot.joint_tree)
+    q, v, a = robot.random_motion(0, 300)
+    elsewhere, at_the_end, reused = q.copy(), q.copy(), q.copy()
+    elsewhere[:, 1] += 0.1
+    at_the_end[-1, 0] += 0.1
+    motions = (
+        q,
+        elsewhere,
+        at_the_end,
+        q[:200],
+        q,
+        *np.random.default_rng(0).normal(size=(4, 300, 3)),
+    )
+
+    def torques(positions):
+        return made(
+            positions, v[: len(positions)], a[: len(positions)], parameters=robot.theta.tolist()
+        )
+
+    wanted = []
+    for one in motions:
+        kernel._turned.clear()
+        wanted.append(torques(one).copy())
+    for _ in range(2):
+        for one, want in zip(motions, wanted, strict=True):
+            np.testing.assert_array_equal(torques(one), want)
+            if len(one) == len(reused):
+                reused[:] = one
+                np.testing.assert_array_equal(torques(reused), want)
+    assert len(kernel._turned) <= 4

@@ -130,6 +130,7 @@ def test_predicted_sigma_is_that_of_the_regression() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_begins")
 def test_it_tells_more_than_many_random_motions_within_the_limits() -> None:
     task = DesignTask(duration=10.0, repeat=1, harmonics=5, starts=2)
     found = design(MODEL, recorded(), task)
@@ -154,6 +155,7 @@ def test_it_tells_more_than_many_random_motions_within_the_limits() -> None:
     ],
 )
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_begins")
 def test_pairs_are_told_apart_better_than_by_any_of_many_motions(pair, times: float) -> None:
     base = Model(ROBOT) + "coulomb_friction"
     (first,), (second,) = (effects_of(label, ROBOT) for label in pair)
@@ -182,6 +184,7 @@ def test_pairs_are_told_apart_better_than_by_any_of_many_motions(pair, times: fl
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_begins")
 def test_of_several_pairs_the_one_told_least_counts() -> None:
     base = Model(ROBOT) + "viscous_friction" + "coulomb_friction"
     labels = (

@@ -1,4 +1,4 @@
-"""Commands that write, killed at any moment: what was there is whole, or what is new is.
+"""Commands that write, disturbed at any moment: what was there is whole, or what is new is.
 
 `python -m hostile.kills --kills 200` kills as often, at random moments, and prints what was lost.
 """
@@ -9,6 +9,7 @@ import argparse
 import contextlib
 import os
 import random
+import resource
 import signal
 import sys
 import tempfile
@@ -16,7 +17,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import wraps
+from functools import partial, wraps
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -31,6 +32,8 @@ from hostile.writers import WRITERS, Writer, prepare
 
 WRITING = {files: ("write_bytes", "write_text"), file_groups: ("_finish",)}
 """Code that writes: functions of a module, within which a command is killed."""
+Fault = Callable[[], object]
+"""Called in a process that is about to write, and spoils that."""
 
 
 def _click(self: LocalServer) -> None:
@@ -73,9 +76,8 @@ def started(
         silent = os.open(os.devnull, os.O_WRONLY)
         os.dup2(silent, 1)
         os.dup2(silent if errors is None else errors, 2)
-        if errors is not None:  # pytest has put streams of its own in their place
-            sys.stdout = os.fdopen(1, "w", closefd=False)
-            sys.stderr = os.fdopen(2, "w", closefd=False)
+        if errors is not None:
+            _say_it_here()
         LocalServer.serve = _click
         motion_program._TRIED = 10  # a design is written whatever its search began with
         before()
@@ -88,21 +90,41 @@ def started(
         os._exit(status)
 
 
-def _stopped_where_it_writes(lines: Sequence[int], test: Connection) -> None:
-    """Let this process stop before it first writes, and try kills there.
+def _say_it_here() -> None:
+    """Let Python write to the descriptors: pytest has put streams of its own in their place."""
+    sys.stdout = os.fdopen(1, "w", closefd=False)
+    sys.stderr = os.fdopen(2, "w", closefd=False)
 
-    What comes before the writing is the same whatever the line of the kill, and may be a whole
-    diagnosis: it is done once. There a child is begun for each kill, which goes on from that
-    moment; the test, told by `test`, looks at what it leaves and puts the folder back.
+
+def killed_within(lines: int) -> Fault:
+    """Return what kills the process after some lines of the code that writes files."""
+    return partial(sys.settrace, _killer(lines))
+
+
+def no_room() -> None:
+    """Let no file grow beyond some bytes, as a full disk does not."""
+    # Python would cut its own bytecode short, and other tests would read that.
+    sys.dont_write_bytecode = True
+    os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20, 20))
+
+
+def _stopped_where_it_writes(faults: Sequence[Fault], test: Connection) -> None:
+    """Let this process stop before it first writes, and try faults there.
+
+    What comes before the writing is the same whatever the fault, and may be a whole diagnosis: it
+    is done once. There a child is begun for each fault, which goes on from that moment; the test,
+    told by `test`, looks at what it leaves and puts the folder back.
     """
     stopped = False
 
-    def kills_come_first(function: Callable) -> Callable:
+    def faults_come_first(function: Callable) -> Callable:
         @wraps(function)
         def run(*arguments: object, **options: object) -> object:
             nonlocal stopped
             first, stopped = not stopped, True
-            if first and _survives(lines, test):
+            if first and _survives(faults, test):
                 test.close()
             return function(*arguments, **options)
 
@@ -110,19 +132,25 @@ def _stopped_where_it_writes(lines: Sequence[int], test: Connection) -> None:
 
     for module, names in WRITING.items():
         for name in names:
-            setattr(module, name, kills_come_first(getattr(module, name)))
+            setattr(module, name, faults_come_first(getattr(module, name)))
 
 
-def _survives(lines: Sequence[int], test: Connection) -> bool:
-    """Begin a child for each kill, and say whether this process is none of them."""
+def _survives(faults: Sequence[Fault], test: Connection) -> bool:
+    """Begin a child for each fault, and say whether this process is none of them."""
     test.send(None)
-    for line in lines:
+    for fault in faults:
         test.recv()
+        end, start = os.pipe()
         child = os.fork()
         if not child:
-            sys.settrace(_killer(line))
+            os.dup2(start, 2)
+            _say_it_here()
+            fault()
             return False
-        test.send(finished(child))
+        os.close(start)
+        with os.fdopen(end, "rb") as errors:
+            said = errors.read().decode(errors="replace")
+        test.send((finished(child), said))
     test.recv()
     return True
 
@@ -154,16 +182,24 @@ def finished(child: int) -> int:
 
 @dataclass(frozen=True, kw_only=True)
 class Damage:
-    """What a command that was to be killed left behind.
+    """What a command that was disturbed left behind.
 
     Attributes
     ----------
-    killed : whether it was; it may have been done.
+    status : with which it ended, below zero the signal that ended it; it may have been done.
+    said : on standard error.
     lost : what is gone, or half there.
+    files : what is there.
     """
 
-    killed: bool
+    status: int
+    said: str = ""
     lost: list[str]
+    files: dict[str, bytes]
+
+    @property
+    def killed(self) -> bool:
+        return self.status == -signal.SIGKILL
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -172,41 +208,45 @@ class Written:
 
     Attributes
     ----------
-    damage : what is left where it is killed, for each line.
-    files : what nobody kills writes.
+    before : the files that were there.
+    damage : what each fault leaves.
+    files : what there is where nothing disturbs it.
     seconds : that all took.
     """
 
+    before: dict[str, bytes]
     damage: list[Damage]
     files: dict[str, bytes]
     seconds: float
 
 
-def written(writer: Writer, lines: Sequence[int] = ()) -> Written:
-    """Run a command to its end, and kill it on the way there.
+def written(writer: Writer, faults: Sequence[Fault] = ()) -> Written:
+    """Run a command to its end, and disturb it where it begins to write.
 
     Parameters
     ----------
     writer : the command; AssertionError if it fails.
-    lines : for each, that many lines of the code that writes files are run before a kill.
+    faults : each is tried from the moment before the first file is written.
     """
     with tempfile.TemporaryDirectory(prefix="kills.") as name:
         folder = Path(name)
         prepare(folder)
         before, begun = content(folder), time.monotonic()
         test, theirs = Pipe()
-        child = started(writer.words, folder, lambda: _stopped_where_it_writes(lines, theirs))
+        child = started(writer.words, folder, lambda: _stopped_where_it_writes(faults, theirs))
         theirs.close()
         test.recv()  # EOFError where it ends, and has written nothing
         stopped, damage = _Kept.of(folder), []
-        for _ in lines:
+        assert stopped.files == before, "it has written in another way"
+        for _ in faults:
             test.send(None)
-            damage.append(_damage(writer, folder, before, test.recv()))
+            status, said = test.recv()
+            damage.append(_damage(writer, folder, before, status, said))
             stopped.put_back(folder)
         test.send(None)
         assert finished(child) in (0, 1), writer.words
         seconds = time.monotonic() - begun
-        return Written(damage=damage, files=content(folder), seconds=seconds)
+        return Written(before=before, damage=damage, files=content(folder), seconds=seconds)
 
 
 @dataclass(frozen=True)
@@ -237,7 +277,9 @@ class _Kept:
                 (folder / name).write_bytes(data)
 
 
-def _damage(writer: Writer, folder: Path, before: dict[str, bytes], status: int) -> Damage:
+def _damage(
+    writer: Writer, folder: Path, before: dict[str, bytes], status: int, said: str = ""
+) -> Damage:
     """Look at what a command that ended with a status has left of what was there before."""
     after = content(folder)
     lost = [f"{file} is gone" for file in before if file not in after]
@@ -255,7 +297,7 @@ def _damage(writer: Writer, folder: Path, before: dict[str, bytes], status: int)
             lost.append(f"{file} is changed")
     if status == 0 and len(after) < len(before):
         lost.append("it said that all was well")
-    return Damage(killed=status == -signal.SIGKILL, lost=lost)
+    return Damage(status=status, said=said, lost=lost, files=after)
 
 
 def killed_after(writer: Writer, seconds: float) -> Damage:
@@ -284,7 +326,8 @@ def main() -> None:
         name = list(WRITERS)[number % len(WRITERS)]
         writer = WRITERS[name]
         if (number // len(WRITERS)) % 2:
-            (left,) = written(writer, [rng.randrange(30 * len(writer.results))]).damage
+            lines = rng.randrange(30 * len(writer.results))
+            (left,) = written(writer, [killed_within(lines)]).damage
         else:
             left = killed_after(writer, rng.uniform(0.0, 1.05 * seconds[name]))
         count["killed" if left.killed else "done before"] += 1

@@ -149,10 +149,8 @@ READ = frozenset(
 
 LONG = tuple(WRITERS.keys() - {"add", "fit", "refit", "init", "changes", "open"})
 """Commands that take seconds: `make test-fast` leaves them out."""
-each_writer = pytest.mark.parametrize(
-    "name",
-    [pytest.param(one, marks=pytest.mark.slow if one in LONG else ()) for one in WRITERS],
-)
+MARKED = [pytest.param(one, marks=pytest.mark.slow if one in LONG else ()) for one in WRITERS]
+each_writer = pytest.mark.parametrize("name", MARKED)
 
 
 def prepare(folder: Path) -> None:

@@ -13,6 +13,8 @@ from pathlib import Path
 import nbformat
 import pytest
 
+from notebooks.forked_cells import run_cells
+
 FOLDER = Path(__file__).parents[2] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 LARGEST = 1 << 20  # bytes
@@ -21,7 +23,15 @@ MACHINE_PATH = re.compile(r"/(?:work|tmp|root|home|Users)\b|[A-Za-z]:\\\\")
 PROGRESS = re.compile(r"(diagnosing|designing): .* \(\d+ s\)")
 """A line of the log, every ten seconds: on a slow machine."""
 
-each_notebook = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+IN_JUPYTER = FOLDER / "03_closed_loop_instruments.ipynb"
+"""The shortest: a kernel takes seconds to begin."""
+
+
+def each_of(notebooks: list[Path]) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize("path", notebooks, ids=lambda path: path.stem)
+
+
+each_notebook = each_of(NOTEBOOKS)
 
 
 def read(path: Path) -> nbformat.NotebookNode:
@@ -32,10 +42,11 @@ def code_cells(notebook: nbformat.NotebookNode) -> list[nbformat.NotebookNode]:
     return [cell for cell in notebook.cells if cell.cell_type == "code"]
 
 
-@pytest.fixture(scope="session")
-def fonts(tmp_path_factory) -> Path:
+@pytest.fixture
+def fonts(tmp_path: Path) -> Path:
     """Matplotlib's folder, with a list of its own fonts alone."""
-    folder = tmp_path_factory.mktemp("matplotlib")
+    folder = tmp_path / "matplotlib"
+    folder.mkdir()
     own = {"MPLCONFIGDIR": str(folder), "MPL_IGNORE_SYSTEM_FONTS": "1"}
     listing = [sys.executable, "-c", "import matplotlib.font_manager"]
     subprocess.run(listing, env={**os.environ, **own}, check=True)
@@ -47,15 +58,26 @@ def test_there_are_notebooks() -> None:
     assert all(re.fullmatch(r"\d\d_[a-z0-9_]+", path.stem) for path in NOTEBOOKS)
 
 
-@each_notebook
+@each_of([path for path in NOTEBOOKS if path != IN_JUPYTER])
 @pytest.mark.slow
-def test_it_runs_from_top_to_bottom(path: Path, tmp_path: Path, fonts: Path, monkeypatch) -> None:
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks here")
+def test_it_runs_from_top_to_bottom(path: Path, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path))  # no start-up files
+    sources = [cell.source for cell in code_cells(read(path))]
+    outcomes = run_cells(sources, FOLDER, CELL_TIMEOUT)
+    for source, outcome in zip(sources, outcomes, strict=True):
+        assert not outcome.failure, f"{source}\n{outcome.failure}"
+        assert said_beside_progress(outcome.errors) == [], source
+
+
+@pytest.mark.slow
+def test_jupyter_runs_one_from_top_to_bottom(tmp_path: Path, fonts: Path, monkeypatch) -> None:
     from nbclient import NotebookClient
 
     # Nothing of the user's own: no start-up files, no history, no list of fonts from before.
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path))
     monkeypatch.setenv("MPLCONFIGDIR", str(fonts))
-    notebook = copy.deepcopy(read(path))
+    notebook = copy.deepcopy(read(IN_JUPYTER))
     for cell in code_cells(notebook):
         cell.outputs, cell.execution_count = [], None
     client = NotebookClient(
@@ -104,7 +126,12 @@ def test_it_ends_with_two_exercises_whose_answers_are_folded(path: Path) -> None
 
 
 def complaints(cell: nbformat.NotebookNode) -> list[str]:
-    """Errors and warnings among a cell's outputs; what says that long work goes on is neither."""
+    """Errors and warnings among a cell's outputs."""
     found = [o.evalue for o in cell.outputs if o.output_type == "error"]
-    said = (line for o in cell.outputs if o.get("name") == "stderr" for line in o.text.splitlines())
-    return found + [line for line in said if not PROGRESS.fullmatch(line)]
+    said = "".join(o.text for o in cell.outputs if o.get("name") == "stderr")
+    return found + said_beside_progress(said)
+
+
+def said_beside_progress(errors: str) -> list[str]:
+    """Lines on standard error but those that say that long work goes on."""
+    return [line for line in errors.splitlines() if not PROGRESS.fullmatch(line)]

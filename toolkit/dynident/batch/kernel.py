@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ctypes
+from collections import deque
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -20,6 +22,7 @@ from dynident.batch.torque_derivatives import torque_derivative_equations
 
 _KEPT = 32  # functions; one of 60 joints takes some MB
 _used: dict[Evaluation, None] = {}
+_FEW_ANGLES = 2**18  # positions at most, of which cosines and sines are kept
 
 
 class Kernel:
@@ -156,9 +159,42 @@ def _signals(q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
     samples, n = q.shape
     signals = np.moveaxis(side_by_side(samples, (SIGNALS, n)), 0, -1)
     signals[2], signals[3], signals[4] = q.T, v.T, a.T
-    np.cos(signals[2], out=signals[0])
-    np.sin(signals[2], out=signals[1])
+    _turn(signals[2], signals[:2])
     return signals.reshape(SIGNALS * n, samples)
+
+
+@dataclass(frozen=True)
+class _Turned:
+    """Positions (n, T), and their cosines and sines (2, n, T)."""
+
+    q: np.ndarray
+    both: np.ndarray
+
+
+_turned: deque[_Turned] = deque(maxlen=4)
+
+
+def _turn(q: np.ndarray, both: np.ndarray) -> None:
+    """Write cosines and sines (2, n, T) of positions (n, T).
+
+    A model is evaluated again and again along the same motion, or along one in which a single joint
+    stands elsewhere, and they take longer than all that follows from them.
+    """
+    left = np.ones(len(q), dtype=bool)
+    for known in list(_turned):
+        if known.q.shape != q.shape:
+            continue
+        for j in np.flatnonzero(left & (known.q[:, :1] == q[:, :1]).all(axis=1)):
+            if np.array_equal(known.q[j], q[j]):
+                both[:, j] = known.both[:, j]
+                left[j] = False
+    if not left.any():
+        return
+    for j in np.flatnonzero(left):
+        np.cos(q[j], out=both[0, j])
+        np.sin(q[j], out=both[1, j])
+    if q.size <= _FEW_ANGLES:
+        _turned.append(_Turned(q.copy(), both.copy()))
 
 
 def _is_side_by_side(out: np.ndarray, shape: tuple[int, ...]) -> bool:
