@@ -65,20 +65,31 @@ def _draw(app: Any) -> None:
 
 
 def _for_the_site(app: Any, docname: str, source: list[str]) -> None:
-    """Leave out of a page what only a forge shows: Mermaid, and links to folders of the source.
+    """Leave out of a page what only a forge shows: links to folders of the source, and Mermaid.
+
+    Its arrows are a table here, for it is drawn by a script from elsewhere.
 
     What only the site has is put in: pictures that are made with it.
     """
     folder = Path(app.env.doc2path(docname)).parent
     if folder == NOTEBOOKS:
         return
-    text = re.sub(r"```mermaid\n.*?```\n", "", source[0], flags=re.DOTALL)
+    text = re.sub(r"```mermaid\n(.*?)```\n", _arrows, source[0], flags=re.DOTALL)
     text = re.sub(
         r"<!-- picture of (\w+) -->", r"![\1 in the residual](_made/effects/\1.png)", text
     )
     if not (HERE / "benchmarks.md").exists():  # `make bench` writes it
         text = text.replace("\nbenchmarks\n", "\n")
     source[0] = _with_links(text, folder, folder)
+
+
+def _arrows(found: re.Match[str]) -> str:
+    """Return the arrows of a Mermaid flowchart as a table: each begin with its ends."""
+    ends: dict[str, list[str]] = {}
+    for start, stop in re.findall(r"(\w+) --> (\w+)", found[1]):
+        ends.setdefault(start, []).append(f"`{stop}`")
+    rows = "".join(f"| `{start}` | {', '.join(stops)} |\n" for start, stops in ends.items())
+    return f"| room | imports |\n| --- | --- |\n{rows}"
 
 
 def _with_links(text: str, folder: Path, made: Path) -> str:

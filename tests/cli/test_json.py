@@ -90,9 +90,14 @@ def check_diagnosis(said: dict[str, Any], source: str) -> None:
         assert said["steps"][-1]["test_error_after"] == errors["after"]
 
 
-@pytest.mark.parametrize("command", ["explain", pytest.param("diagnose", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
-    ("text", "source"), [(REPEATED, "replicates"), (GIVEN, "given"), (UNKNOWN, "unknown")]
+    ("command", "text", "source"),
+    [
+        ("explain", REPEATED, "replicates"),
+        ("explain", GIVEN, "given"),
+        ("explain", UNKNOWN, "unknown"),
+        pytest.param("diagnose", REPEATED, "replicates", marks=pytest.mark.slow),
+    ],
 )
 def test_diagnosis(run, study, tmp_path, command, text, source):
     path = study(text)

@@ -65,6 +65,14 @@ def test_every_effect_has_its_picture(site: Path, pages) -> None:
     assert own <= drawn
 
 
+def test_who_imports_whom_is_on_the_site_too(site: Path, pages) -> None:
+    text = (ROOT / "docs" / "architecture.md").read_text()
+    arrows = set(re.findall(r"^ +(\w+) --> (\w+)$", text, flags=re.MULTILINE))
+    first = pages[site / "architecture.html"].find("table")
+    rows = [[cell.text for cell in row.find_all("td")] for row in first.find_all("tr")[1:]]
+    assert arrows == {(start, stop) for start, stops in rows for stop in stops.split(", ")}
+
+
 @pytest.mark.parametrize("path", STORIES, ids=lambda path: path.stem[:2])
 def test_notebooks_are_pages_with_their_pictures(site: Path, pages, path: Path) -> None:
     page = pages[site / "_made" / "notebooks" / f"{path.stem}.html"]

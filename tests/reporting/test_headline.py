@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import product
+from pathlib import Path
 
 import pytest
 
@@ -11,7 +12,9 @@ from dynident.reporting.content import step_groups
 from dynident.reporting.glossary import glossary
 from dynident.reporting.headline import headline
 from dynident.reporting.html import page
-from dynident.reporting.next_steps import FIRST, next_steps
+from dynident.reporting.joint_states import opened, states
+from dynident.reporting.next_steps import FIRST, in_short, next_steps
+from dynident.tables import percent
 from dynident.wiring import Fault
 from reporting.fabricated import diagnosis, effect
 from reporting.read_page import Elements
@@ -115,6 +118,63 @@ def test_the_headline_never_names_an_effect_without_what_it_cannot_be_told_from(
     assert (
         "Stribeck friction at joint6 (or asymmetric friction at joint6)" in headline(six).sentence
     )
+
+
+def test_what_follows_the_motion_is_said_and_shown_at_its_joint(six):
+    """Verdict, next step, table and the picture that is open name one joint."""
+    joints = tuple(
+        replace(one, ratio_before=None, ratio_after=None, noise_rms=None) for one in six.joints
+    )
+    found = replace(six, noise_source="unknown", joints=joints, verdict="unexplained")
+    found = replace(found, following_motion=("joint2",))
+    assert "what is left at joint2 follows the motion" in headline(found).sentence
+    assert any("pictures of joint2" in one.what for one in next_steps(found))
+    (failing,) = (one for one in states(found) if one.state == "failing")
+    assert failing.joint.name == "joint2" and "not all noise" in failing.words
+    assert opened(found) == {"joint2"}
+
+
+def test_without_a_noise_the_error_is_said_in_the_headline_and_the_json():
+    found = of_kind("nothing_missing", steps=False, noise=False)
+    error = percent(found.test_error.after)
+    assert error in headline(found).sentence and error in found.sentence
+    said = found.to_dict()
+    assert said["verdict"] == "nothing_missing" and "cannot be said" in said["notes"][0]
+    assert error in said["notes"][0]
+    known = of_kind("nothing_missing", steps=False, noise=True).to_dict()
+    assert not any("cannot be said" in note for note in known["notes"])
+
+
+def test_a_small_fall_that_may_be_chance_is_not_to_be_added(six):
+    one = six.steps[0]
+    falls = ((0.10, 0.02, 1e-3), (0.02, 0.019, 1e-4), (0.019, 0.0189, 1e-3))
+    names = ("stribeck_friction", "joint_spring", "torque_offset")
+    steps = tuple(
+        replace(
+            one,
+            effect=effect(name, "joint6"),
+            indistinguishable=(),
+            test_error_before=before,
+            test_error_after=after,
+            fall_standard_error=sigma,
+        )
+        for name, (before, after, sigma) in zip(names, falls, strict=True)
+    )
+    told = next_steps(replace(six, steps=steps))
+    assert [c for one in told for c in one.commands if "add" in c] == [
+        "dynident add STUDY stribeck_friction@joint6",
+        "dynident add STUDY joint_spring@joint6",
+    ]
+    (left_out,) = (one for one in told if one.what.startswith("Leave"))
+    assert "torque offset at joint6" in left_out.what and "chance" in left_out.why
+
+
+def test_a_long_text_ends_with_the_verdict_and_what_to_type(six):
+    verdict, following = in_short(six, Path("my studies/arm.toml"))
+    assert headline(six).sentence in verdict
+    what, *commands = following.splitlines()
+    assert next_steps(six)[0].what in what
+    assert commands[0].startswith("dynident add 'my studies/arm.toml' ") and len(commands) == 2
 
 
 def test_at_most_three_next_steps_are_unfolded(six):

@@ -9,6 +9,8 @@ from html import escape, unescape
 import numpy as np
 import pytest
 
+from dynident.diagnosis.dependence.explained_shares import ExplainedShares, Share
+from dynident.diagnosis.dependence.residual_dependence import JointDependence
 from dynident.diagnosis.details import Candidate, Step
 from dynident.diagnosis.effect_groups import hidden_effects
 from dynident.diagnosis.result import Diagnosis
@@ -66,6 +68,24 @@ def test_it_goes_from_the_verdict_to_the_provenance(found, html):
     text = Elements(html).text
     assert text.index(headline(found).sentence) < text.index("What to do next")
     assert text.index("How sure this is") < text.index(found.sentence)
+
+
+def test_windows_of_one_recording_are_told_apart(found):
+    """Several windows of a file are drawn under its name; what is chosen has to be told."""
+    later = [replace(trace, t=trace.t + 100.0) for trace in found.traces]
+    html = page(replace(found, traces=(*found.traces, *later)))
+    chosen = re.findall(r"<option value=\"torque-[^>]*>([^<]*)<", html)
+    assert len(set(chosen)) == len(chosen) == 2 * len(found.traces)
+
+
+def test_what_is_left_is_a_sentence_or_two_beside_the_verdict_and_its_table_is_folded(found):
+    part = {"position and velocity": Share(0.3, 0.05, 2.5)}
+    shares = ExplainedShares(by=part, rest=Share(0.7, 0.05, 2.5), units=20)
+    left = JointDependence(joint="elbow", whole="systematic", shares=shares)
+    html = page(replace(found, verdict="unexplained", residual_dependence=(left,)))
+    between = html[html.index('<h2 id="left"') : html.index('<h2 id="next"')]
+    said, _, folded = between.partition("<details>")
+    assert left.sentence in said and "<table>" not in said and "<table>" in folded
 
 
 def test_every_link_has_its_place_and_every_place_is_one(html):
@@ -141,6 +161,12 @@ def test_the_study_is_named_with_its_hash(found, tmp_path):
     study.write_text('robot = "arm.urdf"')
     text = Elements(page(found, study=study)).text
     assert hashlib.sha256(study.read_bytes()).hexdigest() in text
+
+
+def test_what_study_stands_for_is_said_where_it_is_known(found, html):
+    path = "studies/<i>my arm</i>.toml"
+    assert f"STUDY stands for <code>{escape(path)}</code>" in page(found, study=path)
+    assert "STUDY stands for" not in html
 
 
 def test_every_plot_has_its_figure(found, html):

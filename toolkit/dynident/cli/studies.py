@@ -63,6 +63,7 @@ def explain(
     Example: dynident explain study.toml --report report.html
     """
     from dynident.reporting.intervals import printed_parameters
+    from dynident.reporting.next_steps import in_short
 
     if next_ is not None:
         files.require_folder(next_)
@@ -86,6 +87,7 @@ def explain(
             *diagnosis.tables(),
             *printed_parameters(diagnosis),
             *following.parts(),
+            *in_short(diagnosis, study),
         ),
     )
     return with_drives(loaded, answer)

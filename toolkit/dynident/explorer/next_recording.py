@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -118,7 +119,7 @@ def _advice(opened: OpenedStudy) -> list[Any]:
         hidden = [one.title for one in task.show]
         more = f" and {len(hidden) - _MOST} more" if len(hidden) > _MOST else ""
         what = f"show what these recordings cannot: {', '.join(hidden[:_MOST])}{more}"
-    command = f"dynident explain {opened.study.path.name} --design next"
+    command = f"dynident explain {shlex.quote(opened.study.path.name)} --design next"
     return [html.P([f"A motion may {what}. Have it designed: ", html.Code(command)])]
 
 

@@ -24,6 +24,8 @@ from dynident.explorer.page_parts import (
 )
 from dynident.explorer.tab_state import TabState
 
+_WORKING = "Working out the intervals ..."
+
 
 def page(server: Flask, token: str, versions: StudyVersions, motions: str) -> Dash:
     """Put the page of a study on a server.
@@ -73,6 +75,7 @@ def _told(error: Exception) -> None:
     if not isinstance(error, DynidentError):
         said = f"Unexpected {type(error).__name__}: {error}. Please report it with the study."
     set_props("fault", {"children": said})
+    set_props("working", {"children": ""})
 
 
 class _Callbacks:
@@ -129,9 +132,9 @@ class _Callbacks:
         )(self.mapped)
         on(
             Output("values", "children"),
+            Output("working", "children"),
             Input("errors", "figure"),
             tab,
-            running=[(Output("working", "children"), "Working out the intervals ...", "")],
         )(self.valued)
         on(
             Output("written", "children"),
@@ -169,6 +172,8 @@ class _Callbacks:
             found = Contrast.of(opened, state)
         except DynidentError as error:
             return no_update, f"This cannot be fitted: {error}", "Nothing to write", True
+        # Until the values of this choice are there; those of one that it has replaced end nothing.
+        set_props("working", {"children": _WORKING if opened.chosen(state.on) else ""})
         many = len(state.fresh)
         name = opened.study.path.name
         words = f"Write {many} effect{'s' * (many > 1)} into {name}" if many else "Nothing to write"
@@ -198,18 +203,18 @@ class _Callbacks:
         names, against, words, figure = map_answer(found.maps, robot.names[joint], against)
         return names, against, [html.Span([one, html.Br()]) for one in words], figure
 
-    def valued(self, _: object, tab: object) -> Any:
+    def valued(self, _: object, tab: object) -> tuple[Any, str]:
         """The values of what is switched on, with intervals: they take longer than the errors."""
         opened, state = self._of(tab)
         chosen = opened.chosen(state.on)
         if not chosen:
-            return html.P("Switch on an effect to see its values.", className="quiet")
+            return html.P("Switch on an effect to see its values.", className="quiet"), ""
         try:
             estimate = opened.refitter.with_intervals([one.effect for one in chosen])
             impossible = opened.refitter.impossible(estimate)
         except DynidentError as error:
-            return html.P(f"No values: {error}")
-        return table(value_table(estimate, [one.label for one in chosen], impossible))
+            return html.P(f"No values: {error}"), ""
+        return table(value_table(estimate, [one.label for one in chosen], impossible)), ""
 
     def written(self, clicks: int | None, tab: object) -> tuple[Any, Any, Any]:
         """Write what is switched on into the study."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,6 +14,7 @@ from dynident.explorer.next_recording import next_recording
 from dynident.explorer.opened_study import OpenedStudy
 from dynident.explorer.page_figures import MAP_HEIGHT, TORQUE_HEIGHT, bars_height, waiting
 from dynident.explorer.tab_state import TabState
+from dynident.reporting.content import recording_titles
 from dynident.tables import Table
 
 SWITCH = "switch"
@@ -37,6 +37,7 @@ _CHOSEN_BY = (
     "Choosing effects by this error makes it too small: judge the model that you choose by new "
     "recordings."
 )
+_ASKED = "Asked by a flexible regression, on blocks of time that it was not fitted to:"
 _HEADS: dict[Group, str] = {
     "added": "Missing, says the diagnosis",
     "proposed": "Laws proposed for what the catalogue leaves",
@@ -177,12 +178,10 @@ def recordings_of(opened: OpenedStudy) -> tuple[str, ...]:
     """Return the names of the recordings, in the order of the page, with what each is for."""
     fit, tested = opened.given.fit(), len(opened.study.test) > 0
     runs = (*fit.judged.runs, *(fit.fitted.runs if tested else ()))
-    names = Counter(run.name for run in runs)
     found = []
-    for place, run in enumerate(runs):
-        span = f", {run.t[0]:.3g} to {run.t[-1]:.3g} s" if names[run.name] > 1 else ""
+    for place, title in enumerate(recording_titles([(run.name, run.t) for run in runs])):
         use = "fitted" if place >= len(fit.judged.runs) else "held out"
-        found.append(f"{run.name}{span} ({use if tested else 'held out block by block'})")
+        found.append(f"{title} ({use if tested else 'held out block by block'})")
     return tuple(found)
 
 
@@ -261,7 +260,7 @@ def verdict(opened: OpenedStudy) -> list[Any]:
     return [
         html.P("The diagnosis of the study:", className="quiet"),
         html.P(found.sentence, className="sentence"),
-        *asked,
+        *([html.P(_ASKED, className="quiet"), *asked] if asked else []),
         *([html.Details([html.Summary("How far this can be trusted"), *more])] if more else []),
     ]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -53,6 +54,19 @@ class Bar:
         """
         end = max(self.start, self.stop)
         return floor if end < floor < end + LABEL * width else end
+
+
+def recording_titles(stretches: Sequence[tuple[str, np.ndarray]]) -> tuple[str, ...]:
+    """Names by which stretches of recordings are told apart: those of one file by their time, too.
+
+    Parameters
+    ----------
+    stretches : name of the recording and times (T,) in s, each.
+    """
+    many = Counter(name for name, _ in stretches)
+    return tuple(
+        f"{name}, {t[0]:.3g} to {t[-1]:.3g} s" if many[name] > 1 else name for name, t in stretches
+    )
 
 
 @dataclass(frozen=True)
@@ -114,6 +128,7 @@ def bars(diagnosis: Diagnosis) -> tuple[Bar, ...]:
         before = 100 * group.steps[0].test_error_before
         after = 100 * group.steps[-1].test_error_after
         change = f"{after - before:+.2f}".replace("-", "\u2212")
+        change = change if change.strip("+\u22120.") else "under 0.01"
         found.append(
             Bar(lines=_group_lines(group), start=after, stop=before, kind="added", text=change)
         )

@@ -146,7 +146,9 @@ def _nothing_added(diagnosis: Diagnosis, known: bool) -> Headline:
             return Headline("?", "no missing effect is confirmed", said)
         said = f"Nothing is missing: what remains is {rest}."
         return Headline("\u2713", "nothing is missing", said)
-    said = f"No effect of the catalogue would be of use. {_NOT_KNOWN}"
+    error = percent(diagnosis.test_error.after)
+    none = "No effect of the catalogue would be of use"
+    said = f"{none}, and the torque error is {error}. {_NOT_KNOWN}"
     return Headline("?", "nothing found, noise unknown", said)
 
 

@@ -16,7 +16,7 @@ from dynident.diagnosis.detection_limits import limit_table
 from dynident.diagnosis.result import Diagnosis
 from dynident.evidence.maps import ResidualMap
 from dynident.fitting.drive_gains import anew_tables
-from dynident.reporting.content import after_name, left, ranked, seen
+from dynident.reporting.content import after_name, left, ranked, recording_titles, seen
 from dynident.reporting.diagnosis_tables import (
     candidate_table,
     joint_table,
@@ -132,12 +132,13 @@ def page(
     """
     if isinstance(found, Validation):
         return _validation_page(found, command)
-    tables = provenance(found, command, None if study is None else Path(study))
-    return _diagnosis_page(found, loop_section(loop), tables)
+    path = None if study is None else Path(study)
+    tables = provenance(found, command, path)
+    return _diagnosis_page(found, loop_section(loop), tables, path)
 
 
 def _diagnosis_page(
-    diagnosis: Diagnosis, closed: LoopSection | None, made: tuple[Table, ...]
+    diagnosis: Diagnosis, closed: LoopSection | None, made: tuple[Table, ...], study: Path | None
 ) -> str:
     joint_maps = _joint_maps(diagnosis)
     switch = switch_section(diagnosis)
@@ -160,6 +161,9 @@ def _diagnosis_page(
     laws = [f"law-{k}" for k, one in enumerate(diagnosis.proposals) if one.picture]
     for name, one in zip(laws, (p for p in diagnosis.proposals if p.picture), strict=True):
         figures[name] = pictures.law_picture(one)
+    titles = recording_titles(
+        [(f"{trace.joint}, {trace.recording}", trace.t) for trace in diagnosis.traces]
+    )
     place = {one.joint.name: i for i, one in enumerate(states(diagnosis))}
     order = sorted(range(len(names)), key=lambda i: place[diagnosis.traces[i].joint])
     advice, terms = next_steps(diagnosis), glossary(diagnosis)
@@ -174,6 +178,7 @@ def _diagnosis_page(
         added=after_name(diagnosis) if diagnosis.steps else "",
         advice=advice[:FIRST],
         more_advice=advice[FIRST:],
+        study=study if any(one.commands for one in advice) else None,
         switch=switch,
         proposals=[
             (f"law-{k}", p, proposal_table(p, diagnosis)) for k, p in enumerate(diagnosis.proposals)
@@ -182,7 +187,7 @@ def _diagnosis_page(
         dependence=dependence_table(diagnosis.residual_dependence),
         joints=joint_table(diagnosis),
         steps=step_table(diagnosis),
-        torques=[(names[i], diagnosis.traces[i]) for i in order],
+        torques=[(names[i], titles[i]) for i in order],
         thinned=any(len(trace.t) > points for trace in diagnosis.traces),
         joint_maps=joint_maps,
         candidates=candidate_table(diagnosis, ranked(diagnosis)),
@@ -268,7 +273,7 @@ def _numeric(table: Table) -> list[bool]:
     return [
         any(row[i] for row in table.rows)
         and all(
-            not row[i] or (row[i][0] in "<-+.0123456789" and len(row[i]) < _HASH)
+            not row[i] or (row[i][0] in "<>-+.0123456789" and len(row[i]) < _HASH)
             for row in table.rows
         )
         for i in range(len(table.columns))

@@ -98,7 +98,7 @@ def parameter_table(estimate: Estimate, widening: Widening | None, noise: NoiseS
             words[i],
             number(values[i], _digits(values[i], half[i])),
             _interval(values[i], half[i]),
-            percent(float(half[i] / abs(values[i])) if values[i] else None, 1),
+            _relative(values[i], half[i]),
             model.units[i],
             stands_for[i],
         )
@@ -145,9 +145,8 @@ def _shape_rows(estimate: Estimate, widening: Widening | None) -> list[tuple[str
     for effect, one, found in _shapes(estimate):
         factor = 1.0 if widening is None else widening.of(effect.joint)
         x, half = found.value, _QUANTILE * factor * found.sigma
-        relative = percent(float(half / abs(x)) if x and np.isfinite(half) else None, 1)
         words, between = _placed(one.means, effect), _interval(x, half)
-        rows.append((found.name, words, number(x, 4), between, relative, one.unit, ""))
+        rows.append((found.name, words, number(x, 4), between, _relative(x, half), one.unit, ""))
     return rows
 
 
@@ -175,6 +174,13 @@ def printed_parameters(diagnosis: Diagnosis) -> tuple[Table | str, ...]:
         estimate.parameter_table(),
         *((inside.shape_table(),) if inside.shapes else ()),
     )
+
+
+def _relative(value: float, half: float) -> str:
+    """Half of an interval over its value; no figure where it holds zero, for it says no more."""
+    if not value or not np.isfinite(value) or not np.isfinite(half):
+        return percent(None)
+    return percent(half / abs(value), 1) if half < abs(value) else "> 100 %"
 
 
 def _interval(value: float, half: float) -> str:

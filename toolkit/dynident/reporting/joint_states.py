@@ -55,6 +55,9 @@ def opened(diagnosis: Diagnosis) -> frozenset[str]:
 def _state(diagnosis: Diagnosis, joint: JointResult) -> JointState:
     named = any(step.effect.joint == joint.name for step in diagnosis.steps)
     before, after = joint.ratio_before, joint.ratio_after
+    if joint.name in diagnosis.following_motion:
+        words = "what is left follows the motion: it is not all noise"
+        return JointState(joint, "failing", words, (2, joint.error_after))
     if before is None or after is None:
         words = "an effect was added here" if named else "the noise is unknown"
         return JointState(joint, "unknown", words, (named, joint.error_before))

@@ -5,12 +5,14 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from dynident.diagnosis.details import Step
 from dynident.diagnosis.effect_groups import grouped_title, in_words
 from dynident.diagnosis.leading_effects import LeadingEffects
 from dynident.diagnosis.result import Diagnosis
 from dynident.effects import Effect
+from dynident.reporting.headline import headline
 from dynident.reporting.joint_states import states
 from dynident.tables import percent, points
 from dynident.wiring import Fault
@@ -69,6 +71,22 @@ def next_steps(diagnosis: Diagnosis) -> tuple[Advice, ...]:
     return tuple(found)
 
 
+def in_short(diagnosis: Diagnosis, study: Path) -> tuple[str, ...]:
+    """Return the verdict and the first thing to do, a paragraph each: the end of a long text.
+
+    Parameters
+    ----------
+    diagnosis : of the study.
+    study : its file, as commands name it.
+    """
+    first, *_ = next_steps(diagnosis)
+    commands = [one.replace("STUDY", shlex.quote(str(study)), 1) for one in first.commands]
+    return (
+        f"In short: {headline(diagnosis).sentence}",
+        "\n".join([f"Next: {first.what}", *commands]),
+    )
+
+
 def _to_mend(fault: Fault) -> Advice:
     what = f"Mend the study: {fault.what}. {fault.where}."
     return Advice(what, f"{fault.evidence[0].upper()}{fault.evidence[1:]}.", fault.mend)
@@ -122,12 +140,25 @@ def _to_add_after(diagnosis: Diagnosis) -> list[Advice]:
     steps = _addable(diagnosis)
     smaller = LeadingEffects.of(steps).smaller if steps else ()
     smaller = [group for group in smaller if sum(step.fall for step in group) > 0.0]
-    if not smaller:
-        return []
-    names, labels = _added(smaller, len(diagnosis.joints))
-    fall = points(sum(step.fall for group in smaller for step in group))
-    why = f"Small beside what comes first: {fall} points of the fall."
-    return [Advice(f"Then add {names}.", why, (f"dynident add STUDY {shlex.join(labels)}",))]
+    certain = [group for group in smaller if not all(step.uncertain for step in group)]
+    chance = [group for group in smaller if all(step.uncertain for step in group)]
+    found = []
+    if certain:
+        names, labels = _added(certain, len(diagnosis.joints))
+        why = f"Small beside what comes first: {_points_of(certain)} points of the fall."
+        command = f"dynident add STUDY {shlex.join(labels)}"
+        found.append(Advice(f"Then add {names}.", why, (command,)))
+    if chance:
+        names, labels = _added(chance, len(diagnosis.joints))
+        them, fall = ("them", "The fall with each") if labels[1:] else ("it", "Its fall")
+        what = f"Leave {names} out until another recording confirms {them}."
+        why = f"{fall} is within two standard errors, and may be chance."
+        found.append(Advice(what, why))
+    return found
+
+
+def _points_of(groups: Sequence[Sequence[Step]]) -> str:
+    return points(sum(step.fall for group in groups for step in group))
 
 
 def _added(groups: Sequence[Sequence[Step]], joints: int) -> tuple[str, list[str]]:

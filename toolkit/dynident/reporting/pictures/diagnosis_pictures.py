@@ -141,7 +141,7 @@ def ranking(diagnosis: Diagnosis, most: int = 10) -> go.Figure:
     members = [i for i, c in enumerate(shown) if c.effect.label in first_set(diagnosis)]
     if len(members) > 1:
         _bracket(figure, members)
-    title = "gain: fall of held-out error with it alone (points)"
+    title = "gain alone (points)"
     figure.update_xaxes(title=title, zeroline=True, fixedrange=True)
     figure.update_yaxes(
         tickvals=list(range(len(shown))),

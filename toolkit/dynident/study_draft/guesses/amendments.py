@@ -18,7 +18,7 @@ from dynident.recording import Recording
 from dynident.robot import Robot
 from dynident.study_draft.guesses.coupled_motors import Coupling, coupling_by_torques
 from dynident.study_draft.guesses.file_reading import Reading
-from dynident.study_draft.guesses.motor_side import coupled, turned
+from dynident.study_draft.guesses.motor_side import coupled, expression_of, turned
 from dynident.study_draft.guesses.wiring_guess import guess_wiring
 from dynident.study_draft.guesses.zeros import guess_zeros
 from dynident.tables import percent
@@ -138,6 +138,20 @@ def _zeros(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | N
     )
 
 
+def _ratios_to_give(reading: Reading) -> str:
+    """What to type where ratios of gears are missing, in the names of the file."""
+    names = reading.robot.names
+    how = "turns of the motor for one of the joint, a minus where they turn against each other"
+    ratios = ",".join(f"N{k}" for k in range(1, len(names) + 1))
+    given = f"give them, as the arm's manual has them: --gears {ratios} ({how})"
+    if len(names) < 2:
+        return given
+    before, last = (expression_of(reading.columns[f"q.{name}"]).text for name in names[-2:])
+    k = len(names)
+    sum_ = f"q.{names[-1]} = {last}/N{k} - {before}/N{k - 1}"
+    return f"{given}; where the motor of {names[-2]} turns {names[-1]} too, also --column '{sum_}'"
+
+
 def _wiring(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | None:
     """Units, gears, signs and order of columns."""
     rows = reading.rows(recordings)
@@ -151,11 +165,7 @@ def _wiring(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | 
             f"positions of {', '.join(guess.unknown_gears)} are on the motor side of gears, whose "
             "ratios the data do not tell"
         )
-        remedy = (
-            "give them: --gears 32,-48,1 for three joints, say; of a motor that turns two joints "
-            "also --column 'q.j6 = m6/32 - m5/45'"
-        )
-        raise RecordingError(what, recordings[0].where, remedy)
+        raise RecordingError(what, recordings[0].where, _ratios_to_give(reading))
     return Amendment(
         subject="units and signs",
         what="; ".join(guess.findings),
