@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -10,9 +10,13 @@ import pytest
 from dynident.closed_loop import Controller, Experiment, Fourier, Sensors, TrueEffect
 from dynident.closed_loop import ExperimentRun as Motion
 from dynident.diagnosis import diagnose
+from dynident.effects.transmissions.along import mean_inertia
 from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import fit_evidence
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
+from dynident.evidence.held_out import on_recordings
 from dynident.evidence.model_columns import model_columns
+from dynident.evidence.response_motion import simulation_predicts_better
+from dynident.evidence.runs import gather
 from dynident.evidence.simulated_motion import motion_of_loop
 from dynident.model import Model
 from dynident.recording import Dataset
@@ -35,7 +39,9 @@ def known() -> list[TrueEffect]:
     ]
 
 
-def recordings(seed: int, count: int, hidden: tuple[TrueEffect, ...] = ()) -> Dataset:
+def recordings(
+    seed: int, count: int, hidden: tuple[TrueEffect, ...] = (), sensors: Sensors = NOISY
+) -> Dataset:
     """Closed-loop recordings of no period, encoders noisy enough to mislead least squares."""
     robot = arm()
     motions = tuple(
@@ -51,7 +57,7 @@ def recordings(seed: int, count: int, hidden: tuple[TrueEffect, ...] = ()) -> Da
         controller=CONTROLLER,
         runs=motions,
         effects=(*known(), *hidden),
-        sensors=NOISY,
+        sensors=sensors,
         seed=seed,
     ).run()
     return Dataset(tuple(one.replace(period=None) for one in made))
@@ -121,3 +127,58 @@ def test_without_references_least_squares_and_why(healthy: Dataset) -> None:
     loop = motion_of_loop(model(), blind, CONTROLLER)
     assert not loop.runs and "q_ref" in loop.notes[0]
     assert not motion_of_loop(model(), healthy, None).notes
+
+
+@dataclass(frozen=True, eq=False)
+class Springy:
+    """A spring that is known of, fitted to recordings of it, and what one more recording says.
+
+    Attributes
+    ----------
+    evidence, simulated : of that recording, without a simulator and with one.
+    fitted : values of recordings without noise, and columns of noisy ones, with motions that were
+        simulated.
+    """
+
+    evidence: Evidence
+    simulated: Evidence
+    fitted: EvidenceFit
+
+
+def springy(position_std: float) -> Springy:
+    robot, shape = arm(), (9.0, 0.08, 0.3)
+    compliance = 1.0 / ((2.0 * np.pi * shape[0]) ** 2 * mean_inertia(robot, 0))
+    hidden = TrueEffect.of("joint_elasticity@shoulder", robot, [compliance], shape)
+    given = model() + hidden[0].effect
+    ideal, noisy = (Sensors(position_std=std, torque_std=0.05) for std in (0.0, position_std))
+    known_of = Evidence(given, gather(recordings(5, 2, hidden, ideal)))
+    values = fit_evidence(known_of, given).values
+    training, held_out = (recordings(*which, hidden, noisy) for which in ((7, 1), (6, 1)))
+    loop = motion_of_loop(given, training, CONTROLLER)
+    evidence = Evidence(given, loop.runs)
+    fitted = replace(fit_evidence(evidence, given), values=values)
+    return Springy(
+        Evidence(given, gather(held_out)),
+        Evidence(given, gather(held_out), simulator=loop.simulator(held_out)),
+        replace(fitted, white=fit_evidence(loop.renewed(evidence, fitted)[1], given).white),
+    )
+
+
+@pytest.mark.slow
+def test_a_spring_is_predicted_along_the_simulated_motion_where_positions_are_noisy() -> None:
+    one = springy(2e-4)
+    assert simulation_predicts_better(one.fitted)
+    measured, simulated = (on_recordings(e, one.fitted) for e in (one.evidence, one.simulated))
+    assert simulated.error < 0.75 * measured.error
+
+
+@pytest.mark.slow
+def test_a_spring_is_predicted_along_positions_that_are_without_noise() -> None:
+    one = springy(0.0)
+    assert not simulation_predicts_better(one.fitted)
+    measured, simulated = (on_recordings(e, one.fitted) for e in (one.evidence, one.simulated))
+    assert simulated.error == measured.error
+    along = one.simulated.predicted_by(one.fitted.model, one.fitted.values)
+    assert along.runs[0].columns_from == "simulation"
+    assert one.simulated.predicted_by(model(), one.fitted.values[: model().size]) is one.simulated
+    assert one.evidence.predicted_by(one.fitted.model, one.fitted.values) is one.evidence
