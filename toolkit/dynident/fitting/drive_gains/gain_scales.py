@@ -108,12 +108,13 @@ def as_described(
         return solution
     rank = problem.model.base.rank
     given, gains = problem.given_values()[:rank], np.array(solution.gains)
+    weighted = WeightedFactors(problem, factors, solution.weights)
+    found, kept = weighted.linear(1.0 / gains)[0], np.array(weighted.kept)
+    # Of a body's inertia and a rotor's that turns as it does, the body has all.
+    bodies = kept < rank
     for group in scales.groups:
-        R = (
-            factors.R[list(group)][:, :, :rank]
-            * (solution.weights[list(group)] / np.abs(solution.gains[list(group)]))[:, None, None]
-        )
-        ours, described = R @ solution.values[:rank], R @ given
+        R = weighted.R[list(group)] / np.abs(solution.gains[list(group)])[:, None, None]
+        ours, described = R[:, :, kept[bodies]] @ found[bodies], R[:, :, :rank] @ given
         square = float(np.sum(ours**2))
         scale = float(np.sum(ours * described)) / square if square > 0 else 0.0
         # A robot of negative masses draws the same currents: the sign is a scale like any other.
