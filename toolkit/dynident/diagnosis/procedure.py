@@ -169,12 +169,7 @@ def _compare(
     evidence = Evidence(given, runs, criteria=criteria, candidates=_variants(given))
     held = None
     if task.test is not None and len(task.test):
-        held = Evidence(
-            given,
-            gather(task.test, criteria.noise),
-            criteria=criteria,
-            simulator=loop.simulator(task.test),
-        )
+        held = Evidence(given, gather(task.test, criteria.noise), criteria=criteria)
     task.progress("evaluating every effect")
     start = with_friction_width(evidence, shaped(evidence, given))
     whole = evidence

@@ -140,6 +140,13 @@ def notes_on(
             f"squares, whose columns carry noise{floor}. Small effects may be false; record a "
             "repeated motion."
         )
+    responses = [one.title for one in fitted.model.effects if one.is_dynamic_response]
+    if simulated and responses:
+        notes.append(
+            f"{', '.join(responses)}: the response is that to the measured positions, not to "
+            "simulated ones. Their noise makes its value too small, and its interval does not "
+            "allow for that."
+        )
     if any(effect.is_payload for effect in fitted.model.effects):
         payload_recordings = [r.recording.name for r in evidence.runs if r.recording.payload]
         payload_recordings += [

@@ -17,7 +17,7 @@ from dynident.effects import Block, Effect, Needs
 from dynident.evidence.column_cache import ColumnCache, FirstLook, Kept
 from dynident.evidence.joint_columns import RigidColumns
 from dynident.evidence.noise_model import SpeedClasses
-from dynident.evidence.runs import MotionSimulator, Run, Signals
+from dynident.evidence.runs import Run, Signals
 from dynident.evidence.stacks import Stack
 from dynident.evidence.windows import Source, sources
 from dynident.fitting.sampling import Sampled, decimate_each
@@ -45,8 +45,6 @@ class Evidence:
     candidates : further effects whose columns are kept. Those that follow from a sample alone are
         evaluated with the model's in one pass through a motion. Of all other effects, which are
         tried once, only those of the model that asks are kept.
-    simulator : of the motions of models that are judged on the recordings; None where they are
-        judged along measured motions alone.
     cache : of columns, shared with the evidence that this one was made of.
     look : the current first look, see `first_look`.
     """
@@ -56,28 +54,12 @@ class Evidence:
     _: KW_ONLY
     criteria: Criteria = DEFAULTS
     candidates: tuple[Effect, ...] = ()
-    simulator: MotionSimulator | None = None
     cache: ColumnCache = field(default_factory=ColumnCache, repr=False)
     look: FirstLook = field(default_factory=FirstLook, repr=False)
 
     def with_runs(self, runs: tuple[Run, ...]) -> Evidence:
         """Return the evidence of other runs: what is known of their motions is still known."""
         return replace(self, runs=runs)
-
-    def predicted_by(self, model: Model, values: np.ndarray) -> Evidence:
-        """Return the evidence with the simulated motion that a prediction by a model needs.
-
-        Parameters
-        ----------
-        model, values : (p,) that predict.
-
-        Returns
-        -------
-        The evidence as it is, where no effect of the model needs one, or nothing simulates it.
-        """
-        if self.simulator is None or not any(e.is_dynamic_response for e in model.effects):
-            return self
-        return self.with_runs(self.simulator.along(self.runs, model, values))
 
     @cached_property
     def stacks(self) -> tuple[Stack, ...]:
@@ -163,7 +145,8 @@ class Evidence:
         Returns
         -------
         (T, J, k) for each replicate. Of a candidate where the columns are taken along a simulated
-        motion: of that motion only.
+        motion: of that motion only. What rings behind a spring or a gap rings along the measured
+        motion in the simulated one's place.
         """
         values = np.zeros(model.size) if values is None else values
         return [self._of(effect, one, model, values) for one in self._along(effect, run, model)]
@@ -423,6 +406,9 @@ class Evidence:
     def _along(self, effect: Effect, run: int, model: Model) -> tuple[Sampled, ...]:
         """Replicates along which an effect's columns are taken."""
         every = self.runs[run].replicates
+        if effect.is_dynamic_response and self._from_simulation:
+            # What rings has the phase of the true motion, which a loop without it does not have.
+            every = (*every[:-1], every[0])
         # Of a simulated motion, candidates need no more than that one.
         return every[-1:] if self._from_simulation and effect not in model else every
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -13,9 +12,8 @@ from dynident.criteria import NoiseCriteria
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.joint_columns import JointColumns
-from dynident.evidence.model_columns import joint_columns, predicting_columns
+from dynident.evidence.model_columns import joint_columns
 from dynident.evidence.noise_model import differences, inflation, systematic_square
-from dynident.evidence.response_motion import simulation_predicts_better
 from dynident.fitting.estimate import Estimate
 from dynident.moments.replicates import Kind
 
@@ -113,15 +111,12 @@ class HeldOut:
 
 def on_recordings(evidence: Evidence, fitted: EvidenceFit | Estimate) -> HeldOut:
     """Judge a fitted model on the recordings of the evidence, which it has not seen."""
-    columns_of = _predicting(fitted)
-    if columns_of is predicting_columns:
-        evidence = evidence.predicted_by(fitted.model, fitted.values)
     combination = np.append(-fitted.values, 1.0)
     n = fitted.model.robot.n
     runs, folded, doubt = [], [], []
     for r, run in enumerate(evidence.runs):
         first = run.replicates[0]
-        joints = [columns_of(evidence, fitted.model, r, j, fitted.values) for j in range(n)]
+        joints = [joint_columns(evidence, fitted.model, r, j, fitted.values) for j in range(n)]
         left = [[one.times(combination) for one in each] for each in joints]
         residual = np.stack([one[0] for one in left], axis=-1)
         kept, predicted = run.kept, first.tau - residual
@@ -145,10 +140,10 @@ def on_recordings(evidence: Evidence, fitted: EvidenceFit | Estimate) -> HeldOut
 
 def on_blocks(evidence: Evidence, fitted: EvidenceFit) -> HeldOut:
     """Judge a model on blocks of time, each predicted by the fit to all others."""
-    columns_of, n = _predicting(fitted), fitted.model.robot.n
+    n = fitted.model.robot.n
     runs, folded, doubt, block = [], [], [], 0
     for r, run in enumerate(evidence.runs):
-        joints = [columns_of(evidence, fitted.model, r, j, fitted.values) for j in range(n)]
+        joints = [joint_columns(evidence, fitted.model, r, j, fitted.values) for j in range(n)]
         columns = [run.fold([one.used for one in each]) for each in joints]
         residual = np.empty((*columns[0].shape[:2], n))
         for start, stop in zip(run.edges[:-1], run.edges[1:], strict=True):
@@ -179,12 +174,6 @@ def on_blocks(evidence: Evidence, fitted: EvidenceFit) -> HeldOut:
         doubt.append(np.array([prediction_variance(c[0], fitted) for c in joints]))
     judged = _judged(evidence, tuple(runs), folded, doubt)
     return replace(judged, what="blocks of time")
-
-
-def _predicting(fitted: EvidenceFit | Estimate) -> Callable[..., list[JointColumns]]:
-    """Where the columns of a prediction come from, by the recordings that the model was fitted to."""
-    simulated = isinstance(fitted, EvidenceFit) and simulation_predicts_better(fitted)
-    return predicting_columns if simulated else joint_columns
 
 
 def with_noise_of(judged: HeldOut, noise: HeldOut, criteria: NoiseCriteria) -> HeldOut:

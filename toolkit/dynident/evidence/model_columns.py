@@ -47,61 +47,17 @@ def joint_columns(
     -------
     One for each replicate of the run.
     """
-    return _columns(evidence, model, run, joint, _dependent(evidence, model, run, joint, values))
-
-
-def predicting_columns(
-    evidence: Evidence, model: Model, run: int, joint: int, values: np.ndarray
-) -> list[JointColumns]:
-    """As `joint_columns`, for a prediction of the torque.
-
-    The response of what is behind a spring or a gap amplifies the noise of measured positions, and
-    fits are made along simulated motions where there are any. There that response, and that alone,
-    is predicted along the simulated motion.
-
-    Parameters
-    ----------
-    evidence, run, model, joint, values : as for `model_columns`.
-
-    Returns
-    -------
-    One for each replicate of the run.
-    """
-    dependent = _dependent(evidence, model, run, joint, values)
-    carries = bool(evidence.runs[run].recording.payload)
-    acting = model.acting_at(joint, carries_payload=carries).dependent
-    if evidence.runs[run].columns_from == "simulation":
-        dependent = [
-            [each[-1]] * len(each) if effect.is_dynamic_response else each
-            for (effect, _), each in zip(acting, dependent, strict=True)
-        ]
-    return _columns(evidence, model, run, joint, dependent)
-
-
-def _dependent(
-    evidence: Evidence, model: Model, run: int, joint: int, values: np.ndarray | None
-) -> list[Signals]:
-    """Columns (T, k) of each effect at a joint that depends on the fit, for each replicate."""
-    carries = bool(evidence.runs[run].recording.payload)
-    return [
-        [one[:, at] for one in evidence.of(effect, run, model, values)]
-        for effect, at in model.acting_at(joint, carries_payload=carries).dependent
-    ]
-
-
-def _columns(
-    evidence: Evidence, model: Model, run: int, joint: int, dependent: list[Signals]
-) -> list[JointColumns]:
     first = evidence.runs[run].replicates[0]
     acting = model.acting_at(joint, carries_payload=bool(first.recording.payload))
     places = np.concatenate([evidence.loading(first, joint), acting.places, [model.size]])
+    moved = [(evidence.of(e, run, model, values), at) for e, at in acting.dependent]
     return [
         JointColumns(
             model.size + 1,
             places,
             (
                 *evidence.plain_parts(one, model, joint),
-                *(each[r] for each in dependent),
+                *(each[r][:, at] for each, at in moved),
                 evidence.torque(one, joint),
             ),
         )

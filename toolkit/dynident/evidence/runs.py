@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
@@ -32,24 +32,6 @@ from dynident.recording import (
 
 Signals = list[np.ndarray]
 """One array per replicate of a recording, (T, J, k): rows, joints of the effect, columns."""
-
-
-class MotionSimulator(Protocol):
-    """Simulates the motion of whatever model is judged on some recordings."""
-
-    def along(self, runs: tuple[Run, ...], model: Model, values: np.ndarray) -> tuple[Run, ...]:
-        """Return the runs with the simulated motion of a model as their last replicate.
-
-        Parameters
-        ----------
-        runs : the recordings, with or without one.
-        model, values : (p,) what is simulated.
-
-        Returns
-        -------
-        The runs as they are, where it cannot be simulated.
-        """
-        ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -224,18 +206,12 @@ def gather(
             replicates, index, kind = (first,), usable[None, :], "single"
         edges = np.linspace(0, index.shape[1], per_run + 1).round().astype(int)
         runs.append(Run(kind=kind, replicates=replicates, index=index, edges=edges))
-    return tuple(runs) if simulated is None else resimulated(runs, simulated)
-
-
-def resimulated(runs: Sequence[Run], simulated: Dataset) -> tuple[Run, ...]:
-    """Return runs with simulated motions as their last replicates, in place of what they had.
-
-    Parameters
-    ----------
-    runs : the recordings in their replicates.
-    simulated : the motion of each, simulated, on the same time stamps.
-    """
-    return with_motions(runs, simulated_versions(runs, simulated))
+    if simulated is None:
+        return tuple(runs)
+    return tuple(
+        replace(run, replicates=(*run.replicates, motion), columns_from="simulation")
+        for run, motion in zip(runs, simulated_versions(runs, simulated), strict=True)
+    )
 
 
 def simulated_versions(runs: Sequence[Run], simulated: Dataset) -> tuple[Sampled, ...]:
@@ -251,21 +227,12 @@ def simulated_versions(runs: Sequence[Run], simulated: Dataset) -> tuple[Sampled
     )
 
 
-def with_motions(runs: Sequence[Run], motions: Sequence[Sampled]) -> tuple[Run, ...]:
-    """As `resimulated`, with motions that are filtered and cut."""
+def resimulated(runs: Sequence[Run], simulated: Dataset) -> tuple[Run, ...]:
+    """Return runs with other simulated motions in place of theirs."""
     return tuple(
-        replace(
-            run,
-            replicates=(*_recorded(run), motion),
-            columns_from="simulation",
-        )
-        for run, motion in zip(runs, motions, strict=True)
+        replace(run, replicates=(*run.replicates[:-1], motion))
+        for run, motion in zip(runs, simulated_versions(runs, simulated), strict=True)
     )
-
-
-def _recorded(run: Run) -> tuple[Sampled, ...]:
-    """The replicates of a run but for a simulated one."""
-    return run.replicates if run.columns_from == "recording" else run.replicates[:-1]
 
 
 def noisy(recording: Recording, noise: Noise, stream: np.random.Generator) -> Recording:

@@ -8,8 +8,7 @@ nothing of the noise. How the two enter the regression is said in `Run.moved`.
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,16 +19,12 @@ from dynident.effects import Effect
 from dynident.errors import DynidentError
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
-from dynident.evidence.runs import Run, gather, resimulated, simulated_versions, with_motions
+from dynident.evidence.runs import Run, gather, resimulated
 from dynident.fitting.history import Ending
 from dynident.fitting.instrumental import IV, SimulatedLoop
 from dynident.fitting.instrumental.source import Guess
-from dynident.fitting.sampling import Sampled
 from dynident.model import Model
-from dynident.recording import Dataset, uniform
-
-_LATEST = 8
-"""Models whose motions are kept: those along a path are judged again and again."""
+from dynident.recording import Dataset
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -66,73 +61,28 @@ class SimulatedMotion:
         if self.controller is None or self.measured is None:
             return self, evidence
         model, values = fitted.model, fitted.values
-        measured = _carrying(self.measured, [run.recording.payload for run in evidence.runs])
-        found = _motion_of(self.controller, model, values, measured, self.left_out)
-        if found.motion is None:
-            note = f"Instruments: the motion of an earlier model, as {found.problem}."
-            return replace(self, notes=(*self.notes, note)), evidence
-        runs, note = resimulated(evidence.runs, found.motion), ()
-        if found.left_out and found.left_out != self.left_out:
-            names = ", ".join(effect.title for effect in found.left_out)
-            note = (f"Instruments: simulated without {names} ({found.problem}).",)
-        renewed = replace(self, runs=runs, left_out=found.left_out, notes=(*self.notes, *note))
-        return renewed, evidence.with_runs(runs).looked_at_anew()
-
-    def simulator(self, recordings: Dataset) -> RecordedLoop | None:
-        """What simulates models on other recordings of the same loop.
-
-        Parameters
-        ----------
-        recordings : with their references.
-
-        Returns
-        -------
-        None where these recordings' motions are not simulated.
-        """
-        if self.controller is None or not all(r.q_ref is not None for r in recordings.recordings):
-            return None
-        return RecordedLoop(self.controller, recordings)
-
-
-class RecordedLoop:
-    """Simulates models in the loop of some recordings; see `runs.MotionSimulator`.
-
-    The references of the recordings alone drive it: what it says of a model is a prediction.
-
-    Parameters
-    ----------
-    controller : of the loop.
-    recordings : with their references.
-    """
-
-    def __init__(self, controller: Controller, recordings: Dataset) -> None:
-        self._controller = controller
-        straight = tuple(uniform(one) for one in recordings.recordings)
-        self._measured = replace(recordings, recordings=straight)
-        self._known: OrderedDict[Hashable, tuple[Sampled, ...] | None] = OrderedDict()
-
-    def along(self, runs: tuple[Run, ...], model: Model, values: np.ndarray) -> tuple[Run, ...]:
-        """Return the runs with the simulated motion of a model as their last replicate.
-
-        Parameters
-        ----------
-        runs : the recordings, with or without one.
-        model, values : (p,) what is simulated.
-
-        Returns
-        -------
-        The runs as they are, where it cannot be simulated.
-        """
-        carried = tuple(run.recording.payload for run in runs)
-        key = model.effects, tuple(model.friction_widths), values.tobytes(), carried
-        if key not in self._known:
-            measured = _carrying(self._measured, carried)
-            found = _motion_of(self._controller, model, values, measured).motion
-            self._known[key] = None if found is None else simulated_versions(runs, found)
-            if len(self._known) > _LATEST:
-                self._known.popitem(last=False)
-        motions = self._known[key]
-        return runs if motions is None else with_motions(runs, motions)
+        payload_recordings = [run.recording.payload for run in evidence.runs]
+        recordings = (
+            one.replace(payload=carries)
+            for one, carries in zip(self.measured.recordings, payload_recordings, strict=True)
+        )
+        measured = replace(self.measured, recordings=tuple(recordings))
+        problem, note = "", ()
+        for effects in _ever_fewer(model.effects, self.left_out):
+            part, own = _without(model, values, effects)
+            try:
+                simulated = _simulated(self.controller, part, own, measured)
+                runs = resimulated(evidence.runs, simulated)
+            except DynidentError as error:
+                problem = problem or str(error)
+                continue
+            if effects and effects != self.left_out:
+                names = ", ".join(effect.title for effect in effects)
+                note = (f"Instruments: simulated without {names} ({problem}).",)
+            renewed = replace(self, runs=runs, left_out=effects, notes=(*self.notes, *note))
+            return renewed, evidence.with_runs(runs).looked_at_anew()
+        note = (f"Instruments: the motion of an earlier model, as {problem}.",)
+        return replace(self, notes=(*self.notes, *note)), evidence
 
 
 def motion_of_loop(
@@ -191,47 +141,6 @@ def _simulated(
     # Believed are the inertias of these very values: the gains are the real loop's, as stated.
     source = SimulatedLoop(controller).prepare(model, measured, Guess(values, (values,)))
     return source.at(values)
-
-
-def _carrying(measured: Dataset, payloads: Sequence[bool | None]) -> Dataset:
-    """Recordings, marked as carrying the payload, or not, or as nobody knows."""
-    pairs = zip(measured.recordings, payloads, strict=True)
-    return replace(measured, recordings=tuple(one.replace(payload=each) for one, each in pairs))
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class _Found:
-    """The simulated motion of a model; `problem` says why anything is left out of it, or all."""
-
-    motion: Dataset | None
-    left_out: tuple[Effect, ...] = ()
-    problem: str = ""
-
-
-def _motion_of(
-    controller: Controller,
-    model: Model,
-    values: np.ndarray,
-    measured: Dataset,
-    left_out: tuple[Effect, ...] = (),
-) -> _Found:
-    """Simulate a model in a loop, without what cannot be simulated.
-
-    Parameters
-    ----------
-    controller, measured : the loop, and recordings of it.
-    model, values : (p,) to be simulated.
-    left_out : effects that could not be simulated before.
-    """
-    problem = ""
-    for effects in _ever_fewer(model.effects, left_out):
-        try:
-            motion = _simulated(controller, *_without(model, values, effects), measured)
-        except DynidentError as error:
-            problem = problem or str(error)
-            continue
-        return _Found(motion=motion, left_out=effects, problem=problem)
-    return _Found(motion=None, problem=problem)
 
 
 def _ever_fewer(effects: tuple[Effect, ...], known: tuple[Effect, ...]):

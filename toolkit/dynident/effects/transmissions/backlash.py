@@ -14,7 +14,7 @@ from dynident.effects.transmissions.dead_zone import Transmitting
 from dynident.effects.transmissions.flexible import DAMPING, RESONANCE, ROTOR_SHARE, FlexibleJoint
 from dynident.effects.transmissions.link_response import responses
 
-_GAPS = (0.0005, 0.0015, 0.004, 0.01, 0.025)
+_GAPS = (0.0005, 0.0015, 0.004, 0.01, 0.025, 0.05)
 """rad (a tenth of it in m): gaps that are screened."""
 _USUAL, _LEAST = 0.004, 1.5e-5
 """rad or m: the gap of an effect without a value, and the least at which a column is taken."""
