@@ -10,10 +10,12 @@ import pytest
 from dynident.closed_loop import Controller, Experiment, Fourier, Sensors, TrueEffect
 from dynident.closed_loop import ExperimentRun as Motion
 from dynident.diagnosis import diagnose
+from dynident.effects import effects_of
 from dynident.effects.transmissions.along import mean_inertia
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.model_columns import model_columns
+from dynident.evidence.runs import gather
 from dynident.evidence.simulated_motion import motion_of_loop
 from dynident.model import Model
 from dynident.recording import Dataset
@@ -126,9 +128,22 @@ def test_without_references_least_squares_and_why(healthy: Dataset) -> None:
     assert not motion_of_loop(model(), healthy, None).notes
 
 
+def test_what_rings_is_taken_along_the_measured_motion(healthy: Dataset) -> None:
+    """In a loop that does not know of the spring nothing rings."""
+    loop = motion_of_loop(model(), healthy, CONTROLLER)
+    assert loop.measured is not None
+    simulated, measured = (Evidence(model(), runs) for runs in (loop.runs, gather(loop.measured)))
+    values = fit_evidence(simulated, model()).values
+    (spring,) = effects_of("joint_elasticity@shoulder", arm())
+    (drag,) = effects_of("quadratic_drag@shoulder", arm())
+    (along,) = simulated.of(spring, 0, model(), values)
+    np.testing.assert_allclose(along, measured.of(spring, 0, model(), values)[0])
+    (along,) = simulated.of(drag, 0, model(), values)
+    assert not np.allclose(along, measured.of(drag, 0, model(), values)[0], rtol=1e-3)
+
+
 @pytest.mark.slow
 def test_a_hidden_spring_is_found_along_the_measured_motion() -> None:
-    """In a loop that does not know of it nothing rings: it would be taken for damped, or stiff."""
     robot, shape = arm(), (9.0, 0.08, 0.3)
     compliance = 1.0 / ((2.0 * np.pi * shape[0]) ** 2 * mean_inertia(robot, 0))
     hidden = TrueEffect.of("joint_elasticity@shoulder", robot, [compliance], shape)
