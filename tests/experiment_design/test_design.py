@@ -224,7 +224,8 @@ def test_a_pair_that_nothing_tells_hides_no_other() -> None:
     task = DesignTask(starts=1, harmonics=3, tell=((viscous, law), (drag, spring)))
     found = design(model, recorded(model), task)
     hopeless, told = found.separations
-    assert hopeless.designed < 1e-3 < 1.0 < told.designed
+    assert hopeless.designed < 1e-3
+    assert told.designed > 5 * told.usual > 0.5
     assert "No motion within the limits" in found.sentence
 
 
