@@ -269,7 +269,7 @@ def test_the_friction_width_of_a_joint_is_found_and_is_no_missing_effect(
     else:  # below what the samples show
         assert found_widths[1] < 0.006
     assert found_widths[0] == 0.01
-    (note,) = (one for one in found.notes if one.startswith("Friction width at"))
+    (note,) = (one for one in found.notes if one.startswith("Friction width"))
     assert "at elbow" in note
     assert ("95 % interval" in note) or ("at most" in note)
     assert found.after.value("Fc@elbow") == pytest.approx(3.0, rel=0.02)

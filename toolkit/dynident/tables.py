@@ -157,6 +157,11 @@ def percent(value: float | None, digits: int = 2) -> str:
     return f"{100 * value:.{digits}f} %"
 
 
+def listed(names: Sequence[str], last: str = "and") -> str:
+    """Names as a sentence has them: "a, b and c"."""
+    return f" {last} ".join([*([", ".join(names[:-1])] if names[1:] else []), *names[-1:]])
+
+
 def points(value: float | None) -> str:
     """A difference of two fractions in percentage points, a dash where there is none."""
     if value is None or value != value:

@@ -133,6 +133,8 @@ def test_rows_around_reversals_count_no_more_and_the_others_do() -> None:
     assert sticking_notes(of) == ()
     (note,) = sticking_notes(without)
     assert note.startswith("elbow stands still")
+    (note,) = sticking_notes(without_reversals(of, ("shoulder", "elbow")))
+    assert note.startswith("shoulder and elbow stand still") and "of each joint's rows" in note
 
 
 def test_noise_of_the_speed_is_that_of_encoder_and_filter() -> None:

@@ -14,7 +14,7 @@ from dynident.diagnosis.result import Diagnosis
 from dynident.effects import Effect
 from dynident.reporting.headline import headline
 from dynident.reporting.joint_states import states
-from dynident.tables import percent, points
+from dynident.tables import listed, percent, points
 from dynident.wiring import Fault
 
 _MOST_NAMED = 3
@@ -167,7 +167,7 @@ def _added(groups: Sequence[Sequence[Step]], joints: int) -> tuple[str, list[str
     titles = [grouped_title([step.effect for step in group], joints) for group in groups]
     more = len(titles) - _MOST_NAMED
     named = titles[:_MOST_NAMED] + ([f"{in_words(more)} more"] if more > 0 else [])
-    return _listed(named), labels
+    return listed(named), labels
 
 
 def _to_separate(diagnosis: Diagnosis) -> list[Advice]:
@@ -212,7 +212,7 @@ def _experiments(step: Step) -> str:
 
 def _unexplained(diagnosis: Diagnosis) -> Advice:
     if diagnosis.training_only:
-        where = _listed(list(diagnosis.training_only))
+        where = listed(list(diagnosis.training_only))
         return Advice(
             f"Hold out a recording with the motion that shows what is left at {where}.",
             "The pictures are of the held-out recordings, which do not show it. The notes say in "
@@ -220,7 +220,7 @@ def _unexplained(diagnosis: Diagnosis) -> Advice:
         )
     worst = [one.joint.name for one in states(diagnosis) if one.state == "failing"]
     worst = worst or list(diagnosis.following_motion)
-    where = _listed(worst[:3]) or "the joints"
+    where = listed(worst[:3]) or "the joints"
     return Advice(
         f"Look at the pictures of {where} below: something is left there that no effect of the "
         "catalogue explains.",
@@ -239,7 +239,3 @@ def _to_repeat(diagnosis: Diagnosis) -> Advice:
     if diagnosis.noise_source == "given":
         why = f"The noise is so far only what the study states. {why}"
     return Advice(what, why)
-
-
-def _listed(names: list[str]) -> str:
-    return " and ".join([*([", ".join(names[:-1])] if names[1:] else []), *names[-1:]])

@@ -21,7 +21,7 @@ from dynident.diagnosis.dependence.motion_blocks import motion_blocks
 from dynident.diagnosis.dependence.position_errors import position_error_columns
 from dynident.diagnosis.dependence.residual_record import ResidualRecord
 from dynident.evidence.held_out import HeldOut
-from dynident.tables import Table, percent
+from dynident.tables import Table, listed, percent
 
 ROWS = 750
 """Rows of a joint in its regressions, at most: time grows with their cube."""
@@ -107,7 +107,7 @@ class JointDependence:
         ]
         rest = self.shares.rest
         left = f"; no input explains {_rounded(rest.value)} ({_rounded(rest.error)})"
-        return f"{what}: {_listed(parts, 'and')}{left if rest.told else ''}."
+        return f"{what}: {listed(parts)}{left if rest.told else ''}."
 
     def to_dict(self) -> dict[str, Any]:
         """As `--json` has it."""
@@ -127,9 +127,7 @@ def dependence_sentences(found: Sequence[JointDependence]) -> tuple[str, ...]:
     alike: dict[str, list[JointDependence]] = {}
     for one in found:
         alike.setdefault(one.said_of(""), []).append(one)
-    return tuple(
-        some[0].said_of(_listed([one.joint for one in some], "and")) for some in alike.values()
-    )
+    return tuple(some[0].said_of(listed([one.joint for one in some])) for some in alike.values())
 
 
 def residual_dependence(
@@ -261,7 +259,3 @@ def _rest(one: JointDependence) -> str:
 
 def _rounded(value: float) -> str:
     return percent(round(value, 2) + 0.0, 0)
-
-
-def _listed(names: Sequence[str], last: str) -> str:
-    return f" {last} ".join([*([", ".join(names[:-1])] if names[1:] else []), *names[-1:]])

@@ -27,7 +27,7 @@ from dynident.fitting.sampling import Sampled
 from dynident.recording.filters import butterworth
 from dynident.recording.sections import response
 from dynident.recording.white_noise import encoder_noise_std
-from dynident.tables import percent
+from dynident.tables import listed, percent
 
 _FREQUENCIES = 4096  # at which a filter's response is taken
 
@@ -142,13 +142,19 @@ def sticking_notes(evidence: Evidence, others: Collection[str] = ()) -> tuple[st
     evidence : of the training recordings.
     others : joints whose rows are left out for another reason.
     """
-    return tuple(
-        f"{joint} stands still at many of its stops, or its dry friction reverses within the noise "
-        "of its speed or within a held command: no data tell that friction, and "
-        f"{percent(share, 0)} of the joint's rows, those around its stops, count neither in the "
-        "fit nor in the errors."
-        for joint, share in shares_left_out(evidence).items()
-        if joint not in others
+    shares = {j: s for j, s in shares_left_out(evidence).items() if j not in others}
+    if not shares:
+        return ()
+    low, high = (percent(one, 0) for one in (min(shares.values()), max(shares.values())))
+    share = low if low == high else f"{low.removesuffix(' %')} to {high}"
+    stand, their, stops = "stands", "its", "the joint's"
+    if len(shares) > 1:
+        stand, their, stops = "stand", "their", "each joint's"
+    return (
+        f"{listed(list(shares))} {stand} still at many of {their} stops, or {their} dry friction "
+        f"reverses within the noise of {their} speed or within a held command: no data tell that "
+        f"friction, and {share} of {stops} rows, those around {their} stops, count neither in the "
+        "fit nor in the errors.",
     )
 
 
