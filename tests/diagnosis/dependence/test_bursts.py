@@ -56,10 +56,17 @@ def test_bursts_are_counted_and_the_largest_is_placed() -> None:
     first[100:103, 1] += [20.0, 40.0, 20.0]
     second[500:503, 1] -= [20.0, 60.0, 20.0]
     (said,) = told(left(first, second))
-    assert said.startswith("At b ")
+    assert "; at b the " in said and "at a the" not in said
     assert ": 2 bursts, " in said
     assert "at 10.02 s of run2" in said
     assert f"the largest of {abs(second[501, 1]):.2g} N " in said
+
+
+def test_several_joints_are_told_of_at_once() -> None:
+    one = noise(5)
+    one[100:103] += 40.0
+    (said,) = told(left(one))
+    assert "; at a the " in said and "; at b the " in said
 
 
 @pytest.mark.parametrize(("knocks", "rows"), [(1, 10_000), (3, 20_000), (40, 20_000)])
@@ -122,5 +129,5 @@ def test_a_diagnosis_without_a_noise_floor_tells_of_knocks() -> None:
     found = diagnose(model, train, Dataset((recorded(2, ()),)), propose="never")
     said = [note for note in found.notes if "largest of" in note]
     assert len(said) == 1
-    assert said[0].startswith("At elbow ")
+    assert "; at elbow the " in said[0] and "shoulder" not in said[0]
     assert ": 3 bursts, " in said[0]

@@ -36,9 +36,9 @@ def burst_notes(
 
     Returns
     -------
-    A sentence for each such joint, with the place and the height of the largest burst.
+    One note on all such joints, with the place and the height of the largest burst of each.
     """
-    notes = []
+    found = []
     for j, (joint, unit) in enumerate(zip(joints, units, strict=True)):
         rows = np.concatenate([run.residual[run.certain[:, j], j] for run in trained.runs])
         few = int(criteria.few_rows * len(rows))
@@ -53,15 +53,19 @@ def burst_notes(
             continue
         size, where = max(bursts)
         many = "one burst" if len(bursts) == 1 else f"{len(bursts)} bursts"
-        notes.append(
-            f"At {joint} the {few} largest of {len(rows)} training rows hold "
-            f"{percent(square[:few].sum() / square.sum(), 0)} of the square of what the model "
-            f"leaves: {many}, the largest of {size:.2g} {unit} at {where}, {size / rest:.0f} times "
-            "the rms of all other rows. Noise of one size is seldom like that. Backlash or a stop "
-            "that the link knocks against is, a touch, friction at a reversal, a fault of the "
-            "recording, or one that is noisier than the others."
+        found.append(
+            f"at {joint} the {few} largest of {len(rows)} hold "
+            f"{percent(square[:few].sum() / square.sum(), 0)} of it: {many}, the largest of "
+            f"{size:.2g} {unit} at {where}, {size / rest:.0f} times the rms of all other rows"
         )
-    return tuple(notes)
+    if not found:
+        return ()
+    return (
+        "A few training rows hold most of the square of what the model leaves; "
+        f"{'; '.join(found)}. Noise of one size is seldom like that. Backlash or a stop that the "
+        "link knocks against is, a touch, friction at a reversal, a fault of the recording, or one "
+        "that is noisier than the others.",
+    )
 
 
 def _bursts(run: HeldOutRun, j: int, least: float) -> list[tuple[float, str]]:
