@@ -313,6 +313,16 @@ class GlobalSearchCriteria(CriteriaGroup):
     finalists: int = criterion(
         24, "shapes", "shapes about which the other recordings are asked", least=1
     )
+    recordings: int = criterion(
+        4, "recordings", "recordings on which what fits one alone is sought again", least=1
+    )
+    holds: float = criterion(
+        0.9,
+        "1",
+        "share explained of all recordings over that of one, below which it fits that one alone",
+        least=0,
+        most=1,
+    )
     patience: int = criterion(
         9, "generations", "generations after which a search that explains nothing ends", least=1
     )

@@ -2,9 +2,10 @@
 
 A response with backlash fits where its shape is nearly the true one and nowhere else: the few
 shapes of the grid may all miss it. Differential evolution seeks it on one recording, all shapes of
-a generation in the same steps of time; all recordings are asked about the best that it finds. What
-tells a true one is that the value found is the one at which its column was taken, which no accident
-brings about.
+a generation in the same steps of time; all recordings are asked about the best that it finds. Where
+a link rattles, a wrong shape may fit one recording and no other: then it is sought on some at once.
+What tells a true one is that the value found is the one at which its column was taken, which no
+accident brings about.
 """
 
 from __future__ import annotations
@@ -71,21 +72,25 @@ def global_search(
     # An effect that is in the last model with a wrong shape is missing from the first one.
     wrong = sought[0] in last.fitted.model or last.fitted is start.fitted
     bases = (start,) if wrong else (last, start)
-    part, searches = _worst_recording(bases[0].evidence, bases[0].fitted), []
+    part, searches = _worst_recordings(bases[0], 1), []
     if not part[1].error_signal > 0:
         return None
     for effect in sought:
         progress(f"{effect.label}, the global search")
         searches.append(_shapes_on(*part, effect))
-    finals = [
-        _final(one.evidence, one.fitted, searches) if one.fitted.error_signal > 0 else None
-        for one in bases
-    ]
-    found = [(one, base) for one, base in zip(finals, bases, strict=True) if one is not None]
+    found = _finals(bases, searches)
+    most = max(range(len(sought)), key=lambda k: _fall(searches[k]))
+    alone = _fall(searches[most]) / part[1].error_signal
+    own = criteria.global_search
+    if alone > own.least and max((share for share, *_ in found), default=0.0) < own.holds * alone:
+        wider = _worst_recordings(bases[0], own.recordings)
+        progress(f"{sought[most].label}, the global search in {len(wider[0].runs)} recordings")
+        searches.append(_shapes_on(*wider, sought[most]))
+        found = _finals(bases, searches)
     if not found:
         return None
-    one, base = max(found, key=lambda pair: pair[0].fall / pair[1].fitted.error_signal)
-    tests = base.ranking.tests + sum(found.evaluations for found in searches)
+    _, one, base = max(found, key=lambda each: each[0])
+    tests = base.ranking.tests + sum(each.evaluations for each in searches)
     best, refusal = judged(base.evidence, base.fitted, one, tests)
     if refusal:
         return None
@@ -98,6 +103,22 @@ def _sought(evidence: Evidence, model: Model, last: EvidenceFit) -> list[Effect]
     every = [one for one in candidates(model) if one.sought_in(model.robot)]
     added = [one for one in every if one in last.model]
     return added or [one for one in every if one.joint not in below_noise]
+
+
+def _finals(
+    bases: Sequence[RankedModel], searches: list[ShapeSolution[ScoreTrial]]
+) -> list[tuple[float, Score, RankedModel]]:
+    """The best of what was found for each model, and its share of what that model leaves."""
+    every = [
+        (one, _final(one.evidence, one.fitted, searches))
+        for one in bases
+        if one.fitted.error_signal > 0
+    ]
+    return [
+        (best.fall / base.fitted.error_signal, best, base)
+        for base, best in every
+        if best is not None
+    ]
 
 
 def _final(
@@ -126,8 +147,14 @@ def _headed(ranking: Ranking, best: Score, tests: int, alike: float) -> Ranking:
     return Ranking((best, *(one for one, _ in others)), tests, ("", *(why for _, why in others)))
 
 
-def _worst_recording(evidence: Evidence, fitted: EvidenceFit) -> tuple[Evidence, EvidenceFit]:
-    """The recording with most systematic residual over noise, and the model as it alone fits it."""
+def _fall(found: ShapeSolution[ScoreTrial]) -> float:
+    """What the best shape of a search takes off the squared residual."""
+    return -found.best[0].loss if found.best else 0.0
+
+
+def _worst_recordings(base: RankedModel, most: int) -> tuple[Evidence, EvidenceFit]:
+    """Recordings with most systematic residual over noise, and the model as they alone fit it."""
+    evidence, fitted = base.evidence, base.fitted
     left = residuals(evidence, fitted.model, fitted.values)
     sizes = [
         -1.0
@@ -137,7 +164,8 @@ def _worst_recording(evidence: Evidence, fitted: EvidenceFit) -> tuple[Evidence,
         )
         for run, e in zip(evidence.runs, left, strict=True)
     ]
-    alone = evidence.with_runs((evidence.runs[int(np.argmax(sizes))],))
+    worst = sorted(np.argsort(sizes)[::-1][:most])
+    alone = evidence.with_runs(tuple(evidence.runs[k] for k in worst))
     return alone, fit_evidence(alone, fitted.model, fitted)
 
 
