@@ -143,6 +143,19 @@ def test_what_rings_is_taken_along_the_measured_motion(healthy: Dataset) -> None
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("position_std", [1e-4, 3e-4])
+def test_noise_of_positions_makes_no_spring(position_std: float) -> None:
+    """Columns of noisy positions explain their noise, on held-out data too."""
+    made = recordings(2, 3, (), Sensors(position_std=position_std, torque_std=0.05))
+    training, held_out = (Dataset(some) for some in (made.recordings[:2], made.recordings[2:]))
+    found = diagnose(model(), training, held_out, controller=CONTROLLER)
+    assert not found.steps
+    springs = [one for one in found.candidates if one.effect.name == "joint_elasticity"]
+    assert min(one.p_value or 1.0 for one in springs) < 1e-3
+    assert any("no noise of positions" in one.remark for one in springs)
+
+
+@pytest.mark.slow
 def test_a_hidden_spring_is_found_along_the_measured_motion() -> None:
     robot, shape = arm(), (9.0, 0.08, 0.3)
     compliance = 1.0 / ((2.0 * np.pi * shape[0]) ** 2 * mean_inertia(robot, 0))
@@ -153,4 +166,4 @@ def test_a_hidden_spring_is_found_along_the_measured_motion() -> None:
     assert found.best is not None and found.best.effect.label == "joint_elasticity@shoulder"
     assert found.best.effect.shape[0] == pytest.approx(shape[0], rel=0.1)
     assert found.test_error.after < 0.6 * found.test_error.before
-    assert any("measured positions" in note for note in found.caveats)
+    assert any("along the measured one" in note for note in found.caveats)

@@ -143,9 +143,9 @@ def notes_on(
     responses = [one.title for one in fitted.model.effects if one.is_dynamic_response]
     if simulated and responses:
         notes.append(
-            f"{', '.join(responses)}: the response is that to the measured positions, not to "
-            "simulated ones. Their noise makes its value too small, and its interval does not "
-            "allow for that."
+            f"{', '.join(responses)}: significant along the simulated motion, which has no noise, "
+            "and fitted along the measured one. The noise of its positions biases value and shape, "
+            "and may be part of what the error falls by; no interval allows for that."
         )
     if any(effect.is_payload for effect in fitted.model.effects):
         payload_recordings = [r.recording.name for r in evidence.runs if r.recording.payload]

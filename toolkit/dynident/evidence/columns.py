@@ -9,6 +9,7 @@ from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 from itertools import islice
+from typing import Literal
 
 import numpy as np
 
@@ -45,6 +46,9 @@ class Evidence:
     candidates : further effects whose columns are kept. Those that follow from a sample alone are
         evaluated with the model's in one pass through a motion. Of all other effects, which are
         tried once, only those of the model that asks are kept.
+    responses : along whose motion, where columns are taken along simulated ones, the responses
+        behind springs and gaps are taken. Along the measured one they fit best, and carry its
+        noise; along a simulated one that does not ring yet they have another phase, and no noise.
     cache : of columns, shared with the evidence that this one was made of.
     look : the current first look, see `first_look`.
     """
@@ -54,12 +58,22 @@ class Evidence:
     _: KW_ONLY
     criteria: Criteria = DEFAULTS
     candidates: tuple[Effect, ...] = ()
+    responses: Literal["recording", "simulation"] = "recording"
     cache: ColumnCache = field(default_factory=ColumnCache, repr=False)
     look: FirstLook = field(default_factory=FirstLook, repr=False)
 
     def with_runs(self, runs: tuple[Run, ...]) -> Evidence:
         """Return the evidence of other runs: what is known of their motions is still known."""
         return replace(self, runs=runs)
+
+    def without_noise_in(self, effect: Effect) -> Evidence:
+        """Return the evidence in which an effect's columns have no noise of measured positions.
+
+        The very same where that noise does not enter, or no motion is simulated.
+        """
+        if not (effect.is_dynamic_response and self.is_simulated and self.responses == "recording"):
+            return self
+        return replace(self, responses="simulation")
 
     @cached_property
     def stacks(self) -> tuple[Stack, ...]:
@@ -145,8 +159,8 @@ class Evidence:
         Returns
         -------
         (T, J, k) for each replicate. Of a candidate where the columns are taken along a simulated
-        motion: of that motion only. What rings behind a spring or a gap rings along the measured
-        motion in the simulated one's place.
+        motion: of that motion only. What rings behind a spring or a gap is in its place along the
+        motion that `responses` says.
         """
         values = np.zeros(model.size) if values is None else values
         return [self._of(effect, one, model, values) for one in self._along(effect, run, model)]
@@ -316,7 +330,7 @@ class Evidence:
 
     def _evaluated_at_once(self, sampled: Sampled) -> dict[Effect, None]:
         """Effects that need nothing but samples, as far as they are asked for along a motion."""
-        if self._from_simulation and all(r.replicates[-1] is not sampled for r in self.runs):
+        if self.is_simulated and all(r.replicates[-1] is not sampled for r in self.runs):
             return {effect: None for effect in self._instantaneous if effect in self.model}
         return self._instantaneous
 
@@ -381,7 +395,8 @@ class Evidence:
         return dict.fromkeys((*self.model.effects, *self.candidates))
 
     @cached_property
-    def _from_simulation(self) -> bool:
+    def is_simulated(self) -> bool:
+        """Whether columns are taken along simulated motions throughout."""
         return all(run.columns_from == "simulation" for run in self.runs)
 
     @cached_property
@@ -406,11 +421,11 @@ class Evidence:
     def _along(self, effect: Effect, run: int, model: Model) -> tuple[Sampled, ...]:
         """Replicates along which an effect's columns are taken."""
         every = self.runs[run].replicates
-        if effect.is_dynamic_response and self._from_simulation:
+        if effect.is_dynamic_response and self.is_simulated and self.responses == "recording":
             # What rings has the phase of the true motion, which a loop without it does not have.
             every = (*every[:-1], every[0])
         # Of a simulated motion, candidates need no more than that one.
-        return every[-1:] if self._from_simulation and effect not in model else every
+        return every[-1:] if self.is_simulated and effect not in model else every
 
     def _at(self, model: Model, values: np.ndarray) -> Kept:
         """What is kept of a linearisation."""

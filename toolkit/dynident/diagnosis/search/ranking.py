@@ -283,7 +283,26 @@ def _refusal(one: Score, evidence: Evidence, fitted: EvidenceFit, tests: int, le
     confident = one.gains.sum() > gates.standard_errors * spread
     if not (one.gains.sum() > 0 and (confident or np.mean(one.gains > 0) >= gates.blocks_gaining)):
         return "does not help on held-out blocks"
+    free = evidence.without_noise_in(one.effect)
+    if free is not evidence:
+        return _like_noise(one.effect, free, fitted, tests, least)
     return unconfirmed(evidence, fitted, one)
+
+
+def _like_noise(
+    effect: Effect, free: Evidence, fitted: EvidenceFit, tests: int, least: float
+) -> str:
+    """Why a response may be made of the noise of measured positions; empty where it is not.
+
+    A column of noisy positions explains their noise, also on held-out data. Along the simulated
+    motion, which knows nothing of that noise, it explains nothing unless something is missing.
+    """
+    tried = list(_score_variants(free, fitted, effect))
+    best = max(tried, key=lambda each: each.penalised)
+    if best.penalised > -np.inf:
+        best = _confirm(free, fitted, best)
+    why = _refusal(best, free, fitted, tests + len(tried), least)
+    return f"along the simulated motion, which has no noise of positions: {why}" if why else ""
 
 
 def _step(evidence: Evidence) -> float:
