@@ -100,7 +100,7 @@ def test_gears_that_are_given_bring_columns_to_the_joints_side(arm: Path) -> Non
         draft_study(arm, [data], facts=LogFacts(gears=[32.0]))
     with pytest.raises(RecordingError, match=r"--gears N1,N2 .*turns elbow too") as refused:
         draft_study(arm, [data])
-    assert "--column 'q.elbow = m_pos_2/N2 - m_pos_1/N1'" in str(refused.value)
+    assert "--column 'q.elbow = (m_pos_2)/N2 - (m_pos_1)/N1'" in str(refused.value)
 
 
 def test_held_commands_are_told_from_measured_torques(arm: Path) -> None:

@@ -247,6 +247,23 @@ def test_what_the_model_lacks_is_said_and_widens_the_errors() -> None:
     assert np.all(lacking.relative_sigma > 2 * whole.relative_sigma) and off.max() < 10
 
 
+@pytest.mark.parametrize("rotors", [(0.0, 0.0, 0.0), (0.5, 0.25, 0.1), (2.0, 1.0, 0.4)])
+def test_a_right_description_fixes_the_scale_whatever_rotors_there_are(
+    rotors: tuple[float, ...],
+) -> None:
+    """The first rotor turns as its link does: nothing tells the inertias of the two apart."""
+    robot = chain(N, 5)
+    model = Model(robot) + "viscous_friction" + "coulomb_friction" + "rotor_inertia"
+    values = model.given_values()
+    values[model.base.rank :] = [0.3, 0.2, 0.1, 0.3, 0.2, 0.1, *rotors]
+    t, q, v, a = smooth_motion(N, 40, 200.0, 8.0, 8.0, 0.9)
+    current = model.torque(model.block(t, q, v, a), values) / GAINS
+    one = Recording(t, q, current, robot.names, name="r", number=1)
+    found = fit_drive_gains(GainProblem(model, Dataset((one,))))
+    assert found.is_scaled
+    np.testing.assert_allclose(found.gains, GAINS, rtol=0.01)
+
+
 def test_trusted_links_fix_the_scale() -> None:
     """The last link as it truly is, the others as described: a third off."""
     model, values, found = recordings()

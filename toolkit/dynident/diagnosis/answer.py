@@ -195,15 +195,18 @@ class Answer:
             )
         if self.training_only:
             left = (
-                f"he training recordings leave more than their noise at "
+                "The training recordings leave more than their noise at "
                 f"{' and '.join(self.training_only)}, and the held-out recordings do not show it."
             )
+            added = f"Added: {effects}. " if effects else ""
             if self.withdrawn:
-                added = f" Added: {effects}." if effects else ""
-                return f"T{left}{added} They call for {self._withdrawn_titles}: withdrawn."
-            if effects:
-                return f"Added: {effects}. T{left}"
-            return f"No effect in the catalogue explains it: t{left}"
+                return (
+                    f"{added}{left} The training recordings call for {self._withdrawn_titles}, "
+                    "which was withdrawn."
+                )
+            return (
+                f"{added}{left}" if effects else f"{left} No effect in the catalogue explains it."
+            )
         if self.noise_source == "unknown" and self.verdict == "unexplained" and not effects:
             return "Effects are significant and relevant, and none was added; the noise is unknown."
         if self.noise_source == "unknown":

@@ -65,7 +65,8 @@ def recording_titles(stretches: Sequence[tuple[str, np.ndarray]]) -> tuple[str, 
     """
     many = Counter(name for name, _ in stretches)
     return tuple(
-        f"{name}, {t[0]:.3g} to {t[-1]:.3g} s" if many[name] > 1 else name for name, t in stretches
+        f"{name}, {t[0]:.3g} to {t[-1]:.3g} s" if many[name] > 1 and len(t) else name
+        for name, t in stretches
     )
 
 

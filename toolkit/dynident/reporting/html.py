@@ -178,7 +178,7 @@ def _diagnosis_page(
         added=after_name(diagnosis) if diagnosis.steps else "",
         advice=advice[:FIRST],
         more_advice=advice[FIRST:],
-        study=study if any(one.commands for one in advice) else None,
+        study=study if any("STUDY" in c for one in advice for c in one.commands) else None,
         switch=switch,
         proposals=[
             (f"law-{k}", p, proposal_table(p, diagnosis)) for k, p in enumerate(diagnosis.proposals)

@@ -103,7 +103,7 @@ def _to_time(diagnosis: Diagnosis) -> list[Advice]:
 def _to_add(diagnosis: Diagnosis) -> list[Advice]:
     """What carries the fall first, by how much it does; what is small beside it after that."""
     steps = _addable(diagnosis)
-    if not steps:
+    if not steps or diagnosis.impossible:
         return []
     error = diagnosis.test_error
     found = LeadingEffects.of(steps)
@@ -120,6 +120,8 @@ def _to_add(diagnosis: Diagnosis) -> list[Advice]:
         else f"; noise alone would make {percent(error.noise_floor)}"
     )
     why = f"{share}{brings} to {percent(error.after)}{floor}."
+    if all(step.uncertain for group in first for step in group):
+        why += " It is within two standard errors, and may be chance: another recording tells."
     commands = (f"dynident add STUDY {shlex.join(labels)}", "dynident fit STUDY")
     return [Advice(f"Add {names} to the model, and fit it.", why, commands)]
 

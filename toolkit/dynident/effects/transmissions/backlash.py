@@ -16,7 +16,7 @@ from dynident.effects.transmissions.link_response import responses
 
 _GAPS = (0.0005, 0.0015, 0.004, 0.01, 0.025, 0.05)
 """rad (a tenth of it in m): gaps that are screened."""
-_USUAL, _LEAST = 0.004, 1.5e-5
+_USUAL, _LEAST = 0.004, 1e-6
 """rad or m: the gap of an effect without a value, and the least at which a column is taken."""
 _SOUGHT = ((8.0, 150.0), (0.02, 1.2), (0.05, 0.9))
 """Hz, 1 and 1: shapes that are searched through, from teeth that bounce to teeth that do not."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from dynident.fitting.drive_gains.gain_rows import GainProblem
 from dynident.fitting.drive_gains.gain_solution import GainSolution, WeightedFactors, at_gains
-from dynident.moments.factors import TriangularFactors
+from dynident.moments.factors import RANK_TOLERANCE, TriangularFactors
 
 UNSEEN = 1e-6
 """Share of the joints' torque below which what a change of gains shows is rounding. What is above
@@ -108,16 +108,27 @@ def as_described(
         return solution
     rank = problem.model.base.rank
     given, gains = problem.given_values()[:rank], np.array(solution.gains)
-    weighted = WeightedFactors(problem, factors, solution.weights)
-    found, kept = weighted.linear(1.0 / gains)[0], np.array(weighted.kept)
-    # Of a body's inertia and a rotor's that turns as it does, the body has all.
-    bodies = kept < rank
     for group in scales.groups:
-        R = weighted.R[list(group)] / np.abs(solution.gains[list(group)])[:, None, None]
-        ours, described = R[:, :, kept[bodies]] @ found[bodies], R[:, :, :rank] @ given
+        R = (
+            factors.R[list(group)]
+            * (solution.weights[list(group)] / np.abs(solution.gains[list(group)]))[:, None, None]
+        )
+        # A rotor that turns as a body does is not described: what both can make tells no scale.
+        ours, described = (
+            _beside(R[:, :, rank : problem.model.size], R[:, :, :rank] @ one)
+            for one in (solution.values[:rank], given)
+        )
         square = float(np.sum(ours**2))
         scale = float(np.sum(ours * described)) / square if square > 0 else 0.0
         # A robot of negative masses draws the same currents: the sign is a scale like any other.
         if scale != 0 and np.isfinite(scale):
             gains[list(group)] *= scale
     return at_gains(problem, factors, solution, gains)
+
+
+def _beside(columns: np.ndarray, torque: np.ndarray) -> np.ndarray:
+    """What of a torque (g, m) of some joints columns (g, m, k) cannot make, (g m,)."""
+    A, b = columns.reshape(-1, columns.shape[-1]), torque.ravel()
+    size = np.linalg.norm(A, axis=0)
+    A = A[:, size > 0] / size[size > 0]
+    return b - A @ np.linalg.lstsq(A, b, rcond=RANK_TOLERANCE)[0]

@@ -6,6 +6,7 @@ robot on the ceiling looks like one whose joints count from elsewhere, and the b
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -147,9 +148,9 @@ def _ratios_to_give(reading: Reading) -> str:
     if len(names) < 2:
         return given
     before, last = (expression_of(reading.columns[f"q.{name}"]).text for name in names[-2:])
-    k = len(names)
-    sum_ = f"q.{names[-1]} = {last}/N{k} - {before}/N{k - 1}"
-    return f"{given}; where the motor of {names[-2]} turns {names[-1]} too, also --column '{sum_}'"
+    k, column = len(names), names[-1]
+    together = shlex.quote(f"q.{column} = ({last})/N{k} - ({before})/N{k - 1}")
+    return f"{given}; where the motor of {names[-2]} turns {column} too, also --column {together}"
 
 
 def _wiring(reading: Reading, recordings: tuple[Recording, ...]) -> Amendment | None:
