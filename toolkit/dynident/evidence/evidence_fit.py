@@ -326,8 +326,9 @@ def _moved(run: Run, signals: Sequence[JointColumns], values: np.ndarray) -> Seq
     the simulated one, are not symmetric. They are the least squares of y - (W - V) x on V, taken at
     the x that they find. So the simulated replicate's torque becomes that at the latest x, and
     everything that follows is plain regression on columns without noise (but for responses behind
-    springs and gaps, see `Evidence.responses`). What another column would bring is then its instrumental moment with the residual y - W x: zero in the mean if nothing is
-    missing, wherever the simulated motion may lie.
+    springs and gaps, see `Evidence.responses`). What another column would bring is then its
+    instrumental moment with the residual y - W x: zero in the mean if nothing is missing, wherever
+    the simulated motion may lie.
 
     Parameters
     ----------
