@@ -73,7 +73,7 @@ def test_without_a_noise_floor_shares_are_of_everything_and_it_says_so() -> None
     assert shares is not None
     assert 0.4 < shares.by["position and velocity"].value < 0.65
     assert first.whole == "all" and "noise included" in first.sentence
-    assert second.told == {} and "no share that any input explains" in second.sentence
+    assert second.told == {} and "no share that the regression explains" in second.sentence
     assert "noise included" in " ".join(str(dependence_table((first, second))).split())
 
 
@@ -160,7 +160,8 @@ def test_the_sentence_names_what_is_told_and_what_no_input_explains() -> None:
     )
     assert one.sentence == (
         "What is left at elbow, beyond the noise: position and velocity of this joint explain 62 % "
-        "of it (standard error 4 %) and its past 20 % (3 %) more; no input explains 18 % (5 %)."
+        "of it (standard error 4 %) and its past 20 % (3 %) more; the regression leaves 18 % (5 %) "
+        "unexplained."
     )
     said = one.to_dict()
     assert [x["distinguishable"] for x in said["inputs"]] == [True, True, False, False, False]
@@ -175,7 +176,7 @@ def test_the_sentence_names_what_is_told_and_what_no_input_explains() -> None:
 
 def test_where_nothing_is_told_no_share_is_named() -> None:
     one = shares(position_and_velocity=(0.05, 0.04), time=(-0.1, 0.05))
-    assert one.sentence.endswith("no share that any input explains can be told from nothing.")
+    assert one.sentence.endswith("no share that the regression explains can be told from nothing.")
     assert "%" not in one.sentence
     (row,) = dependence_table((one,)).rows
     assert row == ("elbow", "(5 \u00b1 4)", "(0 \u00b1 5)", "all")

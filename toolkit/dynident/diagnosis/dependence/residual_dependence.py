@@ -97,7 +97,7 @@ class JointDependence:
         noise = "noise included" if self.whole == "all" else "beyond the noise"
         what, told = f"What is left at {joints}, {noise}", self.told
         if not told:
-            return f"{what}: no share that any input explains can be told from nothing."
+            return f"{what}: no share that the regression explains can be told from nothing."
         (first, share), *more = told.items()
         explain = "explains" if first in _ONE else "explain"
         parts = [
@@ -105,9 +105,9 @@ class JointDependence:
             f"{_rounded(share.error)})",
             *(f"{_WORDS[k]} {_rounded(s.value)} ({_rounded(s.error)}) more" for k, s in more),
         ]
-        rest = self.shares.rest
-        left = f"; no input explains {_rounded(rest.value)} ({_rounded(rest.error)})"
-        return f"{what}: {listed(parts)}{left if rest.told else ''}."
+        rest = f"{_rounded(self.shares.rest.value)} ({_rounded(self.shares.rest.error)})"
+        left = f"; the regression leaves {rest} unexplained"
+        return f"{what}: {listed(parts)}{left if self.shares.rest.told else ''}."
 
     def to_dict(self) -> dict[str, Any]:
         """As `--json` has it."""
@@ -223,8 +223,8 @@ def dependence_table(found: Sequence[JointDependence]) -> Table:
         "Shares are of the systematic residual: the noise is taken off."
         if all(one.whole == "systematic" for one in found)
         else "Shares are of all that is left, noise included: nothing tells it from the rest. The "
-        "verdict calls it no noise where such a share is large for certain, also behind lower "
-        "cut-offs of the filter."
+        "verdict calls it no noise where such a share is large beyond its standard error, also "
+        "behind lower cut-offs of the filter where nothing is simulated."
     )
     return Table(
         "Percent of what is left that a flexible regression explains on held-out blocks of time",
