@@ -214,8 +214,8 @@ def test_of_several_pairs_the_one_told_least_counts() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("few_begins")
 def test_a_pair_that_nothing_tells_hides_no_other() -> None:
+    """From as many begins as a design has: of few the best may end in a worse motion."""
     law = law_effect(Law(name="again", torque="c*v"))("elbow").on(ROBOT)
     (viscous,), (drag,), (spring,) = (
         effects_of(one, ROBOT) for one in ("viscous_friction@elbow", "quadratic_drag@elbow", SPRING)
@@ -224,8 +224,7 @@ def test_a_pair_that_nothing_tells_hides_no_other() -> None:
     task = DesignTask(starts=1, harmonics=3, tell=((viscous, law), (drag, spring)))
     found = design(model, recorded(model), task)
     hopeless, told = found.separations
-    assert hopeless.designed < 1e-3
-    assert told.designed > 5 * told.usual > 0.5
+    assert hopeless.designed < 1e-3 < 1.0 < told.designed
     assert "No motion within the limits" in found.sentence
 
 
