@@ -264,6 +264,17 @@ def test_a_right_description_fixes_the_scale_whatever_rotors_there_are(
     np.testing.assert_allclose(found.gains, GAINS, rtol=0.01)
 
 
+def test_a_right_description_fixes_the_scale_of_a_robot_without_effects() -> None:
+    robot = chain(N, 5)
+    model = Model(robot)
+    t, q, v, a = smooth_motion(N, 40, 200.0, 8.0, 8.0, 0.9)
+    current = model.torque(model.block(t, q, v, a), model.given_values()) / GAINS
+    one = Recording(t, q, current, robot.names, name="r", number=1)
+    found = fit_drive_gains(GainProblem(model, Dataset((one,))))
+    assert found.is_scaled
+    np.testing.assert_allclose(found.gains, GAINS, rtol=0.01)
+
+
 def test_trusted_links_fix_the_scale() -> None:
     """The last link as it truly is, the others as described: a third off."""
     model, values, found = recordings()

@@ -128,7 +128,7 @@ def as_described(
 
 def _beside(columns: np.ndarray, torque: np.ndarray) -> np.ndarray:
     """What of a torque (g, m) of some joints columns (g, m, k) cannot make, (g m,)."""
-    A, b = columns.reshape(-1, columns.shape[-1]), torque.ravel()
+    A, b = columns.reshape(torque.size, -1), torque.ravel()
     size = np.linalg.norm(A, axis=0)
     A = A[:, size > 0] / size[size > 0]
     return b - A @ np.linalg.lstsq(A, b, rcond=RANK_TOLERANCE)[0]
