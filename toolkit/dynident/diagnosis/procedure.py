@@ -45,6 +45,7 @@ from dynident.diagnosis.proposals.proposals_of import proposals_of
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.reversals import as_much, left_out, without_their_reversals
 from dynident.diagnosis.search.global_search import global_search
+from dynident.diagnosis.search.order_of_steps import responses_in_place
 from dynident.diagnosis.search.payload_recordings import (
     marked,
     with_payload,
@@ -349,7 +350,10 @@ def _pruned(stage: Stage, task: DiagnosisTask) -> tuple[Stage, Path]:
     if contacts.pulses != stage.contacts.pulses:
         start = fit_evidence(evidence, start.model, start)
         final = fit_evidence(evidence, final.model, final)
-    path = path_of(evidence, held, start, final, tuple(kept.found), task.progress)
+    found = tuple(kept.found)
+    if not stage.loop.runs:  # measured columns would credit a response with noise
+        found = responses_in_place(evidence, start, final, found)
+    path = path_of(evidence, held, start, final, found, task.progress)
     withdrawn = (*kept.unhelpful, *path.withdrawn)
     said = [one.payload for one in task.train.recordings]
     marks = [run.recording.payload for run in evidence.runs]
