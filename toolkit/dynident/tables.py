@@ -157,6 +157,19 @@ def percent(value: float | None, digits: int = 2) -> str:
     return f"{100 * value:.{digits}f} %"
 
 
+def relative(value: float, spread: float) -> str:
+    """A spread over the size of its value; no figure above 100 %, for it says no more.
+
+    Parameters
+    ----------
+    value : of a parameter; a dash where it is zero or not known.
+    spread : a standard deviation, or half an interval, in the unit of the value.
+    """
+    if not value or not math.isfinite(value) or not math.isfinite(spread):
+        return percent(None)
+    return percent(spread / abs(value), 1) if spread < abs(value) else "> 100 %"
+
+
 def listed(names: Sequence[str], last: str = "and") -> str:
     """Names as a sentence has them: "a, b and c"."""
     return f" {last} ".join([*([", ".join(names[:-1])] if names[1:] else []), *names[-1:]])

@@ -14,7 +14,7 @@ import numpy as np
 from dynident.fitting.linear_solution import solve_columns, solve_factors
 from dynident.model import Model
 from dynident.moments.factors import TriangularFactors
-from dynident.tables import Table, number, percent
+from dynident.tables import Table, number, percent, relative
 
 LARGEST_RELATIVE_SIGMA = 0.3
 
@@ -40,7 +40,7 @@ class EssentialParameters:
     def table(self) -> Table:
         """Values and standard deviations of what is kept."""
         rows = tuple(
-            (name, number(value, 6), number(sigma, 3), percent(sigma / abs(value), 1))
+            (name, number(value, 6), number(sigma, 3), relative(value, sigma))
             for name, value, sigma in zip(self.names, self.values, self.sigma, strict=True)
         )
         note = (
@@ -80,9 +80,9 @@ def essential_parameters(
         values = found.values
         sigma = np.sqrt(found.variance * np.sum(found.inverse**2, axis=1))
         with np.errstate(divide="ignore"):
-            relative = sigma / np.abs(values)
-        worst = int(np.argmax(relative))
-        if relative[worst] <= largest or len(kept) == 1:
+            shares = sigma / np.abs(values)
+        worst = int(np.argmax(shares))
+        if shares[worst] <= largest or len(kept) == 1:
             break
         dropped.append(model.names[kept.pop(worst)])
     norm = float(np.linalg.norm(factors.torque_norms))

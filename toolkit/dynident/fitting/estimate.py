@@ -20,7 +20,7 @@ from dynident.model import Model
 from dynident.nlp import Certificate
 from dynident.robot import BaseParameters, Robot
 from dynident.robot.patching import write
-from dynident.tables import Shown, Table, number, percent
+from dynident.tables import Shown, Table, number, percent, relative
 
 _MUCH_LEFT = 0.2
 """Share of a joint's torque beyond which a fit says that something may be missing."""
@@ -182,7 +182,7 @@ class Estimate(Shown):
                     name,
                     number(values[i], 6),
                     number(sigma[i], 3),
-                    percent(float(sigma[i] / abs(values[i])) if values[i] else None, 1),
+                    relative(values[i], sigma[i]),
                     self.model.units[i],
                     stands_for,
                 )

@@ -29,7 +29,7 @@ from dynident.fitting.row_objective import shaped_effects
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
 from dynident.robot import BaseParameters
-from dynident.tables import Shown, Table, json_row, number, p_value, percent
+from dynident.tables import Shown, Table, json_row, number, p_value, relative
 
 LEVEL = 0.05
 """Probability of any false alarm in a fleet where no robot is odd."""
@@ -159,7 +159,7 @@ class Fleet(Shown):
         for k, head in enumerate(self.basis.independent):
             name = model.names[head]
             mean, spread = float(usual.mean[k]), float(usual.spread[k])
-            share = percent(spread / abs(mean) if mean else None, 1)
+            share = relative(mean, spread)
             own = number(float(np.sqrt(np.median(variances[:, k]))), 3)
             cells = (number(mean), number(spread, 3), share, own, model.units[head])
             rows.append((name, *cells, words[k]))

@@ -12,7 +12,7 @@ from dynident.effects import Effect, ShapeParameter
 from dynident.fitting.estimate import Estimate, ShapeValue
 from dynident.inertia.parameters import MEANINGS, PARAMETERS
 from dynident.recording.dataset import NoiseSource
-from dynident.tables import Table, number, percent
+from dynident.tables import Table, number, relative
 
 _QUANTILE = 1.959964
 """Half width of a 95 % interval, in standard errors."""
@@ -98,7 +98,7 @@ def parameter_table(estimate: Estimate, widening: Widening | None, noise: NoiseS
             words[i],
             number(values[i], _digits(values[i], half[i])),
             _interval(values[i], half[i]),
-            _relative(values[i], half[i]),
+            relative(values[i], half[i]),
             model.units[i],
             stands_for[i],
         )
@@ -146,7 +146,7 @@ def _shape_rows(estimate: Estimate, widening: Widening | None) -> list[tuple[str
         factor = 1.0 if widening is None else widening.of(effect.joint)
         x, half = found.value, _QUANTILE * factor * found.sigma
         words, between = _placed(one.means, effect), _interval(x, half)
-        rows.append((found.name, words, number(x, 4), between, _relative(x, half), one.unit, ""))
+        rows.append((found.name, words, number(x, 4), between, relative(x, half), one.unit, ""))
     return rows
 
 
@@ -174,13 +174,6 @@ def printed_parameters(diagnosis: Diagnosis) -> tuple[Table | str, ...]:
         estimate.parameter_table(),
         *((inside.shape_table(),) if inside.shapes else ()),
     )
-
-
-def _relative(value: float, half: float) -> str:
-    """Half of an interval over its value; no figure where it holds zero, for it says no more."""
-    if not value or not np.isfinite(value) or not np.isfinite(half):
-        return percent(None)
-    return percent(half / abs(value), 1) if half < abs(value) else "> 100 %"
 
 
 def _interval(value: float, half: float) -> str:
