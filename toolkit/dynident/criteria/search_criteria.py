@@ -323,6 +323,15 @@ class GlobalSearchCriteria(CriteriaGroup):
         least=0,
         most=1,
     )
+    felt: float = criterion(
+        0.05,
+        "1",
+        "part of the systematic square, over the noise, that is left at a joint of which shapes "
+        "are sought",
+        "measured: at least 0.18 at the joint of the spring or the gap, 20 cases of two simulators",
+        least=0,
+        most=1,
+    )
     patience: int = criterion(
         9, "generations", "generations after which a search that explains nothing ends", least=1
     )

@@ -25,7 +25,6 @@ from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, residuals
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.noise_model import systematic_square
 from dynident.fitting.shape_search import Evolution, ShapeProblem, ShapeSolution, search
-from dynident.model import Model
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -66,7 +65,7 @@ def global_search(
         on_recordings(last.evidence, last.fitted), criteria.verdict
     ):
         return None
-    sought = _sought(last.evidence, start.fitted.model, last.fitted)
+    sought = _sought(start, last)
     if not sought:
         return None
     # An effect that is in the last model with a wrong shape is missing from the first one.
@@ -97,12 +96,31 @@ def global_search(
     return replace(base, ranking=_headed(base.ranking, best, tests, criteria.search.alike))
 
 
-def _sought(evidence: Evidence, model: Model, last: EvidenceFit) -> list[Effect]:
-    """Effects of many shapes: those that were added with one that may be wrong, or else all."""
-    below_noise = joints_below_noise(evidence, last)
+def _sought(start: RankedModel, last: RankedModel) -> list[Effect]:
+    """Effects of many shapes: those that were added with one that may be wrong, or else all.
+
+    These only at joints with a part of what either model leaves: what gives way at a joint is felt
+    there, whatever the others feel of it.
+    """
+    model, evidence = start.fitted.model, last.evidence
     every = [one for one in candidates(model) if one.sought_in(model.robot)]
-    added = [one for one in every if one in last.model]
-    return added or [one for one in every if one.joint not in below_noise]
+    added = [one for one in every if one in last.fitted.model]
+    if added:
+        return added
+    below_noise = joints_below_noise(evidence, last.fitted)
+    parts = np.maximum(*(_parts_of_joints(one.fitted) for one in (start, last)))
+    felt = {
+        joint
+        for joint, part in zip(model.robot.names, parts, strict=True)
+        if part >= evidence.criteria.global_search.felt and joint not in below_noise
+    }
+    return [one for one in every if one.joint in felt]
+
+
+def _parts_of_joints(fitted: EvidenceFit) -> np.ndarray:
+    """What a model leaves at each joint, as a part of all that it leaves, each over its noise."""
+    each = np.clip(fitted.squares / fitted.variances, 0.0, None)
+    return each / total if (total := each.sum()) > 0 else each
 
 
 def _finals(
