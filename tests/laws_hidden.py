@@ -8,10 +8,10 @@ import numpy as np
 
 from dynident.criteria import Criteria
 from dynident.diagnosis.proposals.law_search import LawSearch
+from dynident.diagnosis.search.path import Path, judged_on
 from dynident.diagnosis.search.scoring import Score
 from dynident.diagnosis.search.selection import AddedEffect
 from dynident.diagnosis.search.shaped_fit import refitted
-from dynident.diagnosis.search.withdrawal import Path, judged_on
 from dynident.effects import Law, law_effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence

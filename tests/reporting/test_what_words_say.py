@@ -83,10 +83,10 @@ def test_shapes_have_intervals_where_their_sigma_is_known(found: Diagnosis) -> N
 def test_a_stated_coupling_is_not_doubted_by_what_is_left_there(found: Diagnosis) -> None:
     left: Any = (SimpleNamespace(joint="elbow", told=("other joints",)),)
     open_ = replace(found, verdict="unexplained", steps=(), residual_dependence=left)
-    assert any("coupled_motors" in note for note in with_geometry_doubt(open_).notes)
+    assert any("coupled_motors" in note for note in with_geometry_doubt(open_, ()).notes)
     coupled = found.before.model + "joint_coupling@elbow:shoulder"
     stated = replace(open_, before=replace(found.before, model=coupled))
-    assert not any("coupled_motors" in note for note in with_geometry_doubt(stated).notes)
+    assert not any("coupled_motors" in note for note in with_geometry_doubt(stated, ()).notes)
 
 
 def test_explain_says_above_its_parameters_that_a_model_is_rejected() -> None:

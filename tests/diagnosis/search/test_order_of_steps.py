@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dynident.diagnosis.search.order_of_steps import responses_in_place
+from dynident.diagnosis.search.path import responses_in_place
 from dynident.diagnosis.search.scoring import candidate_moments, score
 from dynident.diagnosis.search.selection import AddedEffect
 from dynident.effects import effects_of

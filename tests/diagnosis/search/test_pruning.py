@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
+from dynident.diagnosis.search.path import path_of
 from dynident.diagnosis.search.ranking import candidates, rank
 from dynident.diagnosis.search.selection import AddedEffect, choose, without_superfluous
-from dynident.diagnosis.search.withdrawal import path_of
 from dynident.effects import effects_of
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence

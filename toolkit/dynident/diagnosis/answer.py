@@ -22,6 +22,7 @@ from dynident.recording import RowCount
 from dynident.recording.dataset import NoiseSource
 from dynident.tables import percent
 from dynident.wiring import Fault
+from dynident.wiring.speed_limits import OverSpeed
 
 Verdict = Literal["nothing_missing", "explained", "unexplained"]
 Rest = Literal["within the noise", "smaller than the noise", "larger than the noise"]
@@ -78,6 +79,7 @@ class Answer:
     following_motion : joints without a noise floor at which what is left is no noise, as functions
         of position and velocity, or of the speeds of all joints, predict it; empty elsewhere.
     sampled : when the torque acts, where that is not when the study says.
+    too_fast : the joint that is faster than it can be, as the study reads its position.
     switches : every choice among the effects added, fitted and judged, where that was asked for.
     drives : gains by which currents became torques, and loads that were identified; None where
         nothing had to be found.
@@ -110,6 +112,7 @@ class Answer:
     training_only: tuple[str, ...] = ()
     following_motion: tuple[str, ...] = ()
     sampled: SamplingTime | None = None
+    too_fast: OverSpeed | None = None
     switches: Switches | None = None
     drives: DriveGains | None = None
     drives_anew: DriveGains | None = None

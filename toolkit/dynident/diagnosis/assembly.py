@@ -27,9 +27,9 @@ from dynident.diagnosis.nuisances.sticking import shares_left_out
 from dynident.diagnosis.nuisances.unlike_recordings import training_notes, unlike_notes
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.paired_falls import fall_standard_error
+from dynident.diagnosis.search.path import Path
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.search.refusal import impossible_joints_of
-from dynident.diagnosis.search.withdrawal import Path
 from dynident.diagnosis.verdict import (
     beyond_noise,
     noise_source,

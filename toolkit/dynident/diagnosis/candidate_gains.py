@@ -10,10 +10,10 @@ from collections.abc import Mapping
 from contextlib import suppress
 from types import MappingProxyType
 
+from dynident.diagnosis.search.path import judged_on
 from dynident.diagnosis.search.payload_recordings import with_payload, with_payload_decided
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.search.scoring import Score
-from dynident.diagnosis.search.withdrawal import judged_on
 from dynident.errors import FitError
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence

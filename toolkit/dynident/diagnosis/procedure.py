@@ -45,7 +45,7 @@ from dynident.diagnosis.proposals.proposals_of import proposals_of
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.reversals import as_much, left_out, without_their_reversals
 from dynident.diagnosis.search.global_search import global_search
-from dynident.diagnosis.search.order_of_steps import responses_in_place
+from dynident.diagnosis.search.path import Path, path_of, responses_in_place
 from dynident.diagnosis.search.payload_recordings import (
     marked,
     with_payload,
@@ -62,7 +62,6 @@ from dynident.diagnosis.search.selection import (
     without_superfluous,
 )
 from dynident.diagnosis.search.shaped_fit import refitted, shaped
-from dynident.diagnosis.search.withdrawal import Path, path_of
 from dynident.diagnosis.stage import AskedSwitches, DiagnosisTask, Propose, Stage
 from dynident.diagnosis.switches import switches_of
 from dynident.effects import Effect
@@ -157,7 +156,7 @@ def diagnose(
     if asked and not faults:
         progress("looking for what the residual depends on")
         found = with_dependence(found, settled.evidence, _decided(settled), path)
-    return with_geometry_doubt(found)
+    return with_geometry_doubt(found, settled.evidence.runs)
 
 
 def _compare(
@@ -322,7 +321,7 @@ def _settle(stage: Stage, task: DiagnosisTask) -> tuple[Stage, Path]:
     asked a few times at most, and never about what is indistinguishable from what they withdrew.
     """
     withdrawn: tuple[Withdrawn, ...] = ()
-    most = stage.evidence.criteria.search.withdrawals
+    most = stage.evidence.criteria.search.paths
     for looks in range(1, most + 2):
         many = len(stage.found)
         stage, path = _pruned(stage, task)

@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
-from dynident.diagnosis.search.withdrawal import Path, judged_on
+from dynident.diagnosis.search.path import Path, judged_on
 from dynident.effects import Effect
 from dynident.errors import FitError
 from dynident.evidence.columns import Evidence

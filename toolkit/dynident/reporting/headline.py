@@ -59,6 +59,11 @@ def headline(diagnosis: Diagnosis) -> Headline:
         said = f"No robot can have what the fit says: {values}{rest}."
         return Headline("!", "impossible values", said)
     found = _of_verdict(diagnosis)
+    if diagnosis.too_fast is not None:
+        joint = diagnosis.too_fast.joint
+        said = f"{found.sentence} Is q.{joint} the position of {joint}? It is too fast for that."
+        mark = "?" if found.mark == "\u2713" else found.mark
+        found = replace(found, mark=mark, sentence=said)
     if diagnosis.sampled is not None:
         mark = "?" if found.mark == "\u2713" else found.mark
         said = f"{found.sentence} The torque is of another moment than the study says."

@@ -37,7 +37,7 @@ def next_steps(diagnosis: Diagnosis) -> tuple[Advice, ...]:
     if diagnosis.wiring:
         return tuple(_to_mend(fault) for fault in diagnosis.wiring)
     # Friction and inertia have taken up a wrong moment: whatever is added comes after that.
-    found = [*_to_time(diagnosis), *_to_add(diagnosis)]
+    found = [*_to_settle(diagnosis), *_to_time(diagnosis), *_to_add(diagnosis)]
     if diagnosis.limit is not None:
         what = "Allow the search more additions (--most)."
         found.append(Advice(what, f"{diagnosis.limit_in_words}."))
@@ -90,6 +90,15 @@ def in_short(diagnosis: Diagnosis, study: Path) -> tuple[str, ...]:
 def _to_mend(fault: Fault) -> Advice:
     what = f"Mend the study: {fault.what}. {fault.where}."
     return Advice(what, f"{fault.evidence[0].upper()}{fault.evidence[1:]}.", fault.mend)
+
+
+def _to_settle(diagnosis: Diagnosis) -> list[Advice]:
+    """That positions may be another's: no torque mends that, and many take it up."""
+    if diagnosis.too_fast is None:
+        return []
+    what = f"Settle first whether q.{diagnosis.too_fast.joint} is the position of that joint."
+    why = f"{diagnosis.too_fast.sentence} The page on coupled motors says how to write it."
+    return [Advice(what, why)]
 
 
 def _to_time(diagnosis: Diagnosis) -> list[Advice]:

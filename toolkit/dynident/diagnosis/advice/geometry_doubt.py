@@ -2,48 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from dynident.diagnosis.result import Diagnosis
+from dynident.errors import RecordingError
+from dynident.evidence.runs import Run
+from dynident.recording import Recording
+from dynident.recording.formats.column_expressions import parse
+from dynident.wiring.speed_limits import over_speed
 
 _OTHER_JOINTS = {"other joints", "speeds of other joints"}
 
 
-def with_geometry_doubt(found: Diagnosis) -> Diagnosis:
+def with_geometry_doubt(found: Diagnosis, runs: Sequence[Run]) -> Diagnosis:
     """Return a diagnosis that says where positions or the description may be wrong.
 
-    The evidence is that the torque at a joint goes with the motion of another one, beyond what the
-    bodies as described make of it, while a residual remains: a coupling that was added, or what a
-    flexible regression explains by the other joints.
+    The evidence is a joint that is faster than it can be, while the others keep their limits; or
+    that the torque at a joint goes with the motion of another one, beyond what the bodies as
+    described make of it, while a residual remains: a coupling that was added, or what a flexible
+    regression explains by the other joints.
 
     Parameters
     ----------
     found : the diagnosis without it.
+    runs : the training recordings that it rests on.
 
     Returns
     -------
     With one note more where there is such evidence.
     """
-    complete = found.verdict != "unexplained" and found.noise_source != "unknown"
-    if found.wiring or complete:
+    if found.wiring:
         return found
-    pairs = [
-        f"{step.effect.joint} goes with {step.effect.source}"
-        for step in found.steps
-        if step.effect.source is not None
-    ]
-    # Where a study states that motors turn two joints, what is left there says nothing new of it.
-    stated = {
-        name
-        for effect in found.before.model.effects
-        if effect.source is not None
-        for name in (effect.joint, effect.source)
-    }
-    pairs += [
-        f"{one.joint} goes with the other joints"
-        for one in found.residual_dependence
-        if not _OTHER_JOINTS.isdisjoint(one.told) and one.joint not in stated
-    ]
+    speeds = [run.replicates[0].motion.v for run in runs]
+    fast = over_speed(found.before.model.robot, np.concatenate(speeds)) if speeds else None
+    if fast is not None:
+        return replace(found, too_fast=fast, notes=(fast.sentence, *found.notes))
+    complete = found.verdict != "unexplained" and found.noise_source != "unknown"
+    pairs = () if complete else _pairs(found, [run.recording for run in runs])
     if not pairs:
         return found
     note = (
@@ -53,3 +51,52 @@ def with_geometry_doubt(found: Diagnosis) -> Diagnosis:
         "may differ from the robot's."
     )
     return replace(found, notes=(*found.notes, note))
+
+
+def _pairs(found: Diagnosis, recordings: Sequence[Recording]) -> tuple[str, ...]:
+    """Which torque goes with the motion of which joint.
+
+    Where a study states that motors turn two joints, what is left there says nothing new of it.
+    """
+    in_columns = _with_shared_motors(recordings)
+    in_model = {
+        name
+        for effect in found.before.model.effects
+        if effect.source is not None
+        for name in (effect.joint, effect.source)
+    }
+    added = [step.effect for step in found.steps if step.effect.source is not None]
+    return (
+        *(
+            f"{effect.joint} goes with {effect.source}"
+            for effect in added
+            if not {effect.joint, effect.source} <= in_columns
+        ),
+        *(
+            f"{one.joint} goes with the other joints"
+            for one in found.residual_dependence
+            if not _OTHER_JOINTS.isdisjoint(one.told) and one.joint not in in_model | in_columns
+        ),
+    )
+
+
+def _with_shared_motors(recordings: Sequence[Recording]) -> set[str]:
+    """Joints whose positions a study makes of columns that those of other joints have, too."""
+    found: set[str] = set()
+    for recording in recordings:
+        made = {
+            ours.removeprefix("q."): _columns_of(theirs)
+            for ours, theirs, _ in recording.provenance.columns
+            if ours.startswith("q.")
+        }
+        for joint, columns in made.items():
+            if any(columns & others for name, others in made.items() if name != joint):
+                found.add(joint)
+    return found
+
+
+def _columns_of(text: str) -> set[str]:
+    try:
+        return set(parse(text).terms)
+    except RecordingError:
+        return {text}  # a name that no expression could hold

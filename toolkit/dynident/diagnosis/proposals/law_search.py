@@ -12,10 +12,10 @@ from dynident.diagnosis.proposals.proposal import LawPicture, Proposal
 from dynident.diagnosis.proposals.term_library import LibraryTerm, centred, extended, library
 from dynident.diagnosis.proposals.term_screen import Screened, screen
 from dynident.diagnosis.search.cross_validation import signed_rank
+from dynident.diagnosis.search.path import judged_on
 from dynident.diagnosis.search.ranking import judged
 from dynident.diagnosis.search.scoring import Score, candidate_moments, score
 from dynident.diagnosis.search.shaped_fit import refitted
-from dynident.diagnosis.search.withdrawal import judged_on
 from dynident.diagnosis.verdict import within_noise
 from dynident.effects import Effect, LawEffect, law_effect
 from dynident.evidence.columns import Evidence

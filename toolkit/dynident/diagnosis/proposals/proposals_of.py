@@ -15,7 +15,7 @@ from itertools import chain
 from dynident.diagnosis.proposals.law_search import FoundLaw, LawSearch
 from dynident.diagnosis.proposals.proposal import Proposal
 from dynident.diagnosis.search.cross_validation import left_out_losses, signed_rank
-from dynident.diagnosis.search.withdrawal import Path
+from dynident.diagnosis.search.path import Path
 from dynident.diagnosis.verdict import within_noise
 from dynident.effects import Effect
 from dynident.evidence.evidence_fit import EvidenceFit, in_metric_of

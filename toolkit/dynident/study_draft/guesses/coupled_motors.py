@@ -20,6 +20,7 @@ from dynident.errors import DynidentError
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
 from dynident.robot import Robot
+from dynident.wiring.speed_limits import WITHIN, over_speed, speed_reached
 from dynident.wiring.wiring_rows import WiringRows, rows_of
 
 _BLOCKS, _FOLDS = 16, 4  # of time; every fourth is held out
@@ -27,10 +28,6 @@ _ROUNDS = 3  # of weighting joints by what is left at them
 _RIDGE = 1e-9
 _LEAST = 1e-5  # share of the torque's power below which a residual is as good as none
 _SPEED_ROWS = 3000
-_SPEED = 0.999  # quantile of a speed that stands for its largest
-_WITHIN = 1.02  # times its limit that a drive may overshoot
-_BEYOND = 1.05  # times its limit that no drive does
-_REACHED = 0.95  # of its limit that another joint has to reach for limits to be believed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,31 +121,24 @@ def coupling_by_speeds(robot: Robot, recordings: Sequence[Recording]) -> Couplin
         )
     except DynidentError:
         return None
-    limits = np.array([joint.velocity for joint in robot.joints])
-    share = np.quantile(np.abs(rows.v), _SPEED, axis=0) / limits
-    over = np.flatnonzero(share > _BEYOND)
-    others = np.delete(share, over)
-    if len(over) != 1 or not len(others) or not _REACHED <= others.max() <= _WITHIN:
+    over = over_speed(robot, rows.v)
+    if over is None:
         return None
-    (i,) = over
-    found, speeds = [], []
+    i, found, speeds = robot.names.index(over.joint), [], []
     for one in _couplings(robot):
-        if one.joint != robot.names[i] or _compared(robot, few, one).gain <= -_enough(few):
+        if one.joint != over.joint or _compared(robot, few, one).gain <= -_enough(few):
             continue
         v = rows.v[:, i] + one.turns * rows.v[:, robot.names.index(one.by)]
-        speed = float(np.quantile(np.abs(v), _SPEED))
-        if speed <= _WITHIN * limits[i]:
+        speed = float(speed_reached(v))
+        if speed <= WITHIN * over.limit:
             found.append(one)
-            speeds.append(f"{speed:.3g}")
+            speeds.append(f"{speed:.3g} {over.unit}")
     if not found:
         return None
-    at_limit = [name for k, name in enumerate(robot.names) if _REACHED <= share[k] <= _WITHIN]
     words = " or ".join(one.words for one in found)
     reason = (
-        f"nobody has said otherwise and the torques do not tell; but {robot.names[i]} so reaches "
-        f"{share[i] * limits[i]:.3g} rad/s, {100 * (share[i] - 1):.0f} % over its limit in the "
-        f"description, while {', '.join(at_limit)} reach theirs and keep them. If {words} it "
-        f"reaches {' or '.join(speeds)}; a wrong ratio or limit would look alike"
+        f"nobody has said otherwise and the torques do not tell; but so {over.words}. "
+        f"If {words}, it reaches {' or '.join(speeds)}; a wrong ratio or limit would look alike"
     )
     return CouplingGuess(found=tuple(found), reason=reason)
 
