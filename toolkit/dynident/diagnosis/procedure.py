@@ -321,7 +321,7 @@ def _settle(stage: Stage, task: DiagnosisTask) -> tuple[Stage, Path]:
     asked a few times at most, and never about what is indistinguishable from what they withdrew.
     """
     withdrawn: tuple[Withdrawn, ...] = ()
-    most = stage.evidence.criteria.search.paths
+    most = stage.evidence.criteria.search.withdrawals
     for looks in range(1, most + 2):
         many = len(stage.found)
         stage, path = _pruned(stage, task)
