@@ -26,7 +26,6 @@ PLAIN_FACTS: dict[str, str] = {
     "carries": "the same of a recording",
     "payload": "the same of a recording, None where it is not known",
     "hidden": "whether an experiment keeps the effect to itself: stored as it is",
-    "named": "whether the answer adds an effect: of it the record of such answers is looked up",
 }
 """Boolean arguments that say how things are and choose no behaviour, with the reason."""
 

@@ -54,6 +54,7 @@ class Judged:
     filter : name of the setting of [filter] that the study has.
     friction : "constraint" where dry friction is MuJoCo's own, else "tanh".
     plant : "mujoco" or "own".
+    withdrawn : number of effects that the training recordings call for, and no others.
     """
 
     name: str
@@ -81,6 +82,7 @@ class Judged:
     filter: str = "none"
     friction: str = "tanh"
     plant: str = "own"
+    withdrawn: int = 0
 
     @property
     def alarm(self) -> bool:
@@ -157,6 +159,7 @@ def judge(truth: dict[str, Any], said: dict[str, Any]) -> Judged:
         filter=said.get("filter", "none"),
         friction=circumstances["friction"] if circumstances else "tanh",
         plant="mujoco" if circumstances else "own",
+        withdrawn=len(answer.get("withdrawn", ())),
     )
 
 

@@ -15,10 +15,12 @@ Kind = tuple[str, str]
 
 
 def kind(one: Judged) -> Kind | None:
-    """The kind of an answer, as the tool knows it; None where it has no floor."""
+    """The kind of an answer, as the tool knows it; None where it says nothing of its record."""
     if one.before_over_floor is None or one.broken:
         return None
-    return kind_of(one.verdict, named=bool(one.added), over_floor=one.before_over_floor)
+    if one.verdict == "unexplained" and one.withdrawn and not one.added:
+        return None
+    return kind_of(one.verdict, effects=len(one.added), over_floor=one.before_over_floor)
 
 
 def is_right(one: Judged) -> bool:

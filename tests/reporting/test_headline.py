@@ -83,6 +83,17 @@ def test_what_was_found_and_withdrawn_is_not_said_to_be_nothing():
     assert headline(one).mark == "?"
 
 
+def test_that_the_catalogue_lacks_it_is_not_said_of_what_was_withdrawn():
+    found = of_kind("unexplained", False, noise=True)
+    assert "no effect in the catalogue takes it away" in found.sentence
+    assert "no effect of the catalogue explains it" in headline(found).sentence
+    taken = Withdrawn(effect=effect("drive_gain", "shoulder"), why="raises the error", with_it=())
+    one = replace(found, withdrawn=(taken,))
+    assert "call for drive gain at shoulder, which held-out data do not confirm" in one.sentence
+    assert "of the catalogue explains" not in one.sentence + headline(one).sentence
+    assert one.track_record is None
+
+
 def opening(html):
     parsed = Elements(html)
     (kind,) = (a["class"] for tag, a in parsed.elements if tag == "body")

@@ -8,7 +8,15 @@ from typing import Literal
 
 from dynident.criteria import DEFAULTS, Criteria
 from dynident.diagnosis.dependence.residual_dependence import JointDependence
-from dynident.diagnosis.details import Candidate, JointResult, Step, TestError, Trace, Withdrawn
+from dynident.diagnosis.details import (
+    Candidate,
+    JointResult,
+    Step,
+    TestError,
+    Trace,
+    Withdrawn,
+    together,
+)
 from dynident.diagnosis.detection_limits import DetectionLimit
 from dynident.diagnosis.leading_effects import LeadingEffects
 from dynident.diagnosis.nuisances.sampling_time import SamplingTime
@@ -233,7 +241,21 @@ class Answer:
                 "Nothing is missing that held-out data confirm: what remains is within the noise. "
                 f"Training recordings call for {self._withdrawn_titles}: withdrawn."
             )
+        if self.only_withdrawn:
+            return (
+                f"A residual beyond the noise remains. Training recordings call for "
+                f"{self._withdrawn_titles}, which held-out data do not confirm: withdrawn. Several "
+                "of them together may be missing, or something that differs between recordings."
+            )
         return _VERDICTS[self.verdict].format(effects=effects)
+
+    @property
+    def only_withdrawn(self) -> bool:
+        """Whether a residual is left for which training recordings call for effects in vain.
+
+        That the catalogue does not hold what is missing is then not known.
+        """
+        return self.verdict == "unexplained" and not self.steps and bool(self.withdrawn)
 
     @property
     def rest(self) -> Rest:
@@ -286,13 +308,14 @@ class Answer:
             or self.impossible
             or stopped
             or self.training_only  # no answer that was counted is of this kind
+            or self.only_withdrawn
             or not JOINTS[0] <= len(self.joints) <= JOINTS[1]
         ):
             return None
         if self.noise_source != "replicates" or not floor or self.criteria.changed:
             return None
         over = self.test_error.before / floor
-        return track_record(self.verdict, named=bool(self.steps), over_floor=over)
+        return track_record(self.verdict, effects=len(together(self.steps)), over_floor=over)
 
     @property
     def confidence(self) -> str:

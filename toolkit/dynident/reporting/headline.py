@@ -137,6 +137,8 @@ def _nothing_added(diagnosis: Diagnosis, known: bool) -> Headline:
     if diagnosis.verdict == "unexplained":
         if known:
             none = ", and no effect of the catalogue explains it"
+            if diagnosis.only_withdrawn:
+                none = ", and held-out data confirm no effect that the training recordings call for"
             said = f"A residual beyond the noise remains{none if diagnosis.limit is None else ''}."
             return Headline("!", "a residual remains", said)
         said = f"Effects are significant, and none was added. {_NOT_KNOWN}"
