@@ -6,7 +6,7 @@ from collections import Counter
 
 from blind_study.foreign import KIN
 from blind_study.judge import Judged
-from dynident.diagnosis.track_record import kind_of
+from dynident.diagnosis.track_record import MOST_EFFECTS, kind_of
 
 SEEN = 0.7
 """Ratio from which an effect counts as seen above the noise."""
@@ -20,7 +20,10 @@ def kind(one: Judged) -> Kind | None:
         return None
     if one.verdict == "unexplained" and one.withdrawn and not one.added:
         return None
-    return kind_of(one.verdict, effects=len(one.added), over_floor=one.before_over_floor)
+    effects = len({name for name, *_ in one.added})
+    if effects > MOST_EFFECTS:
+        return None
+    return kind_of(one.verdict, effects=effects, over_floor=one.before_over_floor)
 
 
 def is_right(one: Judged) -> bool:

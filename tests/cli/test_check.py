@@ -30,7 +30,8 @@ def test_healthy_and_broken(run, tmp_path, name):
     done = run("check", path)
     assert done.status == 1 and done.err == ""
     assert "the mass is negative: -2 kg" in done.out and "BROKEN" in done.out
-    assert "NOT consistent: link 'fore'" in done.out.splitlines()[-1]
+    after = " ".join(done.out.partition("NOT consistent: link 'fore'")[2].split())
+    assert "Next, the nearest robot that can exist: dynident refit" in after
     assert "Traceback" not in done.out
 
 

@@ -37,6 +37,15 @@ class _Files:
         require_places(study, self.out, self.robot, self.plot)
         require_picture(self.plot)
 
+    @property
+    def said(self) -> tuple[str, ...]:
+        """What the description that was written does not hold."""
+        if self.robot is None:
+            return ()
+        return (
+            f"{self.robot} has the rigid bodies; friction and other effects are in the estimate.",
+        )
+
     def write(self, estimate: Estimate) -> None:
         """Write the estimate, its robot, and the picture of its iterations."""
         if self.out:
@@ -46,7 +55,7 @@ class _Files:
             broken = estimate.inconsistent_links()
             if broken:
                 what = f"{self.robot}: no rigid body can have the parameters of {', '.join(broken)}"
-                left = "What the data cannot tell was left as given"
+                left = "What the data cannot tell was left as given; --consistency full fits others"
                 warnings.warn(f"{what}. {left}", DynidentWarning, stacklevel=1)
         if self.plot is not None and estimate.history is not None:
             from dynident.reporting.pictures.convergence import convergence
@@ -169,6 +178,6 @@ def fit(study: Path, chosen: Chosen, kind: _Kind, more: _More, to: _Files) -> Co
         content=lambda: (
             estimate.to_dict() | {"wiring": [fault.to_dict() for fault in wiring]} | content
         ),
-        parts=lambda: (*estimate.tables(), *tables),
+        parts=lambda: (*estimate.tables(), *tables, *to.said),
     )
     return with_drives(loaded, answer)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -42,8 +43,21 @@ def check(robot: Path, every_rule: bool) -> CommandAnswer:
         found = check_robot(robot)
     return CommandAnswer(
         content=found.to_dict,
-        parts=lambda: (*((found.margin_table(),) if every_rule else ()), *found.tables()),
+        parts=lambda: (
+            *((found.margin_table(),) if every_rule else ()),
+            *found.tables(),
+            *(() if found.consistent else (_next_after(robot),)),
+        ),
         status=0 if found.consistent else 1,
+    )
+
+
+def _next_after(robot: Path) -> str:
+    """What to do about a robot that cannot exist."""
+    made = shlex.join(["dynident", "refit", str(robot), "--out", "refitted.urdf"])
+    return (
+        f"Next, the nearest robot that can exist: {made}\n"
+        "Or fit its recordings among those that can: dynident fit STUDY --consistency full"
     )
 
 

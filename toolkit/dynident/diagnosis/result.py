@@ -166,9 +166,10 @@ class Diagnosis(Answer, Shown):
         """Where the model fails, one sentence for each thing seen."""
         seen = tuple((m.joint, m.against, m.sentence) for m in self.maps if m.sentence)
         notes = (self.silent_maps,) if self.silent_maps else ()
-        return Table(
-            "Where the given model fails", ("joint", "against", "what is seen"), seen, notes
-        )
+        title = "Where the given model fails"
+        if not seen:
+            title += ", shapes that have a name"
+        return Table(title, ("joint", "against", "what is seen"), seen, notes)
 
     def candidate_table(self, most: int = 10) -> Table:
         """The ranking on the model as given."""

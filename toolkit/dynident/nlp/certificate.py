@@ -65,6 +65,8 @@ class Certificate:
         if not np.isfinite(self.bound):
             return "Nothing is proved: the conic program gave no bound."
         if self.optimal:
+            if self.objective <= self.bound:
+                return "This is the optimum: no point of the set is better, but for rounding."
             return f"This is the optimum: no point of the set is better by more than {self._gap}."
         return f"This is NOT proved to be the optimum: a point better by {self._gap} may exist."
 
@@ -91,7 +93,7 @@ class Certificate:
             ("smallest margin", f"{_figure(value)} of its size ({rule} of {body})"),
             *((("objective from each start", starts),) if self.starts else ()),
         )
-        return Table("Certificate", ("", ""), rows, (self.sentence,))
+        return Table("Certificate", ("what", "value"), rows, (self.sentence,))
 
     def to_dict(self) -> dict[str, Any]:
         """The certificate as JSON holds it."""

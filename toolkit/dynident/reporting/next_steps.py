@@ -19,6 +19,8 @@ from dynident.wiring import Fault
 
 _MOST_NAMED = 3
 """Effects that a sentence lists; the picture and the command name more of them."""
+_LITTLE = 0.25
+"""Part of the error, below which its fall is said to leave most of it."""
 FIRST = 3
 """Steps that are shown at once: who reads more has time to unfold them."""
 
@@ -129,6 +131,8 @@ def _to_add(diagnosis: Diagnosis) -> list[Advice]:
         else f"; noise alone would make {percent(error.noise_floor)}"
     )
     why = f"{share}{brings} to {percent(error.after)}{floor}."
+    if error.before - error.after < _LITTLE * error.before:
+        why += " Most of the error stays."
     if all(step.uncertain for group in first for step in group):
         why += " It is within two standard errors, and may be chance: another recording tells."
     commands = (f"dynident add STUDY {shlex.join(labels)}", "dynident fit STUDY")

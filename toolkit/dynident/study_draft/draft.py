@@ -189,7 +189,7 @@ class StudyDraft:
     def _filter(self) -> str:
         if self.filter is None:
             one, mark = default_filter(self.rate_hz), "# "
-            said = f"The usual filter at {self.rate_hz:.5g} Hz; with this table, what it says."
+            said = f"Without this table it is the usual one, at {self.rate_hz:.5g} Hz:"
         else:
             one, mark = self.filter, ""
             (taken,) = (each for each in self.decisions if each.subject == "filter")

@@ -315,7 +315,8 @@ def _of_joints(
         reason = "so it was said"
         if found.followed:
             joints = ", ".join(f"tau.{joint}" for joint in found.followed)
-            reason += f"; {joints} follow, for power is the same on either side of gears"
+            follow = "follow" if found.followed[1:] else "follows"
+            reason += f"; {joints} {follow}, for power is the same on either side of gears"
         notes.take("stated", [", ".join(facts.columns)], reason)
     return Reading(
         robot=robot,
