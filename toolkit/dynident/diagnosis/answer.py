@@ -28,7 +28,7 @@ from dynident.fitting.drive_gains import DriveGains
 from dynident.fitting.estimate import DataSource, Estimate
 from dynident.recording import RowCount
 from dynident.recording.dataset import NoiseSource
-from dynident.tables import percent
+from dynident.tables import listed, percent
 from dynident.wiring import Fault
 from dynident.wiring.speed_limits import OverSpeed
 
@@ -273,9 +273,11 @@ class Answer:
     @property
     def _withdrawn_titles(self) -> str:
         """What was taken back, each with what cannot be told from it."""
-        return " and ".join(
-            " or ".join(effect.title for effect in (one.effect, *one.with_it))
-            for one in self.withdrawn
+        return listed(
+            [
+                " or ".join(effect.title for effect in (one.effect, *one.with_it))
+                for one in self.withdrawn
+            ]
         )
 
     def _stopped(self, effects: str) -> str:

@@ -236,9 +236,11 @@ def _unexplained(diagnosis: Diagnosis) -> Advice:
     worst = [one.joint.name for one in states(diagnosis) if one.state == "failing"]
     worst = worst or list(diagnosis.following_motion)
     where = listed(worst[:3]) or "the joints"
+    explained = "that no effect of the catalogue explains"
+    if diagnosis.only_withdrawn:
+        explained = "of which held-out data confirm no explanation"
     return Advice(
-        f"Look at the pictures of {where} below: something is left there that no effect of the "
-        "catalogue explains.",
+        f"Look at the pictures of {where} below: something is left there {explained}.",
         "The shape in the pictures is what is known of it. Rule out the simple causes first: a "
         "wrong unit or scale of a column, a clock that jitters, a filter that cuts too low, a "
         "cable, a hand on the robot.",
