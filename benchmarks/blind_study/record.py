@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import Counter
 
 from blind_study.foreign import KIN
-from blind_study.judge import Judged
+from blind_study.judge import Judged, Place
 from dynident.diagnosis.track_record import MOST_EFFECTS, kind_of
+from dynident.effects import catalogue
 
 SEEN = 0.7
 """Ratio from which an effect counts as seen above the noise."""
@@ -20,10 +21,15 @@ def kind(one: Judged) -> Kind | None:
         return None
     if one.verdict == "unexplained" and one.withdrawn and not one.added:
         return None
-    effects = len({name for name, *_ in one.added})
+    effects = len({_proposal(place) for place in one.added})
     if effects > MOST_EFFECTS:
         return None
     return kind_of(one.verdict, effects=effects, over_floor=one.before_over_floor)
+
+
+def _proposal(place: Place) -> tuple[str | None, ...]:
+    """What counts as one effect: one that every joint has counts once for all of them."""
+    return place[:1] if catalogue()[place[0]].at_every_joint else place
 
 
 def is_right(one: Judged) -> bool:

@@ -221,7 +221,7 @@ def _records(judged: list[Judged]) -> Table:
     for (said, size), (right, cases) in record.counts(judged).items():
         over = LARGE + 0.1 if size == "large" else 1.0
         verdict = "unexplained" if said in ("in_part", "none_of_these") else said
-        told = track_record(verdict, effects=said in ("in_part", "explained"), over_floor=over)
+        told = track_record(verdict, effects=int(said in ("in_part", "explained")), over_floor=over)
         interval = stats.binomtest(right, cases).proportion_ci(method="wilson")
         table.add_row(
             said.replace("_", " "),

@@ -16,6 +16,7 @@ from dynident.reporting.joint_states import opened, states
 from dynident.reporting.next_steps import FIRST, in_short, next_steps
 from dynident.tables import percent
 from dynident.wiring import Fault
+from dynident.wiring.speed_limits import OverSpeed
 from reporting.fabricated import diagnosis, effect
 from reporting.read_page import Elements
 
@@ -83,14 +84,29 @@ def test_what_was_found_and_withdrawn_is_not_said_to_be_nothing():
     assert headline(one).mark == "?"
 
 
+def test_a_joint_that_is_too_fast_comes_first():
+    fast = OverSpeed(joint="elbow", reached=7.0, limit=6.0, unit="rad/s", at_limit=("shoulder",))
+    for verdict, steps in (("explained", True), ("nothing_missing", False), ("unexplained", True)):
+        found = of_kind(verdict, steps, noise=True)
+        doubted = replace(found, too_fast=fast)
+        assert doubted.sentence.startswith("As the study reads positions, elbow reaches 7 rad/s")
+        assert doubted.to_dict()["notes"][0] == fast.sentence
+        assert headline(doubted).sentence.startswith("elbow is too fast")
+        assert headline(doubted).mark != "\u2713"
+        assert "q.elbow" in next_steps(doubted)[0].what
+        assert doubted.track_record is None
+
+
 def test_that_the_catalogue_lacks_it_is_not_said_of_what_was_withdrawn():
     found = of_kind("unexplained", False, noise=True)
     assert "no effect in the catalogue takes it away" in found.sentence
     assert "no effect of the catalogue explains it" in headline(found).sentence
     taken = Withdrawn(effect=effect("drive_gain", "shoulder"), why="raises the error", with_it=())
     one = replace(found, withdrawn=(taken,))
-    assert "call for drive gain at shoulder, which held-out data do not confirm" in one.sentence
+    assert "call for was withdrawn: drive gain at shoulder. Missing may be some" in one.sentence
     assert "of the catalogue explains" not in one.sentence + headline(one).sentence
+    again = replace(one, withdrawn=(taken, replace(taken, effect=effect("drive_gain", "elbow"))))
+    assert "shoulder and drive gain at elbow. Missing may be several of these" in again.sentence
     assert one.track_record is None
 
 

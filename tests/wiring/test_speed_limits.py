@@ -22,7 +22,7 @@ def test_one_joint_beyond_its_limit_beside_one_that_keeps_it() -> None:
     assert found is not None and (found.joint, found.at_limit) == ("elbow", ("shoulder",))
     assert found.reached == pytest.approx(1.2 * LIMIT, rel=1e-3)
     assert "20 % over its limit" in found.sentence
-    assert "shoulder reaches its own and keeps it" in found.sentence
+    assert "shoulder comes near its own and keeps it" in found.sentence
 
 
 @pytest.mark.parametrize(

@@ -167,7 +167,7 @@ def relative(value: float, spread: float) -> str:
     """
     if not value or not math.isfinite(value) or not math.isfinite(spread):
         return percent(None)
-    return percent(spread / abs(value), 1) if spread < abs(value) else "> 100 %"
+    return percent(spread / abs(value), 1) if spread <= abs(value) else "> 100 %"
 
 
 def listed(names: Sequence[str], last: str = "and") -> str:

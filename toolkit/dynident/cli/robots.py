@@ -54,7 +54,8 @@ def check(robot: Path, every_rule: bool) -> CommandAnswer:
 
 def _next_after(robot: Path) -> str:
     """What to do about a robot that cannot exist."""
-    made = shlex.join(["dynident", "refit", str(robot), "--out", "refitted.urdf"])
+    kind = robot.suffix if robot.suffix != ".json" else ".urdf"
+    made = shlex.join(["dynident", "refit", str(robot), "--out", f"refitted{kind}"])
     return (
         f"Next, the nearest robot that can exist: {made}\n"
         "Or fit its recordings among those that can: dynident fit STUDY --consistency full"

@@ -327,7 +327,7 @@ class GlobalSearchCriteria(CriteriaGroup):
         0.05,
         "1",
         "part of the systematic square, over the noise, that is left at a joint of which shapes "
-        "are sought",
+        "are sought, unless it is larger than the noise",
         "measured: at least 0.18 at the joint of the spring or the gap, 20 cases of two simulators",
         least=0,
         most=1,

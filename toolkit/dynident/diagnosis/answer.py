@@ -146,7 +146,14 @@ class Answer:
         if self.wiring:
             faults = " ".join(fault.sentence for fault in self.wiring)
             return f"The recordings are not what the study says, and nothing was sought. {faults}"
-        said = " ".join([self._verdict_in_words, *self.left_out_in_words, *self.when_sampled])
+        said = " ".join(
+            [
+                *self.whose_position,
+                self._verdict_in_words,
+                *self.left_out_in_words,
+                *self.when_sampled,
+            ]
+        )
         if self.limit is None:
             return said
         return f"{said} {self.limit_in_words}: allow more (--most)."
@@ -178,6 +185,11 @@ class Answer:
             f"That leaves out the reversals of {', '.join(each)}, where dry friction may follow "
             "another law than the model's.",
         )
+
+    @property
+    def whose_position(self) -> tuple[str, ...]:
+        """That a joint is faster than it can be; empty where none is."""
+        return () if self.too_fast is None else (self.too_fast.sentence,)
 
     @property
     def when_sampled(self) -> tuple[str, ...]:
@@ -231,10 +243,12 @@ class Answer:
             return f"{found} what remains is {size.format(f'{self._left:.2g}')}."
         if self.verdict == "unexplained" and effects:
             before, after = percent(self.test_error.before), percent(self.test_error.after)
+            none = ", and none of the effects in the catalogue explains it"
+            if self.withdrawn:
+                none = "; what training recordings call for besides was withdrawn"
             return (
                 f"Explained in part: adding {effects} brings the error from {before} to {after}. A "
-                "residual beyond the noise remains, and none of the effects in the catalogue "
-                "explains it."
+                f"residual beyond the noise remains{none}."
             )
         if self.verdict == "nothing_missing" and self.withdrawn:
             return (
@@ -242,10 +256,11 @@ class Answer:
                 f"Training recordings call for {self._withdrawn_titles}: withdrawn."
             )
         if self.only_withdrawn:
+            several = "several of these together, " if self.withdrawn[1:] else ""
             return (
-                f"A residual beyond the noise remains. Training recordings call for "
-                f"{self._withdrawn_titles}, which held-out data do not confirm: withdrawn. Several "
-                "of them together may be missing, or something that differs between recordings."
+                "A residual beyond the noise remains. What training recordings call for was "
+                f"withdrawn: {self._withdrawn_titles}. Missing may be {several}something that "
+                "differs between recordings, or what the catalogue does not have."
             )
         return _VERDICTS[self.verdict].format(effects=effects)
 
@@ -311,6 +326,7 @@ class Answer:
             or stopped
             or self.training_only  # no answer that was counted is of this kind
             or self.only_withdrawn
+            or self.too_fast is not None
             or not JOINTS[0] <= len(self.joints) <= JOINTS[1]
         ):
             return None

@@ -93,7 +93,7 @@ class Diagnosis(Answer, Shown):
             **({"drives_anew": self.drives_anew.to_dict()} if self.drives_anew else {}),
             **self._dependence(),
             "proposals": [one.to_dict() for one in self.proposals],
-            "notes": [*self.without_noise, *self.caveats, *self.when_sampled],
+            "notes": [*self.without_noise, *self.whose_position, *self.caveats, *self.when_sampled],
             **({"criteria": self._changed_criteria()} if self.criteria.changed else {}),
         }
 
@@ -168,7 +168,7 @@ class Diagnosis(Answer, Shown):
         notes = (self.silent_maps,) if self.silent_maps else ()
         title = "Where the given model fails"
         if not seen:
-            title += ", shapes that have a name"
+            title += ", by shapes that have a name"
         return Table(title, ("joint", "against", "what is seen"), seen, notes)
 
     def candidate_table(self, most: int = 10) -> Table:

@@ -57,13 +57,8 @@ def headline(diagnosis: Diagnosis) -> Headline:
         more = len(diagnosis.impossible) - 2
         rest = f" and {more} more" if more > 0 else ""
         said = f"No robot can have what the fit says: {values}{rest}."
-        return Headline("!", "impossible values", said)
-    found = _of_verdict(diagnosis)
-    if diagnosis.too_fast is not None:
-        joint = diagnosis.too_fast.joint
-        said = f"{found.sentence} Is q.{joint} the position of {joint}? It is too fast for that."
-        mark = "?" if found.mark == "\u2713" else found.mark
-        found = replace(found, mark=mark, sentence=said)
+        return _with_doubt(Headline("!", "impossible values", said), diagnosis)
+    found = _with_doubt(_of_verdict(diagnosis), diagnosis)
     if diagnosis.sampled is not None:
         mark = "?" if found.mark == "\u2713" else found.mark
         said = f"{found.sentence} The torque is of another moment than the study says."
@@ -77,6 +72,15 @@ def headline(diagnosis: Diagnosis) -> Headline:
         return found
     said = f"{found.sentence} {diagnosis.limit_in_words}."
     return Headline(found.mark, found.title, said)
+
+
+def _with_doubt(found: Headline, diagnosis: Diagnosis) -> Headline:
+    """A headline that asks first whether positions are those of the joints."""
+    if diagnosis.too_fast is None:
+        return found
+    joint = diagnosis.too_fast.joint
+    mark = "?" if found.mark == "\u2713" else found.mark
+    return replace(found, mark=mark, sentence=f"{joint} is too fast: see below. {found.sentence}")
 
 
 def _of_verdict(diagnosis: Diagnosis) -> Headline:
@@ -138,7 +142,7 @@ def _nothing_added(diagnosis: Diagnosis, known: bool) -> Headline:
         if known:
             none = ", and no effect of the catalogue explains it"
             if diagnosis.only_withdrawn:
-                none = ", and held-out data confirm no effect that the training recordings call for"
+                none = ", and what training recordings call for was withdrawn"
             said = f"A residual beyond the noise remains{none if diagnosis.limit is None else ''}."
             return Headline("!", "a residual remains", said)
         said = f"Effects are significant, and none was added. {_NOT_KNOWN}"

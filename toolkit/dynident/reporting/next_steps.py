@@ -99,7 +99,10 @@ def _to_settle(diagnosis: Diagnosis) -> list[Advice]:
     if diagnosis.too_fast is None:
         return []
     what = f"Settle first whether q.{diagnosis.too_fast.joint} is the position of that joint."
-    why = f"{diagnosis.too_fast.sentence} The page on coupled motors says how to write it."
+    why = (
+        f"{diagnosis.too_fast.sentence} How positions of motors are written: "
+        "docs/howto/coupled_motors.md."
+    )
     return [Advice(what, why)]
 
 
@@ -131,7 +134,8 @@ def _to_add(diagnosis: Diagnosis) -> list[Advice]:
         else f"; noise alone would make {percent(error.noise_floor)}"
     )
     why = f"{share}{brings} to {percent(error.after)}{floor}."
-    if error.before - error.after < _LITTLE * error.before:
+    unclear = diagnosis.verdict == "unexplained" or diagnosis.noise_source == "unknown"
+    if unclear and error.before - error.after < _LITTLE * error.before:
         why += " Most of the error stays."
     if all(step.uncertain for group in first for step in group):
         why += " It is within two standard errors, and may be chance: another recording tells."
@@ -238,7 +242,7 @@ def _unexplained(diagnosis: Diagnosis) -> Advice:
     where = listed(worst[:3]) or "the joints"
     explained = "that no effect of the catalogue explains"
     if diagnosis.only_withdrawn:
-        explained = "of which held-out data confirm no explanation"
+        explained = "for which what training recordings call for was withdrawn"
     return Advice(
         f"Look at the pictures of {where} below: something is left there {explained}.",
         "The shape in the pictures is what is known of it. Rule out the simple causes first: a "

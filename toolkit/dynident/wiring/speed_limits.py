@@ -40,12 +40,12 @@ class OverSpeed:
     @property
     def words(self) -> str:
         """What was seen, as the end of a sentence."""
-        reach, keep = ("reach", "keep") if self.at_limit[1:] else ("reaches", "keeps")
+        come, keep = ("come", "keep") if self.at_limit[1:] else ("comes", "keeps")
         its, them = ("theirs", "them") if self.at_limit[1:] else ("its own", "it")
         return (
             f"{self.joint} reaches {self.reached:.3g} {self.unit}, "
             f"{100 * (self.reached / self.limit - 1):.0f} % over its limit in the description, "
-            f"while {', '.join(self.at_limit)} {reach} {its} and {keep} {them}"
+            f"while {', '.join(self.at_limit)} {come} near {its} and {keep} {them}"
         )
 
     @property
@@ -54,7 +54,7 @@ class OverSpeed:
         return (
             f"As the study reads positions, {self.words}. A motor that turns two joints, a "
             "wrong ratio or a wrong limit looks like that, and wrong positions may fit better than "
-            "right ones: until it is settled, nothing that follows is certain."
+            "right ones: until it is settled, nothing that was found is certain."
         )
 
 

@@ -8,10 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from dynident.diagnosis.result import Diagnosis
-from dynident.errors import RecordingError
 from dynident.evidence.runs import Run
-from dynident.recording import Recording
-from dynident.recording.formats.column_expressions import parse
 from dynident.wiring.speed_limits import over_speed
 
 _OTHER_JOINTS = {"other joints", "speeds of other joints"}
@@ -39,9 +36,9 @@ def with_geometry_doubt(found: Diagnosis, runs: Sequence[Run]) -> Diagnosis:
     speeds = [run.replicates[0].motion.v for run in runs]
     fast = over_speed(found.before.model.robot, np.concatenate(speeds)) if speeds else None
     if fast is not None:
-        return replace(found, too_fast=fast, notes=(fast.sentence, *found.notes))
+        return replace(found, too_fast=fast)
     complete = found.verdict != "unexplained" and found.noise_source != "unknown"
-    pairs = () if complete else _pairs(found, [run.recording for run in runs])
+    pairs = [] if complete else _pairs(found)
     if not pairs:
         return found
     note = (
@@ -53,50 +50,23 @@ def with_geometry_doubt(found: Diagnosis, runs: Sequence[Run]) -> Diagnosis:
     return replace(found, notes=(*found.notes, note))
 
 
-def _pairs(found: Diagnosis, recordings: Sequence[Recording]) -> tuple[str, ...]:
-    """Which torque goes with the motion of which joint.
-
-    Where a study states that motors turn two joints, what is left there says nothing new of it.
-    """
-    in_columns = _with_shared_motors(recordings)
-    in_model = {
+def _pairs(found: Diagnosis) -> list[str]:
+    """Which torque goes with the motion of which joint."""
+    pairs = [
+        f"{step.effect.joint} goes with {step.effect.source}"
+        for step in found.steps
+        if step.effect.source is not None
+    ]
+    # Where a study states that motors turn two joints, what is left there says nothing new of it.
+    stated = {
         name
         for effect in found.before.model.effects
         if effect.source is not None
         for name in (effect.joint, effect.source)
     }
-    added = [step.effect for step in found.steps if step.effect.source is not None]
-    return (
-        *(
-            f"{effect.joint} goes with {effect.source}"
-            for effect in added
-            if not {effect.joint, effect.source} <= in_columns
-        ),
-        *(
-            f"{one.joint} goes with the other joints"
-            for one in found.residual_dependence
-            if not _OTHER_JOINTS.isdisjoint(one.told) and one.joint not in in_model | in_columns
-        ),
-    )
-
-
-def _with_shared_motors(recordings: Sequence[Recording]) -> set[str]:
-    """Joints whose positions a study makes of columns that those of other joints have, too."""
-    found: set[str] = set()
-    for recording in recordings:
-        made = {
-            ours.removeprefix("q."): _columns_of(theirs)
-            for ours, theirs, _ in recording.provenance.columns
-            if ours.startswith("q.")
-        }
-        for joint, columns in made.items():
-            if any(columns & others for name, others in made.items() if name != joint):
-                found.add(joint)
-    return found
-
-
-def _columns_of(text: str) -> set[str]:
-    try:
-        return set(parse(text).terms)
-    except RecordingError:
-        return {text}  # a name that no expression could hold
+    pairs += [
+        f"{one.joint} goes with the other joints"
+        for one in found.residual_dependence
+        if not _OTHER_JOINTS.isdisjoint(one.told) and one.joint not in stated
+    ]
+    return pairs

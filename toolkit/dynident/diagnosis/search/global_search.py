@@ -108,19 +108,20 @@ def _sought(start: RankedModel, last: RankedModel) -> list[Effect]:
     if added:
         return added
     below_noise = joints_below_noise(evidence, last.fitted)
-    parts = np.maximum(*(_parts_of_joints(one.fitted) for one in (start, last)))
     felt = {
         joint
-        for joint, part in zip(model.robot.names, parts, strict=True)
-        if part >= evidence.criteria.global_search.felt and joint not in below_noise
+        for one in (start, last)
+        for joint, is_felt in zip(model.robot.names, _felt(one.fitted), strict=True)
+        if is_felt and joint not in below_noise
     }
     return [one for one in every if one.joint in felt]
 
 
-def _parts_of_joints(fitted: EvidenceFit) -> np.ndarray:
-    """What a model leaves at each joint, as a part of all that it leaves, each over its noise."""
-    each = np.clip(fitted.squares / fitted.variances, 0.0, None)
-    return each / total if (total := each.sum()) > 0 else each
+def _felt(fitted: EvidenceFit) -> np.ndarray:
+    """Joints (n,) with more left than their noise, or with a part of what is left of all."""
+    over_noise = np.clip(fitted.squares / fitted.variances, 0.0, None)
+    part = fitted.criteria.global_search.felt * over_noise.sum()
+    return over_noise >= min(1.0, part)
 
 
 def _finals(

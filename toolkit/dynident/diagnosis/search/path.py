@@ -188,7 +188,7 @@ def judged_on(evidence: Evidence, held: Evidence | None, stage: EvidenceFit) -> 
 def responses_in_place(
     evidence: Evidence, start: EvidenceFit, final: EvidenceFit, found: _Group
 ) -> _Group:
-    """Return the effects in order, responses before what explains clearly less in the same place.
+    """Return the effects in order, responses before what would explain clearly less there.
 
     Clearly: less than `SearchCriteria.simpler_share` of what the response explains on the training
     recordings, as in a choice among candidates. All else keeps its order, and what was added at
@@ -204,8 +204,10 @@ def responses_in_place(
 
     def misfit(groups: Sequence[_Group]) -> float:
         effects = tuple(by_label[one.score.effect.label] for group in groups for one in group)
-        fit = fit_evidence(evidence, start.model + effects, start) if effects else start
-        return fit.misfit(start)
+        if not effects:
+            return start.misfit(start)
+        wider = (start.model + effects).with_shapes(final.model.effects)
+        return with_friction_width(evidence, fit_evidence(evidence, wider, start)).misfit(start)
 
     order: list[_Group] = []
     for _, together in groupby(found, key=lambda one: one.with_it or one.score.effect.label):
@@ -223,6 +225,6 @@ def _place(
     for place, other in enumerate(order):
         before = misfit(order[:place])
         fall, others_fall = (before - misfit((*order[:place], one)) for one in (group, other))
-        if others_fall < least * fall:
+        if fall > 0.0 and others_fall < least * fall:
             return place
     return len(order)
