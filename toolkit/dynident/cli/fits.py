@@ -42,9 +42,7 @@ class _Files:
         """What the description that was written does not hold."""
         if self.robot is None:
             return ()
-        return (
-            f"{self.robot} has the rigid bodies; friction and other effects are in the estimate.",
-        )
+        return (f"{self.robot} has the rigid bodies alone: friction and other effects stay out.",)
 
     def write(self, estimate: Estimate) -> None:
         """Write the estimate, its robot, and the picture of its iterations."""
