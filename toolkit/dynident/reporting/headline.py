@@ -80,7 +80,8 @@ def _with_doubt(found: Headline, diagnosis: Diagnosis) -> Headline:
         return found
     joint = diagnosis.too_fast.joint
     mark = "?" if found.mark == "\u2713" else found.mark
-    return replace(found, mark=mark, sentence=f"{joint} is too fast: see below. {found.sentence}")
+    first = f"{joint} is too fast for its limit: settle that first."
+    return replace(found, mark=mark, sentence=f"{first} {found.sentence}")
 
 
 def _of_verdict(diagnosis: Diagnosis) -> Headline:
