@@ -84,6 +84,13 @@ class FitCriteria(CriteriaGroup):
     value_tolerance: float = criterion(
         1e-4, "1", "relative change of the values at which such columns have converged", over=0
     )
+    samples_hz: float = criterion(
+        1000.0,
+        "Hz",
+        "samples in a second at which columns are evaluated, where a recording has more and the "
+        "filter keeps nothing of what they hold",
+        over=0,
+    )
     instrument_rounds: int = criterion(
         6, "rounds", "simulations of the loop for the first instruments, at most", least=1
     )

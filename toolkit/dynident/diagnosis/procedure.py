@@ -165,11 +165,11 @@ def _compare(
     """Gather the evidence, and fit the model as given to it."""
     task.progress("reading the motion")
     loop = motion_of_loop(given, task.train, controller, task.progress, criteria)
-    runs = loop.runs or gather(task.train, criteria.noise)
+    runs = loop.runs or gather(task.train, criteria)
     evidence = Evidence(given, runs, criteria=criteria, candidates=_variants(given))
     held = None
     if task.test is not None and len(task.test):
-        held = Evidence(given, gather(task.test, criteria.noise), criteria=criteria)
+        held = Evidence(given, gather(task.test, criteria), criteria=criteria)
     task.progress("evaluating every effect")
     start = with_friction_width(evidence, shaped(evidence, given))
     whole = evidence

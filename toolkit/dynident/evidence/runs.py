@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from dynident.criteria import DEFAULTS, NoiseCriteria
+from dynident.criteria import DEFAULTS, Criteria
 from dynident.effects import Block
 from dynident.evidence.windows import shared_motion
 from dynident.fitting.sampling import Sampled, flagged, sample
@@ -148,7 +148,7 @@ class Run:
 
 def gather(
     dataset: Dataset,
-    criteria: NoiseCriteria = DEFAULTS.noise,
+    criteria: Criteria = DEFAULTS,
     *,
     simulated: Dataset | None = None,
     seed: int = 0,
@@ -158,7 +158,7 @@ def gather(
     Parameters
     ----------
     dataset : the recordings.
-    criteria : copies, and blocks of time.
+    criteria : copies, blocks of time, and how many samples columns are evaluated at.
     simulated : the motion of each recording, simulated, on the same time stamps.
     seed : of the noise on the copies.
 
@@ -173,25 +173,27 @@ def gather(
         torque at all.
     """
     require_torque(dataset.recordings)
-    per_run = max(criteria.blocks_per_recording, -(-criteria.blocks // len(dataset.recordings)))
+    noise, least_hz = criteria.noise, criteria.fit.samples_hz
+    per_run = max(noise.blocks_per_recording, -(-noise.blocks // len(dataset.recordings)))
     runs: list[Run] = []
     streams = np.random.SeedSequence(seed).spawn(len(dataset.recordings))
     repeats = any(r.period for r in dataset.recordings)
     for number, recording in enumerate(dataset.recordings):
         # Noise on top would hide the signs of a jittered clock: straighten it before.
         recording = uniform(recording)
-        first = shared_motion(sample(recording, dataset.filter), (r.replicates[0] for r in runs))
-        usable = np.arange(criteria.order, len(first.t))
+        whole = sample(recording, dataset.filter).thinned(least_hz)
+        first = shared_motion(whole, (r.replicates[0] for r in runs))
+        usable = np.arange(noise.order, len(first.t))
         if recording.period:
             where = recording.where
             found = periods(len(usable), first.rate_hz, recording.period, where)
-            require_repetition(first.q[criteria.order :], found, where)
-            index = criteria.order + found.index
+            require_repetition(first.q[noise.order :], found, where)
+            index = noise.order + found.index
             kind: Kind = "repeated"
             replicates: tuple[Sampled, ...] = (first,)
         elif dataset.noise and not repeats:
             # Where columns come from elsewhere, the copies tell the size of the noise only.
-            count = criteria.copies if simulated is None else criteria.copies_beside_simulation
+            count = noise.copies if simulated is None else noise.copies_beside_simulation
             # Windows of one recording have the same noise on their copies: each is evaluated once.
             windows = [k for k, run in enumerate(runs) if run.replicates[0].motion is first.motion]
             stream = np.random.default_rng(streams[windows[0] if windows else number])
@@ -199,7 +201,10 @@ def gather(
             copies = (noisy(recording, dataset.noise, stream) for _ in range(count))
             replicates = (
                 first,
-                *(shared_motion(sample(copy, dataset.filter), known) for copy in copies),
+                *(
+                    shared_motion(sample(copy, dataset.filter).thinned(least_hz), known)
+                    for copy in copies
+                ),
             )
             index, kind = np.tile(usable, (len(replicates), 1)), "noise_augmented"
         else:
@@ -221,7 +226,7 @@ def simulated_versions(runs: Sequence[Run], simulated: Dataset) -> tuple[Sampled
             sample(
                 one.replace(window=run.recording.window, payload=run.recording.payload),
                 simulated.filter,
-            )
+            ).thinned(run.replicates[0].parallel.rate_hz)
         )
         for run, one in zip(runs, simulated.recordings, strict=True)
     )

@@ -83,8 +83,9 @@ def shared_motion(one: Sampled, others: Iterable[Sampled] = ()) -> Sampled:
 
 
 def _equal(one: Motion, other: Motion) -> bool:
-    return (one.first, one.rate_hz, one.samples) == (
+    return (one.first, one.every, one.rate_hz, one.samples) == (
         other.first,
+        other.every,
         other.rate_hz,
         other.samples,
     ) and all(

@@ -42,6 +42,9 @@ _LEAST_BLOCK = 2048  # fewer do not pay for a function of many samples
 LEAST_ROWS = 20
 """Rows below which a recording says too little."""
 
+_OF_CUTOFF, _OF_POSITIONS = 20.0, 10.0
+"""Rate of a thinned motion over the cut-offs of columns and of positions, at least."""
+
 Evaluate = Callable[[Block], list[np.ndarray]]
 """Columns of a block, each (T, ...)."""
 
@@ -79,7 +82,7 @@ class Sampled:
     def t(self) -> np.ndarray:
         """Time stamps of the decimated rows, (T,) s."""
         rows = self.parallel.rows(self.source.samples, self.kept)
-        return self.recording.t[self.source.first + rows]
+        return self.recording.t[self.source.first + self.source.every * rows]
 
     @property
     def q(self) -> np.ndarray:
@@ -117,6 +120,27 @@ class Sampled:
     def rate_hz(self) -> float:
         """Rate of the decimated rows."""
         return self.parallel.output_rate_hz
+
+    def thinned(self, least_hz: float) -> Sampled:
+        """Return the same rows, made of fewer samples where the recording has more than they need.
+
+        Of a low-passed motion a tenth of the samples, say, hold as much. Where columns are
+        evaluated once that saves little; a search evaluates hundreds.
+
+        Parameters
+        ----------
+        least_hz : rate of the samples, at least; and 20 times the cut-off of columns and torque,
+            10 times that of the positions. Recipes with decimation or ends of their own are
+            followed to the letter.
+        """
+        filter, motion = self.parallel.filter, self.motion
+        cutoff, of_positions = filter.cutoff_hz, filter.position_cutoff_hz
+        recipe = filter.decimation != "pick" or filter.ends == "keep"
+        if recipe or cutoff is None or of_positions is None:
+            return replace(self, source=motion)
+        enough = max(least_hz, _OF_CUTOFF * cutoff, _OF_POSITIONS * of_positions)
+        parallel, every = self.parallel.thinned(int(self.parallel.rate_hz / enough + 1e-9))
+        return replace(self, source=motion.thinned(every), parallel=parallel)
 
     def columns(self, model: Model, values: np.ndarray | None = None) -> Iterator[np.ndarray]:
         """Columns of a model block by block, (T, n, p) as decimated rows.
@@ -217,8 +241,9 @@ class Sampled:
         """Some samples of the motion as effects see them."""
         recording, temperature = self.recording, getattr(self.recording, "temperature", None)
         if temperature is not None:
+            first, every = self.source.first, self.source.every
             start, stop, _ = raw.indices(self.source.samples)
-            temperature = temperature[self.source.first + start : self.source.first + stop]
+            temperature = temperature[first + every * start : first + every * stop : every]
         return model.block(
             motion.t + recording.start,
             motion.q,

@@ -6,8 +6,9 @@ long recording never exists as a whole; or all of it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -23,11 +24,17 @@ from dynident.recording.filters import (
 from dynident.recording.recording import Recording
 
 _FEW = 16
+_BAND = 0.25
+"""Cut-off of a thinned torque's low-pass over its rate.
+
+A twentieth of the rate is let through to 3e-6, a fiftieth to 2e-9; what is folded into that band
+from above is less than 4e-5 of what it was.
+"""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Motion:
-    """Filtered positions and their derivatives, at the recording's own rate.
+    """Filtered positions and their derivatives, at the recording's own rate unless thinned.
 
     Attributes
     ----------
@@ -35,7 +42,7 @@ class Motion:
     q, v, a : (T, n) rad or m, and per s and s^2.
     tau : (T, n) N m or N, at the instants of `t` (half a sample after held commands).
     rate_hz : mean sampling rate.
-    first : index in the recording of the first row.
+    first, every : index in the recording of the first row, and its samples from row to row.
     """
 
     t: np.ndarray
@@ -45,6 +52,7 @@ class Motion:
     tau: np.ndarray
     rate_hz: float
     first: int = 0
+    every: int = 1
 
     @property
     def samples(self) -> int:
@@ -59,7 +67,26 @@ class Motion:
     def part(self, rows: slice) -> Motion:
         """Return some consecutive rows."""
         t, q, v, a, tau = (x[rows] for x in (self.t, self.q, self.v, self.a, self.tau))
-        return Motion(t=t, q=q, v=v, a=a, tau=tau, rate_hz=self.rate_hz, first=self.first)
+        return replace(self, t=t, q=q, v=v, a=a, tau=tau)
+
+    def thinned(self, every: int) -> Motion:
+        """Return every so many-th row, the last one included, for positions with a low-pass.
+
+        Far above its cut-off a motion holds nothing that would be lost. The torque, whose noise has
+        all frequencies, passes a low-pass of its own before.
+
+        Parameters
+        ----------
+        every : 1 for all rows.
+        """
+        if every == 1:
+            return self
+        rate, skipped = self.rate_hz / every, (self.samples - 1) % every
+        kept = slice(skipped, None, every)
+        t, q, v, a = (np.ascontiguousarray(x[kept]) for x in (self.t, self.q, self.v, self.a))
+        tau = np.ascontiguousarray(lowpass(self.tau, self.rate_hz, _BAND * rate)[kept])
+        first, every = self.first + self.every * skipped, self.every * every
+        return Motion(t=t, q=q, v=v, a=a, tau=tau, rate_hz=rate, first=first, every=every)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +106,7 @@ class MotionInParts:
 
     recording: Recording
     filter: Filter
+    every: ClassVar[int] = 1
 
     def __post_init__(self) -> None:
         rate, (first, last) = self.rate_hz, self._margins

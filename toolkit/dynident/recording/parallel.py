@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -79,6 +79,20 @@ class ParallelFilter:
     def factor(self) -> int:
         """The step as a whole number."""
         return round(self.step)
+
+    def thinned(self, most: int) -> tuple[ParallelFilter, int]:
+        """Return the filter of every so many-th sample that keeps the same rows, and how many.
+
+        Parameters
+        ----------
+        most : samples from one that is left to the next.
+        """
+        period = round(self.period * self.rate_hz) if self.period else 0
+        for every in range(most, 1, -1):
+            thinner = replace(self, rate_hz=self.rate_hz / every)
+            if period % every == 0 and thinner.step * every == self.step:
+                return thinner, every
+        return self, 1
 
     @property
     def output_rate_hz(self) -> float:

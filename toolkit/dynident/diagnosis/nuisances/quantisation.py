@@ -133,7 +133,8 @@ def _predicted(
     fitted: EvidenceFit, dataset: Dataset, recordings: list[Recording]
 ) -> tuple[np.ndarray, list[np.ndarray]]:
     """Times (T,) s, and the torque that the model predicts along each recording, (T, n)."""
-    each = [shared_motion(sample(one, dataset.filter)) for one in recordings]
+    least_hz = fitted.criteria.fit.samples_hz
+    each = [shared_motion(sample(one, dataset.filter).thinned(least_hz)) for one in recordings]
     predicted = []
     for one in each:
         parts = one.residuals(fitted.model, fitted.values)

@@ -213,7 +213,8 @@ def _between_samples(evidence: Evidence, j: int, width: float, criteria: Stickin
     if not held:
         return False
     speeds = [one.motion.v[_used(one), j] for one in held]
-    steps = [np.abs(np.diff(v))[v[1:] * v[:-1] < 0] for v in speeds]
+    rows = [one.motion.every for one in held]
+    steps = [np.abs(np.diff(v))[v[1:] * v[:-1] < 0] / k for v, k in zip(speeds, rows, strict=True)]
     quick = np.concatenate(steps) > criteria.coarse * width
     return bool(np.sum(quick) >= max(criteria.stops, criteria.stops_share * len(quick)))
 
@@ -243,7 +244,7 @@ def speed_noise(sampled: Sampled) -> np.ndarray:
 
     White noise of the encoders, through the low-pass of the positions and the central difference.
     """
-    rate = sampled.motion.rate_hz
+    rate = sampled.recording.rate_hz
     angle = np.linspace(0.0, np.pi, _FREQUENCIES)
     gain = np.sin(angle) * rate
     cutoff = sampled.parallel.filter.position_cutoff_hz

@@ -140,7 +140,7 @@ def narrower(evidence: Evidence, train: Dataset) -> tuple[Evidence, ...]:
     for share in (gates.filter_share, gates.second_filter_share):
         lower = replace(train, filter=own.narrowed(share, rate))
         try:
-            runs = gather(lower, evidence.criteria.noise)
+            runs = gather(lower, evidence.criteria)
         except RecordingError:
             break
         found.append(Evidence(evidence.model, runs, criteria=evidence.criteria))
