@@ -366,11 +366,26 @@ def _pooled(evidence: Evidence, model: Model, noise, white: White) -> SecondMome
     return reduce(add, (WhiteColumns.pooled(joints) for joints in white))
 
 
+def signal_by_joint(evidence: Evidence, fitted: EvidenceFit) -> np.ndarray:
+    """Return the parts of `error_signal` that are left at each joint, (n,).
+
+    Parameters
+    ----------
+    evidence, fitted : the recordings, and the model as it fits them.
+    """
+    return _signals(evidence, fitted.white, fitted.values)
+
+
 def _signal(evidence: Evidence, white: White, values: np.ndarray) -> float:
     """Squared whitened residual, of what the replicates have in common."""
-    combination, found = np.append(-values, 1.0), 0.0
+    return float(_signals(evidence, white, values).sum())
+
+
+def _signals(evidence: Evidence, white: White, values: np.ndarray) -> np.ndarray:
+    """The same of each joint, (n,)."""
+    combination, found = np.append(-values, 1.0), np.zeros(len(white[0]))
     for stack, joints in zip(evidence.stacks, white, strict=True):
-        for one in joints:
+        for j, one in enumerate(joints):
             left = one.times(combination)
-            found += float(stack.moments(left, left).signal.sum())
+            found[j] += stack.moments(left, left).signal.sum()
     return found

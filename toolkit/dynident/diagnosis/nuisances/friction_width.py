@@ -26,11 +26,14 @@ from dynident.diagnosis.search.scoring import candidate_moments
 from dynident.effects import Block, Effect, JointEffect, Parameter, ShapeParameter, catalogue
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of
+from dynident.model import Model
 from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import regression_values
 from dynident.tables import number
 
 _RIVALS = ("viscous_friction", "quadratic_drag")
+_CLEARLY = 3.0
+"""Times its price that a width brings by its profile, to be worth it without another fit."""
 
 
 class FrictionWidthColumn(JointEffect):
@@ -265,10 +268,30 @@ def _reconsidered(evidence: Evidence, fitted: EvidenceFit) -> EvidenceFit:
         if width == stated:
             continue
         model = fitted.model.with_friction_width(joint, float(stated))
+        if _is_worth_it(evidence, fitted, model, joint):
+            continue
         back = fit_evidence(evidence, model, fitted)
         if _drop(evidence, back, fitted) <= _price(fitted):
             fitted = back
     return fitted
+
+
+def _is_worth_it(evidence: Evidence, fitted: EvidenceFit, stated: Model, joint: str) -> bool:
+    """Whether a profile shows beyond doubt that a joint's width is worth its price.
+
+    A fit with the stated one shows it in any case, and takes long where columns depend on it. The
+    profile holds what is fitted of the bodies, and Coulomb friction alone.
+    """
+    label, model = f"coulomb_friction@{joint}", fitted.model
+    here = (one for one in model.effects if joint in (one.joint, one.source))
+    others = (one for one in here if one.label != label and not one.is_dynamic_response)
+    alone = all(model.known_by(one) == stated.known_by(one) for one in others)
+    if not (alone and fitted.noise_known and label in model.slices):
+        return False
+    profile = WidthProfile(evidence, fitted, joint)
+    factor = float(stated.friction_widths[model.robot.names.index(joint)]) / profile.width
+    missed = profile.missed(np.array([factor]))[0]
+    return bool(missed - fitted.error_signal > _CLEARLY * _price(fitted))
 
 
 def _best_rival(evidence: Evidence, fitted: EvidenceFit, joint: str) -> float:

@@ -21,7 +21,7 @@ from dynident.diagnosis.search.ranking import joints_below_noise, rank
 from dynident.diagnosis.search.scoring import Score
 from dynident.effects import Block, ShapeParameter
 from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, signal_by_joint
 from dynident.tables import number
 
 _WIDTHS = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4)
@@ -36,6 +36,8 @@ _USUAL = 99.0
 """Percentile of a joint's acceleration that counts as its highest."""
 _AS_MUCH = 0.5
 """Share of what an effect explains that a law must explain at least, to stand in for it."""
+_AT_MOST = 2.0
+"""Times what is left at a joint that a law there explains at most, as the others follow."""
 _AT_ONCE = 5e-5
 """s, below which it reverses with the joint."""
 
@@ -130,18 +132,35 @@ def laws_that_do_as_well(
     model = fitted.model
     joints = [model.robot.names[j] for j in one.effect.acting_at(model.robot)]
     dry = [joint for joint in joints if f"coulomb_friction@{joint}" in model.slices]
-    found = [_best_law(evidence, fitted, joint) for joint in dry]
-    worth = 2.0 * np.log(fitted.rows)
-    found = [law for law in found if law.drop > worth and abs(law.lead_s) < _LATEST]
     gates = evidence.criteria.gates
     # What it explains more than they do must itself be worth an effect.
     least = (gates.later_share if added else gates.first_share) * fitted.error_total
-    if sum(law.drop for law in found) < max(one.penalised - least, _AS_MUCH * one.penalised):
+    least = max(one.penalised - least, _AS_MUCH * one.penalised)
+    found = _laws_at(evidence, fitted, dry, least)
+    if sum(law.drop for law in found) < least:
         return ()
     beside = fit_evidence(evidence, fitted.model + tuple(law.column for law in found), fitted)
     if rank(evidence, beside, added, only=(one.effect,)).passing:
         return ()  # it explains something else than they do
     return tuple(found)
+
+
+def _laws_at(
+    evidence: Evidence, fitted: EvidenceFit, joints: list[str], least: float
+) -> list[ReversalLaw]:
+    """Laws at joints that explain something; fewer where all of them cannot explain enough."""
+    names, worth = fitted.model.robot.names, 2.0 * np.log(fitted.rows)
+    left = dict(zip(names, signal_by_joint(evidence, fitted), strict=True))
+    found: dict[str, ReversalLaw] = {}
+    hope = _AT_MOST * sum(max(left[joint], 0.0) for joint in joints)
+    for joint in sorted(joints, key=lambda one: -left[one]):
+        if sum(law.drop for law in found.values()) + hope < least:
+            break
+        hope -= _AT_MOST * max(left[joint], 0.0)
+        law = _best_law(evidence, fitted, joint)
+        if law.drop > worth and abs(law.lead_s) < _LATEST:
+            found[joint] = law
+    return [found[joint] for joint in joints if joint in found]
 
 
 def laws_of_the_rest(evidence: Evidence, fitted: EvidenceFit) -> tuple[ReversalLaw, ...]:
