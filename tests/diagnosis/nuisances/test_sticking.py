@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import dynident as di
+from dynident.criteria import Criteria
 from dynident.diagnosis.nuisances.sticking import (
     speed_noise,
     sticking_joints,
@@ -38,19 +39,19 @@ def given() -> Model:
     return Model(robot, tuple(e for name in names for e in effects_of(name, robot)), WIDTH)
 
 
-def record(seed: int, stands: float, stribeck: float = 0.0) -> Recording:
+def record(seed: int, stands: float, stribeck: float = 0.0, rate_hz: float = RATE_HZ) -> Recording:
     """A motion whose elbow stands while the reference is slower than `stands`, rad/s.
 
     While it stands, its dry friction passes from one side to the other as the reference does: it
     is no function of the elbow's speed. The shoulder's reverses over the width of the model.
     """
     model, rng = given(), np.random.default_rng([seed, 5])
-    t, q, v, _ = smooth_motion(2, seed, RATE_HZ, 16.0, 16.0)
+    t, q, v, _ = smooth_motion(2, seed, rate_hz, 16.0, 16.0)
     reference = v[:, 1].copy()
     if stands:
         v[:, 1] -= np.clip(reference, -stands, stands)
-        q[:, 1] = q[0, 1] + np.concatenate([[0.0], np.cumsum((v[1:, 1] + v[:-1, 1]) / 2)]) / RATE_HZ
-    a = np.gradient(v, 1.0 / RATE_HZ, axis=0)
+        q[:, 1] = q[0, 1] + np.concatenate([[0.0], np.cumsum((v[1:, 1] + v[:-1, 1]) / 2)]) / rate_hz
+    a = np.gradient(v, 1.0 / rate_hz, axis=0)
     values = true_values(model, Fv__shoulder=1.0, Fv__elbow=0.6, Fc__shoulder=COULOMB[0])
     tau = model.torque(model.block(t, q, v, a), values)
     share = np.clip(reference / stands, -1, 1) if stands else np.tanh(v[:, 1] / WIDTH)
@@ -135,6 +136,19 @@ def test_rows_around_reversals_count_no_more_and_the_others_do() -> None:
     assert note.startswith("elbow stands still")
     (note,) = sticking_notes(without_reversals(of, ("shoulder", "elbow")))
     assert note.startswith("shoulder and elbow stand still") and "of each joint's rows" in note
+
+
+def test_stops_are_seen_in_all_samples_of_a_fast_recording() -> None:
+    """They are over in a few samples, if columns are evaluated at fewer."""
+    fast = Dataset(tuple(record(seed, 0.01, rate_hz=5000.0) for seed in (0, 1)))
+    found, rows = [], []
+    for samples_hz in (1e6, 1000.0):
+        criteria = Criteria.with_values({"fit": {"samples_hz": samples_hz}})
+        of = Evidence(given(), gather(fast, criteria), criteria=criteria)
+        found.append(sticking_joints(of, fit_evidence(of, of.model)))
+        rows.append([run.certain_rows for run in without_reversals(of, ("elbow",)).runs])
+    assert found == [("elbow",)] * 2
+    np.testing.assert_array_equal(*rows)
 
 
 def test_noise_of_the_speed_is_that_of_encoder_and_filter() -> None:

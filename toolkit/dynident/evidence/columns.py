@@ -480,10 +480,16 @@ class Evidence:
                 at[len(base) :] = values[model.slices[one.label]]
         torque = known[key].times(at)
         for one in model.effects:
-            if not (one.is_payload or one.needs_torque):
+            if one.is_payload or one.needs_torque:
+                continue
+            key = ("full rate", model.known_by(one))
+            columns = known.get(key)
+            if columns is None:
                 columns = one.acting_columns(model.ready(one, block, values))
-                own = columns @ values[model.slices[one.label]]
-                torque[:, list(one.acting_at(model.robot))] += own
+            if not one.depends_on_fit and Needs.NUMBER not in one.needs:
+                known[key] = columns
+            own = columns @ values[model.slices[one.label]]
+            torque[:, list(one.acting_at(model.robot))] += own
         return torque
 
     def _filtered_torque(self, sampled: Sampled, model: Model, values: np.ndarray) -> np.ndarray:

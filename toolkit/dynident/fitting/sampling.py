@@ -60,6 +60,7 @@ class Sampled:
     parallel : the low-pass and decimation of columns and torque.
     kept : decimated rows that are used, see `usable_rows`.
     at_once : samples at the full rate that are evaluated at a time, at most.
+    unthinned : with all samples of the recording, see `thinned`; None where these are.
     """
 
     recording: Recording
@@ -67,6 +68,7 @@ class Sampled:
     parallel: ParallelFilter
     kept: slice
     at_once: int = BLOCK
+    unthinned: Sampled | None = None
 
     @property
     def motion(self) -> Motion:
@@ -133,14 +135,17 @@ class Sampled:
             10 times that of the positions. Recipes with decimation or ends of their own are
             followed to the letter.
         """
-        filter, motion = self.parallel.filter, self.motion
+        filter = self.parallel.filter
         cutoff, of_positions = filter.cutoff_hz, filter.position_cutoff_hz
         recipe = filter.decimation != "pick" or filter.ends == "keep"
         if recipe or cutoff is None or of_positions is None:
-            return replace(self, source=motion)
+            return self
         enough = max(least_hz, _OF_CUTOFF * cutoff, _OF_POSITIONS * of_positions)
         parallel, every = self.parallel.thinned(int(self.parallel.rate_hz / enough + 1e-9))
-        return replace(self, source=motion.thinned(every), parallel=parallel)
+        if every == 1:
+            return self
+        motion = self.source.part(slice(0, self.source.samples)).thinned(every)
+        return replace(self, source=motion, parallel=parallel, unthinned=self)
 
     def columns(self, model: Model, values: np.ndarray | None = None) -> Iterator[np.ndarray]:
         """Columns of a model block by block, (T, n, p) as decimated rows.

@@ -174,18 +174,33 @@ def _near_stops(evidence: Evidence, run: Run, j: int, least: float = 0.0) -> np.
     known, kept = evidence.cache.along(sampled.motion), sampled.kept
     key = ("near stops", j, least, kept.start, kept.stop)
     if key not in known:
-        v = sampled.motion.v[:, j]
+        v = _speeds(evidence, sampled)[:, j]
         # Around a reversal the speed is off by what the position's low-pass rounds.
         rounded = criteria.rounded * float(np.sqrt(np.mean(v[_used(sampled)] ** 2)))
         reach = max(criteria.noise * _speed_noise(evidence, sampled)[j], rounded, least)
-        near = sampled.filtered((np.abs(v) < reach).astype(float))
-        known[key] = np.abs(near) > criteria.spread
+        near = _recorded(sampled).parallel.apply((np.abs(v) < reach).astype(float))
+        known[key] = np.abs(near[kept]) > criteria.spread
     return known[key]
 
 
+def _recorded(sampled: Sampled) -> Sampled:
+    """With all samples of the recording: a stop may be over in a few."""
+    return sampled.unthinned or sampled
+
+
+def _speeds(evidence: Evidence, sampled: Sampled) -> np.ndarray:
+    """Speeds in all samples of the recording, (T, n)."""
+    known = evidence.cache.along(sampled.motion)
+    if "speeds" not in known:
+        source = _recorded(sampled).source
+        known["speeds"] = source.part(slice(0, source.samples)).v
+    return known["speeds"]
+
+
 def _used(sampled: Sampled) -> slice:
-    """Samples at the full rate from the first to the last row that is used."""
-    rows = sampled.parallel.rows(sampled.motion.samples)[sampled.kept]
+    """Samples of the recording from the first to the last row that is used."""
+    recorded = _recorded(sampled)
+    rows = recorded.parallel.rows(recorded.source.samples)[sampled.kept]
     return slice(int(rows[0]), int(rows[-1]) + 1)
 
 
@@ -199,7 +214,7 @@ def _stands(evidence: Evidence, j: int, criteria: StickingCriteria) -> bool:
         stop
         for sampled in (run.replicates[0] for run in evidence.runs)
         for stop in _stops(
-            sampled.motion.v[_used(sampled), j],
+            _speeds(evidence, sampled)[_used(sampled), j],
             criteria.noise * _speed_noise(evidence, sampled)[j],
         )
     ]
@@ -212,9 +227,8 @@ def _between_samples(evidence: Evidence, j: int, width: float, criteria: Stickin
     held = [run.replicates[0] for run in evidence.runs if run.recording.torque == "held_command"]
     if not held:
         return False
-    speeds = [one.motion.v[_used(one), j] for one in held]
-    rows = [one.motion.every for one in held]
-    steps = [np.abs(np.diff(v))[v[1:] * v[:-1] < 0] / k for v, k in zip(speeds, rows, strict=True)]
+    speeds = [_speeds(evidence, one)[_used(one), j] for one in held]
+    steps = [np.abs(np.diff(v))[v[1:] * v[:-1] < 0] for v in speeds]
     quick = np.concatenate(steps) > criteria.coarse * width
     return bool(np.sum(quick) >= max(criteria.stops, criteria.stops_share * len(quick)))
 

@@ -7,6 +7,7 @@ link's motion, at the samples of a recording and in steps that follow the fastes
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -57,6 +58,8 @@ class DrivenLink:
     step, period : s between samples; samples after which the motion repeats, 0 where it does not
         within the recording.
     M, C, G : (T, n) derivatives of torques by the joint's acceleration, speed and position.
+    latest : the transmission behind which its response was asked for last, and that response; for
+        whoever makes it to keep.
     """
 
     def __init__(self, block: Block, joint: int) -> None:
@@ -77,7 +80,8 @@ class DrivenLink:
         # A record that is shorter than its period does not hold what came before it.
         whole = 0 if block.period is None else round(block.period / self.step)
         self.period = whole if whole <= len(block.t) else 0
-        self._latest: tuple[tuple[int, int], Fine] | None = None
+        self._fine: tuple[tuple[int, int], Fine] | None = None
+        self.latest: tuple[Transmitting, Any] | None = None
 
     def fine(self, per: int, before: np.ndarray) -> Fine:
         """Return the link's motion in finer steps, the latest as it was made.
@@ -87,9 +91,9 @@ class DrivenLink:
         per, before : as for `Fine.of`; rows before are those of `run_up`, told by their number.
         """
         asked = (per, len(before))
-        if self._latest is None or self._latest[0] != asked:
-            self._latest = asked, Fine.of(self, per, before)
-        return self._latest[1]
+        if self._fine is None or self._fine[0] != asked:
+            self._fine = asked, Fine.of(self, per, before)
+        return self._fine[1]
 
     def behind(self, gear: Transmitting) -> np.ndarray:
         """Return the inertia behind a transmission, (T,): no less than a part of the mean."""

@@ -97,8 +97,10 @@ class FlexibleJoint(Forceless):
 
     def _response(self, link: DrivenLink) -> tuple[Transmitting, Response]:
         gear = Transmitting.of(link.inertia, self.shape, self.gap)
-        ((response,),) = responses([link], [[gear]])
-        return gear, response
+        if link.latest is None or link.latest[0] != gear:
+            ((response,),) = responses([link], [[gear]])
+            link.latest = gear, response
+        return link.latest
 
     def transmission(self, robot: Robot, stiffness: float, gap: float) -> Transmission:
         """Return it as a simulator has it, for the motor and the damping of this shape.
