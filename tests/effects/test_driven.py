@@ -208,6 +208,22 @@ def test_what_is_kept_of_a_motion_goes_with_it() -> None:
     assert held() is None
 
 
+def test_a_link_goes_with_the_response_that_it_keeps() -> None:
+    """Without the collector of cycles, which does not see how large it is."""
+    effect = Backlash("elbow").shaped(20.0, 0.3, 0.3).at([0.01])
+    one = block(3)
+    effect.columns(one)
+    made = along.along_motion(one)[1]
+    assert made.latest is not None
+    link = weakref.ref(made.latest[1])
+    gc.disable()
+    try:
+        made.latest = None
+        assert link() is None
+    finally:
+        gc.enable()
+
+
 def test_screened_shapes_share_the_dynamics_of_a_joint() -> None:
     (effect,) = effects_of("joint_elasticity@elbow", ROBOT)
     samples = block(4)

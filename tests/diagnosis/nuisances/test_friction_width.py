@@ -5,15 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dynident.diagnosis.nuisances import friction_width
 from dynident.diagnosis.nuisances.friction_width import (
     WidthProfile,
     at_best_widths,
     with_friction_width,
 )
 from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import fit_evidence, in_metric_of
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.runs import gather
+from dynident.model import Model
 from dynident.recording import Dataset
 from study_files import recording, true_model
 from synthetic import synthetic, true_values
@@ -39,6 +41,27 @@ def test_a_width_that_the_data_call_for_stays_and_its_interval_holds_it() -> Non
     low, high = WidthProfile(evidence, kept, "elbow").interval()
     assert low <= kept.model.friction_widths[1] <= high
     assert low <= STATED <= high
+
+
+@pytest.mark.parametrize(("stated", "fits"), [(5 * STATED, 0), (1.02 * STATED, 1)])
+def test_a_width_far_beyond_its_price_needs_no_fit_of_the_stated_one(
+    stated: float, fits: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The profile says the same as the fit does; where it is less clear, the fit is asked."""
+    given = true_model().with_friction_width("elbow", stated)
+    evidence = Evidence(given, gather(Dataset((recording(0), recording(2)))))
+    own = fit_evidence(evidence, true_model())
+    made: list[Model] = []
+
+    def counted(evidence: Evidence, model: Model, near: EvidenceFit) -> EvidenceFit:
+        made.append(model)
+        return fit_evidence(evidence, model, near)
+
+    monkeypatch.setattr(friction_width, "fit_evidence", counted)
+    kept = friction_width._reconsidered(evidence, own)
+    assert len(made) == fits
+    drop = friction_width._drop(evidence, fit_evidence(evidence, given, own), own)
+    assert (kept is own) == (drop > friction_width._price(own))
 
 
 @pytest.mark.parametrize(("stated", "is_found"), [(0.014, False), (0.04, True)])

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import re
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import dynident as di
-from dynident.diagnosis.nuisances.reversal_laws import laws_of_the_rest, laws_that_do_as_well
+from dynident.diagnosis.nuisances.reversal_laws import (
+    _best_law,
+    laws_of_the_rest,
+    laws_that_do_as_well,
+)
 from dynident.diagnosis.search.ranking import rank
 from dynident.effects import effects_of
 from dynident.effects.friction.stribeck_friction import StribeckFriction
 from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import fit_evidence
+from dynident.evidence.evidence_fit import fit_evidence, signal_by_joint
 from dynident.evidence.runs import gather
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
@@ -99,6 +104,30 @@ def test_a_law_that_explains_a_small_part_of_an_effect_does_not_stand_in_for_it(
     careful = Evidence(given(), evidence.runs, criteria=replace(evidence.criteria, gates=gates))
     far_better = replace(one, penalised=3.0 * law.drop)
     assert laws_that_do_as_well(careful, fitted, far_better, 0) == ()
+
+
+@pytest.mark.parametrize("part", [0.25, 0.5])
+def test_a_law_is_sought_where_what_is_left_is_not_to_be_told_from_noise(
+    part: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The square that is left is known to its noise only: a law may explain several times it."""
+    monkeypatch.setattr(sys.modules[__name__], "COULOMB", 0.04)
+    evidence = Evidence(given(), gather(dataset(0, 1, lead=6e-3)))
+    fitted = fit_evidence(evidence, evidence.model)
+    stands_in = StribeckFriction("elbow").on(evidence.model.robot)
+    (one,) = rank(evidence, fitted, 0, only=(stands_in,)).scores
+    law = _best_law(evidence, fitted, "elbow")
+    assert law.drop > 4.0 * signal_by_joint(evidence, fitted)[1]
+    (found,) = laws_that_do_as_well(evidence, fitted, replace(one, penalised=part * law.drop), 0)
+    assert found is law
+
+
+def test_what_is_left_at_the_joints_is_all_that_is_left() -> None:
+    evidence = Evidence(given(), gather(dataset(0, 1, lead=6e-3)))
+    fitted = fit_evidence(evidence, evidence.model)
+    left = signal_by_joint(evidence, fitted)
+    assert left.sum() == pytest.approx(fitted.error_signal, rel=1e-12)
+    assert left[1] > 10.0 * abs(left[0])
 
 
 @pytest.mark.parametrize(("lead", "excused"), [(6e-3, ["elbow"]), (0.0, ["elbow"]), (-6e-3, [])])

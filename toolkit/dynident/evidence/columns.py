@@ -482,15 +482,21 @@ class Evidence:
         for one in model.effects:
             if one.is_payload or one.needs_torque:
                 continue
-            key = ("full rate", model.known_by(one))
-            columns = known.get(key)
-            if columns is None:
-                columns = one.acting_columns(model.ready(one, block, values))
-            if not one.depends_on_fit and Needs.NUMBER not in one.needs:
-                known[key] = columns
-            own = columns @ values[model.slices[one.label]]
-            torque[:, list(one.acting_at(model.robot))] += own
+            own = self._full_rate_columns(one, sampled, block, model, values)
+            torque[:, list(one.acting_at(model.robot))] += own @ values[model.slices[one.label]]
         return torque
+
+    def _full_rate_columns(
+        self, effect: Effect, sampled: Sampled, block: Block, model: Model, values: np.ndarray
+    ) -> np.ndarray:
+        """Columns at the full rate; the latest of each effect that follow from the motion alone."""
+        if effect.depends_on_fit or Needs.NUMBER in effect.needs:
+            return effect.acting_columns(model.ready(effect, block, values))
+        known, key = self.cache.along(sampled.motion), ("full rate", effect.label)
+        by = model.known_by(effect)
+        if key not in known or known[key][0] != by:
+            known[key] = by, effect.acting_columns(model.ready(effect, block, values))
+        return known[key][1]
 
     def _filtered_torque(self, sampled: Sampled, model: Model, values: np.ndarray) -> np.ndarray:
         """Decimated rows of the torque that the model predicts, but for effects that scale it."""

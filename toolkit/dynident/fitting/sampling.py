@@ -56,11 +56,11 @@ class Sampled:
     Attributes
     ----------
     recording : on a uniform clock.
-    source : its motion at the full rate, part by part.
+    source : its motion at the full rate, before decimation, part by part; or thinned.
     parallel : the low-pass and decimation of columns and torque.
     kept : decimated rows that are used, see `usable_rows`.
     at_once : samples at the full rate that are evaluated at a time, at most.
-    unthinned : with all samples of the recording, see `thinned`; None where these are.
+    unthinned : the recording with all its samples, see `thinned`; None where none is left out.
     """
 
     recording: Recording
@@ -72,7 +72,7 @@ class Sampled:
 
     @property
     def motion(self) -> Motion:
-        """The motion at the full rate, as a whole."""
+        """The motion before decimation, as a whole."""
         return self.source.whole
 
     @property
@@ -127,7 +127,8 @@ class Sampled:
         """Return the same rows, made of fewer samples where the recording has more than they need.
 
         Of a low-passed motion a tenth of the samples, say, hold as much. Where columns are
-        evaluated once that saves little; a search evaluates hundreds.
+        evaluated once that saves little; a search evaluates hundreds. Columns that change within
+        a sample, as friction that reverses sharply, are those of a robot recorded at that rate.
 
         Parameters
         ----------

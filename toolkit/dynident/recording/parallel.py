@@ -81,16 +81,20 @@ class ParallelFilter:
         return round(self.step)
 
     def thinned(self, most: int) -> tuple[ParallelFilter, int]:
-        """Return the filter of every so many-th sample that keeps the same rows, and how many.
+        """Return the filter that keeps the same rows of every k-th sample, and that k.
+
+        The largest that there is: one that divides the samples of a step, and of a period. Itself
+        and 1 if there is none.
 
         Parameters
         ----------
-        most : samples from one that is left to the next.
+        most : largest k.
         """
         period = round(self.period * self.rate_hz) if self.period else 0
         for every in range(most, 1, -1):
             thinner = replace(self, rate_hz=self.rate_hz / every)
-            if period % every == 0 and thinner.step * every == self.step:
+            divides = period % every == 0 and self.step % every == 0
+            if divides and thinner.step * every == self.step:
                 return thinner, every
         return self, 1
 

@@ -276,20 +276,19 @@ def _reconsidered(evidence: Evidence, fitted: EvidenceFit) -> EvidenceFit:
     return fitted
 
 
-def _is_worth_it(evidence: Evidence, fitted: EvidenceFit, stated: Model, joint: str) -> bool:
-    """Whether a profile shows beyond doubt that a joint's width is worth its price.
+def _is_worth_it(evidence: Evidence, fitted: EvidenceFit, other: Model, joint: str) -> bool:
+    """Whether a joint's width is worth its price by far, over that of another model.
 
-    A fit with the stated one shows it in any case, and takes long where columns depend on it. The
-    profile holds what is fitted of the bodies, and Coulomb friction alone.
+    A fit of that model shows it in any case, and takes long where columns depend on the fit. The
+    profile takes these as they are, and has another width of Coulomb friction alone.
     """
     label, model = f"coulomb_friction@{joint}", fitted.model
-    here = (one for one in model.effects if joint in (one.joint, one.source))
-    others = (one for one in here if one.label != label and not one.is_dynamic_response)
-    alone = all(model.known_by(one) == stated.known_by(one) for one in others)
+    others = (e for e in model.effects if e.label != label and not e.is_dynamic_response)
+    alone = all(model.known_by(one) == other.known_by(one) for one in others)
     if not (alone and fitted.noise_known and label in model.slices):
         return False
     profile = WidthProfile(evidence, fitted, joint)
-    factor = float(stated.friction_widths[model.robot.names.index(joint)]) / profile.width
+    factor = float(other.friction_widths[model.robot.names.index(joint)]) / profile.width
     missed = profile.missed(np.array([factor]))[0]
     return bool(missed - fitted.error_signal > _CLEARLY * _price(fitted))
 

@@ -36,8 +36,8 @@ _USUAL = 99.0
 """Percentile of a joint's acceleration that counts as its highest."""
 _AS_MUCH = 0.5
 """Share of what an effect explains that a law must explain at least, to stand in for it."""
-_AT_MOST = 2.0
-"""Times what is left at a joint that a law there explains at most, as the others follow."""
+_AT_MOST, _NOISE = 2.0, 3.0
+"""Times what is left at a joint, and standard deviations of its noise, that a law may explain."""
 _AT_ONCE = 5e-5
 """s, below which it reverses with the joint."""
 
@@ -148,15 +148,22 @@ def laws_that_do_as_well(
 def _laws_at(
     evidence: Evidence, fitted: EvidenceFit, joints: list[str], least: float
 ) -> list[ReversalLaw]:
-    """Laws at joints that explain something; fewer where all of them cannot explain enough."""
+    """Laws at joints that explain something; fewer where all of them are too little by far.
+
+    What a law explains is estimated from what is left at its joint, whose noise-free square is
+    known to the noise of a sum of so many squares.
+    """
     names, worth = fitted.model.robot.names, 2.0 * np.log(fitted.rows)
-    left = dict(zip(names, signal_by_joint(evidence, fitted), strict=True))
+    noise = _NOISE * np.sqrt(2.0 * fitted.rows / len(names))
+    left = _AT_MOST * (np.clip(signal_by_joint(evidence, fitted), 0.0, None) + noise)
+    most = dict(zip(names, left, strict=True))
     found: dict[str, ReversalLaw] = {}
-    hope = _AT_MOST * sum(max(left[joint], 0.0) for joint in joints)
-    for joint in sorted(joints, key=lambda one: -left[one]):
+    waiting = sorted(joints, key=lambda one: -most[one])
+    while waiting:
+        hope = sum(most[joint] for joint in waiting)
         if sum(law.drop for law in found.values()) + hope < least:
             break
-        hope -= _AT_MOST * max(left[joint], 0.0)
+        joint = waiting.pop(0)
         law = _best_law(evidence, fitted, joint)
         if law.drop > worth and abs(law.lead_s) < _LATEST:
             found[joint] = law

@@ -58,8 +58,8 @@ class DrivenLink:
     step, period : s between samples; samples after which the motion repeats, 0 where it does not
         within the recording.
     M, C, G : (T, n) derivatives of torques by the joint's acceleration, speed and position.
-    latest : the transmission behind which its response was asked for last, and that response; for
-        whoever makes it to keep.
+    latest : the transmission behind which its response was asked for last, and that response, as
+        `FlexibleJoint` keeps it: a shape's derivatives are those of the same response.
     """
 
     def __init__(self, block: Block, joint: int) -> None:

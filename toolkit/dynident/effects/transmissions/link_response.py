@@ -83,7 +83,10 @@ class Response:
     """
 
     def __init__(self, link: DrivenLink, fine: Fine, gear: Transmitting) -> None:
-        self.gear, self._link, self._fine = gear, link, fine
+        self.gear, self._fine = gear, fine
+        # Not the link itself, which keeps its latest response.
+        self._joint, self._least = link.joint, link.least_inertia
+        self._by, self._behind = (link.M, link.C, link.G), link.behind(gear)
         self.m = np.maximum(fine.whole - gear.rotor, link.least_inertia)
         self.load = fine.load - gear.rotor * fine.a
         self.walked: DeadZoneMotion | None = None
@@ -164,12 +167,12 @@ class Response:
 
     def _torque(self, moved: Deflection) -> np.ndarray:
         """Return the change of the torque, (T, n), to first order in a deflection."""
-        link, j = self._link, self._link.joint
+        (M, C, G), j = self._by, self._joint
         d, rate, bend = (x[:, None] for x in (moved.d, moved.rate, moved.bend))
-        changed = link.M * bend
-        changed[:, j] = link.behind(self.gear) * moved.bend
-        changed += link.C * rate
-        changed += link.G * d
+        changed = M * bend
+        changed[:, j] = self._behind * moved.bend
+        changed += C * rate
+        changed += G * d
         return np.negative(changed, out=changed)
 
     def by(
@@ -185,7 +188,7 @@ class Response:
         -------
         (T, n), exact while the link keeps touching where it touches.
         """
-        lighter = -rotor * (self._fine.whole - self.gear.rotor > self._link.least_inertia)
+        lighter = -rotor * (self._fine.whole - self.gear.rotor > self._least)
         d, moved = self._d, self._differences(self._d)
         bent = d - self._side * self.gear.half_gap
         lost = rotor * self._fine.a
@@ -195,7 +198,7 @@ class Response:
         rest = -stiffness * (d[:2] - self._rests * self.gear.half_gap)
         rest += self._rests * self.gear.stiffness * half_gap - lost[:2]
         change = self._torque(self._sampled(self._banded(rest, right)))
-        change[:, self._link.joint] -= (lighter * moved.bend)[self._samples]
+        change[:, self._joint] -= (lighter * moved.bend)[self._samples]
         return change
 
 
@@ -204,12 +207,12 @@ class Unmoved(Response):
 
     @cached_property
     def torque(self) -> np.ndarray:
-        return np.zeros(self._link.M.shape[:2])
+        return np.zeros(self._by[0].shape)
 
     def by(
         self, stiffness: float, damping: float, rotor: float, half_gap: float = 0.0
     ) -> np.ndarray:
-        return np.zeros(self._link.M.shape[:2])
+        return np.zeros(self._by[0].shape)
 
 
 def _bounded(d: np.ndarray) -> np.ndarray:
