@@ -171,7 +171,8 @@ class Fine:
             # Without kinks, which a second derivative would show; but an inertia stays positive.
             samples = CubicSpline(np.arange(len(rows)), samples)(steps)
             whole = np.interp(steps, np.arange(len(rows)), whole)
-        c, g, load, a = samples.T
+        # In one piece each: a recursion, and all that is made of them, reads one after the other.
+        c, g, load, a = np.ascontiguousarray(samples.T)
         return cls(
             rows=rows,
             first=len(before),

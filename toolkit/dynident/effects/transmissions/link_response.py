@@ -87,8 +87,11 @@ class Response:
         # Not the link itself, which keeps its latest response.
         self._joint, self._least = link.joint, link.least_inertia
         self._by, self._behind = (link.M, link.C, link.G), link.behind(gear)
-        self.m = np.maximum(fine.whole - gear.rotor, link.least_inertia)
-        self.load = fine.load - gear.rotor * fine.a
+        # In place: a search makes thousands of these, and memory that is new costs most.
+        self.m = fine.whole - gear.rotor
+        np.maximum(self.m, link.least_inertia, out=self.m)
+        self.load = gear.rotor * fine.a
+        np.subtract(fine.load, self.load, out=self.load)
         self.walked: DeadZoneMotion | None = None
 
     @property
@@ -153,12 +156,21 @@ class Response:
 
     def _sampled(self, d: np.ndarray) -> Deflection:
         """Return the deflection of every step as `_differences`, at the samples of the motion."""
-        at, h = np.arange(len(d))[self._samples], self._fine.step
-        inner = np.clip(at, 1, len(d) - 2)
-        before, now, after = d[inner - 1], d[inner], d[inner + 1]
-        rate, bend = (after - before) / (2.0 * h), (after - 2.0 * now + before) / h**2
-        rate[at == 0] = bend[at == 0] = 0.0
-        return Deflection(d[at], rate, bend)
+        first, per, h = self._fine.first * self._fine.per, self._fine.per, self._fine.step
+        sampled = d[first::per]
+        rate, bend = np.zeros((2, len(sampled)))
+        if len(d) > 2:
+            # Each sample's step but the very first one, and the last but one for the last.
+            begun = 0 if first else 1
+            start = first + begun * per
+            inner = slice(begun, len(sampled) - 1)
+            before, now, after = (d[start + k : len(d) - 1 + k : per] for k in (-1, 0, 1))
+            np.subtract(after, before, out=rate[inner])
+            bend[inner] = after - 2.0 * now + before
+            rate[-1], bend[-1] = d[-1] - d[-3], d[-1] - 2.0 * d[-2] + d[-3]
+            rate /= 2.0 * h
+            bend /= h**2
+        return Deflection(sampled, rate, bend)
 
     @property
     def _samples(self) -> slice:
