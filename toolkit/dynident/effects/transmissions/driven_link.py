@@ -14,6 +14,7 @@ import numpy as np
 from dynident.effects.block import Block
 from dynident.effects.transmissions.along import along_motion, mean_inertia
 from dynident.effects.transmissions.dead_zone import Transmitting
+from dynident.effects.transmissions.finer import finer
 from dynident.errors import EffectError
 
 _PHASE = 0.3
@@ -162,17 +163,14 @@ class Fine:
         before : (R,) rows of the motion that are run through first.
         """
         rows, j = np.concatenate([before, np.arange(len(link.a))]), link.joint
-        steps = np.arange((len(rows) - 1) * per + 1) / per
         samples = np.stack([link.C[:, j], link.G[:, j], link.load, link.a], axis=1)[rows]
+        # Without kinks, which a second derivative would show; but an inertia stays positive.
+        c, g, load, a = finer(samples, per)
         whole = link.whole[rows]
         if per > 1:
-            from scipy.interpolate import CubicSpline
-
-            # Without kinks, which a second derivative would show; but an inertia stays positive.
-            samples = CubicSpline(np.arange(len(rows)), samples)(steps)
-            whole = np.interp(steps, np.arange(len(rows)), whole)
-        # In one piece each: a recursion, and all that is made of them, reads one after the other.
-        c, g, load, a = np.ascontiguousarray(samples.T)
+            whole = np.interp(
+                np.arange((len(rows) - 1) * per + 1) / per, np.arange(len(rows)), whole
+            )
         return cls(
             rows=rows,
             first=len(before),
