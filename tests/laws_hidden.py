@@ -73,7 +73,7 @@ def searched(made: list[Recording], model: Model = MODEL) -> tuple[LawSearch, Ev
     """The search on all recordings but the last, which is held out; and the fit of the model."""
     criteria = Criteria()
     evidence, held = (
-        Evidence(model, gather(Dataset(tuple(some)), criteria), criteria=criteria)
+        Evidence(model, gather(Dataset(tuple(some)), criteria.noise), criteria=criteria)
         for some in (made[:-1], made[-1:])
     )
     return LawSearch(evidence=evidence, held=held), fit_evidence(evidence, model)

@@ -62,8 +62,8 @@ def test_the_ends_are_the_model_as_given_and_the_final_one(found):
 
 
 def test_every_choice_is_the_fit_of_that_model(found, given):
-    evidence = Evidence(given, gather(recordings(range(3)), DEFAULTS), criteria=DEFAULTS)
-    held = Evidence(given, gather(recordings([3]), DEFAULTS), criteria=DEFAULTS)
+    evidence = Evidence(given, gather(recordings(range(3)), DEFAULTS.noise), criteria=DEFAULTS)
+    held = Evidence(given, gather(recordings([3]), DEFAULTS.noise), criteria=DEFAULTS)
     start = fit_evidence(evidence, given, fit_evidence(evidence, given))  # its noise settled
     for choice in found.switches.choices[1:]:
         model = given

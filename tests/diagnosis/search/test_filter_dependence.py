@@ -22,7 +22,7 @@ def evidence(viscosity: float) -> Evidence:
     """What a recording shows that does not repeat."""
     values = true_values(MODEL, Fv__elbow=viscosity)
     made = synthetic(MODEL, values, rate_hz=250.0, period=None, torque_std=0.01)
-    return Evidence(MODEL, gather(Dataset((made,)), DEFAULTS), criteria=DEFAULTS)
+    return Evidence(MODEL, gather(Dataset((made,)), DEFAULTS.noise), criteria=DEFAULTS)
 
 
 @pytest.mark.parametrize(

@@ -101,7 +101,7 @@ def test_repetitions_of_an_instant_are_in_one_block(period: float | None) -> Non
     model = Model(arm()) + "viscous_friction"
     truth = true_values(model, Fv__shoulder=1.2, Fv__elbow=0.5)
     recording = synthetic(model, truth, 0, rate_hz=250.0, torque_std=0.3).replace(period=period)
-    (run,) = gather(Dataset((recording,)), DEFAULTS)
+    (run,) = gather(Dataset((recording,)), DEFAULTS.noise)
     blocks = run.block_of_rows
     assert blocks.shape == run.replicates[0].t.shape
     for repetition in run.index:

@@ -165,11 +165,13 @@ def _compare(
     """Gather the evidence, and fit the model as given to it."""
     task.progress("reading the motion")
     loop = motion_of_loop(given, task.train, controller, task.progress, criteria)
-    runs = loop.runs or gather(task.train, criteria)
+    noise, samples_hz = criteria.noise, criteria.fit.samples_hz
+    runs = loop.runs or gather(task.train, noise, samples_hz=samples_hz)
     evidence = Evidence(given, runs, criteria=criteria, candidates=_variants(given))
     held = None
     if task.test is not None and len(task.test):
-        held = Evidence(given, gather(task.test, criteria), criteria=criteria)
+        tested = gather(task.test, noise, samples_hz=samples_hz)
+        held = Evidence(given, tested, criteria=criteria)
     task.progress("evaluating every effect")
     start = with_friction_width(evidence, shaped(evidence, given))
     whole = evidence

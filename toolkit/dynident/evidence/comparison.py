@@ -161,7 +161,7 @@ def compare(
     if not dataset.recordings:
         remedy = 'mark some recordings use = "test"'
         raise FitError("no recording to compare with", remedy=remedy)
-    runs = gather(dataset, criteria)
+    runs = gather(dataset, criteria.noise)
     results = []
     for estimate in named.values():
         evidence = Evidence(estimate.model, runs, criteria=criteria)
@@ -201,8 +201,8 @@ def compare_models(
     -------
     As `compare`, of the fitted models.
     """
-    runs = gather(train, criteria)
-    held = gather(test, criteria) if len(test) else None
+    runs = gather(train, criteria.noise)
+    held = gather(test, criteria.noise) if len(test) else None
     results, compared, loops = [], [], []
     for model in models.values():
         if shaped_effects(model):

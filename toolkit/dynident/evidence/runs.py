@@ -7,6 +7,7 @@ the control loop is known.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from dynident.criteria import DEFAULTS, Criteria
+from dynident.criteria import DEFAULTS, NoiseCriteria
 from dynident.effects import Block
 from dynident.evidence.windows import shared_motion
 from dynident.fitting.sampling import Sampled, flagged, sample
@@ -148,9 +149,10 @@ class Run:
 
 def gather(
     dataset: Dataset,
-    criteria: Criteria = DEFAULTS,
+    criteria: NoiseCriteria = DEFAULTS.noise,
     *,
     simulated: Dataset | None = None,
+    samples_hz: float = math.inf,
     seed: int = 0,
 ) -> tuple[Run, ...]:
     """Arrange the recordings of a dataset in replicates; see the module.
@@ -158,8 +160,9 @@ def gather(
     Parameters
     ----------
     dataset : the recordings.
-    criteria : copies, blocks of time, and how many samples columns are evaluated at.
+    criteria : copies, and blocks of time.
     simulated : the motion of each recording, simulated, on the same time stamps.
+    samples_hz : rate to which recordings are thinned, see `Sampled.thinned`; by default none is.
     seed : of the noise on the copies.
 
     Returns
@@ -173,27 +176,26 @@ def gather(
         torque at all.
     """
     require_torque(dataset.recordings)
-    noise, least_hz = criteria.noise, criteria.fit.samples_hz
-    per_run = max(noise.blocks_per_recording, -(-noise.blocks // len(dataset.recordings)))
+    per_run = max(criteria.blocks_per_recording, -(-criteria.blocks // len(dataset.recordings)))
     runs: list[Run] = []
     streams = np.random.SeedSequence(seed).spawn(len(dataset.recordings))
     repeats = any(r.period for r in dataset.recordings)
     for number, recording in enumerate(dataset.recordings):
         # Noise on top would hide the signs of a jittered clock: straighten it before.
         recording = uniform(recording)
-        whole = sample(recording, dataset.filter).thinned(least_hz)
+        whole = sample(recording, dataset.filter).thinned(samples_hz)
         first = shared_motion(whole, (r.replicates[0] for r in runs))
-        usable = np.arange(noise.order, len(first.t))
+        usable = np.arange(criteria.order, len(first.t))
         if recording.period:
             where = recording.where
             found = periods(len(usable), first.rate_hz, recording.period, where)
-            require_repetition(first.q[noise.order :], found, where)
-            index = noise.order + found.index
+            require_repetition(first.q[criteria.order :], found, where)
+            index = criteria.order + found.index
             kind: Kind = "repeated"
             replicates: tuple[Sampled, ...] = (first,)
         elif dataset.noise and not repeats:
             # Where columns come from elsewhere, the copies tell the size of the noise only.
-            count = noise.copies if simulated is None else noise.copies_beside_simulation
+            count = criteria.copies if simulated is None else criteria.copies_beside_simulation
             # Windows of one recording have the same noise on their copies: each is evaluated once.
             windows = [k for k, run in enumerate(runs) if run.replicates[0].motion is first.motion]
             stream = np.random.default_rng(streams[windows[0] if windows else number])
@@ -202,7 +204,7 @@ def gather(
             replicates = (
                 first,
                 *(
-                    shared_motion(sample(copy, dataset.filter).thinned(least_hz), known)
+                    shared_motion(sample(copy, dataset.filter).thinned(samples_hz), known)
                     for copy in copies
                 ),
             )

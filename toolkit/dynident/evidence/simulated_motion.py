@@ -124,7 +124,12 @@ def motion_of_loop(
     )
     try:
         found = method.iterated(model, dataset)
-        runs = gather(found.source.measured, criteria, simulated=found.instruments)
+        runs = gather(
+            found.source.measured,
+            criteria.noise,
+            simulated=found.instruments,
+            samples_hz=criteria.fit.samples_hz,
+        )
     except DynidentError as error:
         return SimulatedMotion(notes=(f"The loop cannot be simulated for instruments: {error}",))
     notes = found.source.notes

@@ -68,10 +68,10 @@ class Refitter:
     def __init__(self, study: Study, model: Model | None = None) -> None:
         self.study, self.model = study, study.model if model is None else model
         criteria = study.criteria
-        self._train = Evidence(self.model, gather(study.train, criteria), criteria=criteria)
+        self._train = Evidence(self.model, gather(study.train, criteria.noise), criteria=criteria)
         self._test = None
         if len(study.test):
-            runs = gather(study.test, criteria)
+            runs = gather(study.test, criteria.noise)
             self._test = Evidence(self.model, runs, criteria=criteria)
         # What is kept of columns is for one at a time; requests come in threads.
         self._lock, self._slowly = RLock(), RLock()

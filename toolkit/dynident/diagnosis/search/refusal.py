@@ -135,15 +135,15 @@ def narrower(evidence: Evidence, train: Dataset) -> tuple[Evidence, ...]:
     if any(run.kind != "single" or run.columns_from != "recording" for run in evidence.runs):
         return ()
     rate = min(one.rate_hz for one in train.recordings)
-    gates, own = evidence.criteria.gates, train.filter or default_filter(rate)
+    criteria, own = evidence.criteria, train.filter or default_filter(rate)
     found = []
-    for share in (gates.filter_share, gates.second_filter_share):
+    for share in (criteria.gates.filter_share, criteria.gates.second_filter_share):
         lower = replace(train, filter=own.narrowed(share, rate))
         try:
-            runs = gather(lower, evidence.criteria)
+            runs = gather(lower, criteria.noise, samples_hz=criteria.fit.samples_hz)
         except RecordingError:
             break
-        found.append(Evidence(evidence.model, runs, criteria=evidence.criteria))
+        found.append(Evidence(evidence.model, runs, criteria=criteria))
     return tuple(found)
 
 
