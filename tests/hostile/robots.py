@@ -190,7 +190,7 @@ CHECKED: dict[str, tuple[str, Content, str]] = {
     "very wide": (
         "a.urdf",
         '<robot name="a">' + "<link/>" * 300_000 + "</robot>",
-        r"a\.urdf: has a link without a name",
+        r"a\.urdf: has 300000 links, and 4096 is the limit",
     ),
     "an attribute of 10 MB": (
         "a.urdf",

@@ -52,12 +52,12 @@ def open_description(text: str, where: str) -> Opened:
 
 
 def _contents(format_: Format, root: Element, where: str) -> Contents:
-    """What a description holds, if it is not of too many links."""
-    contents = format_.read(root, where)
-    if len(contents.elements) > MOST_LINKS:
-        what = f"has {len(contents.elements)} links, and {MOST_LINKS} is the limit"
+    """What a description holds, if it is not of too many links: counted before any is read."""
+    count = sum(1 for _ in root.iter(format_.link))
+    if count > MOST_LINKS:
+        what = f"has {count} links, and {MOST_LINKS} is the limit"
         raise RobotError(what, where, "leave out links that do not move, or split the robot")
-    return contents
+    return format_.read(root, where)
 
 
 def _format_of(root: Element, where: str) -> Format:
