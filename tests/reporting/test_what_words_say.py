@@ -99,16 +99,22 @@ def test_explain_says_above_its_parameters_that_a_model_is_rejected() -> None:
     assert [str(one) for one in rest] == [str(one) for one in printed_parameters(fine)]
 
 
-def test_explain_prints_what_is_inside_effects_with_sigma_where_it_is_known() -> None:
+def test_explain_prints_what_it_added_and_what_that_is() -> None:
     found = diagnosis(("shoulder", "elbow"), samples=100)
     model = Model(found.after.model.robot) + effect("thermal_friction", "elbow", shape=(240.0,))
+    model += effect("viscous_friction", "elbow")
     block = model.block(*motion(model.robot, 1, 400))
     after = fitted(model, np.random.default_rng(1).normal(size=block.q.shape), block)
-    for sigma, said in ((3.0, "3"), (None, "-")):
-        shapes = (
-            ()
-            if sigma is None
-            else (ShapeValue(name="T@elbow", value=240.0, sigma=sigma, unit="s"),)
-        )
-        *_, table = printed_parameters(replace(found, after=replace(after, shapes=shapes)))
-        assert ["T@elbow", "240", said, "s"] in [line.split() for line in str(table).splitlines()]
+    step = replace(found.steps[0], effect=model.effects[0])
+    for shapes, said in (
+        ((ShapeValue(name="T@elbow", value=240.0, sigma=3.0, unit="s"),), ["3", "1.2", "%"]),
+        ((), ["-", "-"]),
+    ):
+        one = replace(found, steps=(step,), after=replace(after, shapes=shapes))
+        (table,) = printed_parameters(one)
+        lines = [line.split() for line in str(table).splitlines()]
+        inside = ["T@elbow", "240", *said, "s", "time", "in"]
+        assert inside in [line[: len(inside)] for line in lines]
+        names = [line[0] for line in lines if line and "@" in line[0]]
+        assert names == ["Fvt@elbow", "Fct@elbow", "T@elbow"]
+        assert printed_parameters(replace(one, steps=())) == ()

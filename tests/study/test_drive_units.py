@@ -147,8 +147,8 @@ def test_an_explanation_and_its_report_have_the_gains_with_their_intervals(tmp_p
         between = f"{low:.4g} to {high:.4g}"
         assert between in done.stdout and between in page.read_text()
     said = " ".join(done.stdout.split())
-    assert "It holds the errors of the gains and loads too." in said
     assert "What is said in N m of torques is A times these gains." in said
+    assert "It holds the errors of the gains and loads too." in page.read_text()
 
 
 def test_sigma_beside_other_effects_takes_the_gains_for_known_and_says_so(study) -> None:

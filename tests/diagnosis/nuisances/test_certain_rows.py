@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dynident.criteria import DEFAULTS
-from dynident.diagnosis.nuisances.friction_width import friction_width_notes
 from dynident.diagnosis.nuisances.quantisation import rounding_power
+from dynident.diagnosis.nuisances.width_notes import friction_width_notes
 from dynident.effects import effects_of
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
@@ -192,3 +192,4 @@ def test_of_a_joint_that_sticks_no_width_is_said_to_be_found() -> None:
     shoulder, elbow = friction_width_notes(of, fit_evidence(of, wider))
     assert "over which dry friction reverses" in shoulder
     assert "by the rows that count" in elbow and "no finding" in elbow
+    assert "friction_width =" not in shoulder + elbow  # neither is known

@@ -11,6 +11,7 @@ from dynident.diagnosis.nuisances.friction_width import (
     at_best_widths,
     with_friction_width,
 )
+from dynident.diagnosis.nuisances.width_notes import friction_width_notes
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of
 from dynident.evidence.held_out import on_recordings
@@ -41,6 +42,9 @@ def test_a_width_that_the_data_call_for_stays_and_its_interval_holds_it() -> Non
     low, high = WidthProfile(evidence, kept, "elbow").interval()
     assert low <= kept.model.friction_widths[1] <= high
     assert low <= STATED <= high
+    (note,) = friction_width_notes(evidence, kept)
+    width = kept.model.friction_widths[1]
+    assert f"friction_width = {{ shoulder = 0.01, elbow = {width:.2g} }}" in note
 
 
 @pytest.mark.parametrize(("stated", "fits"), [(5 * STATED, 0), (1.02 * STATED, 1)])

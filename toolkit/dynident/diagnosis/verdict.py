@@ -9,8 +9,8 @@ import numpy as np
 from dynident.criteria import VerdictCriteria
 from dynident.diagnosis.answer import Verdict
 from dynident.diagnosis.details import Step
-from dynident.diagnosis.nuisances.friction_width import friction_width_notes
 from dynident.diagnosis.nuisances.sticking import sticking_notes
+from dynident.diagnosis.nuisances.width_notes import friction_width_notes
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit

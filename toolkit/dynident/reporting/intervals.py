@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -114,7 +114,7 @@ def parameter_table(estimate: Estimate, widening: Widening | None, noise: NoiseS
         "unit",
         "stands for",
     )
-    notes = (_in_words(widening, noise), estimate.parameter_table().notes[0])
+    notes = (_in_words(widening, noise), *estimate.parameter_table().notes)
     return Table("Parameters", columns, rows, notes)
 
 
@@ -161,19 +161,35 @@ def _shapes(estimate: Estimate) -> Iterator[tuple[Effect, ShapeParameter, ShapeV
 
 
 def printed_parameters(diagnosis: Diagnosis) -> tuple[Table | str, ...]:
-    """Parameters of the final model as text: with sigma, those inside effects too.
+    """Parameters of the effects that were added, as text; nothing where none was.
 
-    Where the model is rejected by a noise that is known, that is said above them: sigma is not
-    widened.
+    Those of the study's own model are in the report. Where the final model is rejected by a noise
+    that is known, that is said above them: sigma is not widened.
     """
-    rejected = widening_after(diagnosis) is not None
+    added = [step.effect.label for step in diagnosis.steps]
+    if not added:
+        return ()
     estimate = diagnosis.after
-    inside = replace(estimate, shapes=tuple(found for *_, found in _shapes(estimate)))
-    return (
-        *((_REJECTED,) if rejected else ()),
-        estimate.parameter_table(),
-        *((inside.shape_table(),) if inside.shapes else ()),
+    plain, words = estimate.parameter_table(), _meanings(estimate)
+    rows = [
+        (*plain.rows[i][:-1], words[i], plain.rows[i][-1])
+        for label in added
+        for i in range(estimate.model.size)[estimate.model.slices[label]]
+    ]
+    for effect, one, x in _shapes(estimate):
+        if effect.label in added:
+            spread = number(x.sigma, 3), relative(x.value, x.sigma)
+            rows.append(
+                (x.name, number(x.value, 6), *spread, x.unit, _placed(one.means, effect), "")
+            )
+    columns = (*plain.columns[:-1], "what it is", plain.columns[-1])
+    if not any(row[-1] for row in rows):
+        rows, columns = [row[:-1] for row in rows], columns[:-1]
+    elsewhere = "The report (--report) has all parameters of this model."
+    table = Table(
+        "Parameters of the effects added", columns, tuple(rows), (*plain.notes, elsewhere)
     )
+    return (table,) if widening_after(diagnosis) is None else (_REJECTED, table)
 
 
 def _interval(value: float, half: float) -> str:

@@ -20,7 +20,6 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.special import chdtri
 
 from dynident.criteria import DEFAULTS
-from dynident.diagnosis.nuisances.sticking import left_out_at
 from dynident.diagnosis.search.ranking import rank
 from dynident.diagnosis.search.scoring import candidate_moments
 from dynident.effects import Block, Effect, JointEffect, Parameter, ShapeParameter, catalogue
@@ -29,7 +28,6 @@ from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_
 from dynident.model import Model
 from dynident.moments.second_moments import SecondMoments
 from dynident.moments.solution import regression_values
-from dynident.tables import number
 
 _RIVALS = ("viscous_friction", "quadratic_drag")
 _CLEARLY = 3.0
@@ -306,48 +304,3 @@ def _best_rival(evidence: Evidence, fitted: EvidenceFit, joint: str) -> float:
 
 def _at(name: str, joint: str) -> Effect:
     return catalogue()[name](joint)
-
-
-def friction_width_notes(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
-    """Joints whose dry friction has another width than the given model's, in plain words."""
-    model, given = fitted.model, evidence.model.friction_widths
-    sticking, moving, standing, wider = left_out_at(evidence), [], [], False
-    for joint, unit, stated in zip(model.robot.names, model.robot.units, given, strict=True):
-        profile = WidthProfile(evidence, fitted, joint)
-        if f"coulomb_friction@{joint}" not in model.slices or profile.width == stated:
-            continue
-        if f"presliding@{joint}" in model.slices:
-            continue  # presliding tells how friction reverses: the width is of what is beside it
-        says = f"the study says {number(stated, 2)}"
-        known = f"at {joint} {_known_width(profile, stated, f'{unit}/s', says)}"
-        (standing if joint in sticking else moving).append(known)
-        wider = wider or (joint not in sticking and profile.width > stated)
-    notes = []
-    if moving:
-        noise = ". Noise that a drive feeds into its joint widens it" if wider else ""
-        notes.append(
-            f"Friction width, over which dry friction reverses: {'; '.join(moving)}{noise}."
-        )
-    if standing:
-        where = "; ".join(standing)
-        notes.append(
-            f"Friction width by the rows that count, stops left out: {where}. That is how friction "
-            "looks in motion, and no finding of how sharply it reverses."
-        )
-    return tuple(notes)
-
-
-def _known_width(profile: WidthProfile, stated: float, unit: str, says: str) -> str:
-    """What is known of a width, in words."""
-    own = profile.evidence.criteria.nuisances
-    low, high = profile.interval()
-    low = 0.0 if profile.width <= own.at_bound * own.narrowest_width * stated else low
-    high = np.inf if profile.width >= own.widest_width * stated / own.at_bound else high
-    if low > 0 and np.isfinite(high):
-        interval = f"95 % interval {number(low, 2)} to {number(high, 2)}"
-        return f"{number(profile.width, 2)} {unit} ({interval}; {says})"
-    if low > 0:
-        return f"at least {number(low, 2)} {unit} ({says})"
-    if np.isfinite(high):
-        return f"at most {number(high, 2)} {unit} ({says})"
-    return f"hardly seen ({number(profile.width, 2)} {unit} fits best; {says})"

@@ -1,0 +1,78 @@
+"""What is said of friction widths that are other than the study's."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynident.diagnosis.nuisances.friction_width import WidthProfile
+from dynident.diagnosis.nuisances.sticking import left_out_at
+from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence_fit import EvidenceFit
+from dynident.formulas import quoted_joint
+from dynident.tables import number
+
+
+def friction_width_notes(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
+    """Joints whose dry friction has another width than the given model's, in plain words."""
+    model, given = fitted.model, evidence.model.friction_widths
+    sticking, moving, standing, wider = left_out_at(evidence), [], [], False
+    stated = dict(zip(model.robot.names, given, strict=True))
+    found: dict[str, float] = {}
+    for joint, unit in zip(model.robot.names, model.robot.units, strict=True):
+        profile = WidthProfile(evidence, fitted, joint)
+        if f"coulomb_friction@{joint}" not in model.slices or profile.width == stated[joint]:
+            continue
+        if f"presliding@{joint}" in model.slices:
+            continue  # presliding tells how friction reverses: the width is of what is beside it
+        low, high = _interval(profile, stated[joint])
+        says = f"the study says {number(stated[joint], 2)}"
+        known = f"at {joint} {_in_words(profile.width, (low, high), f'{unit}/s', says)}"
+        if joint in sticking:
+            standing.append(known)
+            continue
+        moving.append(known)
+        wider = wider or profile.width > stated[joint]
+        if low > 0 and np.isfinite(high):
+            found[joint] = profile.width
+    notes = []
+    if moving:
+        noise = ". Noise that a drive feeds into its joint widens it" if wider else ""
+        line = f" For fits, which take the study's: {_line(stated | found)}" if found else ""
+        notes.append(
+            f"Friction width, over which dry friction reverses: {'; '.join(moving)}{noise}.{line}"
+        )
+    if standing:
+        where = "; ".join(standing)
+        notes.append(
+            f"Friction width by the rows that count, stops left out: {where}. That is how friction "
+            "looks in motion, and no finding of how sharply it reverses."
+        )
+    return tuple(notes)
+
+
+def _line(widths: dict[str, float]) -> str:
+    """The key of a study; it names every joint, as the others would have the default."""
+    each = (f"{quoted_joint(joint)} = {number(width, 2)}" for joint, width in widths.items())
+    return f"friction_width = {{ {', '.join(each)} }}"
+
+
+def _interval(profile: WidthProfile, stated: float) -> tuple[float, float]:
+    """95 % interval of a width, from 0 or to infinity where the search for it ended."""
+    own = profile.evidence.criteria.nuisances
+    low, high = profile.interval()
+    low = 0.0 if profile.width <= own.at_bound * own.narrowest_width * stated else low
+    high = np.inf if profile.width >= own.widest_width * stated / own.at_bound else high
+    return low, high
+
+
+def _in_words(width: float, interval: tuple[float, float], unit: str, says: str) -> str:
+    """What is known of a width."""
+    low, high = interval
+    if low > 0 and np.isfinite(high):
+        between = f"95 % interval {number(low, 2)} to {number(high, 2)}"
+        return f"{number(width, 2)} {unit} ({between}; {says})"
+    if low > 0:
+        return f"at least {number(low, 2)} {unit} ({says})"
+    if np.isfinite(high):
+        return f"at most {number(high, 2)} {unit} ({says})"
+    return f"hardly seen ({number(width, 2)} {unit} fits best; {says})"
