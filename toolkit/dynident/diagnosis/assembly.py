@@ -64,6 +64,9 @@ _METHODS: dict[NoiseSource, str] = {
 }
 
 
+_WHITENED = "sigma holds the noise, with its colour; what the model lacks is not in it."
+
+
 @dataclass(frozen=True, kw_only=True)
 class Search:
     """What a search did: the evidence, the effects added, their fits, the ranking of each round.
@@ -323,7 +326,7 @@ def _estimate(evidence: Evidence, fitted: EvidenceFit, train: Dataset) -> Estima
     basis = base_parameters(shown, model.names, RANK_TOLERANCE)
     kept, combination = list(basis.independent), basis.combination
     covariance = np.zeros((model.size, model.size))
-    whole, words = fitted.covariance, ""
+    whole, words = fitted.covariance, _WHITENED if fitted.noise_known else ""
     measured = all(run.columns_from == "recording" for run in evidence.runs)
     if measured and not fitted.noise_known:
         # Nothing has whitened these rows: their errors hang together as the filters make them.
