@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dynident.diagnosis.verdict import notes_on
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
@@ -133,3 +134,10 @@ def test_a_fit_to_fewer_samples_is_the_same(noise: Noise | None) -> None:
     sigma = np.sqrt(np.diag(slow.covariance))
     assert np.all(np.abs(fast.values - slow.values) < 0.1 * sigma)
     np.testing.assert_allclose(np.sqrt(np.diag(fast.covariance)), sigma, rtol=0.02)
+
+
+def test_an_answer_says_that_it_took_fewer_samples() -> None:
+    for rate_hz, thinned in ((4000.0, True), (1000.0, False)):
+        evidence = Evidence(model(), gather(Dataset((recording(rate_hz),)), samples_hz=1000.0))
+        notes = " ".join(notes_on(evidence, None, fit_evidence(evidence, model()), "replicates"))
+        assert ("thinned to 1000 Hz" in notes) == ("thinned" in notes) == thinned

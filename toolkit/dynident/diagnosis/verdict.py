@@ -17,6 +17,7 @@ from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut
 from dynident.fitting.estimate import nearly_hidden
 from dynident.recording.dataset import NoiseSource
+from dynident.tables import listed
 
 
 def verdict_of(
@@ -158,4 +159,11 @@ def notes_on(
             "the others."
         )
     notes += [*sticking_notes(evidence, doubtful), *friction_width_notes(evidence, fitted)]
+    first = [run.replicates[0] for run in evidence.runs]
+    if any(one.unthinned for one in first):
+        rates = listed(sorted({f"{one.parallel.rate_hz:.4g}" for one in first if one.unthinned}))
+        notes.append(
+            f"Fast recordings were low-passed and thinned to {rates} Hz for this diagnosis, which "
+            "leaves its rows at the same instants. Fits and comparisons take every sample."
+        )
     return (*notes, *nearly_hidden(fitted.model.base))
