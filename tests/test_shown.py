@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
+import pytest
+
 import dynident as di
-from dynident.tables import MOSTLY_NOISE, Table, mostly_noise
+from dynident.tables import MOSTLY_NOISE, Table, mostly_noise, relative
 from study_files import recording, true_model
 
 
@@ -50,3 +54,18 @@ def test_a_table_without_rows_says_none_instead_of_showing_its_headings() -> Non
     empty = Table("Effects added", ("effect added", "after"), (), ("A note.",))
     assert str(empty).split("\n")[:2] == ["Effects added: none", "  A note."]
     assert empty._repr_html_() == "<p>Effects added: none</p><p>A note.</p>"
+
+
+@pytest.mark.parametrize(
+    ("value", "spread", "said"),
+    [
+        (-2.0, 0.5, "25.0 %"),
+        (2.0, 2.0, "100.0 %"),
+        (1e-9, 1.0, "> 100 %"),
+        (0.0, 1.0, "-"),
+        (math.nan, 1.0, "-"),
+        (1.0, math.inf, "-"),
+    ],
+)
+def test_a_spread_beyond_its_value_has_no_figure(value: float, spread: float, said: str) -> None:
+    assert relative(value, spread) == said

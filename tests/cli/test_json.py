@@ -171,6 +171,13 @@ def test_fit(run, study, tmp_path):
     assert np.linalg.norm(again - truth) < 0.05 * np.linalg.norm(truth)
 
 
+def test_a_fit_says_what_the_description_that_it_writes_lacks(run, study) -> None:
+    done = run("fit", study(NOTHING_MISSING), "--robot", "new.urdf")
+    assert done.status == 0
+    assert "new.urdf has the rigid bodies alone: friction" in " ".join(done.out.split())
+    assert "rigid bodies alone" not in run("fit", study(NOTHING_MISSING)).out
+
+
 def test_compare(run, study, tmp_path):
     path = study()
     before = listing(tmp_path)

@@ -149,6 +149,8 @@ def test_a_poor_answer_is_told_from_the_optimum(distance) -> None:
     answer = solve(problem, "conic")
     proof = answer.certificate
     assert proof.optimal and proof.gap <= 1e-6 and "This is the optimum" in proof.sentence
+    below = replace(proof, objective=proof.bound * (1 - 1e-12), gap=0.0)
+    assert below.sentence.endswith("no point of the set is better, but for rounding.")
     assert "fully consistent" in proof.notion
     bound = Bound(proof.bound, proof.stationarity, proof.dual_feasibility)
     poor = answer.x + 0.2 * (problem.space.reference - answer.x)

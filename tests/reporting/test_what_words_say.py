@@ -34,6 +34,15 @@ def test_what_carries_the_fall_is_to_be_added_first() -> None:
     assert "torque ripple at elbow and quadratic drag at elbow" in then.what
 
 
+@pytest.mark.parametrize(("fall", "stays"), [(2.0, True), (6.0, False)])
+def test_a_small_fall_is_said_to_leave_most(fall: float, stays: bool) -> None:
+    """Where something is left, or nobody knows: of a model that explains all it is noise."""
+    found = along((fall,))
+    why = next_steps(replace(found, verdict="unexplained"))[0].why
+    assert ("Most of the error stays." in why) == stays
+    assert "stays" not in next_steps(replace(found, verdict="explained"))[0].why
+
+
 def test_more_than_three_are_named_by_their_number() -> None:
     first = next_steps(along((2.0, 2.1, 2.2, 2.3)))[0]
     assert first.what.endswith("and one more to the model, and fit it.")
