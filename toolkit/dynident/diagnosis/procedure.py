@@ -31,6 +31,7 @@ import numpy as np
 from dynident.arguments import checked
 from dynident.closed_loop import Controller
 from dynident.criteria import DEFAULTS, Criteria
+from dynident.diagnosis.advice.coupled_pairs import alike_notes
 from dynident.diagnosis.advice.geometry_doubt import with_geometry_doubt
 from dynident.diagnosis.assembly import Search, assemble
 from dynident.diagnosis.dependence.what_is_left import doubted, with_dependence
@@ -156,6 +157,7 @@ def diagnose(
     if asked and not faults:
         progress("looking for what the residual depends on")
         found = with_dependence(found, settled.evidence, _decided(settled), path)
+    found = replace(found, notes=(*found.notes, *alike_notes(found)))
     return with_geometry_doubt(found, settled.evidence.runs)
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from dynident.diagnosis.advice.coupled_pairs import stated_pairs
 from dynident.diagnosis.result import Diagnosis
 from dynident.evidence.runs import Run
 from dynident.wiring.speed_limits import over_speed
@@ -38,7 +39,7 @@ def with_geometry_doubt(found: Diagnosis, runs: Sequence[Run]) -> Diagnosis:
     if fast is not None:
         return replace(found, too_fast=fast)
     complete = found.verdict != "unexplained" and found.noise_source != "unknown"
-    pairs = [] if complete else _pairs(found)
+    pairs = [] if complete else _pairs(found, stated_pairs(run.recording for run in runs))
     if not pairs:
         return found
     note = (
@@ -50,23 +51,24 @@ def with_geometry_doubt(found: Diagnosis, runs: Sequence[Run]) -> Diagnosis:
     return replace(found, notes=(*found.notes, note))
 
 
-def _pairs(found: Diagnosis) -> list[str]:
-    """Which torque goes with the motion of which joint."""
+def _pairs(found: Diagnosis, stated: set[frozenset[str]]) -> list[str]:
+    """Which torque goes with the motion of which joint, where the study does not say why."""
     pairs = [
         f"{step.effect.joint} goes with {step.effect.source}"
         for step in found.steps
         if step.effect.source is not None
+        and frozenset((step.effect.joint, step.effect.source)) not in stated
     ]
     # Where a study states that motors turn two joints, what is left there says nothing new of it.
-    stated = {
+    known = {
         name
         for effect in found.before.model.effects
         if effect.source is not None
         for name in (effect.joint, effect.source)
-    }
+    }.union(*stated)
     pairs += [
         f"{one.joint} goes with the other joints"
         for one in found.residual_dependence
-        if not _OTHER_JOINTS.isdisjoint(one.told) and one.joint not in stated
+        if not _OTHER_JOINTS.isdisjoint(one.told) and one.joint not in known
     ]
     return pairs
