@@ -2,6 +2,7 @@ import hashlib
 import json
 import platform
 import re
+import shlex
 from dataclasses import replace
 from datetime import datetime
 from html import escape, unescape
@@ -163,10 +164,12 @@ def test_the_study_is_named_with_its_hash(found, tmp_path):
     assert hashlib.sha256(study.read_bytes()).hexdigest() in text
 
 
-def test_what_study_stands_for_is_said_where_it_is_known(found, html):
+def test_commands_name_the_study_where_it_is_known(found, html):
     path = "studies/<i>my arm</i>.toml"
-    assert f"STUDY stands for <code>{escape(path)}</code>" in page(found, study=path)
-    assert "STUDY stands for" not in html
+    commands = re.findall("<code>(dynident .*?)</code>", page(found, study=path))
+    assert commands and all("STUDY" not in one and "<i>" not in one for one in commands)
+    assert unescape(commands[0]).startswith(f"dynident add {shlex.quote(path)} ")
+    assert "<code>dynident add STUDY" in html
 
 
 def test_every_plot_has_its_figure(found, html):

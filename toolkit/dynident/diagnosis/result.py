@@ -174,12 +174,13 @@ class Diagnosis(Answer, Shown):
     def candidate_table(self, most: int = 10) -> Table:
         """The ranking on the model as given."""
         shown = [c for c in self.candidates if c.status != "absorbed"][:most]
+        added = {step.effect.label for step in self.steps}
         rows = tuple(
             (
                 c.effect.label,
                 p_value(c.p_value),
                 points(c.test_gain),
-                c.finding,
+                "added" if c.effect.label in added else c.finding,
             )
             for c in shown
         )

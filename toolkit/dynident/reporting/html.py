@@ -32,7 +32,7 @@ from dynident.reporting.headline import headline
 from dynident.reporting.intervals import parameter_table, widening_after, widening_before
 from dynident.reporting.joint_states import State, joint_errors, opened, states
 from dynident.reporting.loop_page import LoopSection, loop_section
-from dynident.reporting.next_steps import FIRST, next_steps
+from dynident.reporting.next_steps import FIRST, next_steps, of_study
 from dynident.reporting.packing import compressed, packed
 from dynident.reporting.pictures import diagnosis_pictures as pictures
 from dynident.reporting.switch_page import switch_section
@@ -167,6 +167,7 @@ def _diagnosis_page(
     place = {one.joint.name: i for i, one in enumerate(states(diagnosis))}
     order = sorted(range(len(names)), key=lambda i: place[diagnosis.traces[i].joint])
     advice, terms = next_steps(diagnosis), glossary(diagnosis)
+    advice = advice if study is None else of_study(advice, study)
     known = diagnosis.noise_source
     parameters = parameter_table(diagnosis.after, widening_after(diagnosis), known)
     bodies = diagnosis.after.model.base.rank
@@ -178,7 +179,6 @@ def _diagnosis_page(
         added=after_name(diagnosis) if diagnosis.steps else "",
         advice=advice[:FIRST],
         more_advice=advice[FIRST:],
-        study=study if any("STUDY" in c for one in advice for c in one.commands) else None,
         switch=switch,
         proposals=[
             (f"law-{k}", p, proposal_table(p, diagnosis)) for k, p in enumerate(diagnosis.proposals)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dynident.diagnosis.details import Step
@@ -65,12 +65,21 @@ def next_steps(diagnosis: Diagnosis) -> tuple[Advice, ...]:
         )
         found.append(
             Advice(
-                f"{what} that this data cannot show, record the motion named for it.",
-                "They are listed, each with its experiment, under \u201cWhat this data cannot "
-                "show\u201d.",
+                f"{what} that this data cannot show, record the motion named for it, if any is.",
+                "They are listed, each with its experiment or why none shows it, under \u201cWhat "
+                "this data cannot show\u201d.",
             )
         )
     return tuple(found)
+
+
+def of_study(advice: Sequence[Advice], study: Path | str) -> tuple[Advice, ...]:
+    """Return advice whose commands name a study's file, as they are typed."""
+    name = shlex.quote(str(study))
+    return tuple(
+        replace(one, commands=tuple(c.replace("STUDY", name, 1) for c in one.commands))
+        for one in advice
+    )
 
 
 def in_short(diagnosis: Diagnosis, study: Path) -> tuple[str, ...]:
@@ -81,11 +90,10 @@ def in_short(diagnosis: Diagnosis, study: Path) -> tuple[str, ...]:
     diagnosis : of the study.
     study : its file, as commands name it.
     """
-    first, *_ = next_steps(diagnosis)
-    commands = [one.replace("STUDY", shlex.quote(str(study)), 1) for one in first.commands]
+    first, *_ = of_study(next_steps(diagnosis), study)
     return (
         f"In short: {headline(diagnosis).sentence}",
-        "\n".join([f"Next: {first.what}", *commands]),
+        "\n".join([f"Next: {first.what}", *first.commands]),
     )
 
 
@@ -98,11 +106,11 @@ def _to_settle(diagnosis: Diagnosis) -> list[Advice]:
     """That positions may be another's: no torque mends that, and many take it up."""
     if diagnosis.too_fast is None:
         return []
-    what = f"Settle first whether q.{diagnosis.too_fast.joint} is the position of that joint."
-    why = (
-        f"{diagnosis.too_fast.sentence} How positions of motors are written: "
-        "docs/howto/coupled_motors.md."
+    what = (
+        f"Settle first whether q.{diagnosis.too_fast.joint} is the position of that joint; how "
+        "positions of motors are written: docs/howto/coupled_motors.md."
     )
+    why = f"{diagnosis.too_fast.sentence} What is added before that takes up the wrong motion."
     return [Advice(what, why)]
 
 
@@ -117,7 +125,7 @@ def _to_time(diagnosis: Diagnosis) -> list[Advice]:
 def _to_add(diagnosis: Diagnosis) -> list[Advice]:
     """What carries the fall first, by how much it does; what is small beside it after that."""
     steps = _addable(diagnosis)
-    if not steps or diagnosis.impossible:
+    if not steps or diagnosis.impossible or diagnosis.too_fast is not None:
         return []
     error = diagnosis.test_error
     found = LeadingEffects.of(steps)
@@ -156,7 +164,7 @@ def _addable(diagnosis: Diagnosis) -> list[Step]:
 
 def _to_add_after(diagnosis: Diagnosis) -> list[Advice]:
     """What is small beside the effects that carry the fall."""
-    steps = _addable(diagnosis)
+    steps = _addable(diagnosis) if diagnosis.too_fast is None else []
     smaller = LeadingEffects.of(steps).smaller if steps else ()
     smaller = [group for group in smaller if sum(step.fall for step in group) > 0.0]
     certain = [group for group in smaller if not all(step.uncertain for step in group)]
