@@ -125,7 +125,9 @@ def print_tables(*tables: Table | str) -> None:
     )
     for table in tables:
         if isinstance(table, str):
-            console.print(printable(table), markup=False)
+            # What is to be typed is set in by four blanks, and not broken where a line ends.
+            for line in printable(table).split("\n"):
+                console.print(line, markup=False, soft_wrap=line.startswith("    "))
         else:
             _print(console, table)
 
@@ -196,7 +198,11 @@ def _print(console, table: Table) -> None:
         # The first column names things that a user types: never shortened.
         justify = "right" if numeric else "left"
         shown.add_column(
-            Text(printable(column)), justify=justify, no_wrap=index == 0, overflow="fold"
+            Text(printable(column)),
+            justify=justify,
+            no_wrap=index == 0,
+            overflow="fold",
+            min_width=max(map(len, column.split()), default=1),
         )
     for row in table.rows:
         shown.add_row(*(Text(printable(cell)) for cell in row))

@@ -93,7 +93,7 @@ def in_short(diagnosis: Diagnosis, study: Path) -> tuple[str, ...]:
     first, *_ = of_study(next_steps(diagnosis), study)
     return (
         f"In short: {headline(diagnosis).sentence}",
-        "\n".join([f"Next: {first.what}", *first.commands]),
+        "\n".join([f"Next: {first.what}", *(f"    {one}" for one in first.commands)]),
     )
 
 

@@ -41,7 +41,9 @@ class OtherReading:
     @property
     def open_question(self) -> str:
         """The question with its answers, as they are typed; empty where there is none."""
-        return "\n".join([self.question, *self.answers]) if self.question else ""
+        if not self.question:
+            return ""
+        return "\n".join([self.question, *(f"    {one}" for one in self.answers)])
 
 
 def columns_text(

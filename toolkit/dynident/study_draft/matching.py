@@ -19,6 +19,8 @@ from dynident.study_draft.timing import is_clock
 
 _SIGNALS: tuple[Signal, ...] = ("q", "v", "tau", "temperature")
 _INCREASING = 0.999  # share of the steps of a clock that go forward
+_ALIKE: dict[str, tuple[Signal, ...]] = {"q": ("q",), "tau": ("tau", "current")}
+"""Signals by which columns may be told as ours."""
 _MEASURED: tuple[Origin, ...] = ("measured", "plain")
 _ASKED: tuple[Origin, ...] = ("reference", "command")
 
@@ -142,7 +144,10 @@ def match(
                 f"it holds {shown}; joints: {', '.join(robot.names)}. Say which they are, "
                 f'--column "{signal}.{robot.names[0]} = NAME" for each joint'
             )
-            lack = f"no {what} of {robot.n} joints are told by name"
+            held = {role.joint for role in roles if role.signal in _ALIKE[signal]}
+            lacking = [name for k, name in enumerate(robot.names) if k not in held]
+            of = ", ".join(lacking) if 0 < len(lacking) < robot.n else f"{robot.n} joints"
+            lack = f"no {what} of {of} are told by name"
             raise RecordingError(lack, log.where, remedy)
     found = {signal: tuple(some) for signal, some in groups.items() if some}
     readable = [role for role in roles if role.column in log.columns]
@@ -159,8 +164,8 @@ def _require_read(
 ) -> None:
     """Refuse a log in which columns of the likeliest group cannot be read, or of none there is."""
     of_it = [one for group in likeliest for one in group.roles]
-    alike = {"q": ("q",), "tau": ("tau", "current")}[signal]
-    for column in _unread(of_it or [one for one in roles if one.signal in alike], log):
+    alike = [one for one in roles if one.signal in _ALIKE[signal]]
+    for column in _unread(of_it or alike, log):
         raise log.unread[column]
 
 

@@ -25,7 +25,7 @@ def friction_width_notes(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, 
         if f"presliding@{joint}" in model.slices:
             continue  # presliding tells how friction reverses: the width is of what is beside it
         low, high = _interval(profile, stated[joint])
-        says = f"the study says {number(stated[joint], 2)}"
+        says = f"the model has {number(stated[joint], 2)}"
         known = f"at {joint} {_in_words(profile.width, (low, high), f'{unit}/s', says)}"
         if joint in sticking:
             standing.append(known)
@@ -37,7 +37,12 @@ def friction_width_notes(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, 
     notes = []
     if moving:
         noise = ". Noise that a drive feeds into its joint widens it" if wider else ""
-        line = f" For fits, which take the study's: {_line(stated | found)}" if found else ""
+        line = ""
+        if found:
+            line = (
+                " Fits take those of the model: for these write, above the first table of the "
+                f"study:\n    {_line(stated | found)}"
+            )
         notes.append(
             f"Friction width, over which dry friction reverses: {'; '.join(moving)}{noise}.{line}"
         )

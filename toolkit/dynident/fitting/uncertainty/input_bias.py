@@ -96,7 +96,8 @@ class InputBias:
         which = reported(self.values, self.sigma)
         if not len(which):
             return ""
-        std = ", ".join(number(x, 2) for x in self.position_std)
+        units = "/".join(dict.fromkeys(self.model.robot.units))
+        std = f"{', '.join(number(x, 2) for x in self.position_std)} {units}"
         return (
             f"Expected bias, from encoder noise of the size in the positions ({std}; in sigma, not "
             f"subtracted): {listed(self.model, self.values, which)}."

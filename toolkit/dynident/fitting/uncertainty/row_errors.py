@@ -72,9 +72,9 @@ class RowErrors:
     def words(self) -> str:
         """What the standard deviations hold, and what they do not."""
         return (
-            "sigma holds the noise with the colour that it has in the rows: the "
-            f"{self.rows} equations say as much as {number(self.effective_rows, 3)} independent "
-            "ones. What the model lacks is in it only as far as it looks like noise."
+            "sigma holds the noise with the colour that it has in the rows: the equations say as "
+            f"much as {number(self.effective_rows, 3)} independent ones. What the model lacks is "
+            "in it only as far as it looks like noise."
         )
 
 

@@ -176,10 +176,14 @@ def _located(
         else:
             missing += [(name, "" if name == ours else f" (for {ours})") for name in one]
     if missing:
+        # A column that holds another signal is no slip of the pen for this one.
+        taken = {term.name for one in found.values() for term in one.terms}.union(wanted)
+        free = [name for name in table.names if name not in taken]
+        clock = "; a file without times takes rate_hz" if ("t", "") in missing else ""
         raise RecordingError(
             "no column " + ", ".join(f"'{name}'{role}" for name, role in dict.fromkeys(missing)),
             table.file,
-            _there(table) + _close(missing[0][0], table.names),
+            _there(table) + _close(missing[0][0], free) + clock,
         )
     return found
 
