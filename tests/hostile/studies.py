@@ -14,6 +14,15 @@ KNOWN = {
     "not TOML": ("robot = [", r"study.toml: is not TOML"),
     "empty": ("", r"study.toml: key 'robot' is missing"),
     "unknown key": (edited(("effects", "efects")), r"unknown key 'efects'. did you mean 'effects'"),
+    "a key of the file in a table": (
+        STUDY + "friction_width = 0.02\n",
+        r"\.friction_width'. friction_width is a key of the whole file: write it above the first",
+    ),
+    "one table of recordings": (
+        STUDY[: STUDY.index("[[")] + '[recordings]\nfile = "train.csv"\n',
+        r"recordings: input should be a valid list. write \[\[recordings\]\] above each table",
+    ),
+    "no quotes": (edited(('"arm.urdf"', "arm.urdf")), r"is not TOML: .*texts stand between quotes"),
     "unknown key of a recording": (
         edited(("period = 8.0", "priod = 8.0")),
         r"unknown key 'recordings.0.priod'. did you mean 'period'",

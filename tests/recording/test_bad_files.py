@@ -26,6 +26,11 @@ CSV = {
         GOOD.replace("tau.a", "Tau.a").encode(),
         r"no column 'tau.a'. it holds t, q.a, Tau.a; did you mean 'Tau.a'\?",
     ),
+    "no torque": (
+        b"t,q.a,v.a\n0,1,2\n1,1,2\n",  # the position is no slip of the pen for it
+        r"no column 'tau.a'. it holds t, q.a, v.a$",
+    ),
+    "no time": (b"q.a,tau.a\n1,2\n1,2\n", r"no column 't'. .*; a file without times takes rate_hz"),
     "cut off": (GOOD.encode()[:-3], "line 4: 2 columns where the header has 3. is the file comp"),
     "too wide": (GOOD.replace("1,2\n", "1,2,3\n").encode(), "line 2: 4 columns where the header"),
     "uneven": (b"t,q.a,tau.a\n0,1\n1,2,3,4\n", "line 2: 2 columns"),

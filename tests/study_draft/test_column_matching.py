@@ -133,7 +133,8 @@ def test_a_clock_that_does_not_go_forward_is_none() -> None:
         (["tau1", "tau2", "x1", "x2"], "no positions"),
         (["q1", "q2", "x1", "x2"], "no torques or currents"),
         (["q1", "tau1", "tau2"], "no positions of 2 joints"),
-        (["q.shoulder", "q1", "tau1", "tau2"], "no positions of 2 joints"),
+        (["q.shoulder", "q1", "tau1", "tau2"], "no positions of elbow"),
+        (["q.shoulder", "q.elbow", "tau.shoulder"], "no torques or currents of elbow are told"),
     ],
 )
 def test_what_is_not_told_by_name_is_refused_with_what_is_there(

@@ -47,7 +47,7 @@ def find_data(file: str, folder: Path) -> Path:
     downloaded = _download(Path(file).name)
     if downloaded is not None:
         return downloaded
-    remedy = f"put it beside the study, or name the data folder in the variable {VARIABLE}"
+    remedy = f"put it there, or name the data folder in the variable {VARIABLE}"
     if "EMPS" in file:
         remedy += "; or `pip install nonlinear-benchmarks`, which downloads this benchmark"
     raise FileError("no such data file", str(tried[0]), remedy)

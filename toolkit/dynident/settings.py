@@ -97,7 +97,8 @@ def parse_toml(path: str | Path) -> dict[str, Any]:
     except RecursionError:
         raise deep from None
     except ValueError as error:  # of TOML, and of whole numbers of thousands of digits
-        raise StudyError(f"is not TOML: {error}", str(path)) from None
+        remedy = "texts stand between quotes" if "Invalid value" in str(error) else ""
+        raise StudyError(f"is not TOML: {error}", str(path), remedy) from None
 
 
 def nearest(word: str, valid: tuple[str, ...] | list[str], kind: str) -> str:
@@ -123,10 +124,12 @@ def _complaint(error: ValidationError, path: Path, schema: type[BaseModel]) -> S
     # Where a key takes several types, pydantic appends the one that it tried first.
     key = ".".join(map(str, _place(first)))
     if first["type"] == "extra_forbidden":
+        *table, last = map(str, _place(first))
         names = _keys_at(schema, _place(first)[:-1])
-        return StudyError(
-            f"unknown key '{key}'", str(path), nearest(str(_place(first)[-1]), names, "keys")
-        )
+        remedy = nearest(last, names, "keys")
+        if table and last in schema.model_fields and last not in names:
+            remedy = f"{last} is a key of the whole file: write it above the first table"
+        return StudyError(f"unknown key '{key}'", str(path), remedy)
     if first["type"] == "missing" and isinstance(first["loc"][-1], int):
         return StudyError(f"{key.rpartition('.')[0]}: too few values", str(path), "add the rest")
     if first["type"] == "missing":
@@ -135,7 +138,11 @@ def _complaint(error: ValidationError, path: Path, schema: type[BaseModel]) -> S
         return StudyError(
             f"{key}: a table is needed here", str(path), "write [name] or { key = 1 }"
         )
-    return StudyError(f"{key}: {first['msg'][:1].lower()}{first['msg'][1:]}", str(path))
+    remedy = ""
+    if first["type"] == "list_type":
+        tables = _keys_at(schema, _place(first))
+        remedy = f"write [[{key}]] above each table" if tables else "write [ ... ]"
+    return StudyError(f"{key}: {first['msg'][:1].lower()}{first['msg'][1:]}", str(path), remedy)
 
 
 def _place(complaint: Any) -> tuple[str | int, ...]:

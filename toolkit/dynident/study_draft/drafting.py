@@ -33,6 +33,7 @@ from dynident.study_draft.decision import Ask, Decision, decided
 from dynident.study_draft.draft import DraftedRecording, StudyDraft
 from dynident.study_draft.entries import drafted_recordings
 from dynident.study_draft.guesses.amendments import amended
+from dynident.study_draft.guesses.coupled_motors import couplings_of
 from dynident.study_draft.guesses.degrees import positions_in_radians
 from dynident.study_draft.guesses.drive_unit import drive_sizes
 from dynident.study_draft.guesses.file_reading import Reading
@@ -317,6 +318,8 @@ def _of_joints(
             joints = ", ".join(f"tau.{joint}" for joint in found.followed)
             follow = "follow" if found.followed[1:] else "follows"
             reason += f"; {joints} {follow}, for power is the same on either side of gears"
+        if motors is not None:
+            reason += "".join(f"; {one.words}" for one in couplings_of(motors, robot))
         notes.take("stated", [", ".join(facts.columns)], reason)
     return Reading(
         robot=robot,

@@ -6,8 +6,6 @@ import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from dynident.recording import Recording
 from dynident.study_draft.drafted_columns import OtherReading
 from dynident.study_draft.guesses.amendments import shared
@@ -15,6 +13,7 @@ from dynident.study_draft.guesses.coupled_motors import (
     Coupling,
     CouplingGuess,
     coupling_by_speeds,
+    couplings_of,
 )
 from dynident.study_draft.guesses.file_reading import Reading
 from dynident.study_draft.guesses.motor_side import expression_of
@@ -65,9 +64,8 @@ def with_shared_motors(
 def _alone(reading: Reading) -> OtherReading:
     """The lines of a reading without the motor that turns two joints."""
     assert reading.motors is not None
-    names = reading.robot.names
-    ((i, k),) = np.argwhere(reading.motors - np.eye(len(names)))
-    back = Coupling(joint=names[i], by=names[k], turns=float(reading.motors[i, k]))
+    (one,) = couplings_of(reading.motors, reading.robot)
+    back = replace(one, turns=-one.turns)
     return _otherwise(reading, shared(replace(reading, motors=None), back), f"If {_ALONE}")
 
 

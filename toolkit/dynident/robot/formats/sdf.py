@@ -70,7 +70,7 @@ def _read(root: Element, where: str) -> Contents:
     _copy_pose(model, clean, where)
     links = named(model, "link", where)
     if not links:
-        raise RobotError("has no links", where)
+        raise RobotError("has no links", where, "is it the whole description? its links are <link>")
     inertials: dict[str, Inertial] = {}
     for link_name, link in links.items():
         at = f"{where}: link '{link_name}'"

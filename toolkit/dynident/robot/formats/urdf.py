@@ -55,7 +55,7 @@ def _read(root: Element, where: str) -> Contents:
     copy = Element("robot", {"name": name})
     links = named(root, "link", where)
     if not links:
-        raise RobotError("has no links", where)
+        raise RobotError("has no links", where, "is it the whole description? its links are <link>")
     inertials = {n: _inertial(link, f"{where}: link '{n}'") for n, link in links.items()}
     copy.extend(Element("link", {"name": link}) for link in links)
     joints = named(root, "joint", where)

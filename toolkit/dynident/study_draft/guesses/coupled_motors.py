@@ -9,6 +9,7 @@ of time that the fit has not seen. What a light wrist leaves open, limits of spe
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -48,7 +49,22 @@ class Coupling:
     def words(self) -> str:
         """What turns what."""
         more = "less" if self.turns < 0 else "plus"
-        return f"{self.joint} is its motor's turn {more} that of {self.by}"
+        times = "" if math.isclose(abs(self.turns), 1.0) else f"{abs(self.turns):.4g} times "
+        return f"{self.joint} is its motor's turn {more} {times}that of {self.by}"
+
+
+def couplings_of(motors: np.ndarray, robot: Robot) -> tuple[Coupling, ...]:
+    """Return what motors that turn several joints make of these.
+
+    Parameters
+    ----------
+    motors : (n, n) turns of the motors, behind their gears, from those of the joints.
+    robot : for the joints' names.
+    """
+    return tuple(
+        Coupling(joint=robot.names[i], by=robot.names[k], turns=-float(motors[i, k]))
+        for i, k in np.argwhere(motors - np.eye(robot.n))
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
