@@ -303,7 +303,7 @@ OTHERS: dict[str, tuple[tuple[str, ...], str]] = {
     ),
     "a draft with gears of zero": (
         ("init", "arm.urdf", "train.csv", "--gears", "0,1", "--out", "new.toml"),
-        r"gears 0, 1\. give one number for each of shoulder, elbow; negative ones t",
+        r"gears 0, 1\. give one number for each of shoulder, elbow, none of them 0; neg",
     ),
     "a draft with gears of nothing": (
         ("init", "arm.urdf", "train.csv", "--gears", ",", "--out", "new.toml"),

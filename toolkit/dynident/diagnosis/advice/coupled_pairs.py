@@ -6,15 +6,19 @@ from collections.abc import Iterable
 from itertools import permutations
 
 import numpy as np
+from scipy.special import chdtrc
 
 from dynident.diagnosis.result import Diagnosis
 from dynident.errors import RecordingError
 from dynident.recording import Recording
 from dynident.recording.formats.column_expressions import parse
 from dynident.tables import listed, number
+from dynident.tables import p_value as p_value_words
 
-_ALIKE, _SURE = 2.0, 3.0
-"""Standard deviations: by which two values may differ, and which a value has at least."""
+_SURE = 3.0
+"""Standard deviations that a value has at least, to be named."""
+_LEAST = 0.05
+"""Probability below which two couplings are not called alike."""
 
 
 def stated_pairs(recordings: Iterable[Recording]) -> set[frozenset[str]]:
@@ -53,15 +57,10 @@ def alike_notes(found: Diagnosis) -> tuple[str, ...]:
             continue
         there, here = model.slices[one.label], model.slices[back.label]
         x, y = estimate.values[there], estimate.values[here]
-        sigma = estimate.sigma[there], estimate.sigma[here]
-        C = estimate.covariance
-        cross = np.diag(C[there, here])
-        apart = np.sqrt(np.clip(sigma[0] ** 2 + sigma[1] ** 2 - 2 * cross, 0.0, None))
-        with np.errstate(invalid="ignore"):
-            sure = (np.abs(x) > _SURE * sigma[0]) & (np.abs(y) > _SURE * sigma[1])
-            alike = np.abs(x - y) < _ALIKE * apart
-        signs = set(np.sign(x[sure]))
-        if len(signs) != 1 or not np.all(alike[sure]):
+        sure = _sure(x, estimate.sigma[there]) & _sure(y, estimate.sigma[here])
+        signs = set(np.sign([*x[sure], *y[sure]]))
+        p_value = _same(x - y, estimate.covariance, there, here)
+        if len(signs) != 1 or not p_value > _LEAST:
             continue
         parameters = one.parameters(model.robot)
         each = [
@@ -70,8 +69,23 @@ def alike_notes(found: Diagnosis) -> tuple[str, ...]:
         ]
         turns = "sum" if signs == {1.0} else "difference"
         notes.append(
-            f"{joint} and {source} load each other alike: {listed(each)}, no further apart than "
-            "twice the standard error of their difference. So does a part of the drive that turns "
-            f"with the {turns} of both, as in a wrist whose gears couple it."
+            f"{joint} and {source} load each other alike: {listed(each)}; equal parameters are not "
+            f"rejected (Wald test of all, p = {p_value_words(p_value)}). A part of the drive that "
+            f"turns with the {turns} of both does so, as in a wrist whose gears couple it."
         )
     return tuple(notes)
+
+
+def _sure(values: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+    return (sigma > 0.0) & (np.abs(values) > _SURE * sigma)
+
+
+def _same(difference: np.ndarray, C: np.ndarray, there: slice, here: slice) -> float:
+    """How probable it is that equal parameters are estimated so far apart: a Wald test."""
+    of_it = C[there, there] + C[here, here] - C[there, here] - C[here, there]
+    size = np.sqrt(np.diag(of_it))
+    if not np.all(size > 0.0):
+        return 0.0  # one of them is not known on its own
+    scaled = of_it / np.outer(size, size)
+    d = difference / size
+    return float(chdtrc(len(d), d @ np.linalg.lstsq(scaled, d, rcond=None)[0]))

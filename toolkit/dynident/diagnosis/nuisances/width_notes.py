@@ -32,7 +32,7 @@ def friction_width_notes(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, 
             continue
         moving.append(known)
         wider = wider or profile.width > stated[joint]
-        if low > 0 and np.isfinite(high):
+        if low > 0 or np.isfinite(high):
             found[joint] = profile.width
     notes = []
     if moving:

@@ -63,9 +63,8 @@ def require_ratios(gears: Sequence[float] | None, robot: Robot) -> tuple[float, 
     ratios = tuple(float(ratio) for ratio in gears)
     if len(ratios) != robot.n or not all(math.isfinite(x) and x for x in ratios):
         what = f"gears {', '.join(f'{x:g}' for x in ratios)}"
-        remedy = (
-            f"give one number, not 0, for each of {', '.join(robot.names)}; negative ones turn back"
-        )
+        names = ", ".join(robot.names)
+        remedy = f"give one number for each of {names}, none of them 0; negative ones turn back"
         raise RecordingError(what, remedy=remedy)
     return ratios
 
