@@ -7,7 +7,7 @@ import math
 import pytest
 
 import dynident as di
-from dynident.tables import MOSTLY_NOISE, Table, mostly_noise, relative
+from dynident.tables import MOSTLY_NOISE, WIDTH, Table, mostly_noise, print_tables, relative
 from study_files import recording, true_model
 
 
@@ -54,6 +54,21 @@ def test_a_table_without_rows_says_none_instead_of_showing_its_headings() -> Non
     empty = Table("Effects added", ("effect added", "after"), (), ("A note.",))
     assert str(empty).split("\n")[:2] == ["Effects added: none", "  A note."]
     assert empty._repr_html_() == "<p>Effects added: none</p><p>A note.</p>"
+
+
+def test_words_of_headings_stay_whole_where_there_is_room() -> None:
+    few = Table("few", ("joint", *["acceleration and load"] * 6), (("j", *["(0 ± 0)"] * 6),))
+    assert str(few).count("acceleration") == 6
+    # Where there is none, they are broken, and every column is there.
+    many = Table("many", ("joint", *["joint_elasticity@shoulder"] * 7), (("j", *"1234567"),))
+    assert all(digit in str(many) for digit in "1234567")
+
+
+def test_what_is_typed_is_not_broken_where_a_line_ends(capsys: pytest.CaptureFixture) -> None:
+    command = "dynident add study.toml " + " ".join(f"torque_offset@joint{k}" for k in range(9))
+    print_tables(f"Next: {'long ' * 40}\n    {command}")
+    lines = capsys.readouterr().out.splitlines()
+    assert f"    {command}" in lines and max(map(len, lines[:-1])) <= WIDTH
 
 
 @pytest.mark.parametrize(

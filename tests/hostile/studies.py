@@ -22,6 +22,8 @@ KNOWN = {
         STUDY[: STUDY.index("[[")] + '[recordings]\nfile = "train.csv"\n',
         r"recordings: input should be a valid list. write \[\[recordings\]\] above each table",
     ),
+    "a large truth": (STUDY + "x = True\n", r"is not TOML: .*true or false, in small letters"),
+    "no value": (STUDY + "x =\n", r"is not TOML: Invalid value \(at line \d+, column \d+\)$"),
     "no quotes": (edited(('"arm.urdf"', "arm.urdf")), r"is not TOML: .*texts stand between quotes"),
     "unknown key of a recording": (
         edited(("period = 8.0", "priod = 8.0")),

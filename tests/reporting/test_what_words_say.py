@@ -126,4 +126,9 @@ def test_explain_prints_what_it_added_and_what_that_is() -> None:
         assert inside in [line[: len(inside)] for line in lines]
         names = [line[0] for line in lines if line and "@" in line[0]]
         assert names == ["Fvt@elbow", "Fct@elbow", "T@elbow"]
+        # A contact is an event: it has a step, and no part in the model.
+        contact = replace(step, effect=effect("contact", "elbow"))
+        with_it = printed_parameters(replace(one, steps=(contact, step)))
+        assert str(with_it[0]) == str(table)
+        assert printed_parameters(replace(one, steps=(contact,))) == ()
         assert printed_parameters(replace(one, steps=())) == ()

@@ -53,6 +53,7 @@ DEEPEST = 50
 T = TypeVar("T", bound=SettingsTable)
 _LEVEL = r"(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')\s*+\.\s*+"
 # From the beginnings of words only: of a long text every letter would be one.
+_INVALID = re.compile(r"Invalid value \(at line (?P<line>\d+), column (?P<column>\d+)\)")
 _DEEP = re.compile(rf"(?<![\w-])(?:{_LEVEL}){{{DEEPEST}}}")
 """A dotted key of very many levels, which takes a parser memory by their square."""
 _TRIED = re.compile(
@@ -97,8 +98,18 @@ def parse_toml(path: str | Path) -> dict[str, Any]:
     except RecursionError:
         raise deep from None
     except ValueError as error:  # of TOML, and of whole numbers of thousands of digits
-        remedy = "texts stand between quotes" if "Invalid value" in str(error) else ""
-        raise StudyError(f"is not TOML: {error}", str(path), remedy) from None
+        raise StudyError(f"is not TOML: {error}", str(path), _unquoted(text, str(error))) from None
+
+
+def _unquoted(text: str, complaint: str) -> str:
+    """A remedy where a value is a word, which TOML has but for `true` and `false` in quotes."""
+    place = _INVALID.match(complaint)
+    if place is None:
+        return ""
+    rest = text.split("\n")[int(place["line"]) - 1][int(place["column"]) - 1 :]
+    if rest.startswith(("True", "False")):
+        return "write true or false, in small letters"
+    return "texts stand between quotes" if rest[:1].isalpha() else ""
 
 
 def nearest(word: str, valid: tuple[str, ...] | list[str], kind: str) -> str:

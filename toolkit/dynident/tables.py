@@ -192,6 +192,10 @@ def _print(console, table: Table) -> None:
     shown = RichTable(
         title=Text(printable(table.title), style="bold"), title_justify="left", box=box.SIMPLE_HEAD
     )
+    words = [max(map(len, column.split()), default=1) for column in table.columns]
+    first = max((len(row[0]) for row in table.rows), default=0)
+    # Words of headings stay whole where there is room for all of them.
+    fits = max(first, words[0]) + sum(words[1:]) + 3 * len(words) <= console.width
     for index, column in enumerate(table.columns):
         cells: Sequence[str] = [row[index] for row in table.rows]
         numeric = bool(cells) and all(_is_number(cell) for cell in cells)
@@ -202,7 +206,7 @@ def _print(console, table: Table) -> None:
             justify=justify,
             no_wrap=index == 0,
             overflow="fold",
-            min_width=max(map(len, column.split()), default=1),
+            min_width=words[index] if fits else None,
         )
     for row in table.rows:
         shown.add_row(*(Text(printable(cell)) for cell in row))

@@ -112,7 +112,7 @@ def candidate_table(diagnosis: Diagnosis, shown: tuple[Candidate, ...]) -> Table
             ("\u2503 " if c.effect.label in bracketed else "") + c.effect.title,
             p_value(c.p_value),
             points(c.test_gain),
-            "added" if c.effect.label in added else c.finding,
+            f"{c.finding}; added" if c.effect.label in added else c.finding,
         )
         for c in shown
     )

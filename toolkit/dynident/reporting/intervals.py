@@ -114,7 +114,8 @@ def parameter_table(estimate: Estimate, widening: Widening | None, noise: NoiseS
         "unit",
         "stands for",
     )
-    notes = (_in_words(widening, noise), *estimate.parameter_table().notes)
+    how, of_sigma = estimate.parameter_table().notes
+    notes = (_in_words(widening, noise), how, *((of_sigma,) if widening is None else ()))
     return Table("Parameters", columns, rows, notes)
 
 
@@ -166,10 +167,11 @@ def printed_parameters(diagnosis: Diagnosis) -> tuple[Table | str, ...]:
     Those of the study's own model are in the report. Where the final model is rejected by a noise
     that is known, that is said above them: sigma is not widened.
     """
-    added = [step.effect.label for step in diagnosis.steps]
+    estimate, steps = diagnosis.after, diagnosis.steps
+    # A contact is an event of one recording: it has a step, and no part in the model.
+    added = [one.effect.label for one in steps if one.effect.label in estimate.model.slices]
     if not added:
         return ()
-    estimate = diagnosis.after
     plain, words = estimate.parameter_table(), _meanings(estimate)
     rows = [
         (*plain.rows[i][:-1], words[i], plain.rows[i][-1])

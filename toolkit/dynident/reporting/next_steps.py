@@ -40,7 +40,7 @@ def next_steps(diagnosis: Diagnosis) -> tuple[Advice, ...]:
         return tuple(_to_mend(fault) for fault in diagnosis.wiring)
     # Friction and inertia have taken up a wrong moment: whatever is added comes after that.
     found = [*_to_settle(diagnosis), *_to_time(diagnosis), *_to_add(diagnosis)]
-    if diagnosis.limit is not None:
+    if diagnosis.limit is not None and diagnosis.too_fast is None:
         what = "Allow the search more additions (--most)."
         found.append(Advice(what, f"{diagnosis.limit_in_words}."))
     elif diagnosis.verdict == "unexplained" and (
@@ -110,7 +110,7 @@ def _to_settle(diagnosis: Diagnosis) -> list[Advice]:
         f"Settle first whether q.{diagnosis.too_fast.joint} is the position of that joint; how "
         "positions of motors are written: docs/howto/coupled_motors.md."
     )
-    why = f"{diagnosis.too_fast.sentence} What is added before that takes up the wrong motion."
+    why = f"{diagnosis.too_fast.sentence} What is added before that may take up the wrong motion."
     return [Advice(what, why)]
 
 
@@ -212,7 +212,8 @@ def _to_separate(diagnosis: Diagnosis) -> list[Advice]:
 def _to_try(diagnosis: Diagnosis) -> list[Advice]:
     """Proposed laws, of which a robot knows nothing yet."""
     found = []
-    for number, one in enumerate(diagnosis.proposals, 1):
+    proposals = diagnosis.proposals if diagnosis.too_fast is None else ()
+    for number, one in enumerate(proposals, 1):
         what = f"Ask yourself whether {one.effect.joint} can have the torque {one.torque}."
         why = (
             "It was found among many terms and fits: a mechanism that makes it is what would make "

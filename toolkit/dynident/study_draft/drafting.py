@@ -318,8 +318,8 @@ def _of_joints(
             joints = ", ".join(f"tau.{joint}" for joint in found.followed)
             follow = "follow" if found.followed[1:] else "follows"
             reason += f"; {joints} {follow}, for power is the same on either side of gears"
-        if motors is not None:
-            reason += "".join(f"; {one.words}" for one in couplings_of(motors, robot))
+        if motors is not None and len(couplings := couplings_of(motors, robot)) == 1:
+            reason += f"; {couplings[0].words}"
         notes.take("stated", [", ".join(facts.columns)], reason)
     return Reading(
         robot=robot,

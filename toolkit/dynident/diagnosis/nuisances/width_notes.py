@@ -32,8 +32,8 @@ def friction_width_notes(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, 
             continue
         moving.append(known)
         wider = wider or profile.width > stated[joint]
-        if low > 0 or np.isfinite(high):
-            found[joint] = profile.width
+        if low > 0 and np.isfinite(high):
+            found[joint] = float(number(profile.width, 2))
     notes = []
     if moving:
         noise = ". Noise that a drive feeds into its joint widens it" if wider else ""
@@ -41,7 +41,7 @@ def friction_width_notes(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, 
         if found:
             line = (
                 " Fits take those of the model: for these write, above the first table of the "
-                f"study:\n    {_line(stated | found)}"
+                f"study, in place of any that it has:\n    {_line(stated | found)}"
             )
         notes.append(
             f"Friction width, over which dry friction reverses: {'; '.join(moving)}{noise}.{line}"
@@ -57,7 +57,7 @@ def friction_width_notes(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, 
 
 def _line(widths: dict[str, float]) -> str:
     """The key of a study; it names every joint, as the others would have the default."""
-    each = (f"{quoted_joint(joint)} = {number(width, 2)}" for joint, width in widths.items())
+    each = (f"{quoted_joint(joint)} = {float(width)!r}" for joint, width in widths.items())
     return f"friction_width = {{ {', '.join(each)} }}"
 
 

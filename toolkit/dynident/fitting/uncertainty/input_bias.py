@@ -96,8 +96,8 @@ class InputBias:
         which = reported(self.values, self.sigma)
         if not len(which):
             return ""
-        units = "/".join(dict.fromkeys(self.model.robot.units))
-        std = f"{', '.join(number(x, 2) for x in self.position_std)} {units}"
+        each = zip(self.position_std, self.model.robot.units, strict=True)
+        std = ", ".join(f"{number(x, 2)} {unit}" for x, unit in each)
         return (
             f"Expected bias, from encoder noise of the size in the positions ({std}; in sigma, not "
             f"subtracted): {listed(self.model, self.values, which)}."
