@@ -63,7 +63,7 @@ def test_a_law_is_proposed_and_written(simulated: Path, tmp_path: Path, run) -> 
         assert abs(found["values"][name] - value) < 0.03
     assert 0 < found["sigma"]["k"] < 0.05
     assert "Laws that no catalogue has" in page.read_text()
-    assert "add STUDY --proposal 1" in page.read_text()
+    assert f"add {study} --proposal 1" in page.read_text()
     assert found["explains"] > 0.85
     assert found["test_error_after"] < found["test_error_before"]
 

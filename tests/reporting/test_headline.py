@@ -201,7 +201,7 @@ def test_a_long_text_ends_with_the_verdict_and_what_to_type(six):
     assert headline(six).sentence in verdict
     what, *commands = following.splitlines()
     assert next_steps(six)[0].what in what
-    assert commands[0].startswith("dynident add 'my studies/arm.toml' ") and len(commands) == 2
+    assert commands[0].startswith("    dynident add 'my studies/arm.toml' ") and len(commands) == 2
 
 
 def test_at_most_three_next_steps_are_unfolded(six):
