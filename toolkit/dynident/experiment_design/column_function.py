@@ -59,7 +59,7 @@ class ColumnFunction:
         x = ca.SX.sym("x", 3 * n + 1)
         robot = _robot(model, values)
         rigid = _rigid_columns(robot, base.independent, x)
-        own, torque = [], rigid @ values[: base.rank]
+        own, torque = [], _rigid_torque(robot, x)
         later: list[tuple[int, Effect]] = []
         for place, effect in enumerate(model.effects):
             own.append(None)

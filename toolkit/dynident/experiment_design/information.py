@@ -104,12 +104,23 @@ class Information:
             return float(np.log(np.trace(np.linalg.inv(scaled))))
         return self._unit - float(np.linalg.slogdet(scaled)[1])
 
-    def symbolic_loss(self, columns: Any, instants: int) -> Any:
-        """Return the loss of CasADi's columns, (m, n * instants)."""
-        n = len(self.weight)
-        weights = np.tile(np.sqrt(self.weight / instants), instants)
-        rows = (ca.DM(self.mix / self.scale).T @ columns) @ ca.diag(ca.DM(weights))
-        assert rows.shape[1] == n * instants
+    def symbolic_loss(self, inputs: Any) -> Any:
+        """Return the loss of CasADi's instants.
+
+        Parameters
+        ----------
+        inputs : (3 n + 1, T) q, v, a and the time.
+
+        Returns
+        -------
+        An expression, with what the recordings tell.
+        """
+        instants = inputs.shape[1]
+        x = ca.SX.sym("x", inputs.shape[0])
+        # Mixed instant by instant: a product of large matrices costs as much as the columns do.
+        mix = ca.sparsify(ca.DM(self.mix / self.scale)).T
+        own = mix @ self.columns.function(x) @ ca.diag(ca.DM(np.sqrt(self.weight / instants)))
+        rows = ca.Function("told", [x], [ca.densify(own)]).map(instants)(inputs)
         prior = self.prior / np.outer(self.scale, self.scale) + RIDGE * np.eye(len(self.scale))
         return self._factor_loss()(rows @ rows.T + ca.DM(prior))
 

@@ -140,9 +140,9 @@ class MotionProgram:
     def _is_inside(self, variables: np.ndarray, t: np.ndarray) -> bool:
         return self.workspace.admits(self.motions.trajectory(variables).at(t)[0])
 
-    def _limited(self, variables: np.ndarray) -> np.ndarray | None:
-        """The motion within the limits, in the workspace or not."""
-        t = self.motions.times(FINER * self.instants)
+    def _limited(self, variables: np.ndarray, finer: int = FINER) -> np.ndarray | None:
+        """The motion within the limits at `finer` times the instants, in the workspace or not."""
+        t = self.motions.times(finer * self.instants)
         found = np.array(variables)
         found[:, 0] = np.clip(found[:, 0], -0.999, 0.999)
         still = np.array(found)
@@ -290,7 +290,7 @@ class MotionProgram:
         rng = np.random.default_rng(seed)
         status = "no better motion than a random one"
         some = (
-            self._limited(self.motions.random(int(number)))
+            self._limited(self.motions.random(int(number)), finer=1)
             for number in rng.integers(0, 2**31, starts * _TRIED)
         )
         found = [
@@ -299,7 +299,7 @@ class MotionProgram:
             if one is not None
         ]
         found.sort(key=lambda one: one.loss)
-        # Distances are costly: they are looked at from the best motion on.
+        # Fine grids and distances are costly: they are looked at from the best motion on.
         clear = (one for begin in found for one in self._within(begin))
         return list(islice(clear, starts))
 
@@ -324,9 +324,7 @@ class MotionProgram:
         return [clear for one in found for clear in self._within(one)]
 
     def _within(self, motion: DesignedMotion) -> list[DesignedMotion]:
-        """The motion, made smaller until it is in the workspace; none where that fails."""
-        if self.workspace.is_free:
-            return [motion]
+        """The motion, made smaller until it is within all limits; none where that fails."""
         best = self.within(motion.variables)
         return [] if best is None else [replace(motion, variables=best, loss=self.loss(best))]
 
@@ -339,9 +337,15 @@ class MotionProgram:
         start : (n, 1 + k).
         """
         solver, variables = self._end_of(lazy, start)
+        more = False
         while np.all(np.isfinite(variables)) and lazy.limit(self._torques_beyond(variables, 1.0)):
             solver, variables = self._end_of(lazy, variables)
+            more = True
         best = self._limited(variables) if np.all(np.isfinite(variables)) else None
+        if best is None and more:
+            # From far beyond a limit a search may not come back, as it may from where it began.
+            solver, variables = self._end_of(lazy, start)
+            best = self._limited(variables) if np.all(np.isfinite(variables)) else None
         stats = solver.function.stats()
         if best is None:
             return []

@@ -49,6 +49,57 @@ class LimitedTorque:
     most: np.ndarray
     joints: Collection[int]
 
+    def shares(self, inputs: Any, slopes: tuple[np.ndarray, ...]) -> tuple[Any, Any]:
+        """Return shares of the limits at some instants, and their slopes.
+
+        The slopes are written out: sought along every variable at once, as CasADi would, they are
+        most of a program's time.
+
+        Parameters
+        ----------
+        inputs : (3 n + 1, T) expression: q, v, a and the time.
+        slopes : of q, v and a of a joint by its own variables, (n, T, k) each.
+
+        Returns
+        -------
+        Expressions: (T, m) of the m limited joints, and (T m, n k), instants of a joint together.
+        """
+        limited = sorted(self.joints)
+        n, instants, _ = slopes[0].shape
+        x = ca.SX.sym("x", inputs.shape[0])
+        share = self.function(x)[limited] / ca.DM(self.most[limited])
+        slope = ca.densify(ca.jacobian(share, x)[:, : 3 * n])
+        found, change = (
+            ca.Function("along", [x], [one]).map(instants)(inputs) for one in (share, slope)
+        )
+        change = ca.reshape(change, 3 * n * len(limited), instants).T
+        blocks = [
+            [
+                sum(
+                    ca.repmat(change[:, (s * n + j) * len(limited) + i], 1, one.shape[2])
+                    * ca.DM(one[j])
+                    for s, one in enumerate(slopes)
+                )
+                for j in range(n)
+            ]
+            for i in range(len(limited))
+        ]
+        return found.T, ca.blockcat(blocks)
+
+
+def slopes_of(motions: MotionFamily, t: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return the slopes of q, v and a of each joint by its own variables, (n, T, k) each.
+
+    Parameters
+    ----------
+    motions : of which the variables are.
+    t : (T,) s.
+    """
+    limits = motions.limits
+    found = [limits.speed[:, None, None] * one for one in motions.bases(t)]
+    found[0][:, :, 0] += (limits.upper - limits.lower)[:, None] / 2  # of the centre
+    return tuple(found)
+
 
 @dataclass(frozen=True, eq=False)
 class MotionSolver:
@@ -105,21 +156,16 @@ class MotionSolver:
 
         evaluated, count = instants
         *_, every = along(motions.times(evaluated))
-        losses = [
-            one.symbolic_loss(one.columns.function.map(evaluated)(every), evaluated)
-            for one in informations
-        ]
+        losses = [one.symbolic_loss(every) for one in informations]
         q, v, a, inputs = along(motions.times(count))
         rows = LimitRows()
         rows.add(q / ca.repmat(ca.DM(half).T, count, 1), limits.lower / half, limits.upper / half)
         ones = np.ones(n)
         rows.add(v / ca.repmat(ca.DM(limits.speed).T, count, 1), -ones, ones)
         rows.add(a / ca.repmat(ca.DM(limits.acceleration).T, count, 1), -ones, ones)
-        limited = sorted(torque.joints)
-        if limited:
-            needed = torque.function.map(count)(inputs).T[:, limited]
-            needed = needed / ca.repmat(ca.DM(torque.most[limited]).T, count, 1)
-            rows.add(needed, -np.ones(len(limited)), np.ones(len(limited)))
+        if torque.joints:
+            needed, slopes = torque.shares(inputs, slopes_of(motions, motions.times(count)))
+            rows.add(needed, -np.ones(needed.shape[1]), np.ones(needed.shape[1]), slopes)
         if cuts:
             held, *_ = along(np.array([one.t for one in cuts]))
             slopes = np.array([one.slope for one in cuts])
@@ -135,7 +181,8 @@ class MotionSolver:
             over = ca.vertcat(*losses).T - loss
             rows.add(over, np.full(len(losses), -np.inf), np.zeros(len(losses)))
         program = {"x": unknown, "f": loss, "g": ca.vertcat(*rows.parts)}
-        return cls(ca.nlpsol("design", "ipopt", program, _options(iterations)), rows)
+        options = _options(iterations) | {"jac_g": rows.jacobian(unknown)}
+        return cls(ca.nlpsol("design", "ipopt", program, options), rows)
 
 
 class LazySolver:
@@ -192,39 +239,76 @@ def _options(iterations: int) -> dict[str, Any]:
             "sb": "yes",
             "tol": 1e-4,
             "max_iter": iterations,
+            # Losses are logarithms: fifteen steps that change one by less than this end a search.
+            "acceptable_tol": 100.0,
+            "acceptable_obj_change_tol": 1e-4,
+            "acceptable_iter": 15,
             "hessian_approximation": "limited-memory",
-            "limited_memory_max_history": 20,
+            "limited_memory_max_history": 10,
+            # One solution of the large system an iteration, not one for each vector of the history.
+            "limited_memory_aug_solver": "extended",
         },
     }
 
 
 class LimitRows:
-    """Rows of limits: expressions, and their bounds."""
+    """Rows of limits: expressions, their slopes where these are written out, and their bounds."""
 
     def __init__(self) -> None:
         self.parts: list[Any] = []
+        self.slopes: list[Any] = []
         self.lower = np.zeros(0)
         self.upper = np.zeros(0)
 
-    def add(self, expression: Any, lower: np.ndarray, upper: np.ndarray) -> None:
+    def add(
+        self, expression: Any, lower: np.ndarray, upper: np.ndarray, slopes: Any = None
+    ) -> None:
         """Add rows.
 
         Parameters
         ----------
         expression : (T, n).
         lower, upper : (n,) bounds of each column.
+        slopes : as for `add_bounds`, of the columns one below the other.
         """
         count = expression.shape[0]
-        self.add_bounds(ca.vec(expression), np.repeat(lower, count), np.repeat(upper, count))
+        bounds = np.repeat(lower, count), np.repeat(upper, count)
+        self.add_bounds(ca.vec(expression), *bounds, slopes)
 
-    def add_bounds(self, expression: Any, lower: np.ndarray, upper: np.ndarray) -> None:
+    def add_bounds(
+        self, expression: Any, lower: np.ndarray, upper: np.ndarray, slopes: Any = None
+    ) -> None:
         """Add rows, each with its own bounds.
 
         Parameters
         ----------
         expression : (k,).
         lower, upper : (k,).
+        slopes : (k, v) by the first v variables; where there are none CasADi finds them.
         """
         self.parts.append(expression)
+        self.slopes.append(slopes)
         self.lower = np.concatenate([self.lower, lower])
         self.upper = np.concatenate([self.upper, upper])
+
+    def jacobian(self, unknown: Any) -> Any:
+        """Return the function of the variables, and of no parameters, that Ipopt asks for.
+
+        Parameters
+        ----------
+        unknown : (v,) symbols of the variables.
+
+        Returns
+        -------
+        The rows, and their slopes.
+        """
+        slopes = []
+        for part, known in zip(self.parts, self.slopes, strict=True):
+            if known is None:
+                slopes.append(ca.jacobian(part, unknown))
+                continue
+            others = ca.MX(known.shape[0], unknown.shape[0] - known.shape[1])
+            slopes.append(ca.horzcat(known, others))
+        values = [ca.vertcat(*self.parts), ca.vertcat(*slopes)]
+        none = ca.MX.sym("none", 0, 0)
+        return ca.Function("nlp_jac_g", [unknown, none], values, ["x", "p"], ["g", "jac_g_x"])
