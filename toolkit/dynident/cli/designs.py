@@ -35,7 +35,7 @@ _PATH = click.Path(path_type=Path)
     type=click.IntRange(2, 200),
     help="Of B-splines, in the place of Fourier series.",
 )
-@click.option("--starts", type=click.IntRange(1, 100), default=2, show_default=True)
+@click.option("--starts", type=click.IntRange(1, 100), default=3, show_default=True)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--objective", type=click.Choice(["D", "A"]), default="D", show_default=True)
 @click.option(

@@ -34,7 +34,7 @@ class DesignTask:
     objective: Objective = "D"
     tell: tuple[tuple[Effect, ...], ...] = ()
     show: tuple[Effect, ...] = ()
-    starts: int = 2
+    starts: int = 3
     seed: int = 0
     clearance: float | None = None
 

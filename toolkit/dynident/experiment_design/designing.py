@@ -142,7 +142,7 @@ def _program(
     kept = [
         one
         for one in asked
-        if max(_sigma(one.information, program.told(one.information, x)) for x in usual) > _HOPELESS
+        if any(_sigma(one.information, program.told(one.information, x)) > _HOPELESS for x in usual)
     ]
     kept = kept or asked[:1]
     return replace(
