@@ -123,6 +123,10 @@ def test_what_decides_is_said() -> None:
     weak = separation(4.0, 0.2, 2.6)
     assert not weak.decides
     assert f"{DECIDES:g}" in weak.sentence(8.0) and "take 2.6 times as long" in weak.sentence(8.0)
+    soon = separation(11.8, 0.9 * ALIKE, 1.4)
+    assert not soon.decides
+    assert f"{DECIDES:g}, from" not in soon.sentence(8.0)
+    assert "may name both; 1.4 times as long would." in soon.sentence(8.0)
     alike = separation(50.0, 0.5 * ALIKE, np.inf)
     assert not alike.decides
     assert "may name both" in alike.sentence(8.0)

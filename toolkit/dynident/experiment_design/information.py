@@ -102,7 +102,7 @@ class Information:
         scaled = self.scaled_about(matrix) + RIDGE * np.eye(self.last)
         if self.objective == "A":
             return float(np.log(np.trace(np.linalg.inv(scaled))))
-        return self._unit - float(np.linalg.slogdet(scaled)[1])
+        return self.unit - float(np.linalg.slogdet(scaled)[1])
 
     def symbolic_loss(self, inputs: Any) -> Any:
         """Return the loss of CasADi's instants.
@@ -113,7 +113,7 @@ class Information:
 
         Returns
         -------
-        An expression, with what the recordings tell.
+        An expression: the loss of the motion and of what is recorded together.
         """
         instants = inputs.shape[1]
         x = ca.SX.sym("x", inputs.shape[0])
@@ -125,7 +125,7 @@ class Information:
         return self._factor_loss()(rows @ rows.T + ca.DM(prior))
 
     @property
-    def _unit(self) -> float:
+    def unit(self) -> float:
         """What the scales take from a determinant: losses of several questions are compared."""
         return -2 * float(np.sum(np.log(self.scale[len(self.scale) - self.last :])))
 
@@ -140,5 +140,5 @@ class Information:
             inverse = ca.solve(own, ca.SX.eye(self.last))
             loss = ca.log(ca.sumsqr(inverse))
         else:
-            loss = self._unit - 2 * ca.sum1(ca.log(ca.diag(own)))
+            loss = self.unit - 2 * ca.sum1(ca.log(ca.diag(own)))
         return ca.Function("loss", [matrix], [loss])

@@ -337,15 +337,14 @@ class MotionProgram:
         start : (n, 1 + k).
         """
         solver, variables = self._end_of(lazy, start)
-        more = False
+        best = self._finite_within(variables)
         while np.all(np.isfinite(variables)) and lazy.limit(self._torques_beyond(variables, 1.0)):
-            solver, variables = self._end_of(lazy, variables)
-            more = True
-        best = self._limited(variables) if np.all(np.isfinite(variables)) else None
-        if best is None and more:
             # From far beyond a limit a search may not come back, as it may from where it began.
-            solver, variables = self._end_of(lazy, start)
-            best = self._limited(variables) if np.all(np.isfinite(variables)) else None
+            for begin in (variables, start):
+                solver, variables = self._end_of(lazy, begin)
+                best = self._finite_within(variables)
+                if best is not None:
+                    break
         stats = solver.function.stats()
         if best is None:
             return []
@@ -356,6 +355,10 @@ class MotionProgram:
             iterations=int(stats["iter_count"]),
         )
         return [motion]
+
+    def _finite_within(self, variables: np.ndarray) -> np.ndarray | None:
+        """As `_limited`, of where a search ended; none where it ended nowhere."""
+        return self._limited(variables) if np.all(np.isfinite(variables)) else None
 
     def _end_of(self, lazy: LazySolver, start: np.ndarray) -> tuple[MotionSolver, np.ndarray]:
         """Where a program as it stands ends, within the limits or not."""

@@ -72,19 +72,18 @@ class LimitedTorque:
         found, change = (
             ca.Function("along", [x], [one]).map(instants)(inputs) for one in (share, slope)
         )
+        # A row for each instant: the slopes of all limited joints by one signal after the other.
         change = ca.reshape(change, 3 * n * len(limited), instants).T
-        blocks = [
-            [
-                sum(
-                    ca.repmat(change[:, (s * n + j) * len(limited) + i], 1, one.shape[2])
-                    * ca.DM(one[j])
-                    for s, one in enumerate(slopes)
-                )
-                for j in range(n)
-            ]
-            for i in range(len(limited))
-        ]
-        return found.T, ca.blockcat(blocks)
+
+        def block(i: int, j: int) -> Any:
+            """Slopes of the torque of a limited joint by the variables of a joint, (T, k)."""
+            parts = []
+            for signal, of_variables in enumerate(slopes):
+                of_signal = change[:, (signal * n + j) * len(limited) + i]
+                parts.append(ca.repmat(of_signal, 1, of_variables.shape[2]) * of_variables[j])
+            return sum(parts)
+
+        return found.T, ca.blockcat([[block(i, j) for j in range(n)] for i in range(len(limited))])
 
 
 def slopes_of(motions: MotionFamily, t: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -142,8 +141,10 @@ class MotionSolver:
         """
         limits = motions.limits
         n, size = motions.n, motions.size
-        z = ca.MX.sym("z", n * size)
-        variables = ca.reshape(z, size, n)  # a column for each joint
+        several = len(informations) > 1
+        # One symbol: slopes along several that are joined come out wrong in CasADi 3.8.
+        unknown = ca.MX.sym("unknown", n * size + several)
+        variables = ca.reshape(unknown[: n * size], size, n)  # a column for each joint
         half = (limits.upper - limits.lower) / 2
         speed = ca.diag(ca.DM(limits.speed))
 
@@ -157,30 +158,32 @@ class MotionSolver:
         evaluated, count = instants
         *_, every = along(motions.times(evaluated))
         losses = [one.symbolic_loss(every) for one in informations]
-        q, v, a, inputs = along(motions.times(count))
+        limited = motions.times(count)
+        q, v, a, inputs = along(limited)
         rows = LimitRows()
         rows.add(q / ca.repmat(ca.DM(half).T, count, 1), limits.lower / half, limits.upper / half)
         ones = np.ones(n)
         rows.add(v / ca.repmat(ca.DM(limits.speed).T, count, 1), -ones, ones)
         rows.add(a / ca.repmat(ca.DM(limits.acceleration).T, count, 1), -ones, ones)
         if torque.joints:
-            needed, slopes = torque.shares(inputs, slopes_of(motions, motions.times(count)))
-            rows.add(needed, -np.ones(needed.shape[1]), np.ones(needed.shape[1]), slopes)
+            needed, of_torque = torque.shares(inputs, slopes_of(motions, limited))
+            rows.add(needed, -np.ones(needed.shape[1]), np.ones(needed.shape[1]), of_torque)
         if cuts:
             held, *_ = along(np.array([one.t for one in cuts]))
-            slopes = np.array([one.slope for one in cuts])
+            of_room = np.array([one.slope for one in cuts])
             rows.add_bounds(
-                ca.sum2(held * ca.DM(slopes)),
+                ca.sum2(held * ca.DM(of_room)),
                 np.array([one.least for one in cuts]),
                 np.full(len(cuts), np.inf),
             )
-        unknown, loss = z, losses[0]
-        if len(losses) > 1:
-            loss = ca.MX.sym("loss")  # the largest: none is above it
-            unknown = ca.vertcat(z, loss)
-            over = ca.vertcat(*losses).T - loss
-            rows.add(over, np.full(len(losses), -np.inf), np.zeros(len(losses)))
-        program = {"x": unknown, "f": loss, "g": ca.vertcat(*rows.parts)}
+        loss = losses[0]
+        if several:
+            loss = unknown[-1]  # the largest: none is above it
+            over = ca.vertcat(*(one - loss for one in losses))
+            rows.add_bounds(over, np.full(len(losses), -np.inf), np.zeros(len(losses)))
+        # Without what units make of it: the search ends by its changes in relation to its size.
+        objective = loss - informations[0].unit
+        program = {"x": unknown, "f": objective, "g": ca.vertcat(*rows.parts)}
         options = _options(iterations) | {"jac_g": rows.jacobian(unknown)}
         return cls(ca.nlpsol("design", "ipopt", program, options), rows)
 
@@ -239,7 +242,8 @@ def _options(iterations: int) -> dict[str, Any]:
             "sb": "yes",
             "tol": 1e-4,
             "max_iter": iterations,
-            # Losses are logarithms: fifteen steps that change one by less than this end a search.
+            # Losses are logarithms: fifteen steps that change one by less than this share of it
+            # each end a search, however far slopes are from zero.
             "acceptable_tol": 100.0,
             "acceptable_obj_change_tol": 1e-4,
             "acceptable_iter": 15,
@@ -284,7 +288,7 @@ class LimitRows:
         ----------
         expression : (k,).
         lower, upper : (k,).
-        slopes : (k, v) by the first v variables; where there are none CasADi finds them.
+        slopes : (k, u) by the first u variables; where there are none CasADi finds them.
         """
         self.parts.append(expression)
         self.slopes.append(slopes)

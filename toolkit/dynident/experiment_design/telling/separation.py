@@ -97,7 +97,10 @@ class Separation:
         if self.decides:
             return words
         if not np.isfinite(self.enough):
-            return f"{words} That may not decide, however long it is: {self._alike()}"
+            return f"{words} That may not decide, however long it is: {self._alike()}."
+        if self.designed >= DECIDES:
+            longer = number(self.enough, 2)
+            return f"{words} That may not decide: {self._alike()}; {longer} times as long would."
         return (
             f"{words} That does not decide: {DECIDES:g}, from which on the residuals that they "
             f"leave differ beyond chance nine times in ten, take {number(self.enough, 2)} times as "
@@ -107,10 +110,10 @@ class Separation:
     def _alike(self) -> str:
         """Why no length decides."""
         if self.share > ALIKE:
-            return "too little of it is beyond the noise."
+            return "too little of it is beyond the noise"
         return (
             f"all but {percent(self.share, 2)} of what it explains is imitated, and up to "
-            f"{percent(ALIKE, 1)} a diagnosis may name both."
+            f"{percent(ALIKE, 1)} a diagnosis may name both"
         )
 
     def to_dict(self) -> dict[str, Any]:
