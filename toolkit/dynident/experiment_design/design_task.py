@@ -21,7 +21,8 @@ class DesignTask:
     intervals : of B-splines, in the place of series; None for series.
     objective : "D", the volume of the confidence region, or "A", the sum of the variances.
     tell : groups of effects, of each of which the recording is to tell which one it is; the first
-        of a group is taken for true. Of several groups, the one that is told least counts.
+        of a group is taken for true. Of several groups, the one that is told least counts, and the
+        others a little.
     show : effects that the recordings so far could not show.
     starts, seed : of the search.
     clearance : m, that the robot's links keep from each other; None where that is not looked at.

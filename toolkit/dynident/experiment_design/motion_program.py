@@ -23,6 +23,7 @@ from dynident.experiment_design.motion_solver import (
     LazySolver,
     LimitedTorque,
     MotionSolver,
+    joined,
 )
 from dynident.experiment_design.motions.motion_family import MotionFamily
 from dynident.experiment_design.predicted_torque import PredictedTorque
@@ -61,7 +62,8 @@ class MotionProgram:
 
     Attributes
     ----------
-    informations : what is asked; of several, the one that is told least counts.
+    informations : what is asked; of several, the one that is told least counts, and the others
+        a little.
     motions : among which it is sought.
     torque : that is limited.
     softer : of each of these, the same with dry friction over wider ranges of speed, the widest
@@ -103,15 +105,19 @@ class MotionProgram:
         return self._matrix(information, variables, FINER * self.instants)
 
     def loss(self, variables: np.ndarray, finer: int = 1) -> float:
-        """Return the loss of some variables; of several informations, the largest.
+        """Return the loss of some variables; of several informations, see `joined`.
 
         Parameters
         ----------
         variables : (n, 1 + k).
         finer : instants, over those of the program.
         """
+        losses = self._losses(variables, finer)
+        return losses[0] if len(losses) == 1 else joined(max(losses), losses)
+
+    def _losses(self, variables: np.ndarray, finer: int = 1) -> list[float]:
         count = finer * self.instants
-        return max(one.loss(self._matrix(one, variables, count)) for one in self.informations)
+        return [one.loss(self._matrix(one, variables, count)) for one in self.informations]
 
     def _matrix(self, information: Information, variables: np.ndarray, count: int) -> np.ndarray:
         t = self.motions.times(count)
@@ -369,7 +375,7 @@ class MotionProgram:
         bound[:, 0] = 0.999
         bounds, begin = bound.ravel(), start.ravel()
         if len(self.informations) > 1:
-            bounds, begin = np.append(bounds, np.inf), np.append(begin, self.loss(start))
+            bounds, begin = np.append(bounds, np.inf), np.append(begin, max(self._losses(start)))
         with interruptible():
             result = solver.function(
                 x0=begin, lbx=-bounds, ubx=bounds, lbg=solver.rows.lower, ubg=solver.rows.upper

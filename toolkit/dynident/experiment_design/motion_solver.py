@@ -14,6 +14,8 @@ from dynident.experiment_design.motions.motion_family import MotionFamily
 from dynident.late_modules import LateModule
 
 ca: Any = LateModule("casadi")
+_OTHERS = 0.2
+"""Weight of the mean of several losses beside the largest."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -86,6 +88,19 @@ class LimitedTorque:
         return found.T, ca.blockcat([[block(i, j) for j in range(n)] for i in range(len(limited))])
 
 
+def joined(largest: Any, losses: Sequence[Any]) -> Any:
+    """Return one loss of several: the largest, and a part of their mean.
+
+    Of the largest alone, what is told well already would be given up for hardly anything.
+
+    Parameters
+    ----------
+    largest : of the losses.
+    losses : numbers or expressions.
+    """
+    return largest + _OTHERS * sum(losses) / len(losses)
+
+
 def slopes_of(motions: MotionFamily, t: np.ndarray) -> tuple[np.ndarray, ...]:
     """Return the slopes of q, v and a of each joint by its own variables, (n, T, k) each.
 
@@ -129,7 +144,7 @@ class MotionSolver:
         Parameters
         ----------
         motions : among which one is sought.
-        informations : what is asked; of several, the largest loss is made small.
+        informations : what is asked; of several, see `joined`.
         instants : at which columns are evaluated, and at which limits are imposed.
         iterations : at most.
         torque : what is limited of it.
@@ -178,9 +193,10 @@ class MotionSolver:
             )
         loss = losses[0]
         if several:
-            loss = unknown[-1]  # the largest: none is above it
-            over = ca.vertcat(*(one - loss for one in losses))
+            largest = unknown[-1]  # none is above it
+            over = ca.vertcat(*(one - largest for one in losses))
             rows.add_bounds(over, np.full(len(losses), -np.inf), np.zeros(len(losses)))
+            loss = joined(largest, losses)
         # Without what units make of it: the search ends by its changes in relation to its size.
         objective = loss - informations[0].unit
         program = {"x": unknown, "f": objective, "g": ca.vertcat(*rows.parts)}
