@@ -126,7 +126,9 @@ def test_what_decides_is_said() -> None:
     soon = separation(11.8, 0.9 * ALIKE, 1.4)
     assert not soon.decides
     assert f"{DECIDES:g}, from" not in soon.sentence(8.0)
-    assert "may name both; 1.4 times as long would." in soon.sentence(8.0)
+    assert "it is predicted to decide from 1.4 times that length on." in soon.sentence(8.0)
+    both = separation(5.9, 0.9 * ALIKE, 3.0)
+    assert "6.5" not in both.sentence(8.0) and "from 3 times that length on" in both.sentence(8.0)
     alike = separation(50.0, 0.5 * ALIKE, np.inf)
     assert not alike.decides
     assert "may name both" in alike.sentence(8.0)

@@ -126,7 +126,13 @@ class Information:
 
     @property
     def unit(self) -> float:
-        """What the scales take from a determinant: losses of several questions are compared."""
+        """What of the loss follows from the scales, and no motion changes.
+
+        A determinant holds their product, by which losses of several questions are compared; the
+        sum of variances is in units of them.
+        """
+        if self.objective == "A":
+            return 0.0
         return -2 * float(np.sum(np.log(self.scale[len(self.scale) - self.last :])))
 
     def _factor_loss(self) -> Any:

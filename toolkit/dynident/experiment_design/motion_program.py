@@ -113,7 +113,7 @@ class MotionProgram:
         finer : instants, over those of the program.
         """
         losses = self._losses(variables, finer)
-        return losses[0] if len(losses) == 1 else joined(max(losses), losses)
+        return joined(losses, max(losses))
 
     def _losses(self, variables: np.ndarray, finer: int = 1) -> list[float]:
         count = finer * self.instants
@@ -345,11 +345,12 @@ class MotionProgram:
         solver, variables = self._end_of(lazy, start)
         best = self._finite_within(variables)
         while np.all(np.isfinite(variables)) and lazy.limit(self._torques_beyond(variables, 1.0)):
-            # From far beyond a limit a search may not come back, as it may from where it began.
+            # Where a search ended beyond a limit may lead nowhere, made smaller or not.
             for begin in (variables, start):
                 solver, variables = self._end_of(lazy, begin)
-                best = self._finite_within(variables)
-                if best is not None:
+                ended = self._finite_within(variables)
+                if ended is not None:
+                    best = ended
                     break
         stats = solver.function.stats()
         if best is None:

@@ -130,7 +130,7 @@ def close_design_loop(
     ----------
     model : the robot and its effects, as they are known.
     recorded : recordings so far.
-    truth : the robot as it truly is, for the recording; its seed is that of the noise.
+    truth : the robot as it truly is, for the recording; its seed is that of the recordings so far.
     task : length, repetitions and search of the design.
     progress : is called with what is being done, for a display.
 
@@ -152,7 +152,8 @@ def close_design_loop(
     designed = design(before.after.model, recorded, wanted, progress=progress)
     progress("following the designed motion")
     end = max(one.start + one.duration for one in recorded.recordings)
-    made = record_virtually(designed, truth, truth.seed, end)
+    # Another seed: a run's noise follows from it and from the run's place among the runs.
+    made = record_virtually(designed, truth, truth.seed + 1, end)
     (every,) = numbered(replace(recorded, recordings=(*recorded.recordings, made)))
     progress("diagnosing with the designed recording")
     after = diagnose(model, every, propose="never")

@@ -98,9 +98,11 @@ class Separation:
             return words
         if not np.isfinite(self.enough):
             return f"{words} That may not decide, however long it is: {self._alike()}."
-        if self.designed >= DECIDES:
-            longer = number(self.enough, 2)
-            return f"{words} That may not decide: {self._alike()}; {longer} times as long would."
+        if self.share <= ALIKE:
+            return (
+                f"{words} That may not decide: {self._alike()}; it is predicted to decide from "
+                f"{number(self.enough, 2)} times that length on."
+            )
         return (
             f"{words} That does not decide: {DECIDES:g}, from which on the residuals that they "
             f"leave differ beyond chance nine times in ten, take {number(self.enough, 2)} times as "
@@ -108,7 +110,7 @@ class Separation:
         )
 
     def _alike(self) -> str:
-        """Why no length decides."""
+        """Why many standard deviations may not decide."""
         if self.share > ALIKE:
             return "too little of it is beyond the noise"
         return (
