@@ -16,7 +16,7 @@ from dynident.batch import c_function, side_by_side
 from dynident.errors import RecordingError
 from dynident.recording.sections import state_at_rest
 
-_LANES = 8  # columns that are filtered together
+_LANES = 4  # columns that are filtered together: wider vectors than the processor has are slow
 _AT_ONCE = 64  # columns that SciPy filters at a time; bounds the temporary memory
 _ENTRY = "dynident_zero_phase"
 _SOURCE = """\

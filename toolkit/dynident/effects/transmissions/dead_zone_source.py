@@ -5,8 +5,8 @@ The operations, and their order, are those that `dead_zone` does by NumPy, step 
 
 from __future__ import annotations
 
-LANES = 8
-"""Links that walk together."""
+LANES = 4
+"""Links that walk together: wider vectors than the processor has are slow."""
 
 ENTRY = "dynident_dead_zones"
 """Name of the function: of the number of steps, of pointers to m, load, c and g of each link, of

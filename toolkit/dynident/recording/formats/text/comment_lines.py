@@ -22,8 +22,9 @@ class CommentLines:
 
     def found_in(self, body: bytes, above: int) -> bool:
         """Note those of some lines; whether there are any."""
-        # Their marks are rare, and that there are none is found a hundred times as fast.
-        if not any(mark in body for mark in (b"#", b"%", b"//")):
+        # Their marks are rare. That one byte is nowhere is found a hundred times as fast as that an
+        # expression is not, and fifty times as fast as that two bytes are not.
+        if not any(mark in body for mark in (b"#", b"%", b"/")):
             return False
         before, line, place = self._count, above + 1, 0
         for found in _COMMENTS.finditer(body):
