@@ -73,13 +73,15 @@ class Tangent(Effect):
     def acting_columns(self, block: Block) -> np.ndarray:
         """Columns (T, J, k), then derivatives one after the other, (T, J, k + s k)."""
         assert self.of is not None
-        here = list(self.joints)
+        here, samples = list(self.joints), len(block.t)
         plain, slopes = self.of.acting_columns(block), self.of.sensitivities(block)
         assert slopes is not None
-        turned = np.moveaxis(slopes[:, here], 3, 2).reshape(*plain.shape[:2], -1)
-        at_point = self.of.point_slope(block) if self.of.point else None
-        parts = (plain, turned) if at_point is None else (plain, turned, at_point[:, here])
-        return np.concatenate(parts, axis=2)
+        # Samples last, as they lie in memory: what is side by side is copied and filtered so.
+        turned = slopes.transpose(1, 3, 2, 0)[here].reshape(len(here), -1, samples)
+        parts = [plain.transpose(1, 2, 0), turned]
+        if self.of.point:
+            parts.append(self.of.point_slope(block).transpose(1, 2, 0)[here])
+        return np.concatenate(parts, axis=1).transpose(2, 0, 1)
 
     def columns(self, block: Block) -> np.ndarray:
         """The same at all joints, (T, n, k + s k)."""

@@ -68,7 +68,8 @@ class DrivenLink:
         rotor = 0.0 if block.rotor is None else float(block.rotor[joint])
         self.joint, self.a = joint, block.a[:, joint]
         by = along.by(joint)
-        self.M, self.C, self.G = map(np.ascontiguousarray, (by.by_a, by.by_v, by.by_q))
+        # Samples side by side: they are multiplied by signals, again and again.
+        self.M, self.C, self.G = map(np.asfortranarray, (by.by_a, by.by_v, by.by_q))
         self.whole = self.M[:, joint] + rotor
         self.load = along.torque[:, joint] + rotor * self.a
         # What is stiff stays as stiff when a payload is taken up.

@@ -241,5 +241,5 @@ def _sign(load: np.ndarray) -> np.ndarray:
 
 
 def stacked(columns: Iterable[np.ndarray]) -> np.ndarray:
-    """Return derivatives (T, n) each as (T, n, 1, s)."""
-    return np.stack(list(columns), axis=-1)[:, :, None, :]
+    """Return derivatives (T, n) each as (T, n, 1, s), the samples side by side."""
+    return np.stack([one.T for one in columns]).T[:, :, None, :]
