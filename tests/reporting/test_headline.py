@@ -13,7 +13,7 @@ from dynident.reporting.glossary import glossary
 from dynident.reporting.headline import headline
 from dynident.reporting.html import page
 from dynident.reporting.joint_states import opened, states
-from dynident.reporting.next_steps import FIRST, in_short, next_steps
+from dynident.reporting.next_steps import FIRST, in_short, next_steps, then_record
 from dynident.tables import percent
 from dynident.wiring import Fault
 from dynident.wiring.speed_limits import OverSpeed
@@ -202,6 +202,29 @@ def test_a_long_text_ends_with_the_verdict_and_what_to_type(six):
     what, *commands = following.splitlines()
     assert next_steps(six)[0].what in what
     assert commands[0].startswith("    dynident add 'my studies/arm.toml' ") and len(commands) == 2
+
+
+def test_rivals_of_what_was_added_are_told_with_the_recording_that_decides(six):
+    rivals = (effect("torque_ripple", "joint6"), effect("joint_zero", "joint6"))
+    steps = tuple(
+        replace(six.steps[0], effect=effect(name, "joint6"), indistinguishable=those)
+        for name, those in (
+            ("joint_spring", rivals),
+            ("quadratic_drag", ()),
+            ("stribeck_friction", (effect("viscous_friction", "joint6"),)),
+        )
+    )
+    one, both = (replace(six, steps=some) for some in (steps[:2], steps))
+    (alone,), (told,) = (then_record(found, Path("my arm.toml")) for found in (one, both))
+    for said in (alone, told):
+        assert said.startswith("Then: Before you believe in joint spring at joint6")
+        assert said.endswith("\n    dynident explain 'my arm.toml' --design next")
+        assert "quadratic drag" not in said
+    assert "from torque ripple at joint6 and from joint zero at joint6" in alone
+    assert "joint spring at joint6 and stribeck friction at joint6" in told
+    (advice,) = (a for a in next_steps(both) if a.what in told)
+    assert "stribeck friction at joint6 and viscous friction at joint6" in advice.why
+    assert then_record(replace(six, steps=(steps[1],)), Path("arm.toml")) == ()
 
 
 def test_at_most_three_next_steps_are_unfolded(six):

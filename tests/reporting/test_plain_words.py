@@ -48,6 +48,7 @@ def test_what_to_do_names_commands_and_the_experiment_that_separates(found):
     add, separate, not_identifiable = next_steps(found)
     assert add.commands == ("dynident add STUDY stribeck_friction@elbow", "dynident fit STUDY")
     assert "asymmetric friction at elbow" in separate.what
+    assert separate.commands == ("dynident explain STUDY --design next",)
     for one in (found.steps[0].effect, *found.steps[0].indistinguishable):
         assert one.advice in separate.why
     assert "cannot show" in not_identifiable.what
@@ -73,7 +74,9 @@ def test_what_a_study_cannot_take_up_or_what_brings_nothing_is_no_command(found,
 
 def test_without_noise_the_first_thing_is_a_motion_that_repeats():
     unknown = diagnosis(("slide",), noise=False, steps=False, samples=200)
-    assert "Record a motion that repeats" in next_steps(unknown)[0].what
+    first = next_steps(unknown)[0]
+    assert "Record a motion that repeats" in first.what
+    assert first.commands == ("dynident design STUDY --out next",)
     assert "noise is unknown" in headline(unknown).sentence
 
 

@@ -63,7 +63,7 @@ def explain(
     Example: dynident explain study.toml --report report.html
     """
     from dynident.reporting.intervals import printed_parameters
-    from dynident.reporting.next_steps import in_short
+    from dynident.reporting.next_steps import in_short, then_record
 
     if next_ is not None:
         files.require_folder(next_)
@@ -88,6 +88,7 @@ def explain(
             *printed_parameters(diagnosis),
             *following.parts(),
             *in_short(diagnosis, study),
+            *(then_record(diagnosis, study) if next_ is None else ()),
         ),
     )
     return with_drives(loaded, answer)

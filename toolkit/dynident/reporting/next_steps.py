@@ -90,11 +90,25 @@ def in_short(diagnosis: Diagnosis, study: Path) -> tuple[str, ...]:
     diagnosis : of the study.
     study : its file, as commands name it.
     """
-    first, *_ = of_study(next_steps(diagnosis), study)
-    return (
-        f"In short: {headline(diagnosis).sentence}",
-        "\n".join([f"Next: {first.what}", *(f"    {one}" for one in first.commands)]),
-    )
+    first, *_ = next_steps(diagnosis)
+    return f"In short: {headline(diagnosis).sentence}", _typed("Next", first, study)
+
+
+def then_record(diagnosis: Diagnosis, study: Path) -> tuple[str, ...]:
+    """Return what follows it where effects that were added cannot be told from others.
+
+    Parameters
+    ----------
+    diagnosis, study : as for `in_short`.
+    """
+    others = next_steps(diagnosis)[1:]
+    return tuple(_typed("Then", one, study) for one in _to_separate(diagnosis) if one in others)
+
+
+def _typed(when: str, advice: Advice, study: Path) -> str:
+    """Advice as a paragraph of text, its commands below it."""
+    (one,) = of_study([advice], study)
+    return "\n".join([f"{when}: {one.what}", *(f"    {typed}" for typed in one.commands)])
 
 
 def _to_mend(fault: Fault) -> Advice:
@@ -125,7 +139,7 @@ def _to_time(diagnosis: Diagnosis) -> list[Advice]:
 def _to_add(diagnosis: Diagnosis) -> list[Advice]:
     """What carries the fall first, by how much it does; what is small beside it after that."""
     steps = _addable(diagnosis)
-    if not steps or diagnosis.impossible or diagnosis.too_fast is not None:
+    if not steps or diagnosis.impossible:
         return []
     error = diagnosis.test_error
     found = LeadingEffects.of(steps)
@@ -152,7 +166,12 @@ def _to_add(diagnosis: Diagnosis) -> list[Advice]:
 
 
 def _addable(diagnosis: Diagnosis) -> list[Step]:
-    """What the study can take up: no event of one recording, and no gain that is fitted anyway."""
+    """What the study can take up: no event of one recording, and no gain that is fitted anyway.
+
+    Nothing before it is settled whose positions these are.
+    """
+    if diagnosis.too_fast is not None:
+        return []
     fitted = set() if diagnosis.drives is None else set(diagnosis.drives.joints)
     return [
         step
@@ -164,7 +183,7 @@ def _addable(diagnosis: Diagnosis) -> list[Step]:
 
 def _to_add_after(diagnosis: Diagnosis) -> list[Advice]:
     """What is small beside the effects that carry the fall."""
-    steps = _addable(diagnosis) if diagnosis.too_fast is None else []
+    steps = _addable(diagnosis)
     smaller = LeadingEffects.of(steps).smaller if steps else ()
     smaller = [group for group in smaller if sum(step.fall for step in group) > 0.0]
     certain = [group for group in smaller if not all(step.uncertain for step in group)]
@@ -192,20 +211,41 @@ def _added(groups: Sequence[Sequence[Step]], joints: int) -> tuple[str, list[str
     """Effects in words, no more of them than a sentence lists, and the labels of all."""
     labels = [step.effect.label for group in groups for step in group]
     titles = [grouped_title([step.effect for step in group], joints) for group in groups]
+    return _few_of(titles), labels
+
+
+def _few_of(titles: list[str]) -> str:
+    """No more of them than a sentence lists."""
     more = len(titles) - _MOST_NAMED
-    named = titles[:_MOST_NAMED] + ([f"{in_words(more)} more"] if more > 0 else [])
-    return listed(named), labels
+    return listed(titles[:_MOST_NAMED] + ([f"{in_words(more)} more"] if more > 0 else []))
 
 
 def _to_separate(diagnosis: Diagnosis) -> list[Advice]:
+    """Which recording tells effects that were added from those that do as well."""
+    open_ = [step for step in diagnosis.steps if step.indistinguishable]
+    if not open_:
+        return []
+    command = "dynident explain STUDY --design next"
+    if len(open_) == 1:
+        (step,) = open_
+        return [
+            Advice(
+                f"Before you believe in {step.effect.title}, record a motion that tells it from "
+                f"{_either(step.indistinguishable)}.",
+                f"With this data they do the same. {_experiments(step)}",
+                (command,),
+            )
+        ]
+    titles = _few_of([step.effect.title for step in open_])
+    pairs = "; ".join(f"{one.effect.title} and {_either(one.indistinguishable)}" for one in open_)
+    experiments = " ".join(dict.fromkeys(map(_experiments, open_)))
     return [
         Advice(
-            f"Before you believe in {step.effect.title}, record a motion that tells it from "
-            f"{_either(step.indistinguishable)}.",
-            f"With this data they do the same. {_experiments(step)}",
+            f"Before you believe in {titles}, record a motion that tells each from what "
+            "does the same.",
+            f"With this data these do the same: {pairs}. {experiments}",
+            (command,),
         )
-        for step in diagnosis.steps
-        if step.indistinguishable
     ]
 
 
@@ -268,4 +308,5 @@ def _to_repeat(diagnosis: Diagnosis) -> Advice:
     )
     if diagnosis.noise_source == "given":
         why = f"The noise is so far only what the study states. {why}"
-    return Advice(what, why)
+    why += " `design` makes one within the limits of the description."
+    return Advice(what, why, ("dynident design STUDY --out next",))
