@@ -6,10 +6,11 @@ Each robot is drawn at random: one to seven joints, some of them rails, shapes o
 meet, limits from loose to tight, often obstacles and a box for the tip. Its description is wrong by
 up to 20 % in the mass and the inertia of each link, and all that is recorded are four seconds of a
 small motion. A motion is designed for it and looked at on ten times as many instants as the design
-looked at: position, speed and acceleration from the coefficients, torque of the true robot by
-Pinocchio, distances of links and obstacles and the place of the tip by a Drake plant that is built
-here from the drawn text. Printed are the largest share of each limit, the least room, what moves at
-either end, and how many were refused; a line for each robot says what its motion exceeds, if any.
+looked at: position, speed, acceleration and its differences from the coefficients, torque of the
+true robot by Pinocchio, distances of links and obstacles and the place of the tip by a Drake plant
+that is built here from the drawn text. Printed are the largest share of each limit, the least room,
+what moves at either end, and how many were refused; a line for each robot says what its motion
+exceeds, if any.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ class Drawn:
     @classmethod
     def of(cls, seed: int) -> Drawn:
         """Draw one."""
-        rng = np.random.default_rng([seed, 19])
+        rng, own = (np.random.default_rng([seed, k]) for k in (19, 20))
         n = int(rng.integers(1, 8))
         text = _urdf(n, rng)
         robot = Robot.from_text(text)
@@ -78,6 +79,8 @@ class Drawn:
             torque=np.where(rng.random(n) < 0.7, torque, np.inf),
             obstacles=tuple(_obstacle(rng) for _ in range(rng.integers(0, 3))),
         )
+        jerk = limits.acceleration * own.uniform(2.0, 20.0, n)
+        limits = replace(limits, jerk=np.where(own.random(n) < 0.5, jerk, np.inf))
         if rng.random() < 0.4:
             low, high = (rng.uniform(0.2, 0.9, 3) * side for side in (-1, 1))
             entry = BoxEntry(joint=robot.names[-1], lower=low.tolist(), upper=high.tolist())
@@ -159,7 +162,8 @@ class Seen:
 
     Attributes
     ----------
-    position, speed, acceleration, torque : largest share of a limit, 1 or less where it holds.
+    position, speed, acceleration, jerk, torque : largest share of a limit, 1 or less where it
+        holds.
     clear, inside : m, least room beyond the clearance, and to a face of the box; infinite where
         there is none to keep.
     moving : largest share of a limit of speed or acceleration at the beginning and at the end.
@@ -168,6 +172,7 @@ class Seen:
     position: float
     speed: float
     acceleration: float
+    jerk: float
     torque: float
     clear: float
     inside: float
@@ -176,7 +181,7 @@ class Seen:
     @property
     def beyond(self) -> list[str]:
         """Names of what does not hold."""
-        shares = ("position", "speed", "acceleration", "torque")
+        shares = ("position", "speed", "acceleration", "jerk", "torque")
         found = [one for one in shares if not getattr(self, one) <= 1.0 + ROUNDING]
         found += [one for one in ("clear", "inside") if not getattr(self, one) >= -ROUNDING]
         return found + ["moving"] * (not self.moving <= 1e-6)
@@ -200,6 +205,7 @@ def seen(drawn: Drawn, found: RecordingDesign) -> Seen:
         position=float(np.abs((q - middle) / half).max()),
         speed=float(np.abs(v / limits.speed).max()),
         acceleration=float(np.abs(a / limits.acceleration).max()),
+        jerk=float(np.abs(np.diff(a, axis=0) / np.diff(t)[:, None] / limits.jerk).max()),
         torque=float(np.abs(torque / limits.torque).max()),
         clear=clear,
         inside=inside,
@@ -283,7 +289,7 @@ def main() -> None:
         )
     rows = [
         (name, f"{max(getattr(one, name) for one in kept):.9f}", "1")
-        for name in ("position", "speed", "acceleration", "torque")
+        for name in ("position", "speed", "acceleration", "jerk", "torque")
     ]
     rows += [
         (f"{name}, mm", f"{1000 * min(getattr(one, name) for one in kept):.6f}", "0 or more")

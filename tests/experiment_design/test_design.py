@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -60,11 +61,14 @@ def test_motions_begin_and_end_at_rest(harmonics: int) -> None:
     assert np.ptp(q, axis=0).max() < 1e-12
     assert np.abs(v).max() < 1e-12 and np.abs(a).max() < 1e-10
     t = some.times(300)
-    for basis, found in zip(some.bases(t), some.trajectory(variables).at(t), strict=True):
+    motion = some.trajectory(variables)
+    for basis, found in zip(some.bases(t)[:3], motion.at(t), strict=True):
         linear = some.limits.speed * (basis @ variables.T)
         found = found - (some.centre(variables) if basis is some.bases(t)[0] else 0.0)
         moved = found - found[0] + linear[0]
         np.testing.assert_allclose(moved, linear, atol=1e-10)
+    later, earlier = (motion.at(t + step)[2] for step in (1e-5, -1e-5))
+    np.testing.assert_allclose(some.jerk(variables, t), (later - earlier) / 2e-5, rtol=1e-5)
 
 
 @pytest.mark.parametrize("label", EVERY_INSTANT)
@@ -256,6 +260,7 @@ def test_no_limit_is_exceeded_on_a_fine_grid(seed: int) -> None:
         speed=plain.speed * rng.uniform(0.2, 1.0, robot.n),
         acceleration=plain.acceleration * rng.uniform(0.2, 1.0, robot.n),
         torque=np.full(robot.n, np.inf),
+        jerk=np.where(rng.random(robot.n) < 0.5, 3.0 * plain.acceleration, np.inf),
     )
     model = Model(robot)
     values = model.given_values()
@@ -270,6 +275,28 @@ def test_no_limit_is_exceeded_on_a_fine_grid(seed: int) -> None:
     assert np.all(q >= limits.lower - small * span) and np.all(q <= limits.upper + small * span)
     assert np.all(np.abs(v) <= (1 + small) * limits.speed)
     assert np.all(np.abs(a) <= (1 + small) * limits.acceleration)
+    jerk = np.diff(a, axis=0) / np.diff(t)[:, None]  # a mean, between two instants
+    assert np.all(np.abs(jerk) <= (1 + 1e-6) * limits.jerk)
+
+
+@pytest.mark.parametrize("kind", [{"harmonics": 4}, {"intervals": 8}])
+@pytest.mark.usefixtures("few_begins")
+def test_a_limit_of_jerk_is_used_and_kept(kind: dict[str, int], tmp_path: Path) -> None:
+    limits = tmp_path / "limits.toml"
+    limits.write_text("[joints.shoulder]\njerk = 12.0\n")
+    task = DesignTask(duration=6.0, repeat=1, starts=1, **kind)
+    free, held = (
+        design(MODEL, recorded(), task, limits=some)
+        for some in (None, MotionLimits.from_file(limits, ROBOT))
+    )
+    t = np.linspace(0, 6.0, 60_000)
+    jerks = [
+        np.abs(np.diff(one.trajectory.at(t)[2], axis=0) / np.diff(t)[:, None])
+        for one in (free, held)
+    ]
+    assert jerks[0].max(axis=0)[0] > 15.0
+    assert 11.0 < jerks[1].max(axis=0)[0] <= 12.0
+    assert "jerk" in str(held.limit_table()) and "jerk" not in str(free.limit_table())
 
 
 @pytest.mark.usefixtures("few_begins")

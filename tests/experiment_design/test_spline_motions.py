@@ -45,10 +45,14 @@ def test_they_begin_and_end_at_rest_and_are_linear_in_their_variables(intervals:
     just = 6.0 * (1 - 1e-12)
     assert max(np.abs(one).max() for one in motion.at(np.array([just]))[1:]) < 1e-6
     t = some.times(301)
-    for basis, part in zip(some.bases(t), motion.at(t), strict=True):
+    for basis, part in zip(some.bases(t)[:3], motion.at(t), strict=True):
         linear = some.limits.speed * (basis @ variables.T)
         moved = part - part[0] if basis is not some.bases(t)[1] else part
         np.testing.assert_allclose(moved, linear - linear[0], atol=1e-10)
+    later, earlier = (motion.at(t[1:] + step)[2] for step in (1e-5, -1e-5))
+    np.testing.assert_allclose(
+        some.jerk(variables, t[1:]), (later - earlier) / 2e-5, rtol=1e-3, atol=1e-2
+    )
 
 
 def test_memory_is_that_of_the_motion_however_many_points_it_has() -> None:

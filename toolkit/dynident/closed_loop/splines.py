@@ -16,10 +16,8 @@ RESTING = 3
 """Points at either end that are equal: position, speed and acceleration are those at rest."""
 
 
-def spline_basis(
-    t: np.ndarray, period: float, intervals: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the B-splines of a period, their first and their second derivatives.
+def spline_basis(t: np.ndarray, period: float, intervals: int) -> tuple[np.ndarray, ...]:
+    """Return the B-splines of a period, and their first three derivatives.
 
     Parameters
     ----------
@@ -29,20 +27,18 @@ def spline_basis(
 
     Returns
     -------
-    Three arrays (T, intervals + 5).
+    Four arrays (T, intervals + 5).
     """
-    return _along(t, period, np.eye(intervals + DEGREE))
+    return _along(t, period, np.eye(intervals + DEGREE), 3)
 
 
-def _along(
-    t: np.ndarray, period: float, points: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Splines of points (k, m), their first and their second derivatives, (T, m) each."""
+def _along(t: np.ndarray, period: float, points: np.ndarray, most: int) -> tuple[np.ndarray, ...]:
+    """Splines of points (k, m) and their derivatives, up to so many, (T, m) each."""
     inner = np.linspace(0.0, period, len(points) - DEGREE + 1)
     knots = np.concatenate([np.zeros(DEGREE), inner, np.full(DEGREE, period)])
     spline = Spline(knots, points, DEGREE)
     phase = np.remainder(np.asarray(t, dtype=float), period)
-    return spline(phase), spline(phase, 1), spline(phase, 2)
+    return tuple(spline(phase, order) for order in range(most + 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +83,7 @@ class BSpline:
         """Return position, velocity and acceleration at times t (T,) s, each (T, n)."""
         # About the position at rest, so that rounding does not move what rests.
         moved = self.points - self.points[:, :1]
-        q, v, a = _along(t, self.period, moved.T)
+        q, v, a = _along(t, self.period, moved.T, 2)
         return q + self.points[:, 0], v, a
 
     @property

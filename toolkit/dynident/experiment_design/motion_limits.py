@@ -1,4 +1,4 @@
-"""What a motion may do: limits of position, speed, acceleration and torque of each joint."""
+"""What a motion may do: limits of position, speed, acceleration, jerk and torque of each joint."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class _JointLimits(SettingsTable):
     Attributes
     ----------
     lower, upper : rad or m.
-    speed, acceleration : rad/s or m/s, and per s.
+    speed, acceleration, jerk : rad/s or m/s, per s, and per s^2.
     torque : N m or N.
     """
 
@@ -39,6 +39,7 @@ class _JointLimits(SettingsTable):
     upper: float | None = None
     speed: float | None = Field(default=None, gt=0)
     acceleration: float | None = Field(default=None, gt=0)
+    jerk: float | None = Field(default=None, gt=0)
     torque: float | None = Field(default=None, gt=0)
 
 
@@ -58,6 +59,7 @@ class MotionLimits:
     ----------
     lower, upper : rad or m.
     speed, acceleration : rad/s or m/s, and per s.
+    jerk : rad/s^3 or m/s^3; infinite where none is stated.
     torque : N m or N; infinite where none is known.
     boxes : that points of the robot stay in.
     obstacles : that it stays clear of.
@@ -67,9 +69,15 @@ class MotionLimits:
     upper: np.ndarray
     speed: np.ndarray
     acceleration: np.ndarray
+    jerk: np.ndarray
     torque: np.ndarray
     boxes: tuple[StayBox, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
+
+    @property
+    def jerk_limited(self) -> np.ndarray:
+        """Joints whose jerk is limited, (n,) mask."""
+        return np.isfinite(self.jerk)
 
     @classmethod
     def of(cls, robot: Robot, margin: float = MARGIN) -> MotionLimits:
@@ -101,14 +109,16 @@ class MotionLimits:
             upper=middle + half,
             speed=speed,
             acceleration=acceleration,
+            jerk=np.full(len(speed), np.inf),
             torque=margin * effort,
         )
 
     @classmethod
     def from_file(cls, path: str | Path, robot: Robot) -> MotionLimits:
-        """Read limits: `[joints.elbow]` with `lower`, `upper`, `speed`, `acceleration`, `torque`.
+        """Read limits: `[joints.elbow]` with those that differ from the description's.
 
-        Besides `[[boxes]]` that points of the robot stay in, and `[[obstacles]]`.
+        They are `lower`, `upper`, `speed`, `acceleration`, `jerk` and `torque`. Besides there are
+        `[[boxes]]` that points of the robot stay in, and `[[obstacles]]`.
 
         Raises
         ------
@@ -124,7 +134,7 @@ class MotionLimits:
         )
 
     def shares(
-        self, q: np.ndarray, rates: tuple[np.ndarray, np.ndarray, np.ndarray], centre: np.ndarray
+        self, q: np.ndarray, rates: tuple[np.ndarray, ...], centre: np.ndarray
     ) -> np.ndarray:
         """Return the largest share of each limit that a motion uses; infinite if it is no number.
 
@@ -134,15 +144,15 @@ class MotionLimits:
         Parameters
         ----------
         q : (T, n), at instants that are evenly spaced over a period.
-        rates : speed, acceleration and torque, (T, n) each.
+        rates : speed, acceleration, jerk and torque, (T, n) each.
         centre : (n,) position that the range is seen from.
 
         Returns
         -------
-        (4 n,) of position, speed, acceleration and torque.
+        (5 n,) of position, speed, acceleration, jerk and torque.
         """
         moved = q - centre
-        limits = (self.speed, self.acceleration, self.torque)
+        limits = (self.speed, self.acceleration, self.jerk, self.torque)
         shares = [
             moved / np.where(moved > 0, self.upper - centre, centre - self.lower),
             *(one / limit for one, limit in zip(rates, limits, strict=True)),
@@ -214,6 +224,6 @@ def _stated(numbers: list[float]) -> np.ndarray:
     return np.where(np.abs(found) < _NONE, found, np.copysign(np.inf, found))
 
 
-_NAMES = ("lower", "upper", "speed", "acceleration", "torque")
+_NAMES = ("lower", "upper", "speed", "acceleration", "jerk", "torque")
 _ENDS = ("lower", "upper")
 _NONE = 1e6

@@ -1,8 +1,8 @@
 """The motion that tells the most within limits: a nonlinear program, solved by Ipopt.
 
-Variables are amplitudes; position, speed and acceleration are linear in them, and the torque is
-not. The limits hold on a grid of instants while the program is solved; then the motion is looked at
-on ten times as many, and made smaller about its centre until none is exceeded there.
+Variables are amplitudes; position, speed, acceleration and jerk are linear in them, and the torque
+is not. The limits hold on a grid of instants while the program is solved; then the motion is looked
+at on ten times as many, and made smaller about its centre until none is exceeded there.
 """
 
 from __future__ import annotations
@@ -181,10 +181,13 @@ class MotionProgram:
         return float(self._shares(variables, t).max())
 
     def _shares(self, variables: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """The largest share of each limit that a motion uses, (4 n,)."""
+        """The largest share of each limit that a motion uses, (5 n,)."""
         q, v, a = self.motions.trajectory(variables).at(t)
+        jerk = (
+            self.motions.jerk(variables, t) if self.limits.jerk_limited.any() else np.zeros_like(a)
+        )
         torque = self.torque.farthest(t, q, v, a)
-        return self.limits.shares(q, (v, a, torque), self.motions.centre(variables))
+        return self.limits.shares(q, (v, a, jerk, torque), self.motions.centre(variables))
 
     # --- the program --------------------------------------------------------------------------
 

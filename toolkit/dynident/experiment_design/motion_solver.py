@@ -112,7 +112,7 @@ def slopes_of(motions: MotionFamily, t: np.ndarray) -> tuple[np.ndarray, ...]:
     t : (T,) s.
     """
     limits = motions.limits
-    found = [limits.speed[:, None, None] * one for one in motions.bases(t)]
+    found = [limits.speed[:, None, None] * one for one in motions.bases(t)[:3]]
     found[0][:, :, 0] += (limits.upper - limits.lower)[:, None] / 2  # of the centre
     return tuple(found)
 
@@ -167,7 +167,7 @@ class MotionSolver:
 
         def along(t: np.ndarray) -> tuple[Any, ...]:
             """Position, speed and acceleration, (T, n) each, and all of an instant."""
-            moved, v, a = (ca.DM(one) @ variables @ speed for one in motions.bases(t))
+            moved, v, a = (ca.DM(one) @ variables @ speed for one in motions.bases(t)[:3])
             centre = ca.DM(limits.lower + half).T + variables[0, :] * ca.DM(half).T
             q = ca.repmat(centre, len(t), 1) + moved
             return q, v, a, ca.vertcat(q.T, v.T, a.T, ca.DM(t).T)
@@ -182,6 +182,11 @@ class MotionSolver:
         ones = np.ones(n)
         rows.add(v / ca.repmat(ca.DM(limits.speed).T, count, 1), -ones, ones)
         rows.add(a / ca.repmat(ca.DM(limits.acceleration).T, count, 1), -ones, ones)
+        if (limited := np.flatnonzero(limits.jerk_limited)).size:
+            *_, basis = motions.bases(times)
+            share = ca.diag(ca.DM((limits.speed / limits.jerk)[limited]))
+            jerk = ca.DM(basis) @ variables[:, limited.tolist()] @ share
+            rows.add(jerk, -np.ones(limited.size), np.ones(limited.size))
         if torque.joints:
             needed, of_torque = torque.shares(inputs, slopes_of(motions, times))
             rows.add(needed, -np.ones(needed.shape[1]), np.ones(needed.shape[1]), of_torque)

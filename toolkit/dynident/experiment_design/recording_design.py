@@ -111,7 +111,10 @@ class RecordingDesign(Shown):
         program, limits = self.program, self.limits
         t = program.motions.times(FINER * program.instants)
         q, v, a = self.trajectory.at(t)
-        torque = program.torque.farthest(t, q, v, a)
+        rates = {"speed": (v, limits.speed), "acceleration": (a, limits.acceleration)}
+        if limits.jerk_limited.any():
+            rates["jerk"] = program.motions.jerk(self.motion.variables, t), limits.jerk
+        rates["torque"] = program.torque.farthest(t, q, v, a), limits.torque
         rows = []
         for j, (name, unit) in enumerate(
             zip(self.model.robot.names, self.model.robot.units, strict=True)
@@ -119,17 +122,13 @@ class RecordingDesign(Shown):
             span = limits.upper[j] - limits.lower[j]
             room = min(q[:, j].min() - limits.lower[j], limits.upper[j] - q[:, j].max())
             ends = (number(float(one), 3) for one in (q[:, j].min(), q[:, j].max()))
-            rows.append(
-                (
-                    name,
-                    f"{' to '.join(ends)} {unit}",
-                    percent(float(room / span), 0),
-                    percent(float(np.abs(v[:, j]).max() / limits.speed[j]), 0),
-                    percent(float(np.abs(a[:, j]).max() / limits.acceleration[j]), 0),
-                    percent(float(np.abs(torque[:, j]).max() / limits.torque[j]), 0),
-                )
+            shares = (
+                percent(float(np.abs(signal[:, j]).max() / limit[j]), 0)
+                for signal, limit in rates.values()
             )
-        heads = ("joint", "moves", "room left", "speed", "acceleration", "torque")
+            moves = f"{' to '.join(ends)} {unit}"
+            rows.append((name, moves, percent(float(room / span), 0), *shares))
+        heads = ("joint", "moves", "room left", *rates)
         return Table("Shares of the limits that the motion uses", heads, tuple(rows))
 
     def tables(self) -> tuple[Table | str, ...]:

@@ -61,8 +61,8 @@ class FourierMotions(MotionFamily):
         ends[1, self.harmonics :] = w / w[0]
         return null_space(ends) / np.tile(w, 2)[:, None]
 
-    def waveforms(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Position, speed and acceleration per amplitude, (T, 2 H - 2) each, for a speed of one.
+    def waveforms(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Position, speed, acceleration and jerk per amplitude, (T, k) each, for a speed of one.
 
         Parameters
         ----------
@@ -74,9 +74,9 @@ class FourierMotions(MotionFamily):
             np.hstack([s, c]),
             np.hstack([c * w, -s * w]),
             np.hstack([-s * w**2, -c * w**2]),
+            np.hstack([-c * w**3, s * w**3]),
         )
-        q, v, a = (one @ self.at_rest for one in each)
-        return q, v, a
+        return tuple(one @ self.at_rest for one in each)
 
     def trajectory(self, variables: np.ndarray) -> Fourier:
         """Return the motion of some variables, (n, 2 H - 1)."""

@@ -47,8 +47,8 @@ class MotionFamily(ABC):
         """Shortest waves of a motion that a period has: so finely it is to be looked at."""
 
     @abstractmethod
-    def waveforms(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Position, speed and acceleration per amplitude, (T, k) each, for a speed of one.
+    def waveforms(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Position, speed, acceleration and jerk per amplitude, (T, k) each, for a speed of one.
 
         Parameters
         ----------
@@ -73,8 +73,8 @@ class MotionFamily(ABC):
         """Instants of a period, evenly spaced, (instants,) s."""
         return np.arange(instants) * (self.period / instants)
 
-    def bases(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Position, speed and acceleration per variable, (T, 1 + k) each, for a speed of one.
+    def bases(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Position, speed, acceleration and jerk per variable, (T, 1 + k) each, for a speed of one.
 
         Of a joint: q = centre + speed * (bases @ variables), the first column of which is empty.
 
@@ -83,8 +83,18 @@ class MotionFamily(ABC):
         t : (T,) s.
         """
         empty = np.zeros((len(t), 1))
-        q, v, a = (np.hstack([empty, one]) for one in self.waveforms(t))
-        return q, v, a
+        return tuple(np.hstack([empty, one]) for one in self.waveforms(t))
+
+    def jerk(self, variables: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Return the jerk of a motion, (T, n) rad/s^3 or m/s^3.
+
+        Parameters
+        ----------
+        variables : (n, 1 + k).
+        t : (T,) s.
+        """
+        *_, jerk = self.waveforms(t)
+        return (jerk @ variables[:, 1:].T) * self.limits.speed
 
     def centre(self, variables: np.ndarray) -> np.ndarray:
         """Positions about which a motion grows with its amplitudes, (n,)."""

@@ -47,16 +47,16 @@ class SplineMotions(MotionFamily):
         """Length of an interval, s."""
         return self.period / self.intervals
 
-    def waveforms(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Position, speed and acceleration per amplitude, (T, k) each, for a speed of one.
+    def waveforms(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Position, speed, acceleration and jerk per amplitude, (T, k) each, for a speed of one.
 
         Parameters
         ----------
         t : (T,) s.
         """
         free = slice(RESTING, -RESTING)
-        q, v, a = (self.unit * one[:, free] for one in spline_basis(t, self.period, self.intervals))
-        return q, v, a
+        every = spline_basis(t, self.period, self.intervals)
+        return tuple(self.unit * one[:, free] for one in every)
 
     def trajectory(self, variables: np.ndarray) -> BSpline:
         """Return the motion of some variables, (n, 1 + k)."""
