@@ -124,6 +124,8 @@ class RecordingDesign(Shown):
             ends = (number(float(one), 3) for one in (q[:, j].min(), q[:, j].max()))
             shares = (
                 percent(float(np.abs(signal[:, j]).max() / limit[j]), 0)
+                if np.isfinite(limit[j])
+                else "no limit"
                 for signal, limit in rates.values()
             )
             moves = f"{' to '.join(ends)} {unit}"
