@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -281,7 +282,7 @@ def test_no_limit_is_exceeded_on_a_fine_grid(seed: int) -> None:
 
 @pytest.mark.parametrize("kind", [{"harmonics": 4}, {"intervals": 8}])
 @pytest.mark.usefixtures("few_begins")
-def test_a_limit_of_jerk_is_used_and_kept(kind: dict[str, int], tmp_path: Path) -> None:
+def test_a_limit_of_jerk_is_used_and_kept(kind: dict[str, Any], tmp_path: Path) -> None:
     limits = tmp_path / "limits.toml"
     limits.write_text("[joints.shoulder]\njerk = 12.0\n")
     task = DesignTask(duration=6.0, repeat=1, starts=1, **kind)
