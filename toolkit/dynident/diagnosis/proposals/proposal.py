@@ -41,8 +41,8 @@ class Proposal:
     values, sigma : (k,) coefficients and their standard deviations, the shapes estimated too.
     shape_sigma : (s,) of the shapes.
     explains : share of the systematic squared residual that it takes off, at all joints.
-    is_explanation : whether that is enough to be called an explanation: it is the only law that is
-        proposed, and nothing but noise is left on held-out data.
+    is_explanation : whether it is enough for these recordings: it is the only law that is proposed,
+        takes most, and nothing but noise is left on held-out data, as far as that is known.
     p_value : of the hypothesis that it has no part, times the number of terms tried.
     tried : how many terms that were.
     test_error_before, test_error_after : relative error on held-out data.
@@ -93,7 +93,10 @@ class Proposal:
     @property
     def sentence(self) -> str:
         """What it does, in plain words."""
-        does = "would explain it" if self.is_explanation else "would help, and not explain it"
+        # Another law, which nobody tried, may do as well: that it is the cause is not said.
+        does = "would be enough for these recordings"
+        if not self.is_explanation:
+            does = "would help, and not be enough"
         law = "A law that no catalogue has"
         if self.instead_of:
             law = f"Instead of {', '.join(self.instead_of)}, a law that no catalogue has"
