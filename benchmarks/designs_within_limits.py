@@ -36,6 +36,7 @@ from dynident.tables import Table
 ROUNDING = 1e-9
 """Of a limit, and m: less than this beyond is the computer's."""
 CLEARANCE = 0.01  # m
+_MOMENT = 1e-7  # s
 _AXES = ("1 0 0", "0 1 0", "0 0 1")
 _POSES = 300
 """Random positions: links that are too near at all of them are housings of neighbours."""
@@ -90,6 +91,7 @@ class Drawn:
             duration=float(rng.uniform(3.0, 10.0)),
             repeat=int(rng.integers(1, 4)),
             harmonics=int(rng.integers(2, 9)),
+            intervals=int(own.integers(4, 20)) if own.random() < 0.4 else None,
             starts=1,
             seed=seed,
             clearance=CLEARANCE,
@@ -194,6 +196,8 @@ def seen(drawn: Drawn, found: RecordingDesign) -> Seen:
     t = np.linspace(0.0, task.duration, count + 1)
     q, v, a = found.trajectory.at(t)
     torque = robot.inverse_dynamics(q, v, a)
+    # Of a spline the jerk jumps where the period ends, at which it rests.
+    last = found.trajectory.at(t[[-1]] - _MOMENT)[2] / -_MOMENT
     middle, half = (limits.upper + limits.lower) / 2, (limits.upper - limits.lower) / 2
     ends = found.trajectory.at(np.array([0.0, task.duration * task.repeat]))
     moving = [
@@ -205,7 +209,7 @@ def seen(drawn: Drawn, found: RecordingDesign) -> Seen:
         position=float(np.abs((q - middle) / half).max()),
         speed=float(np.abs(v / limits.speed).max()),
         acceleration=float(np.abs(a / limits.acceleration).max()),
-        jerk=float(np.abs(np.diff(a, axis=0) / np.diff(t)[:, None] / limits.jerk).max()),
+        jerk=float(np.abs(np.vstack([np.diff(a, axis=0) / t[1], last]) / limits.jerk).max()),
         torque=float(np.abs(torque / limits.torque).max()),
         clear=clear,
         inside=inside,

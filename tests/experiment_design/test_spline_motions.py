@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from dynident.closed_loop import BSpline, Controller, load_experiment
 from dynident.errors import DesignError, SimulationError, StudyError
 from dynident.experiment_design import DesignTask, MotionLimits, RecordingDesign, design
 from dynident.experiment_design.design_files import EXPERIMENT, write_design
-from dynident.experiment_design.motion_program import FINER, MotionProgram
+from dynident.experiment_design.motion_program import FINER, MotionProgram, instants_of
 from dynident.experiment_design.motions.spline_motions import SplineMotions
 from dynident.experiment_design.written_design import read_design
 from dynident.model import Model
@@ -53,6 +54,24 @@ def test_they_begin_and_end_at_rest_and_are_linear_in_their_variables(intervals:
     np.testing.assert_allclose(
         some.jerk(variables, t[1:]), (later - earlier) / 2e-5, rtol=1e-3, atol=1e-2
     )
+
+
+@pytest.mark.parametrize("intervals", [4, 8, 24])
+def test_a_jerk_that_is_largest_where_the_period_ends_is_seen(intervals: int) -> None:
+    """It ends at another jerk than it begins with, and after the last of evenly spaced instants."""
+    limits = replace(MotionLimits.of(ROBOT), jerk=np.array([12.0, 20.0]))
+    some = SplineMotions(limits=limits, period=6.0, intervals=intervals)
+    few = some.to_the_end(FINER * instants_of(some))
+    many = np.append(np.linspace(0.0, 6.0, 20_001)[:-1], np.nextafter(6.0, 0.0))
+    ends = 0
+    for seed in range(30):
+        variables = some.random(seed)
+        used = np.abs(some.jerk(variables, many)) / limits.jerk
+        ends += int((used.argmax(axis=0) == len(many) - 1).sum())
+        share = limits.jerk_shares(some.jerk(variables, few))
+        assert np.all(used.max(axis=0) <= (1 + 1e-6) * share)
+        assert np.all(share <= 1.001 * used.max(axis=0))
+    assert ends > 0
 
 
 def test_memory_is_that_of_the_motion_however_many_points_it_has() -> None:

@@ -215,16 +215,26 @@ def test_rivals_of_what_was_added_are_told_with_the_recording_that_decides(six):
         )
     )
     one, both = (replace(six, steps=some) for some in (steps[:2], steps))
-    (alone,), (told,) = (then_record(found, Path("my arm.toml")) for found in (one, both))
+    arm = Path("my arm.toml")
+    (alone,), (told,) = (then_record(found, arm) for found in (one, both))
     for said in (alone, told):
         assert said.startswith("Then: Before you believe in joint spring at joint6")
         assert said.endswith("\n    dynident explain 'my arm.toml' --design next")
         assert "quadratic drag" not in said
     assert "from torque ripple at joint6 and from joint zero at joint6" in alone
     assert "joint spring at joint6 and stribeck friction at joint6" in told
-    (advice,) = (a for a in next_steps(both) if a.what in told)
-    assert "stribeck friction at joint6 and viscous friction at joint6" in advice.why
-    assert then_record(replace(six, steps=(steps[1],)), Path("arm.toml")) == ()
+    commands = [typed for advice in next_steps(both) for typed in advice.commands]
+    assert commands.count("dynident explain STUDY --design next") == 1
+    none = "no motion of this robot tells joint spring at joint6 from torque ripple at joint6"
+    untold = (
+        replace(six, steps=(steps[1],)),  # without rivals
+        replace(one, steps=(replace(steps[0], advice=none), steps[1])),
+        replace(one, steps=(replace(steps[0], effect=effect("backlash", "joint6")),)),
+        replace(one, impossible=("the inertia of joint6 is negative",)),
+    )
+    for found in untold:
+        assert then_record(found, arm) == ()
+        assert not any("--design" in c for advice in next_steps(found) for c in advice.commands)
 
 
 def test_at_most_three_next_steps_are_unfolded(six):

@@ -87,7 +87,7 @@ def test_a_law_that_a_wrong_effect_hides_is_proposed_instead_of_it() -> None:
     assert (found.torque, found.instead_of) == ("c*q*load", (RIPPLE,))
     assert found.values[0] == pytest.approx(0.08, abs=4 * found.sigma[0])
     assert found.is_explanation
-    assert found.sentence.startswith(f"Instead of {RIPPLE}, a law that no catalogue has would exp")
+    assert found.sentence.startswith(f"Instead of {RIPPLE}, a law that no catalogue has would be")
     assert found.to_dict()["instead_of"] == [RIPPLE]
 
 

@@ -134,7 +134,7 @@ class MotionLimits:
         )
 
     def shares(
-        self, q: np.ndarray, rates: tuple[np.ndarray, ...], centre: np.ndarray
+        self, q: np.ndarray, rates: tuple[np.ndarray, np.ndarray, np.ndarray], centre: np.ndarray
     ) -> np.ndarray:
         """Return the largest share of each limit that a motion uses; infinite if it is no number.
 
@@ -144,15 +144,15 @@ class MotionLimits:
         Parameters
         ----------
         q : (T, n), at instants that are evenly spaced over a period.
-        rates : speed, acceleration, jerk and torque, (T, n) each.
+        rates : speed, acceleration and torque, (T, n) each.
         centre : (n,) position that the range is seen from.
 
         Returns
         -------
-        (5 n,) of position, speed, acceleration, jerk and torque.
+        (4 n,) of position, speed, acceleration and torque.
         """
         moved = q - centre
-        limits = (self.speed, self.acceleration, self.jerk, self.torque)
+        limits = (self.speed, self.acceleration, self.torque)
         shares = [
             moved / np.where(moved > 0, self.upper - centre, centre - self.lower),
             *(one / limit for one, limit in zip(rates, limits, strict=True)),
@@ -161,6 +161,22 @@ class MotionLimits:
         used = np.abs(np.concatenate(shares, axis=1))
         used = np.where(np.isfinite(used), used, np.inf)
         return (used + above_instants(used)).max(axis=0)
+
+    def jerk_shares(self, jerk: np.ndarray) -> np.ndarray:
+        """Return the largest share of the limit of jerk that a motion uses, (n,).
+
+        Between instants as for `shares`; but what ends and begins again need not be the same.
+
+        Parameters
+        ----------
+        jerk : (T, n), at instants that are evenly spaced from the beginning of a period to its end.
+        """
+        used = np.abs(jerk / self.jerk)
+        used = np.where(np.isfinite(used), used, np.inf)
+        above = above_instants(used)
+        if len(used) > 2:
+            above[0], above[-1] = above[1], above[-2]
+        return (used + above).max(axis=0)
 
     def changed(
         self, values: Mapping[str, Mapping[str, float]], robot: Robot, where: str = "limits"

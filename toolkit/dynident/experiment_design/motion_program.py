@@ -183,11 +183,12 @@ class MotionProgram:
     def _shares(self, variables: np.ndarray, t: np.ndarray) -> np.ndarray:
         """The largest share of each limit that a motion uses, (5 n,)."""
         q, v, a = self.motions.trajectory(variables).at(t)
-        jerk = (
-            self.motions.jerk(variables, t) if self.limits.jerk_limited.any() else np.zeros_like(a)
-        )
         torque = self.torque.farthest(t, q, v, a)
-        return self.limits.shares(q, (v, a, jerk, torque), self.motions.centre(variables))
+        shares = self.limits.shares(q, (v, a, torque), self.motions.centre(variables))
+        if not self.limits.jerk_limited.any():
+            return np.append(shares, np.zeros(self.motions.n))
+        jerk = self.motions.jerk(variables, self.motions.to_the_end(len(t)))
+        return np.append(shares, self.limits.jerk_shares(jerk))
 
     # --- the program --------------------------------------------------------------------------
 

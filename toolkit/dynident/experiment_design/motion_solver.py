@@ -183,7 +183,7 @@ class MotionSolver:
         rows.add(v / ca.repmat(ca.DM(limits.speed).T, count, 1), -ones, ones)
         rows.add(a / ca.repmat(ca.DM(limits.acceleration).T, count, 1), -ones, ones)
         if (limited := np.flatnonzero(limits.jerk_limited)).size:
-            *_, basis = motions.bases(times)
+            *_, basis = motions.bases(motions.to_the_end(count))
             share = ca.diag(ca.DM((limits.speed / limits.jerk)[limited]))
             jerk = ca.DM(basis) @ variables[:, limited.tolist()] @ share
             rows.add(jerk, -np.ones(limited.size), np.ones(limited.size))

@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 from dynident.diagnosis import Diagnosis
+from dynident.diagnosis.advice.experiments import NO_MOTION
 from dynident.effects import Effect
 from dynident.experiment_design.column_function import is_of_an_instant
 from dynident.experiment_design.design_task import DesignTask
 from dynident.experiment_design.recording_design import RecordingDesign
 from dynident.experiment_design.telling.separation import Separation
 
+DESIGNED = "record the motion that was designed"
+"""How advice begins that is a designed recording."""
 ADVISED = 2.0
 """Standard deviations below which a recording is not worth advising."""
 
@@ -85,5 +88,5 @@ def with_designed_advice(diagnosis: Diagnosis, design: RecordingDesign) -> Diagn
 def _advice(one: Separation, length: float) -> str:
     """The recording to make, without a full stop; what is not worth making is said to be so."""
     if one.designed >= ADVISED:
-        return f"record the motion that was designed: {one.sentence(length).rstrip('.')}"
-    return f"no motion of {length:g} s decides: {one.sentence(length).rstrip('.')}"
+        return f"{DESIGNED}: {one.sentence(length).rstrip('.')}"
+    return f"{NO_MOTION} {length:g} s decides: {one.sentence(length).rstrip('.')}"

@@ -113,7 +113,8 @@ class RecordingDesign(Shown):
         q, v, a = self.trajectory.at(t)
         rates = {"speed": (v, limits.speed), "acceleration": (a, limits.acceleration)}
         if limits.jerk_limited.any():
-            rates["jerk"] = program.motions.jerk(self.motion.variables, t), limits.jerk
+            whole = program.motions.to_the_end(len(t))
+            rates["jerk"] = program.motions.jerk(self.motion.variables, whole), limits.jerk
         rates["torque"] = program.torque.farthest(t, q, v, a), limits.torque
         rows = []
         for j, (name, unit) in enumerate(

@@ -7,11 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from dynident.diagnosis.advice.experiments import NO_MOTION
 from dynident.diagnosis.details import Step
 from dynident.diagnosis.effect_groups import grouped_title, in_words
 from dynident.diagnosis.leading_effects import LeadingEffects
 from dynident.diagnosis.result import Diagnosis
 from dynident.effects import Effect
+from dynident.experiment_design.column_function import is_of_an_instant
+from dynident.experiment_design.open_questions import DESIGNED, open_groups
 from dynident.reporting.headline import headline
 from dynident.reporting.joint_states import states
 from dynident.tables import listed, percent, points
@@ -21,6 +24,8 @@ _MOST_NAMED = 3
 """Effects that a sentence lists; the picture and the command name more of them."""
 _LITTLE = 0.25
 """Part of the error, below which its fall is said to leave most of it."""
+_DESIGN = "dynident explain STUDY --design next"
+"""Designs the recording that tells all apart that a diagnosis left open."""
 FIRST = 3
 """Steps that are shown at once: who reads more has time to unfold them."""
 
@@ -95,14 +100,19 @@ def in_short(diagnosis: Diagnosis, study: Path) -> tuple[str, ...]:
 
 
 def then_record(diagnosis: Diagnosis, study: Path) -> tuple[str, ...]:
-    """Return what follows it where effects that were added cannot be told from others.
+    """Return what follows it where a motion may tell effects that were added from others.
 
     Parameters
     ----------
     diagnosis, study : as for `in_short`.
     """
-    others = next_steps(diagnosis)[1:]
-    return tuple(_typed("Then", one, study) for one in _to_separate(diagnosis) if one in others)
+    first, groups = next_steps(diagnosis)[0], _told_by_motions(diagnosis)
+    if not groups or _DESIGN in first.commands:
+        return ()
+    titles, rivals = [effect.title for effect, *_ in groups], groups[0][1:]
+    each = f"it from {_either(rivals)}" if len(groups) == 1 else "each from what does the same"
+    what = f"Before you believe in {_few_of(titles)}, record a motion that tells {each}."
+    return (_typed("Then", Advice(what, commands=(_DESIGN,)), study),)
 
 
 def _typed(when: str, advice: Advice, study: Path) -> str:
@@ -221,32 +231,31 @@ def _few_of(titles: list[str]) -> str:
 
 
 def _to_separate(diagnosis: Diagnosis) -> list[Advice]:
-    """Which recording tells effects that were added from those that do as well."""
-    open_ = [step for step in diagnosis.steps if step.indistinguishable]
-    if not open_:
-        return []
-    command = "dynident explain STUDY --design next"
-    if len(open_) == 1:
-        (step,) = open_
-        return [
-            Advice(
-                f"Before you believe in {step.effect.title}, record a motion that tells it from "
-                f"{_either(step.indistinguishable)}.",
-                f"With this data they do the same. {_experiments(step)}",
-                (command,),
-            )
-        ]
-    titles = _few_of([step.effect.title for step in open_])
-    pairs = "; ".join(f"{one.effect.title} and {_either(one.indistinguishable)}" for one in open_)
-    experiments = " ".join(dict.fromkeys(map(_experiments, open_)))
+    """Which recording tells effects that were added from those that do as well; one for all."""
+    designed = [effect.label for effect, *_ in _told_by_motions(diagnosis)][:1]
     return [
         Advice(
-            f"Before you believe in {titles}, record a motion that tells each from what "
-            "does the same.",
-            f"With this data these do the same: {pairs}. {experiments}",
-            (command,),
+            f"Before you believe in {step.effect.title}, record a motion that tells it from "
+            f"{_either(step.indistinguishable)}.",
+            f"With this data they do the same. {_experiments(step)}",
+            (_DESIGN,) if step.effect.label in designed else (),
         )
+        for step in diagnosis.steps
+        if step.indistinguishable
     ]
+
+
+def _told_by_motions(diagnosis: Diagnosis) -> list[tuple[Effect, ...]]:
+    """Effects that were added, each with what a motion that is yet to be designed may tell it from.
+
+    None where nothing is designed before the study is mended.
+    """
+    if diagnosis.wiring or diagnosis.impossible or diagnosis.too_fast is not None:
+        return []
+    advice = {step.effect.label: step.advice for step in diagnosis.steps}
+    settled = (DESIGNED, NO_MOTION)
+    groups = open_groups(diagnosis)
+    return [one for one in groups if not advice[one[0].label].startswith(settled)]
 
 
 def _to_try(diagnosis: Diagnosis) -> list[Advice]:
@@ -308,5 +317,9 @@ def _to_repeat(diagnosis: Diagnosis) -> Advice:
     )
     if diagnosis.noise_source == "given":
         why = f"The noise is so far only what the study states. {why}"
-    why += " `design` makes one within the limits of the description."
+    if diagnosis.too_fast is not None or not all(
+        map(is_of_an_instant, diagnosis.before.model.effects)
+    ):
+        return Advice(what, why)
+    why += " `design` makes one within the limits that the description states, or usual ones."
     return Advice(what, why, ("dynident design STUDY --out next",))

@@ -17,6 +17,9 @@ from dynident.errors import DynidentError
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 
+NO_MOTION = "no motion of"
+"""How advice begins that names no recording, as there is none."""
+
 
 @dataclass(frozen=True, eq=False)
 class Adviser:
@@ -60,7 +63,7 @@ class Adviser:
             return self._by_kind(effect)
         part = " and ".join(self.trials.absorbing(effect))
         why = f"its torque cannot be told from that of {part}" if part else "it makes no torque"
-        return f"no motion of this robot shows {effect.title}: {why}"
+        return f"{NO_MOTION} this robot shows {effect.title}: {why}"
 
     def separating(self, effects: Sequence[Effect], values: Sequence[float]) -> str:
         """Say which experiment would distinguish effects.
@@ -93,7 +96,7 @@ class Adviser:
             sentences.append(self._in_words(first, best))
         if same:
             names = " or ".join(one.title for one in same)
-            sentences.append(f"no motion of this robot tells {first.title} from {names}")
+            sentences.append(f"{NO_MOTION} this robot tells {first.title} from {names}")
         return "; ".join(sentences)
 
     # --- telling apart -------------------------------------------------------------------------

@@ -95,6 +95,8 @@ class Proposal:
         """What it does, in plain words."""
         # Another law, which nobody tried, may do as well: that it is the cause is not said.
         does = "would be enough for these recordings"
+        if self.noise_floor is None:
+            does += ", if what is left is noise"
         if not self.is_explanation:
             does = "would help, and not be enough"
         law = "A law that no catalogue has"

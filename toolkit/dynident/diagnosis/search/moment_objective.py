@@ -71,7 +71,10 @@ class Tangent(Effect):
         return self.joints
 
     def acting_columns(self, block: Block) -> np.ndarray:
-        """Columns (T, J, k), then derivatives one after the other, (T, J, k + s k)."""
+        """Columns (T, J, k), derivatives one after the other, and those by a point if there is one.
+
+        (T, J, k + s k), or k more.
+        """
         assert self.of is not None
         here, samples = list(self.joints), len(block.t)
         plain, slopes = self.of.acting_columns(block), self.of.sensitivities(block)
@@ -79,8 +82,9 @@ class Tangent(Effect):
         # Samples last, as they lie in memory: what is side by side is copied and filtered so.
         turned = slopes.transpose(1, 3, 2, 0)[here].reshape(len(here), -1, samples)
         parts = [plain.transpose(1, 2, 0), turned]
-        if self.of.point:
-            parts.append(self.of.point_slope(block).transpose(1, 2, 0)[here])
+        at_point = self.of.point_slope(block) if self.of.point else None
+        if at_point is not None:
+            parts.append(at_point.transpose(1, 2, 0)[here])
         return np.concatenate(parts, axis=1).transpose(2, 0, 1)
 
     def columns(self, block: Block) -> np.ndarray:

@@ -85,6 +85,13 @@ class MotionFamily(ABC):
         empty = np.zeros((len(t), 1))
         return tuple(np.hstack([empty, one]) for one in self.waveforms(t))
 
+    def to_the_end(self, instants: int) -> np.ndarray:
+        """Instants of a period, evenly spaced, and the moment before its end, (instants + 1,) s.
+
+        There the jerk may be another one than at the beginning.
+        """
+        return np.append(self.times(instants), np.nextafter(self.period, 0.0))
+
     def jerk(self, variables: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Return the jerk of a motion, (T, n) rad/s^3 or m/s^3.
 
