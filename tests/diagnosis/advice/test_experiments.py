@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from dynident.criteria import DEFAULTS
 from dynident.diagnosis.advice.candidate_experiments import (
     CandidateExperiment,
     CandidateExperiments,
@@ -96,6 +99,15 @@ def test_effects_are_told_apart_where_they_differ_most(adviser: Adviser) -> None
     pair = (one("payload"), one("drive_gain@elbow"))
     values = [0.4, 0.02, 0, 0, 0, 0, 0.001, 0, 0, 0.001]
     assert "differ by" in adviser.separating(pair, values)
+
+
+def test_that_usual_motions_tell_little_apart_is_not_said_of_all_motions(adviser: Adviser) -> None:
+    pair = (one("quadratic_drag@elbow"), one("asymmetric_friction@elbow"))
+    assert "differ by" in adviser.separating(pair, [0.2])
+    strict = replace(DEFAULTS, advice=replace(DEFAULTS.advice, clearly=0.99))
+    said = Adviser(replace(adviser.trials, criteria=strict)).separating(pair, [0.2])
+    assert said.startswith("usual motions leave less than 99 % of quadratic drag at elbow beside")
+    assert "designed" in said and "no motion" not in said
 
 
 def test_an_effect_already_in_the_model_is_told_from_others() -> None:

@@ -16,9 +16,12 @@ from dynident.effects import Effect
 from dynident.errors import DynidentError
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
+from dynident.tables import percent
 
 NO_MOTION = "no motion of"
 """How advice begins that names no recording, as there is none."""
+_ROUNDING = 1e-6
+"""Share of an effect's torque below which what another leaves of it is nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,10 +86,12 @@ class Adviser:
         first, *others = effects
         others = [one for one in others if one.label != first.label]
         trials = self.trials.without((first, *others))
-        same, apart = [], []
+        same, hardly, apart = [], [], []
         for other in others:
-            best = self._best_trial(trials, first, values, [other])
-            (same if best is None else apart).append(other)
+            most = self._most_left(trials, first, values, other)
+            told = hardly if most > _ROUNDING else same
+            told = apart if most > self.trials.criteria.advice.clearly else told
+            told.append(other)
         sentences = []
         if apart:
             best = self._best_trial(trials, first, values, apart)
@@ -94,9 +99,14 @@ class Adviser:
             best = best or self._best_trial(trials, first, values, apart[:1])
             assert best is not None
             sentences.append(self._in_words(first, best))
+        if hardly:
+            least = percent(self.trials.criteria.advice.clearly, 0)
+            sentences.append(
+                f"usual motions leave less than {least} of {first.title} beside {_either(hardly)}, "
+                "a designed one may leave more"
+            )
         if same:
-            names = " or ".join(one.title for one in same)
-            sentences.append(f"{NO_MOTION} this robot tells {first.title} from {names}")
+            sentences.append(f"{NO_MOTION} this robot tells {first.title} from {_either(same)}")
         return "; ".join(sentences)
 
     # --- telling apart -------------------------------------------------------------------------
@@ -108,7 +118,32 @@ class Adviser:
         values: Sequence[float],
         others: Sequence[Effect],
     ) -> _Separation | None:
-        found, criteria = [], self.trials.criteria.advice
+        criteria = self.trials.criteria.advice
+        tried = self._tried(trials, first, values, others)
+        found = [one for one in tried if one.size > criteria.clearly * one.torque]
+        most = max((one.size for one in found), default=0.0)
+        return next((one for one in found if one.size >= criteria.nearly * most), None)
+
+    def _most_left(
+        self,
+        trials: CandidateExperiments,
+        first: Effect,
+        values: Sequence[float],
+        other: Effect,
+    ) -> float:
+        """Share of the first effect's torque that the other leaves, in the best experiment."""
+        tried = self._tried(trials, first, values, [other])
+        return max((one.size / one.torque for one in tried), default=0.0)
+
+    def _tried(
+        self,
+        trials: CandidateExperiments,
+        first: Effect,
+        values: Sequence[float],
+        others: Sequence[Effect],
+    ) -> list[_Separation]:
+        """What the nearest of others leaves of an effect in each experiment in which it acts."""
+        found = []
         for trial in self._candidates((first, *others)):
             try:
                 pairs = [trials.difference(first, values, one, trial) for one in others]
@@ -116,10 +151,10 @@ class Adviser:
                 continue
             torque, rest = min(pairs, key=lambda pair: float(np.linalg.norm(pair[1])))
             size, left = float(np.linalg.norm(torque)), float(np.linalg.norm(rest))
-            if left > criteria.clearly * size > 0:
-                found.append(_Separation(trial, left, int(np.argmax(rest)), float(rest.max())))
-        most = max((one.size for one in found), default=0.0)
-        return next((one for one in found if one.size >= criteria.nearly * most), None)
+            if size > 0:
+                worst = int(np.argmax(rest))
+                found.append(_Separation(trial, left, size, worst, float(rest[worst])))
+        return found
 
     def _candidates(self, effects: Sequence[Effect]) -> list[CandidateExperiment]:
         """Experiments in which effects may differ, the simpler ones first."""
@@ -255,9 +290,14 @@ class Adviser:
 
 @dataclass(frozen=True)
 class _Separation:
-    """An experiment that tells effects apart: how far, and where most, N m or N."""
+    """An experiment that tells effects apart: how far, of what torque, and where most, N m or N."""
 
     trial: CandidateExperiment
     size: float
+    torque: float
     joint: int
     rms: float
+
+
+def _either(effects: Sequence[Effect]) -> str:
+    return " or ".join(one.title for one in effects)
