@@ -4,7 +4,9 @@
 
 A two-link arm has an effect that a few recordings of small motions cannot tell from another. The
 diagnosis names both; the next recording is designed, simulated in closed loop with the arm as it
-truly is, and the diagnosis repeated with it. Printed are, of the cases in which both were named:
+truly is, by the package's own simulator or by MuJoCo (`--plant mujoco`: its integrator, recordings
+that begin in mid-motion; dry friction is its own constraint at odd seeds, and tanh at even ones),
+and the diagnosis repeated with it. Printed are, of the cases in which both were named:
 in how many the right effect alone is named afterwards; the separation that was predicted; and that
 which was measured, the square root of the fall of the squared residual, over the noise, from the
 model with the other effect, in the shape in which it imitates most, to that with the right one.
@@ -13,7 +15,7 @@ model with the other effect, in the shape in which it imitates most, to that wit
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -65,6 +67,31 @@ def truth(base: Experiment, pair: OpenPair, seed: int) -> Experiment:
     return replace(base, effects=(*known, *hidden), runs=runs, seed=seed)
 
 
+def in_mujoco(made: Experiment) -> Experiment:
+    """The same experiment with MuJoCo's arm."""
+    from blind_study.circumstances import STOPS_WITHIN, Circumstances
+    from blind_study.mujoco_lab import MujocoLaboratory
+
+    said = Circumstances(
+        friction="constraint" if made.seed % 2 else "tanh",
+        time_constant=STOPS_WITHIN[0],
+        rate_hz=made.controller.simulated_rate(),
+        repetition="stated",
+        jitter=0.0,
+        feedforward="none",
+    )
+    own = {one.name: getattr(made, one.name) for one in fields(Experiment)}
+    return MujocoLaboratory(
+        **own,
+        circumstances=said,
+        width=0.0 if said.friction == "constraint" else made.friction_width,
+        torque_noise=made.sensors.torque_std,
+    )
+
+
+PLANTS = {"own": lambda made: made, "mujoco": in_mujoco}
+
+
 def measured(loop: ClosedDesignLoop, recorded: di.Dataset, group: int) -> float:
     """Standard deviations by which the recordings, with the designed one, prefer the first."""
     first, *others = loop.designed.task.tell[group]
@@ -95,6 +122,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--first", type=int, default=0, help="seed")
     parser.add_argument("--pairs", nargs="*", help="hidden effects; default: all")
+    parser.add_argument("--plant", choices=sorted(PLANTS), default="own")
     asked = parser.parse_args()
     study = di.load(PROBLEM / "study.toml")
     base = load_experiment(PROBLEM / "experiment.toml")
@@ -104,7 +132,7 @@ def main() -> None:
             continue
         both, decides, right, wrong, predicted, found, so_far = 0, 0, 0, 0, [], [], []
         for seed in range(asked.first, asked.first + asked.seeds):
-            made = truth(base, pair, seed)
+            made = PLANTS[asked.plant](truth(base, pair, seed))
             recorded = replace(study.train, recordings=made.run())
             try:
                 loop = close_design_loop(study.model, recorded, made, TASK, lambda _: None)

@@ -30,7 +30,7 @@ class SpeedProduct(JointEffect):
     name = "speed_product"
     in_catalogue = False
     place = "pair"
-    law = "c v_i v_j"
+    law = "c v v[source]"
     sign_of = "a residual where two joints move at once"
     experiment = "move {joint} and {source} together"
 

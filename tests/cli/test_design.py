@@ -63,6 +63,8 @@ def test_what_cannot_be_designed_is_one_line(run, tmp_path) -> None:
         ("--clearance", "-1"),
         ("--clearance", "0.01"),  # of an arm without shapes
         ("--show", "joint_zero@wrist"),
+        ("--joint", "wrist"),
+        ("--joint", "elbow", "--show", "joint_zero@elbow"),
     ):
         done = run("design", study, *wrong, "--starts", "1", "--out", "next")
         assert done.status == 2

@@ -79,6 +79,7 @@ def test_labels_without_a_joint_stand_for_every_place() -> None:
     assert [one.label for one in effects_of("payload", ROBOT)] == ["payload"]
     (pair,) = effects_of("joint_coupling@swing:hoist", ROBOT)
     assert (pair.joint, pair.source) == ("swing", "hoist")
+    assert pair.formula.startswith("cv v[hoist] + cc sign(v[hoist])")
 
 
 @pytest.mark.parametrize("name", list(catalogue()))

@@ -248,6 +248,28 @@ def test_several_effects_are_shown_together() -> None:
     assert np.all(together < before)
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("few_begins")
+def test_parameters_of_a_joint_alone_are_told_better_than_beside_all_others() -> None:
+    task = DesignTask(repeat=1, harmonics=3, starts=1)
+    every = design(MODEL, recorded(), task)
+    found = design(MODEL, recorded(), replace(task, joints=("elbow",)))
+    own = [name for name in every.labels if name.endswith(("@elbow", ".fore"))]
+    last = len(own)
+    assert 0 < last < len(every.labels) and set(found.labels[-last:]) == set(own)
+    assert "standard deviations of elbow are" in found.sentence
+    sigma = dict(zip(every.labels, every.sigma(every.motion.variables), strict=True))
+    beside = dict(zip(found.labels[-last:], found.sigma(every.motion.variables), strict=True))
+    np.testing.assert_allclose([beside[one] for one in own], [sigma[one] for one in own], rtol=1e-6)
+    # The volume of their confidence region, all others estimated too.
+    assert found.motion.loss < found.program.loss(every.motion.variables, FINER) - 0.1
+
+
+def test_joints_that_are_misspelt_are_refused_by_name() -> None:
+    with pytest.raises(DesignError, match=r"no joint 'elbov'.*did you mean 'elbow'"):
+        design(MODEL, recorded(), DesignTask(joints=("elbov",)))
+
+
 @pytest.mark.parametrize(
     "seed", [pytest.param(k, marks=pytest.mark.slow if k > 1 else ()) for k in range(12)]
 )

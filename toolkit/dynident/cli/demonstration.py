@@ -12,7 +12,7 @@ from dynident.cli.designs import write_files
 from dynident.cli.group import CommandAnswer, answered, commands
 from dynident.cli.output import progress
 from dynident.cli.work import diagnosis_of, load_study, require_places, write_report
-from dynident.errors import DesignError, FileError
+from dynident.errors import FileError
 
 if TYPE_CHECKING:
     from dynident.closed_loop import Experiment
@@ -63,9 +63,7 @@ def _settled(source: Path, folder: Path) -> CommandAnswer:
     """Leave two effects open, and settle which of them it is."""
     from dynident.closed_loop import write_experiment
     from dynident.experiment_design import DesignTask
-    from dynident.experiment_design import design as designed
-    from dynident.experiment_design.open_questions import open_task
-    from dynident.experiment_design.virtual_recording import ClosedDesignLoop, record_virtually
+    from dynident.experiment_design.virtual_recording import close_design_loop
     from dynident.recording import write
     from dynident.study import add_recording
 
@@ -75,20 +73,12 @@ def _settled(source: Path, folder: Path) -> CommandAnswer:
         write_experiment(truth, folder)
     path = folder / "study.toml"
     loaded = load_study(path)
-    before = diagnosis_of(loaded, propose="never")
-    task = open_task(before, DesignTask(duration=8.0, repeat=2, harmonics=5, starts=1))
-    if task is None or not task.tell:
-        raise DesignError("the recordings left nothing open", str(path))
-    with progress("designing") as told:
-        design = designed(before.after.model, loaded.train, task, progress=told)
-    _, notes = write_files(design, loaded, folder / "next")
-    with progress("simulating"):
-        end = max(one.start + one.duration for one in loaded.train.recordings)
-        made = record_virtually(design, truth, seed=truth.seed + 1, start=end)
-    write(made, folder / made.name)
-    add_recording(path, made)
-    after = diagnosis_of(load_study(path), propose="never")
-    loop = ClosedDesignLoop(before=before, designed=design, recording=made, after=after)
+    task = DesignTask(duration=8.0, repeat=2, harmonics=5, starts=1)
+    with progress("diagnosing") as told:
+        loop = close_design_loop(loaded.model, loaded.train, truth, task, progress=told)
+    _, notes = write_files(loop.designed, loaded, folder / "next")
+    write(loop.recording, folder / loop.recording.name)
+    add_recording(path, loop.recording)
     return CommandAnswer(
         content=loop.to_dict,
         parts=lambda: (*loop.tables(), *notes, f"The study, with the recording: {path}"),

@@ -48,6 +48,13 @@ _PATH = click.Path(path_type=Path)
 @click.option(
     "--show", multiple=True, metavar="EFFECT", help="Show what the recordings could not; likewise."
 )
+@click.option(
+    "--joint",
+    "joints",
+    multiple=True,
+    metavar="JOINT",
+    help="Only the parameters of this joint and its link; may be repeated.",
+)
 @click.option("--clearance", type=float, help="m, that links keep from each other.")
 @click.option("--limits", type=_PATH, help="A file of limits, [joints.NAME], boxes and obstacles.")
 @click.option(
@@ -56,7 +63,7 @@ _PATH = click.Path(path_type=Path)
     help="Write reference.csv, design.toml, experiment.toml and motion.html here.",
 )
 def design(study: Path, limits: Path | None, out: Path | None, **settings) -> CommandAnswer:
-    """Design the recording to make next: all parameters, or which of two effects it is.
+    """Design the recording to make next: for all parameters, for a joint's, or for effects.
 
     The motion keeps nine tenths of the description's limits, begins and ends at rest, and repeats.
     Look at it in DIR/motion.html before anything moves. For everything that the diagnosis leaves
@@ -83,9 +90,10 @@ def design(study: Path, limits: Path | None, out: Path | None, **settings) -> Co
     elif settings["intervals"] is not None:
         what = "--harmonics are of series, and --intervals of splines in their place"
         raise DesignError(what, remedy="choose one of them")
-    tell, show = settings.pop("tell"), settings.pop("show")
+    tell, show, joints = (settings.pop(name) for name in ("tell", "show", "joints"))
     task = DesignTask(
         **settings,
+        joints=tuple(joints),
         tell=tuple(tuple(one(label) for label in pair) for pair in tell),
         show=tuple(one(label) for label in show),
     )

@@ -76,7 +76,7 @@ class Effect(EffectTraits, SimulatedEffect, ABC):
     place: ClassVar[Literal["joint", "pair", "robot", "joint or robot"]] = "joint"
     """Where it sits; "joint or robot" is common to all joints where no joint is named."""
     law: ClassVar[str]
-    """The torque as a formula, for tables."""
+    """The torque as a formula, for tables: of this joint; v[source] is of the other one's."""
     sign_of: ClassVar[str]
     """What it looks like in the residual, one clause."""
     meaning: ClassVar[str] = ""
@@ -210,6 +210,11 @@ class Effect(EffectTraits, SimulatedEffect, ABC):
         """Return the name of a parameter in a model: `Fv@joint`, or `payload.m`."""
         place = self.label.partition("@")[2]
         return f"{name}@{place}" if place else f"{self.name}.{name}"
+
+    @property
+    def formula(self) -> str:
+        """The torque as a formula, the other joint by its name."""
+        return self.law.replace("[source]", f"[{self.source}]")
 
     @property
     def advice(self) -> str:

@@ -20,8 +20,10 @@ from dynident.experiment_design.telling.imitations import Imitations, TellingMom
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.fit_model import fit
 from dynident.fitting.sampling import sample
+from dynident.inertia import PARAMETERS
 from dynident.model import Model
 from dynident.recording import Dataset
+from dynident.settings import nearest
 
 _SIZES = 5  # random motions by which columns are scaled
 _UNSEEN = 1e-9  # of the size of the others: it makes no torque
@@ -139,7 +141,7 @@ class DesignQuestion:
         kept = size > _UNSEEN * np.median(size[size > 0]) if np.any(size > 0) else size > 0
         last = int(np.sum(kept[len(kept) - last :]))
         if last == 0:
-            named = next((one.title for one in (*self.told, *self.shown)), "the model")
+            named = self.told[0].title if self.told else task.of_what or "the model"
             raise DesignError(f"no motion of this robot makes a torque of {named}")
         mix = mix[:, kept]
         prior, rate = _recorded(columns, mix, recorded, std)
@@ -221,11 +223,13 @@ class DesignQuestion:
         self, columns: ColumnFunction, extra: Sequence[Effect]
     ) -> tuple[np.ndarray, int, tuple[str, ...]]:
         """Combinations of columns, how many of them are of interest, and their names."""
-        count, robot = columns.count, self.bare.robot
+        count = columns.count
         if not self.told:
-            own = sum(len(one.parameters(robot)) for one in self.shown)
-            return np.eye(count), own or count, columns.labels
-        own, label = len(extra[-1].parameters(robot)), extra[-1].label
+            meant = self._meant(count)
+            order = np.argsort(meant, kind="stable")
+            labels = tuple(columns.labels[k] for k in order)
+            return np.eye(count)[:, order], int(meant.sum()), labels
+        own, label = len(extra[-1].parameters(self.bare.robot)), extra[-1].label
         values = self.estimate.effect_values(label)
         if not np.any(values):
             raise DesignError("has no size in the recordings so far", label)
@@ -233,6 +237,25 @@ class DesignQuestion:
         mix[: count - own, : count - own] = np.eye(count - own)
         mix[count - own :, -1] = values
         return mix, 1, (*columns.labels[: count - own], f"torque of {label}")
+
+    def _meant(self, count: int) -> np.ndarray:
+        """Which of the columns are of interest, (count,), where no effects are told apart."""
+        model, joints = self.bare, set(self.task.joints)
+        if self.shown:
+            return np.arange(count) >= model.size
+        if not joints:
+            return np.ones(count, dtype=bool)
+        names = model.robot.names
+        for one in self.task.joints:
+            if one not in names:
+                remedy = nearest(one, names, "joints")
+                raise DesignError(f"the robot has no joint '{one}'", remedy=remedy)
+        meant = np.zeros(count, dtype=bool)
+        links = np.array(model.base.independent, dtype=int) // len(PARAMETERS)
+        meant[: model.base.rank] = [names[link] in joints for link in links]
+        for effect in model.effects:
+            meant[model.slices[effect.label]] = bool(joints & {effect.joint, effect.source})
+        return meant
 
 
 def _std(estimate: Estimate) -> np.ndarray:

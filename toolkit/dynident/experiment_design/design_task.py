@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from dynident.effects import Effect
 from dynident.errors import DesignError
 from dynident.experiment_design.information import Objective
+from dynident.tables import listed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,6 +25,8 @@ class DesignTask:
         of a group is taken for true. Of several groups, the one that is told least counts, and the
         others a little.
     show : effects that the recordings so far could not show.
+    joints : whose parameters are meant: the base parameters that are named by their links, and the
+        effects at them, all others estimated too; none for all parameters.
     starts, seed : of the search.
     clearance : m, that the robot's links keep from each other; None where that is not looked at.
     """
@@ -35,6 +38,7 @@ class DesignTask:
     objective: Objective = "D"
     tell: tuple[tuple[Effect, ...], ...] = ()
     show: tuple[Effect, ...] = ()
+    joints: tuple[str, ...] = ()
     starts: int = 3
     seed: int = 0
     clearance: float | None = None
@@ -47,9 +51,17 @@ class DesignTask:
         _require_different(self.show, "to be shown twice")
         if self.tell and self.show:
             raise DesignError("tell and show together", remedy="design a recording for each")
+        if self.joints and (self.tell or self.show):
+            what = "joints whose parameters are meant, and effects to tell or to show"
+            raise DesignError(what, remedy="design a recording for each")
         if self.repeat < 1 or self.starts < 1:
             what = f"repeat = {self.repeat}, starts = {self.starts}"
             raise DesignError(what, remedy="choose 1 or more of each")
+
+    @property
+    def of_what(self) -> str:
+        """Whose parameters are told, in words; empty for all."""
+        return listed([*(one.title for one in self.show), *self.joints])
 
 
 def _require_different(effects: tuple[Effect, ...], what: str) -> None:

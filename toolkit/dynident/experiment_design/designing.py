@@ -19,7 +19,7 @@ from dynident.experiment_design.motion_program import FINER, MotionProgram
 from dynident.experiment_design.motions.fourier_motions import FourierMotions
 from dynident.experiment_design.motions.motion_family import MotionFamily
 from dynident.experiment_design.motions.spline_motions import SplineMotions
-from dynident.experiment_design.predicted_torque import WRONG, PredictedTorque
+from dynident.experiment_design.predicted_torque import WRONG
 from dynident.experiment_design.recording_design import RecordingDesign
 from dynident.experiment_design.telling.separation import Separation, times_until
 from dynident.model import Model
@@ -79,9 +79,17 @@ def design(
     ]
     progress("writing the columns out")
     asked = [one.asked(recorded, motions) for one in questions]
-    program = _program(asked, motions, questions[0].torque, workspace)
+    program = MotionProgram(
+        informations=tuple(one.information for one in asked),
+        motions=motions,
+        torque=questions[0].torque,
+        softer=tuple(one.softer for one in asked),
+        workspace=workspace,
+    )
     progress("comparing with usual motions")
-    usual = _usual(program)
+    some = _usual_motions(program)
+    program = _without_hopeless(program, some)
+    usual = sorted(some, key=program.loss)[len(some) // 2]
     found = program.solved(task.starts, task.seed, progress)
     first, information = questions[0], asked[0].information
     if task.show and not np.any(
@@ -125,55 +133,45 @@ def _workspace(robot: Robot, task: DesignTask, limits: MotionLimits) -> Workspac
     return Workspace(None, limits.boxes)
 
 
-def _program(
-    asked: list[Asked], motions: MotionFamily, torque: PredictedTorque, workspace: Workspace
-) -> MotionProgram:
-    """The search; what no usual motion tells at all would hide what others are."""
-    program = MotionProgram(
-        informations=tuple(one.information for one in asked),
-        motions=motions,
-        torque=torque,
-        softer=tuple(one.softer for one in asked),
-        workspace=workspace,
-    )
-    if len(asked) == 1:
-        return program
-    usual = _some_usual(program)
-    kept = [
-        one
-        for one in asked
-        if any(_sigma(one.information, program.told(one.information, x)) > _HOPELESS for x in usual)
-    ]
-    kept = kept or asked[:1]
-    return replace(
-        program,
-        informations=tuple(one.information for one in kept),
-        softer=tuple(one.softer for one in kept),
-    )
-
-
-def _some_usual(program: MotionProgram) -> list[np.ndarray]:
-    """Variables of random motions within the limits."""
-    usual = [program.within(program.motions.random(_FIRST_USUAL + k)) for k in range(_USUAL)]
-    return [one for one in usual if one is not None]
-
-
-def _usual(program: MotionProgram) -> np.ndarray:
-    """Variables of the median of some random motions within the limits."""
-    possible = sorted(_some_usual(program), key=program.loss)
-    if not possible:
+def _usual_motions(program: MotionProgram) -> list[np.ndarray]:
+    """Variables of random motions within the limits, of which there are some."""
+    usual = _random_motions(program)
+    if not usual:
         _require_known_torque(program)
         kept = program.workspace.in_words()
         what = "no usual motion is within the limits" + (f" and {kept}" if kept else "")
         raise DesignError(
             what, remedy="widen them, or move the joints' ranges to where there is room"
         )
-    return possible[len(possible) // 2]
+    return usual
+
+
+def _random_motions(program: MotionProgram) -> list[np.ndarray]:
+    """Variables of random motions within the limits; none where all fail."""
+    usual = [program.within(program.motions.random(_FIRST_USUAL + k)) for k in range(_USUAL)]
+    return [one for one in usual if one is not None]
+
+
+def _without_hopeless(program: MotionProgram, usual: list[np.ndarray]) -> MotionProgram:
+    """The search without what no usual motion tells at all, which would hide what others are."""
+    if len(program.informations) == 1:
+        return program
+    kept = [
+        k
+        for k, one in enumerate(program.informations)
+        if any(_sigma(one, program.told(one, x)) > _HOPELESS for x in usual)
+    ]
+    kept = kept or [0]
+    return replace(
+        program,
+        informations=tuple(program.informations[k] for k in kept),
+        softer=tuple(program.softer[k] for k in kept),
+    )
 
 
 def _require_known_torque(program: MotionProgram) -> None:
     """Raise `DesignError` if motions are refused for what is not known of their torque alone."""
-    if not _some_usual(replace(program, torque=program.torque.taken_for_known)):
+    if not _random_motions(replace(program, torque=program.torque.taken_for_known)):
         return
     raise DesignError(
         "no usual motion is surely within the limits of torque: too much of it is left open by the "

@@ -28,14 +28,24 @@ class DesignedMotion:
     ----------
     variables : (n, 1 + k).
     loss : see `MotionProgram.loss`.
-    status : of Ipopt, in words.
-    iterations : of Ipopt.
+    status : of Ipopt, in words; why there is none where no search ended better.
+    iterations : of Ipopt; 0 where no search ended better.
     """
 
     variables: np.ndarray
     loss: float
     status: str
     iterations: int
+
+    @property
+    def ended_in_words(self) -> str:
+        """How the search for it ended, with the solver's own words."""
+        if not self.iterations:
+            return f"The search for a better motion failed: {self.status}."
+        where = "short of a local optimum, at the best motion it had come to"
+        if self.status.startswith("Solve"):
+            where = "at a local optimum"
+        return f"The search ended {where} (Ipopt: {self.status}, {self.iterations} iterations)."
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -84,10 +84,11 @@ class RecordingDesign(Shown):
         seen = np.isfinite(after)
         shares = np.where(seen, after, 0.0) / np.where(seen, usual, 1.0)
         worst = int(np.argmax(shares))
+        whose = self.task.of_what and f" of {self.task.of_what}"
         told = (
-            f"With {length:g} s of this the standard deviations are {percent(_mean(shares), 0)} of "
-            f"those with a usual motion of that length (geometric mean; the worst, {names[worst]}, "
-            f"{percent(float(shares[worst]), 0)})"
+            f"With {length:g} s of this the standard deviations{whose} are "
+            f"{percent(_mean(shares), 0)} of those with a usual motion of that length (geometric "
+            f"mean; the worst, {names[worst]}, {percent(float(shares[worst]), 0)})"
         )
         both = seen & np.isfinite(before)
         if np.any(both):
@@ -136,7 +137,7 @@ class RecordingDesign(Shown):
 
     def tables(self) -> tuple[Table | str, ...]:
         """Everything that `show` prints, in its order."""
-        tail = (_CAVEAT, f"Ipopt: {self.motion.status}, {self.motion.iterations} iterations.")
+        tail = (_CAVEAT, self.motion.ended_in_words)
         told = () if self.separations else (self.sigma_table(),)
         near = () if self.least_distance is None else (self._clear_in_words(),)
         return (self.sentence, *told, self.limit_table(), *near, *tail)

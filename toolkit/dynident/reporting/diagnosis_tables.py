@@ -67,7 +67,7 @@ def step_table(diagnosis: Diagnosis) -> Table:
     rows = tuple(
         (
             step.effect.title,
-            step.effect.law,
+            step.effect.formula,
             _values(diagnosis, step),
             percent(step.test_error_before),
             percent(step.test_error_after),

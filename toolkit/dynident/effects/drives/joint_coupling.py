@@ -18,7 +18,7 @@ class JointCoupling(JointEffect):
 
     name = "joint_coupling"
     place = "pair"
-    law = "cv v_i + cc sign(v_i) + ca a_i + cs sign(v_i + v_j)"
+    law = "cv v[source] + cc sign(v[source]) + ca a[source] + cs sign(v + v[source])"
     sign_of = "a residual that follows another joint's motion"
     meaning = (
         "moving one joint loads the drive of another, as belts, cables and differential gears do"
