@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dynident import diagnose as find
-from dynident.diagnosis.nuisances.quantisation import rounding_power
+from dynident.diagnosis.nuisances.quantisation import mean_rounding, rounding_power
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.held_out import on_recordings
@@ -44,6 +44,27 @@ def test_rounding_power_is_what_rounding_leaves(model: Model) -> None:
     assert (left > 3.0 * judged.noise_std).all(), "rounding is not to be seen"
     predicted = np.sqrt(rounding_power(fitted, runs))
     np.testing.assert_allclose(predicted, left, rtol=0.3)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05, 0.3, 0.7, 2.0])
+def test_rounding_in_the_mean_is_that_of_many_draws(noise: float) -> None:
+    rng, steps = np.random.default_rng(5), np.array([1e-3, 0.0])
+    q = np.column_stack([rng.uniform(-3e-3, 3e-3, 40), np.ones(40)])
+    draws = q[:, 0] + noise * steps[0] * rng.standard_normal((200_000, 40))
+    rounded = np.mean(np.round(draws / steps[0]) * steps[0] - draws, axis=0)
+    found = mean_rounding(q, steps, np.array([noise * steps[0], 0.0]))
+    np.testing.assert_allclose(found[:, 0], rounded, atol=6e-3 * steps[0])
+    np.testing.assert_array_equal(found[:, 1], 0.0)
+
+
+def test_steps_much_smaller_than_the_noise_leave_nothing_that_repeats(model: Model) -> None:
+    """However few the rows: two draws of the noise would agree by chance."""
+    truth = true_values(model, **VALUES)
+    clean = synthetic(model, truth, 1, rate_hz=250.0)
+    noisy = clean.q + 2e-5 * np.random.default_rng(1).standard_normal(clean.q.shape)
+    runs = Dataset((replace(clean, q=np.round(noisy / 1e-5) * 1e-5),))
+    fitted = fit_evidence(Evidence(model, gather(runs)), model)
+    np.testing.assert_array_equal(rounding_power(fitted, runs), np.zeros(2))
 
 
 def test_there_is_none_without_steps(model: Model) -> None:

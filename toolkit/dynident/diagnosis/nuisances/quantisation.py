@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import ndtr
 
 from dynident.criteria import VerdictCriteria
 from dynident.diagnosis.verdict import within_noise
@@ -19,7 +20,8 @@ from dynident.evidence.windows import shared_motion
 from dynident.fitting.sampling import sample
 from dynident.recording import Dataset, Recording, resolution, uniform
 
-_DRAWS = 2  # whose product has no noise in the mean
+_FADED = 1.0
+"""Steps of noise from which on rounding does not repeat: it is 4e-9 of a step in the mean."""
 
 
 def with_rounding(judged: HeldOut, fitted: EvidenceFit, dataset: Dataset) -> HeldOut:
@@ -58,10 +60,10 @@ def rounding_power(
 ) -> np.ndarray:
     """Largest usual mean square of the torque error that repeats as positions are rounded, (n,).
 
-    The filtered motion is rounded again, on a lattice that is moved, with two draws of the noise
-    that the recording has: what both do to the prediction is what repeats. How much that is depends
-    on where the motion lies between the steps, which nobody knows: it is said from the mean and the
-    spread over several places.
+    The filtered motion is rounded again, on a lattice that is moved, in the mean over the noise
+    that the recording has, for noise is another in each repetition: what that does to the
+    prediction is what repeats. How much it is depends on where the motion lies between the steps,
+    which nobody knows: it is said from the mean and the spread over several places.
 
     Parameters
     ----------
@@ -87,9 +89,8 @@ def rounding_power(
         t, (smooth, *rounded) = _predicted(fitted, dataset, again)
         certain = _certain(t, judged[number]) if judged else np.ones(smooth.shape, dtype=bool)
         rows = certain.sum(axis=0)
-        first, second = (np.stack(rounded[draw::_DRAWS]) - smooth for draw in range(_DRAWS))
-        common = np.sum(first * second, axis=1, where=certain) / np.maximum(rows, 1)
-        total += np.clip(common, 0.0, None)
+        repeated = (np.stack(rounded) - smooth) ** 2
+        total += np.sum(repeated, axis=1, where=certain) / np.maximum(rows, 1)
         recordings += rows > 0
     power = total / np.maximum(recordings, 1)
     spread = np.std(power, axis=0, ddof=1)
@@ -106,10 +107,7 @@ def _certain(t: np.ndarray, judged: HeldOutRun) -> np.ndarray:
 def _again(
     recording: Recording, dataset: Dataset, steps: np.ndarray, places: int
 ) -> list[Recording]:
-    """Return the recording with its filtered positions, and these rounded with draws of noise.
-
-    Two draws, one after the other, at each place of the lattice.
-    """
+    """Return the recording with its filtered positions, and with these rounded at each place."""
     recording = uniform(recording)
     motion = sample(recording, dataset.filter).motion
     rows = slice(motion.first, motion.first + motion.samples)
@@ -118,14 +116,34 @@ def _again(
     # What the filter took away is noise, and the rounding itself.
     power = np.mean((recording.q[rows] - motion.q) ** 2, axis=0) - steps**2 / 12.0
     std = np.sqrt(np.clip(power, 0.0, None))
-    rng, safe = np.random.default_rng(0), np.where(steps > 0, steps, 1.0)
     # Other places of the lattice: what the filter left of the first rounding is in `smooth`.
-    shifts = steps * rng.uniform(0.0, 1.0, (places, len(steps)))
-    found = [recording.replace(q=smooth)]
-    for shift in np.repeat(shifts, _DRAWS, axis=0):
-        noisy = smooth + shift + std * rng.standard_normal(smooth.shape)
-        rounded = np.where(steps > 0, np.round(noisy / safe) * safe - shift, smooth)
-        found.append(recording.replace(q=rounded))
+    shifts = steps * np.random.default_rng(0).uniform(0.0, 1.0, (places, len(steps)))
+    moved = (smooth + mean_rounding(smooth + shift, steps, std) for shift in shifts)
+    return [recording.replace(q=one) for one in (smooth, *moved)]
+
+
+def mean_rounding(q: np.ndarray, steps: np.ndarray, std: np.ndarray) -> np.ndarray:
+    """What rounding adds to positions in the mean over Gaussian noise, (T, n) rad or m.
+
+    Noise of a third of a step takes off nine tenths of it (a dither): E[round(x + noise)] - x,
+    with every edge between two steps crossed with its probability.
+
+    Parameters
+    ----------
+    q : (T, n) rad or m, without noise.
+    steps : (n,) of the encoders; nothing is added where it is 0.
+    std : (n,) of the noise before rounding.
+    """
+    found = np.zeros_like(q)
+    for j, (step, noise) in enumerate(zip(steps, std, strict=True)):
+        if step == 0 or noise >= _FADED * step:
+            continue
+        place = q[:, j] / step
+        place -= np.round(place)
+        width = max(noise / step, np.finfo(float).tiny)
+        edges = np.arange(np.ceil(5.0 * width) + 1) + 0.5
+        crossed = (ndtr((place - e) / width) - ndtr((-place - e) / width) for e in edges)
+        found[:, j] = step * (sum(crossed) - place)
     return found
 
 
