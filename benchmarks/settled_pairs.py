@@ -34,37 +34,52 @@ TASK = DesignTask(duration=8.0, repeat=2, harmonics=5, starts=1)
 
 @dataclass(frozen=True)
 class OpenPair:
-    """An effect that is hidden, its values, and the one that it is taken for."""
+    """An effect that is hidden, its values, and the one that it is taken for, or taken with.
+
+    Attributes
+    ----------
+    hidden : its label; of an effect that the study names, the study without it.
+    values, shape : of it.
+    rival : label of the other.
+    reach : rad, largest distance of the small motions from their centre.
+    """
 
     hidden: str
     values: tuple[float, ...]
     rival: str
+    shape: tuple[float, ...] = ()
+    reach: float = 0.5
 
 
 PAIRS = (
     OpenPair("quadratic_drag@elbow", (0.3,), "stribeck_friction@elbow"),
     OpenPair("quadratic_drag@shoulder", (0.3,), "stribeck_friction@shoulder"),
+    OpenPair("coulomb_friction@elbow", (0.7,), "stribeck_friction@elbow"),
+    OpenPair("coulomb_friction@shoulder", (1.6,), "stribeck_friction@shoulder"),
     OpenPair("joint_spring@elbow", (0.1, 0.0), "torque_ripple@elbow"),
-    OpenPair("torque_offset@shoulder", (0.3,), "torque_ripple@shoulder"),
     OpenPair("joint_spring@shoulder", (5.0, 0.0), "torque_ripple@shoulder"),
-    OpenPair("joint_zero@shoulder", (0.1,), "base_tilt"),
+    OpenPair("torque_offset@elbow", (0.3,), "torque_ripple@elbow", reach=0.2),
+    OpenPair("torque_offset@shoulder", (0.3,), "torque_ripple@shoulder"),
+    OpenPair("torque_ripple@elbow", (0.1, 0.1), "joint_spring@elbow", (1.5,), 0.25),
+    OpenPair("torque_ripple@shoulder", (0.3, 0.3), "torque_offset@shoulder", (1.5,)),
 )
 
 
 def truth(base: Experiment, pair: OpenPair, seed: int) -> Experiment:
     """The arm with a hidden effect, in three recordings of small motions."""
     robot = base.robot
-    known = [one for one in base.effects if not one.hidden]
-    hidden = TrueEffect.of(pair.hidden, robot, pair.values, hidden=True)
+    known = [one for one in base.effects if not one.hidden and one.effect.label != pair.hidden]
+    (hidden,) = TrueEffect.of(pair.hidden, robot, pair.values, hidden=True)
+    hidden = replace(hidden, effect=hidden.effect.shaped(*pair.shape or hidden.effect.shape))
     runs = tuple(
         ExperimentRun(
-            trajectory=Fourier.random(robot, 8.0, [seed, k], amplitude=0.5, speed=1.5),
+            trajectory=Fourier.random(robot, 8.0, [seed, k], amplitude=pair.reach, speed=1.5),
             duration=16.0,
             file=f"small{k + 1}.csv",
         )
         for k in range(3)
     )
-    return replace(base, effects=(*known, *hidden), runs=runs, seed=seed)
+    return replace(base, effects=(*known, hidden), runs=runs, seed=seed)
 
 
 def in_mujoco(made: Experiment) -> Experiment:
@@ -130,12 +145,14 @@ def main() -> None:
     for pair in PAIRS:
         if asked.pairs and pair.hidden not in asked.pairs:
             continue
+        model = study.model
+        model = model - pair.hidden if pair.hidden in [x.label for x in model.effects] else model
         both, decides, right, wrong, predicted, found, so_far = 0, 0, 0, 0, [], [], []
         for seed in range(asked.first, asked.first + asked.seeds):
             made = PLANTS[asked.plant](truth(base, pair, seed))
             recorded = replace(study.train, recordings=made.run())
             try:
-                loop = close_design_loop(study.model, recorded, made, TASK, lambda _: None)
+                loop = close_design_loop(model, recorded, made, TASK, lambda _: None)
             except di.DynidentError:
                 continue  # nothing was open
             groups = [{one.label for one in group} for group in loop.designed.task.tell]

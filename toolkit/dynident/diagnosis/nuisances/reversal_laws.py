@@ -3,9 +3,11 @@
 The model's dry friction is Fc tanh(v / w). A joint's may go through zero along a line, over another
 width, and sooner or later than its speed: a lag of friction behind speed is measured on machines
 (Hess and Soom, ASME Journal of Tribology 112, 1990), a lead comes from how torque and position are
-sampled, or from a simulator's constraint. What the model then misses at its reversals, Stribeck
-friction, a delay or presliding would take off too. So whatever is said to be missing at a joint
-with dry friction must explain more than any such law does in the place of the model's.
+sampled, or from a simulator's constraint. And a drive that feeds noise into its torque dithers the
+joint: the speed jitters, and dry friction is what it is in the mean over the jitter. What the model
+then misses at its reversals, Stribeck friction, a delay or presliding would take off too. So
+whatever is said to be missing at a joint with dry friction must explain more than any such law does
+in the place of the model's.
 """
 
 from __future__ import annotations
@@ -16,68 +18,25 @@ from itertools import product
 import numpy as np
 from scipy.optimize import minimize
 
-from dynident.diagnosis.nuisances.friction_width import FrictionWidthColumn, missed_instead
+from dynident.diagnosis.nuisances.friction_width import missed_instead
+from dynident.diagnosis.nuisances.other_reversals import AT_ONCE, LATEST, LAWS, OtherReversal
 from dynident.diagnosis.search.ranking import joints_below_noise, rank
 from dynident.diagnosis.search.scoring import Score
-from dynident.effects import Block, ShapeParameter
+from dynident.effects import Effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, signal_by_joint
-from dynident.tables import number
+from dynident.robot import Robot
 
-_WIDTHS = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4)
-_LEADS = (-8e-3, -4e-3, -2e-3, -1e-3, 0.0, 1e-3, 2e-3, 4e-3, 8e-3)
-_RANGE = (0.02, 15.0)
-"""Narrowest and widest law that is tried, over the model's width."""
-_LATEST = 0.01
-"""s by which friction may reverse before the joint, or after it; a law that wants more is none."""
-_TURNED = 3.0
-"""Speed over the width at which dry friction has turned: tanh(3) is 0.995."""
+_STEP, _STEP_OF_RANGE = 0.3, 0.025
+"""First steps of a search for a shape, of a logarithm or of the range."""
 _USUAL = 99.0
 """Percentile of a joint's acceleration that counts as its highest."""
+_OF_A_SIZE = 3.0
+"""Factor within which shapes are alike."""
 _AS_MUCH = 0.5
 """Share of what an effect explains that a law must explain at least, to stand in for it."""
 _AT_MOST, _NOISE = 2.0, 3.0
 """Times what is left at a joint, and standard deviations of its noise, that a law may explain."""
-_AT_ONCE = 5e-5
-"""s, below which it reverses with the joint."""
-
-
-class SmoothReversal(FrictionWidthColumn):
-    """What dry friction has more that reverses over k times the width, at another moment."""
-
-    name = "smooth_reversal"
-    in_catalogue = False
-    law = "Fc (tanh((v + lead a)/(k w)) - tanh(v/w))"
-    sign_of = "opposite spikes on both sides of zero velocity"
-    experiment = "reverse {joint} at several accelerations"
-
-    def shape_parameters(self, robot):
-        return (
-            ShapeParameter("k", "1", _WIDTHS, lower=_RANGE[0], upper=_RANGE[1]),
-            ShapeParameter("lead", "s", _LEADS, lower=-_LATEST, upper=_LATEST),
-        )
-
-    def at_joint(self, block: Block) -> np.ndarray:
-        j, (k, lead) = block.index(self.joint), self.shape
-        v, a = block.v[:, [j]], block.a[:, [j]]
-        width = float(np.broadcast_to(block.friction_width, len(block.names))[j])
-        return self.reversal((v + lead * a) / (k * width)) - block.direction(self.joint)
-
-    @staticmethod
-    def reversal(x: np.ndarray) -> np.ndarray:
-        """Return a smoothed sign of x."""
-        return np.tanh(x)
-
-
-class StraightReversal(SmoothReversal):
-    """The same of dry friction that goes through zero along a line."""
-
-    name = "straight_reversal"
-    law = "Fc (clip((v + lead a)/(k w), -1, 1) - tanh(v/w))"
-
-    @staticmethod
-    def reversal(x: np.ndarray) -> np.ndarray:
-        return np.clip(x, -1.0, 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +51,7 @@ class ReversalLaw:
     within : rad/s or m/s, speed within which it is another one than the model's.
     """
 
-    column: SmoothReversal
+    column: OtherReversal
     drop: float
     words: str
     within: float
@@ -104,12 +63,12 @@ class ReversalLaw:
     @property
     def lags(self) -> bool:
         """Whether it reverses after the joint."""
-        return self.lead_s <= -_AT_ONCE
+        return self.lead_s <= -AT_ONCE
 
     @property
     def lead_s(self) -> float:
         """By which it reverses before the joint."""
-        return self.column.shape[1]
+        return self.column.lead_s
 
 
 def laws_that_do_as_well(
@@ -140,9 +99,22 @@ def laws_that_do_as_well(
     if sum(law.drop for law in found) < least:
         return ()
     beside = fit_evidence(evidence, fitted.model + tuple(law.column for law in found), fitted)
-    if rank(evidence, beside, added, only=(one.effect,)).passing:
+    again = rank(evidence, beside, added, only=(one.effect,)).passing
+    if any(_is_like(one.effect, other.effect, model.robot) for other in again):
         return ()  # it explains something else than they do
     return tuple(found)
+
+
+def _is_like(one: Effect, other: Effect, robot: Robot) -> bool:
+    """Whether two shapes of an effect are of a size, by the first of their shape parameters.
+
+    Beside another law of dry friction, Stribeck friction over a speed like its width would only be
+    one more law.
+    """
+    sizes = zip(one.shape_parameters(robot), one.shape, other.shape, strict=True)
+    return all(
+        abs(p.coordinate(x) - p.coordinate(y)) <= p.reach(_OF_A_SIZE) for p, x, y in [*sizes][:1]
+    )
 
 
 def _laws_at(
@@ -165,7 +137,7 @@ def _laws_at(
             break
         joint = waiting.pop(0)
         law = _best_law(evidence, fitted, joint)
-        if law.drop > worth and abs(law.lead_s) < _LATEST:
+        if law.drop > worth and abs(law.lead_s) < LATEST:
             found[joint] = law
     return [found[joint] for joint in joints if joint in found]
 
@@ -193,9 +165,7 @@ def laws_of_the_rest(evidence: Evidence, fitted: EvidenceFit) -> tuple[ReversalL
     quiet, names = joints_below_noise(evidence, fitted), fitted.model.robot.names
     dry = [one for one in names if f"coulomb_friction@{one}" in fitted.model.slices]
     every = (_best_law(evidence, fitted, joint) for joint in dry if joint not in quiet)
-    return tuple(
-        law for law in every if law.drop >= least and not law.lags and law.lead_s < _LATEST
-    )
+    return tuple(law for law in every if law.drop >= least and not law.lags and law.lead_s < LATEST)
 
 
 def _best_law(evidence: Evidence, fitted: EvidenceFit, joint: str) -> ReversalLaw:
@@ -207,20 +177,16 @@ def _best_law(evidence: Evidence, fitted: EvidenceFit, joint: str) -> ReversalLa
 
 
 def _law_that_misses_least(evidence: Evidence, fitted: EvidenceFit, joint: str) -> ReversalLaw:
-    each = [_shaped(evidence, fitted, kind(joint)) for kind in (SmoothReversal, StraightReversal)]
+    each = [_shaped(evidence, fitted, kind(joint)) for kind in LAWS]
     missed, column = min(each, key=lambda one: one[0])
-    k, lead = column.shape
     at = fitted.model.robot.names.index(joint)
     own = float(fitted.model.friction_widths[at])
-    words = f"reverses over {number(k * own, 2)} {fitted.model.robot.units[at]}/s"
-    if abs(lead) >= _AT_ONCE:
-        words += f", {number(1e3 * abs(lead), 2)} ms {'before' if lead > 0 else 'after'} the joint"
     fastest = max(float(np.percentile(np.abs(a), _USUAL)) for a in _accelerations(evidence, at))
     return ReversalLaw(
         column=column,
         drop=fitted.error_signal - missed,
-        words=words,
-        within=_TURNED * max(k, 1.0) * own + abs(lead) * fastest,
+        words=column.in_words(own, f"{fitted.model.robot.units[at]}/s"),
+        within=own * column.turned(fastest / own),
     )
 
 
@@ -229,28 +195,31 @@ def _accelerations(evidence: Evidence, at: int) -> list[np.ndarray]:
 
 
 def _shaped(
-    evidence: Evidence, fitted: EvidenceFit, column: SmoothReversal
-) -> tuple[float, SmoothReversal]:
+    evidence: Evidence, fitted: EvidenceFit, column: OtherReversal
+) -> tuple[float, OtherReversal]:
     """Return what is missed with the best shape of a law, and that law."""
-    shapes = list(product(_WIDTHS, _LEADS))
+    wanted = column.shape_parameters(fitted.model.robot)
+    shapes = list(product(*(one.grid for one in wanted)))
     missed = missed_instead(evidence, fitted, [column.shaped(*shape) for shape in shapes])
-    k, lead = shapes[int(np.argmin(missed))]
+    begin = shapes[int(np.argmin(missed))]
+
+    def at(x: np.ndarray) -> OtherReversal:
+        return column.shaped(*(one.at(float(c)) for one, c in zip(wanted, x, strict=True)))
 
     def misses(x: np.ndarray) -> float:
-        shape = float(np.exp(x[0])), float(x[1])
-        return float(missed_instead(evidence, fitted, [column.shaped(*shape)])[0])
+        return float(missed_instead(evidence, fitted, [at(x)])[0])
 
-    start = np.array([np.log(k), lead])
+    start = np.array([one.coordinate(x) for one, x in zip(wanted, begin, strict=True)])
+    steps = np.diag([_STEP if one.lower > 0 else _STEP_OF_RANGE for one in wanted])
     found = minimize(
         misses,
         start,
         method="Nelder-Mead",
-        bounds=[tuple(np.log(_RANGE)), (-_LATEST, _LATEST)],
         options={
-            "initial_simplex": start + np.array([[0.0, 0.0], [0.3, 0.0], [0.0, 5e-4]]),
+            "initial_simplex": start + np.vstack([np.zeros(len(wanted)), steps]),
             "maxfev": 40,
-            "xatol": 1e-2,  # 1 % of the width; of the lead, what is missed decides
+            "xatol": 1e-2,
             "fatol": 0.5,
         },
     )
-    return float(found.fun), column.shaped(float(np.exp(found.x[0])), float(found.x[1]))
+    return float(found.fun), at(found.x)
