@@ -48,6 +48,10 @@ class OtherReversal(FrictionWidthColumn):
         ----------
         v, a : (T, 1) rad/s and rad/s^2, or m/s and m/s^2.
         width : of the model, rad/s or m/s.
+
+        Returns
+        -------
+        (T, 1) from -1 to 1.
         """
 
     @property

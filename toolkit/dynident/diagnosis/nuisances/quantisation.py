@@ -123,7 +123,7 @@ def _again(
 
 
 def mean_rounding(q: np.ndarray, steps: np.ndarray, std: np.ndarray) -> np.ndarray:
-    """What rounding adds to positions in the mean over Gaussian noise, (T, n) rad or m.
+    """Return what rounding adds to positions in the mean over Gaussian noise.
 
     Noise of a third of a step takes off nine tenths of it (a dither): E[round(x + noise)] - x,
     with every edge between two steps crossed with its probability.
@@ -133,6 +133,10 @@ def mean_rounding(q: np.ndarray, steps: np.ndarray, std: np.ndarray) -> np.ndarr
     q : (T, n) rad or m, without noise.
     steps : (n,) of the encoders; nothing is added where it is 0.
     std : (n,) of the noise before rounding.
+
+    Returns
+    -------
+    (T, n) rad or m.
     """
     found = np.zeros_like(q)
     for j, (step, noise) in enumerate(zip(steps, std, strict=True)):
