@@ -150,7 +150,9 @@ def test_fit(run, study, tmp_path):
     names = {parameter["name"]: parameter for parameter in said["parameters"]}
     assert len(names) == len(said["parameters"]) == 9
     for parameter in said["parameters"]:
-        assert set(parameter) == {"name", "value", "sigma", "unit", "expression"}
+        keys = {"name", "value", "sigma", "unit", "expression", "identified", "stands_for"}
+        assert set(parameter) == keys
+        assert number(parameter["identified"])
         assert number(parameter["value"]) and number(parameter["sigma"], 0)
     assert names["Fc@elbow"]["unit"] == "N m"
     assert abs(names["Fc@elbow"]["value"] - 1.5) < 0.05

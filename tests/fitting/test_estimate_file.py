@@ -12,8 +12,10 @@ import pytest
 import dynident as di
 from dynident.errors import FileError, FitError
 from dynident.fitting import Estimate, load_estimate
+from dynident.model import Model
+from dynident.recording import Dataset
 from hostile.estimates import MUTATIONS, changed, estimate_of_arm
-from synthetic import arm
+from synthetic import arm, synthetic, true_values
 
 HUGE = 10**400
 
@@ -136,3 +138,17 @@ def test_links_survive(tmp_path):
 def test_no_such_file(tmp_path):
     with pytest.raises(FileError, match="no such file"):
         load_estimate(tmp_path / "none.json")
+
+
+def test_a_value_and_its_sigma_are_of_the_same_combination() -> None:
+    """The rotor of the shoulder cannot be told from the inertia of the arm: their sum is known."""
+    model = Model(arm()) + "rotor_inertia@shoulder"
+    truth = true_values(model, Ia__shoulder=0.3)
+    data = Dataset((synthetic(model, truth, 1, torque_std=0.02),))
+    rows = {one["name"]: one for one in di.fit(model, data).to_dict()["parameters"]}
+    inertia, rotor = rows["Izz.upper"], rows["Ia@shoulder"]
+    both = truth[model.names.index("Izz.upper")] + 0.3
+    assert inertia["identified"] == pytest.approx(inertia["value"] + rotor["value"], rel=1e-9)
+    assert abs(inertia["identified"] - both) < 4.0 * inertia["sigma"] < 0.01 * both
+    assert "Ia@shoulder" in inertia["stands_for"]
+    assert rotor["sigma"] is None and rotor["identified"] is None

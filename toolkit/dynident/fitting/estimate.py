@@ -124,8 +124,32 @@ class Estimate(Shown):
         return found & ~np.isin(self.names, self.trading_off)
 
     @property
+    def identified_values(self) -> np.ndarray:
+        """What the data identify under each parameter's name, (p,); NaN where that is nothing.
+
+        Where a parameter is the head of a combination, its value is that of the combination, see
+        `stands_for`; those of `values` are one way to share it out.
+        """
+        values = np.array(self.values)
+        values[list(self.basis.independent)] = self.basis.coordinates(self.values)
+        values[~self.identified] = np.nan
+        return values
+
+    @property
+    def stands_for(self) -> tuple[str, ...]:
+        """What is identified under each parameter's name, (p,): it, a combination, or why none."""
+        words = self.model.stands_for(self.basis)
+        heads = dict(zip(self.basis.independent, words, strict=True))
+        return tuple(
+            "not determined: size and shape trade off"
+            if name in self.trading_off
+            else heads.get(i, "not identified on its own, only in combinations")
+            for i, name in enumerate(self.names)
+        )
+
+    @property
     def sigma(self) -> np.ndarray:
-        """Standard deviations, (p,); NaN where a parameter is not identified.
+        """Standard deviations of `identified_values`, (p,); NaN where nothing is identified.
 
         All of them NaN where the method has no covariance to give (a matrix of zeros).
         """
@@ -166,27 +190,17 @@ class Estimate(Shown):
 
     def parameter_table(self) -> Table:
         """Values, standard deviations and what each parameter is a combination of."""
-        words = self.model.stands_for(self.basis)
-        heads = dict(zip(self.basis.independent, words, strict=True))
-        # What is identified is the combination: its value and sigma, not those of its head.
-        values, sigma = np.array(self.values), self.sigma
-        values[list(self.basis.independent)] = self.basis.coordinates(self.values)
-        values[~self.identified] = np.nan
-        rows = []
-        for i, name in enumerate(self.names):
-            stands_for = heads.get(i, "not identified on its own, only in combinations")
-            if name in self.trading_off:
-                stands_for = "not determined: size and shape trade off"
-            rows.append(
-                (
-                    name,
-                    number(values[i], 6),
-                    number(sigma[i], 3),
-                    relative(values[i], sigma[i]),
-                    self.model.units[i],
-                    stands_for,
-                )
-            )
+        columns = (
+            self.names,
+            self.identified_values,
+            self.sigma,
+            self.model.units,
+            self.stands_for,
+        )
+        rows = (
+            (name, number(value, 6), number(sigma, 3), relative(value, sigma), unit, words)
+            for name, value, sigma, unit, words in zip(*columns, strict=True)
+        )
         columns = ("parameter", "value", "sigma", "relative", "unit", "stands for")
         return Table("Parameters", columns, tuple(rows), self._parameter_notes())
 
@@ -269,7 +283,8 @@ class Estimate(Shown):
 
     def to_dict(self) -> dict[str, Any]:
         """The estimate as JSON holds it, with the robot description in it."""
-        model, sigma = self.model, self.sigma
+        model, sigma, identified = self.model, self.sigma, self.identified_values
+        stands_for = self.stands_for
         return {
             "format": FORMAT,
             "method": self.method,
@@ -281,6 +296,8 @@ class Estimate(Shown):
                     "sigma": float(sigma[i]) if np.isfinite(sigma[i]) else None,
                     "unit": model.units[i],
                     "expression": model.expressions[i],
+                    "identified": float(identified[i]) if np.isfinite(identified[i]) else None,
+                    "stands_for": stands_for[i],
                 }
                 for i, name in enumerate(self.names)
             ],

@@ -59,11 +59,16 @@ class _Parameter(_Part):
     value: _Number
     """In `unit`; what the data do not identify keeps the value of the description."""
     sigma: _Size | None
-    """Standard deviation, in `unit`; null where the parameter is not identified on its own."""
+    """Standard deviation of `identified`, in `unit`; null where that is null."""
     unit: str
     """Of value and sigma."""
     expression: str
     """The parameter as a combination of the standard ones of links and effects."""
+    identified: _Number | None = None
+    """What the data identify under this name, in `unit`: of a combination, its value; null where
+    that is nothing."""
+    stands_for: str = ""
+    """The combination that is identified under this name, or why there is none."""
 
 
 class BasisPart(_Part):

@@ -80,17 +80,14 @@ def parameter_table(estimate: Estimate, widening: Widening | None, noise: NoiseS
     inside effects (widths, frequencies, ...) come last, without intervals where sigma is not known.
     """
     model = estimate.model
-    values = np.array(estimate.values)
-    # What is identified is the combination: its value and interval, not those of its head.
-    values[list(estimate.basis.independent)] = estimate.basis.coordinates(estimate.values)
-    values[~estimate.identified] = np.nan
+    values = estimate.identified_values
     factors = np.ones(model.size)
     if widening is not None:
         factors[:] = widening.overall
         for effect in model.effects:
             factors[model.slices[effect.label]] = widening.of(effect.joint)
     half = _QUANTILE * factors * estimate.sigma
-    stands_for = [row[-1] for row in estimate.parameter_table().rows]
+    stands_for = estimate.stands_for
     words = _meanings(estimate)
     rows = tuple(
         (

@@ -94,9 +94,7 @@ def _widened(estimate: Estimate, whole: Estimate, shaped: Sequence[slice]) -> Es
     trading = [*np.flatnonzero(lost), *_makes_a_slope(whole, size)]
     covariance = np.where(np.outer(lost, lost), 0.0, whole.covariance[:size, :size])
     wide = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
-    values = np.array(estimate.values)
-    values[list(estimate.basis.independent)] = estimate.basis.coordinates(estimate.values)
-    reach = np.abs(values) / _QUANTILE
+    reach = np.abs(estimate.identified_values) / _QUANTILE
     for own in shaped:
         trading += [i for i in range(own.start, own.stop) if sigma[i] < reach[i] <= wide[i]]
     return replace(
