@@ -200,6 +200,12 @@ class Robot:
         return max(range(self.n), key=lambda index: (depths[index], index))
 
     @property
+    def ends(self) -> tuple[int, ...]:
+        """Indices of the joints that carry no other joint: the tip, and the ends of branches."""
+        carried = {joint.parent for joint in self.joints}
+        return tuple(index for index in range(self.n) if index not in carried)
+
+    @property
     def bodies(self) -> tuple[str, ...]:
         """Name of each joint's moving body: the link that the joint drives."""
         return tuple(self.links[index].name for index in self.driven)
