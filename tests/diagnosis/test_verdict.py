@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 
 from dynident import diagnose as find
-from dynident.diagnosis.verdict import _payload_notes
+from dynident.diagnosis.verdict import _hidden_weights, _payload_notes
 from dynident.evidence import compare_models
+from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence_fit import fit_evidence
+from dynident.evidence.runs import gather
 from dynident.model import Model
 from dynident.recording import Dataset, Noise, Recording
 from dynident.robot import Robot
@@ -206,3 +209,32 @@ def test_a_payload_on_another_branch_is_said_not_to_be_sought() -> None:
     others = [head.bodies[one] for one in head.ends if one != head.tip]
     assert others == ["left_eye"] and "a load on left_eye" in note
     assert _payload_notes(arm()) == []
+
+
+WAIST = """<robot name="torso"><link name="base"/>
+  <link name="trunk"><inertial><origin xyz="0.05 0.02 0.2"/><mass value="6"/>
+    <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.05"/></inertial></link>
+  <link name="arm"><inertial><origin xyz="0.2 0 0"/><mass value="2"/>
+    <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.03"/></inertial></link>
+  <joint name="waist" type="revolute"><parent link="base"/><child link="trunk"/>
+    <axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="4" effort="99"/></joint>
+  <joint name="shoulder" type="revolute"><parent link="trunk"/><child link="arm"/>
+    <origin xyz="0 0 0.4"/><axis xyz="0 1 0"/>
+    <limit lower="-2" upper="2" velocity="4" effort="99"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("place", ["waist", "shoulder"])
+def test_beside_a_tilt_the_first_links_weight_is_named_where_it_looks_like_an_effect(
+    place: str,
+) -> None:
+    given = Model(Robot.from_text(WAIST))
+    true = given + "base_tilt"
+    run = synthetic(true, true_values(true), 1, rate_hz=250.0, torque_std=0.05)
+    evidence = Evidence(given, gather(Dataset((run,))))
+    for effects, said in ((("base_tilt",), False), (("base_tilt", f"joint_spring@{place}"), True)):
+        model = given
+        for one in effects:
+            model = model + one
+        notes = _hidden_weights(evidence, fit_evidence(evidence, model))
+        assert bool(notes) == (said and place == "waist")
+        assert all("weight of trunk" in note for note in notes)

@@ -23,6 +23,10 @@ from dynident.tables import listed
 
 _STEADY = 0.02
 """Of a torque's size, its standard deviation, below which it counts as constant."""
+_LIKE_A_WEIGHT = ("joint_spring", "torque_ripple", "torque_offset", "joint_zero")
+"""Effects that a sine of the joint's position resembles."""
+_VERTICAL = 0.02
+"""Sine of the angle to gravity below which an axis is vertical."""
 _FELT = 0.01
 """Of the largest torque of an effect, below which a joint does not count."""
 
@@ -153,6 +157,32 @@ def _constant_torques(evidence: Evidence, fitted: EvidenceFit) -> list[str]:
     return notes
 
 
+def _hidden_weights(evidence: Evidence, fitted: EvidenceFit) -> list[str]:
+    """Which effects beside a tilted base may be the weight of a link that an upright one hides.
+
+    About a vertical axis gravity turns nothing: where the centre of mass lies across it, no
+    recording of an upright robot tells, and the columns of a tilt take it from the description.
+    """
+    model, robot = fitted.model, fitted.model.robot
+    if "base_tilt" not in model.slices:
+        return []
+    upright = np.array(robot.gravity) / np.linalg.norm(robot.gravity)
+    notes = []
+    for effect in model.effects:
+        if effect.joint is None or effect.name not in _LIKE_A_WEIGHT or effect in evidence.model:
+            continue
+        joint = robot.joints[robot.names.index(effect.joint)]
+        across = np.linalg.norm(np.cross(joint.R @ joint.axis, upright))
+        if joint.parent == -1 and joint.kind == "revolute" and across < _VERTICAL:
+            link = robot.bodies[robot.names.index(effect.joint)]
+            notes.append(
+                f"{effect.title} may be the weight of {link}: on an upright base nothing shows "
+                f"where its centre of mass lies across the axis of {effect.joint}, the tilted one "
+                "does, and the diagnosis takes it from the description."
+            )
+    return notes
+
+
 def notes_on(
     evidence, held, fitted: EvidenceFit, source: NoiseSource, doubtful: Collection[str] = ()
 ) -> tuple[str, ...]:
@@ -204,7 +234,7 @@ def notes_on(
         )
     if not stated(evidence.runs):
         notes += _payload_notes(fitted.model.robot)
-    notes += _constant_torques(evidence, fitted)
+    notes += [*_constant_torques(evidence, fitted), *_hidden_weights(evidence, fitted)]
     notes += [*sticking_notes(evidence, doubtful), *friction_width_notes(evidence, fitted)]
     first = [run.replicates[0] for run in evidence.runs]
     if any(one.unthinned for one in first):

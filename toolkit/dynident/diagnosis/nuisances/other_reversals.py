@@ -78,6 +78,7 @@ class SmoothReversal(OtherReversal):
 
     name = "smooth_reversal"
     law = "Fc (tanh((v + lead a)/(k w)) - tanh(v/w))"
+    reverses_how = "reverses"
 
     def shape_parameters(self, robot):
         return (
@@ -96,7 +97,8 @@ class SmoothReversal(OtherReversal):
         return _TURNED * max(self.shape[0], 1.0) + abs(self.lead_s) * fastest
 
     def in_words(self, width: float, unit: str) -> str:
-        lead, words = self.lead_s, f"reverses over {number(self.shape[0] * width, 2)} {unit}"
+        lead = self.lead_s
+        words = f"{self.reverses_how} over {number(self.shape[0] * width, 2)} {unit}"
         if abs(lead) < AT_ONCE:
             return words
         when = "before" if lead > 0 else "after"
@@ -113,6 +115,7 @@ class StraightReversal(SmoothReversal):
 
     name = "straight_reversal"
     law = "Fc (clip((v + lead a)/(k w), -1, 1) - tanh(v/w))"
+    reverses_how = "reverses along a straight line"
 
     @staticmethod
     def reversal(x: np.ndarray) -> np.ndarray:
