@@ -7,7 +7,15 @@ import math
 import pytest
 
 import dynident as di
-from dynident.tables import MOSTLY_NOISE, WIDTH, Table, mostly_noise, print_tables, relative
+from dynident.tables import (
+    MOSTLY_NOISE,
+    WIDTH,
+    Table,
+    mostly_noise,
+    print_tables,
+    relative,
+    two_percent,
+)
 from study_files import recording, true_model
 
 
@@ -84,3 +92,15 @@ def test_what_is_typed_is_not_broken_where_a_line_ends(capsys: pytest.CaptureFix
 )
 def test_a_spread_beyond_its_value_has_no_figure(value: float, spread: float, said: str) -> None:
     assert relative(value, spread) == said
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "shown"),
+    [
+        (0.05, 0.04, ("5.00 %", "4.00 %")),
+        (0.00601, 0.00597, ("0.601 %", "0.597 %")),
+        (0.006, 0.006, ("0.60 %", "0.60 %")),
+    ],
+)
+def test_two_errors_have_as_many_digits_as_tell_them_apart(before, after, shown) -> None:
+    assert two_percent(before, after) == shown

@@ -159,6 +159,19 @@ def percent(value: float | None, digits: int = 2) -> str:
     return f"{100 * value:.{digits}f} %"
 
 
+def two_percent(before: float, after: float) -> tuple[str, str]:
+    """Return two fractions as percentages, with as many decimals as tell them apart.
+
+    Parameters
+    ----------
+    before, after : the fractions; six decimals at most.
+    """
+    digits = 2
+    while percent(before, digits) == percent(after, digits) and before != after and digits < 6:
+        digits += 1
+    return percent(before, digits), percent(after, digits)
+
+
 def relative(value: float, spread: float) -> str:
     """A spread over the size of its value; no figure above 100 %, for it says no more.
 

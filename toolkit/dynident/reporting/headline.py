@@ -10,7 +10,7 @@ from dynident.diagnosis.effect_groups import in_words
 from dynident.diagnosis.leading_effects import LeadingEffects
 from dynident.diagnosis.result import Diagnosis
 from dynident.reporting.content import step_groups
-from dynident.tables import percent
+from dynident.tables import percent, two_percent
 
 Mark = Literal["\u2713", "!", "?"]
 """Nothing is left but noise; something is to be mended or remains; it cannot be said."""
@@ -186,4 +186,5 @@ def _capitalised(words: str) -> str:
 
 def _fall(diagnosis: Diagnosis) -> str:
     error = diagnosis.test_error
-    return f"the torque error from {percent(error.before)} to {percent(error.after)}"
+    before, after = two_percent(error.before, error.after)
+    return f"the torque error from {before} to {after}"

@@ -23,7 +23,7 @@ from dynident.diagnosis.search.selection import AddedEffect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import HeldOut, on_blocks, on_recordings, with_noise_of
-from dynident.tables import percent
+from dynident.tables import two_percent
 
 _Group = tuple[AddedEffect, ...]
 
@@ -123,13 +123,8 @@ def _why(held: Evidence | None, before: HeldOut, after: HeldOut) -> str:
     if after.error <= before.error:
         return ""
     where = "the test recordings" if held else "held-out blocks of time"
-    digits = 2
-    while percent(before.error, digits) == percent(after.error, digits) and digits < 6:
-        digits += 1
-    return (
-        f"raises the error on {where} from {percent(before.error, digits)} to "
-        f"{percent(after.error, digits)}"
-    )
+    low, high = two_percent(before.error, after.error)
+    return f"raises the error on {where} from {low} to {high}"
 
 
 def _judged_stages(
