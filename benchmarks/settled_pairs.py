@@ -100,7 +100,7 @@ def in_mujoco(made: Experiment) -> Experiment:
         **own,
         circumstances=said,
         width=0.0 if said.friction == "constraint" else made.friction_width,
-        torque_noise=made.sensors.torque_std,
+        torque_noise=tuple(made.sensors.each("torque_std", made.robot.n)),
     )
 
 

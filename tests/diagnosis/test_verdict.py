@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from dynident import diagnose as find
-from dynident.diagnosis.verdict import _hidden_weights, _payload_notes
 from dynident.evidence import compare_models
-from dynident.evidence.columns import Evidence
-from dynident.evidence.evidence_fit import fit_evidence
-from dynident.evidence.runs import gather
 from dynident.model import Model
 from dynident.recording import Dataset, Noise, Recording
-from dynident.robot import Robot
 from synthetic import arm, synthetic, true_values
-
-PROBLEMS = Path(__file__).resolve().parents[2] / "problems"
 
 FRICTION = {"Fv__shoulder": 1.2, "Fv__elbow": 0.5, "Fc__shoulder": 1.5, "Fc__elbow": 0.6}
 
@@ -171,70 +163,3 @@ def test_what_differentiation_leaves_is_not_called_missing(model: Model) -> None
     found = find(model, Dataset(runs[:2]), Dataset(runs[2:]))
     assert (found.verdict, found.steps) == ("nothing_missing", ())
     assert found.test_error.after < 1e-4
-
-
-@pytest.mark.slow
-def test_offsets_that_do_what_a_tilt_does_are_named_beside_it() -> None:
-    """On a gantry the two are the same torque; rivals are otherwise compared one by one."""
-    given = Model(gantry()) + "viscous_friction" + "coulomb_friction"
-    friction = {f"{name}__{axis}": 20.0 for name in ("Fv", "Fc") for axis in "xyz"}
-    true = given + "torque_offset@x" + "torque_offset@y"
-    truth = true_values(true, **friction, offset__x=4.0, offset__y=-3.0)
-    runs = [synthetic(true, truth, k, rate_hz=250.0, torque_std=1.0) for k in range(3)]
-    said = find(given, Dataset(tuple(runs[:2])), Dataset(tuple(runs[2:])), propose="never")
-    assert [step.effect.label for step in said.steps] == ["base_tilt"]
-    assert any("torque offsets there do as well" in note for note in said.notes)
-
-
-def gantry() -> Robot:
-    """Three slides at right angles, the last one upright."""
-    links, joints, parent = ['<link name="base"/>'], [], "base"
-    for axis, direction, mass in (("x", "1 0 0", 40), ("y", "0 1 0", 12), ("z", "0 0 1", 5)):
-        links.append(
-            f'<link name="{axis}_link"><inertial><origin xyz="0 0 0"/><mass value="{mass}"/>'
-            '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>'
-        )
-        joints.append(
-            f'<joint name="{axis}" type="prismatic"><parent link="{parent}"/>'
-            f'<child link="{axis}_link"/><axis xyz="{direction}"/>'
-            '<limit lower="-3" upper="3" velocity="5" effort="900"/></joint>'
-        )
-        parent = f"{axis}_link"
-    return Robot.from_text(f'<robot name="gantry">{"".join([*links, *joints])}</robot>')
-
-
-def test_a_payload_on_another_branch_is_said_not_to_be_sought() -> None:
-    head = Robot.from_file(PROBLEMS / "vision_head" / "robot.urdf")
-    (note,) = _payload_notes(head)
-    others = [head.bodies[one] for one in head.ends if one != head.tip]
-    assert others == ["left_eye"] and "a load on left_eye" in note
-    assert _payload_notes(arm()) == []
-
-
-WAIST = """<robot name="torso"><link name="base"/>
-  <link name="trunk"><inertial><origin xyz="0.05 0.02 0.2"/><mass value="6"/>
-    <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.05"/></inertial></link>
-  <link name="arm"><inertial><origin xyz="0.2 0 0"/><mass value="2"/>
-    <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.03"/></inertial></link>
-  <joint name="waist" type="revolute"><parent link="base"/><child link="trunk"/>
-    <axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="4" effort="99"/></joint>
-  <joint name="shoulder" type="revolute"><parent link="trunk"/><child link="arm"/>
-    <origin xyz="0 0 0.4"/><axis xyz="0 1 0"/>
-    <limit lower="-2" upper="2" velocity="4" effort="99"/></joint></robot>"""
-
-
-@pytest.mark.parametrize("place", ["waist", "shoulder"])
-def test_beside_a_tilt_the_first_links_weight_is_named_where_it_looks_like_an_effect(
-    place: str,
-) -> None:
-    given = Model(Robot.from_text(WAIST))
-    true = given + "base_tilt"
-    run = synthetic(true, true_values(true), 1, rate_hz=250.0, torque_std=0.05)
-    evidence = Evidence(given, gather(Dataset((run,))))
-    for effects, said in ((("base_tilt",), False), (("base_tilt", f"joint_spring@{place}"), True)):
-        model = given
-        for one in effects:
-            model = model + one
-        notes = _hidden_weights(evidence, fit_evidence(evidence, model))
-        assert bool(notes) == (said and place == "waist")
-        assert all("weight of trunk" in note for note in notes)

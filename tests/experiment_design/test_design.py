@@ -257,7 +257,7 @@ def test_parameters_of_a_joint_alone_are_told_better_than_beside_all_others() ->
     own = [name for name in every.labels if name.endswith(("@elbow", ".fore"))]
     last = len(own)
     assert 0 < last < len(every.labels) and set(found.labels[-last:]) == set(own)
-    assert "standard deviations of elbow are" in found.sentence
+    assert "standard deviations of the parameters of elbow are" in found.sentence
     sigma = dict(zip(every.labels, every.sigma(every.motion.variables), strict=True))
     beside = dict(zip(found.labels[-last:], found.sigma(every.motion.variables), strict=True))
     np.testing.assert_allclose([beside[one] for one in own], [sigma[one] for one in own], rtol=1e-6)

@@ -9,26 +9,16 @@ import numpy as np
 from dynident.criteria import VerdictCriteria
 from dynident.diagnosis.answer import Verdict
 from dynident.diagnosis.details import Step
+from dynident.diagnosis.nuisances.look_alikes import look_alike_notes
 from dynident.diagnosis.nuisances.sticking import sticking_notes
 from dynident.diagnosis.nuisances.width_notes import friction_width_notes
-from dynident.diagnosis.search.payload_recordings import stated
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut
 from dynident.fitting.estimate import nearly_hidden
 from dynident.recording.dataset import NoiseSource
-from dynident.robot import Robot
 from dynident.tables import listed
-
-_STEADY = 0.02
-"""Of a torque's size, its standard deviation, below which it counts as constant."""
-_LIKE_A_WEIGHT = ("joint_spring", "torque_ripple", "torque_offset", "joint_zero")
-"""Effects that a sine of the joint's position resembles."""
-_VERTICAL = 0.02
-"""Sine of the angle to gravity below which an axis is vertical."""
-_FELT = 0.01
-"""Of the largest torque of an effect, below which a joint does not count."""
 
 
 def verdict_of(
@@ -120,69 +110,6 @@ def notes_on_steps(steps: Sequence[Step], held: Evidence | None) -> tuple[str, .
     return tuple(notes)
 
 
-def _payload_notes(robot: Robot) -> list[str]:
-    """On which of a branched robot's links no payload is sought."""
-    others = [robot.bodies[one] for one in robot.ends if one != robot.tip]
-    if not others:
-        return []
-    return [
-        f"A payload was sought on {robot.bodies[robot.tip]} alone, the end of the longest branch: "
-        f"a load on {listed(others, 'or')} may be what is left, or what an effect takes off."
-    ]
-
-
-def _constant_torques(evidence: Evidence, fitted: EvidenceFit) -> list[str]:
-    """Which effects that were added make the same torque all the time, as offsets would.
-
-    A tilted gantry: rivals are compared one by one, and none does what offsets do together.
-    """
-    model, runs = fitted.model, range(len(evidence.runs))
-    names, notes = model.robot.names, []
-    for effect in model.effects:
-        if effect in evidence.model or effect.place != "robot":
-            continue
-        values = fitted.values[model.slices[effect.label]]
-        signals = [one for run in runs for one in evidence.of(effect, run, model, fitted.values)]
-        torque = np.concatenate([one @ values for one in signals])
-        acting = [names[j] for j in effect.acting_at(model.robot)]
-        size = np.sqrt(np.mean(torque**2, axis=0))
-        felt = size > _FELT * size.max()
-        steady = np.std(torque, axis=0) <= _STEADY * size
-        if np.any(felt) and np.all(steady[felt]):
-            where = listed([joint for joint, one in zip(acting, felt, strict=True) if one])
-            notes.append(
-                f"The torque of {effect.title} is the same all the time, at {where}: torque "
-                "offsets there do as well, and these recordings cannot tell them apart."
-            )
-    return notes
-
-
-def _hidden_weights(evidence: Evidence, fitted: EvidenceFit) -> list[str]:
-    """Which effects beside a tilted base may be the weight of a link that an upright one hides.
-
-    About a vertical axis gravity turns nothing: where the centre of mass lies across it, no
-    recording of an upright robot tells, and the columns of a tilt take it from the description.
-    """
-    model, robot = fitted.model, fitted.model.robot
-    if "base_tilt" not in model.slices:
-        return []
-    upright = np.array(robot.gravity) / np.linalg.norm(robot.gravity)
-    notes = []
-    for effect in model.effects:
-        if effect.joint is None or effect.name not in _LIKE_A_WEIGHT or effect in evidence.model:
-            continue
-        joint = robot.joints[robot.names.index(effect.joint)]
-        across = np.linalg.norm(np.cross(joint.R @ joint.axis, upright))
-        if joint.parent == -1 and joint.kind == "revolute" and across < _VERTICAL:
-            link = robot.bodies[robot.names.index(effect.joint)]
-            notes.append(
-                f"{effect.title} may be the weight of {link}: on an upright base nothing shows "
-                f"where its centre of mass lies across the axis of {effect.joint}, the tilted one "
-                "does, and the diagnosis takes it from the description."
-            )
-    return notes
-
-
 def notes_on(
     evidence, held, fitted: EvidenceFit, source: NoiseSource, doubtful: Collection[str] = ()
 ) -> tuple[str, ...]:
@@ -232,9 +159,7 @@ def notes_on(
             "it into the study, set payload = true in the [[recordings]] of these, and false in "
             "the others."
         )
-    if not stated(evidence.runs):
-        notes += _payload_notes(fitted.model.robot)
-    notes += [*_constant_torques(evidence, fitted), *_hidden_weights(evidence, fitted)]
+    notes += look_alike_notes(evidence, fitted)
     notes += [*sticking_notes(evidence, doubtful), *friction_width_notes(evidence, fitted)]
     first = [run.replicates[0] for run in evidence.runs]
     if any(one.unthinned for one in first):

@@ -51,6 +51,9 @@ class DesignTask:
         _require_different(self.show, "to be shown twice")
         if self.tell and self.show:
             raise DesignError("tell and show together", remedy="design a recording for each")
+        twice = next((one for one in self.joints if self.joints.count(one) > 1), None)
+        if twice is not None:
+            raise DesignError(f"joint {twice} is named twice", remedy="name different joints")
         if self.joints and (self.tell or self.show):
             what = "joints whose parameters are meant, and effects to tell or to show"
             raise DesignError(what, remedy="design a recording for each")

@@ -92,12 +92,12 @@ def design(
     usual = sorted(some, key=program.loss)[len(some) // 2]
     found = program.solved(task.starts, task.seed, progress)
     first, information = questions[0], asked[0].information
-    if task.show and not np.any(
+    if task.of_what and not np.any(
         np.isfinite(information.sigma(program.told(information, found.variables)))
     ):
-        names = " or ".join(one.title for one in first.shown)
+        names = " or ".join([*(one.title for one in first.shown), *task.joints])
         raise DesignError(
-            f"no motion of this robot shows {names}: its torque cannot be told from the model's"
+            f"no motion of this robot shows {names}: the torque cannot be told from the model's"
         )
     return RecordingDesign(
         task=task,

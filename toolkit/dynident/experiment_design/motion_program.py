@@ -19,6 +19,7 @@ from dynident.experiment_design.geometry.workspace import RoomCut, Workspace
 from dynident.experiment_design.information import Information
 from dynident.experiment_design.motion_limits import MotionLimits
 from dynident.experiment_design.motion_solver import (
+    NOT_BETTER,
     DesignedMotion,
     LazySolver,
     LimitedTorque,
@@ -298,13 +299,12 @@ class MotionProgram:
     def _begins(self, starts: int, seed: int) -> list[DesignedMotion]:
         """The best of many random motions within the limits."""
         rng = np.random.default_rng(seed)
-        status = "no better motion than a random one"
         some = (
             self._limited(self.motions.random(int(number)), finer=1)
             for number in rng.integers(0, 2**31, starts * _TRIED)
         )
         found = [
-            DesignedMotion(variables=one, loss=self.loss(one), status=status, iterations=0)
+            DesignedMotion(variables=one, loss=self.loss(one), status=NOT_BETTER, iterations=0)
             for one in some
             if one is not None
         ]

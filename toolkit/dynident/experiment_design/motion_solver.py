@@ -20,6 +20,10 @@ worst told pair does not need stood still: in `problems/which_of_two` three pair
 13 and 17 standard deviations, and with the mean by 416, 105 and 15."""
 
 
+NOT_BETTER = "no better motion than a random one"
+"""Status of a motion that no search has bettered."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DesignedMotion:
     """A motion within limits, and how its program ended.
@@ -28,8 +32,8 @@ class DesignedMotion:
     ----------
     variables : (n, 1 + k).
     loss : see `MotionProgram.loss`.
-    status : of Ipopt, in words; why there is none where no search ended better.
-    iterations : of Ipopt; 0 where no search ended better.
+    status : of Ipopt, in words, or `NOT_BETTER`.
+    iterations : of Ipopt.
     """
 
     variables: np.ndarray
@@ -40,12 +44,11 @@ class DesignedMotion:
     @property
     def ended_in_words(self) -> str:
         """How the search for it ended, with the solver's own words."""
-        if not self.iterations:
+        if self.status == NOT_BETTER:
             return f"The search for a better motion failed: {self.status}."
-        where = "short of a local optimum, at the best motion it had come to"
-        if self.status.startswith("Solve"):
-            where = "at a local optimum"
-        return f"The search ended {where} (Ipopt: {self.status}, {self.iterations} iterations)."
+        where = "at" if self.status.startswith("Solve") else "short of"
+        words = f"(Ipopt: {self.status}, {self.iterations} iterations)"
+        return f"The search ended {where} a local optimum {words}."
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -84,7 +84,7 @@ class RecordingDesign(Shown):
         seen = np.isfinite(after)
         shares = np.where(seen, after, 0.0) / np.where(seen, usual, 1.0)
         worst = int(np.argmax(shares))
-        whose = self.task.of_what and f" of {self.task.of_what}"
+        whose = self.task.of_what and f" of the parameters of {self.task.of_what}"
         told = (
             f"With {length:g} s of this the standard deviations{whose} are "
             f"{percent(_mean(shares), 0)} of those with a usual motion of that length (geometric "

@@ -283,8 +283,8 @@ class Estimate(Shown):
 
     def to_dict(self) -> dict[str, Any]:
         """The estimate as JSON holds it, with the robot description in it."""
-        model, sigma, identified = self.model, self.sigma, self.identified_values
-        stands_for = self.stands_for
+        model, sigma = self.model, self.sigma
+        identified, stands_for = self.identified_values, self.stands_for
         return {
             "format": FORMAT,
             "method": self.method,

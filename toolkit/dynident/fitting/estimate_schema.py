@@ -59,7 +59,8 @@ class _Parameter(_Part):
     value: _Number
     """In `unit`; what the data do not identify keeps the value of the description."""
     sigma: _Size | None
-    """Standard deviation of `identified`, in `unit`; null where that is null."""
+    """Standard deviation of `identified`, in `unit`; null where that is null, and where the method
+    has no covariance."""
     unit: str
     """Of value and sigma."""
     expression: str

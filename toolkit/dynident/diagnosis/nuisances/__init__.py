@@ -8,6 +8,8 @@ that says so.
   separates and whitens.
 - `friction_width`: dry friction that reverses over another range of speeds than the model's law.
 - `sticking`: joints that stand at their stops, whose rows there say nothing.
-- `reversal_laws`: other laws of dry friction, which effects at reversals must beat.
+- `reversal_laws`: other laws of dry friction, which effects at reversals must beat;
+  `other_reversals` has them.
+- `look_alikes`: what an effect that was added may be instead, where no single rival says so.
 - `quantisation`: the residual that the steps of encoders leave, the same in every repetition.
 """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from functools import lru_cache
 
 import numpy as np
 from numpy.polynomial.hermite_e import hermegauss
@@ -19,7 +20,7 @@ LATEST = 0.01
 """s by which friction may reverse before the joint, or after it; a law that wants more is none."""
 AT_ONCE = 5e-5
 """s, below which it reverses with the joint."""
-_TURNED = 3.0
+TURNED = 3.0
 """Speed over the width at which dry friction has turned: tanh(3) is 0.995."""
 _JITTERS, _DAMPINGS = (0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0), (1.0, 3.0, 10.0, 30.0, 100.0)
 _JITTER_RANGE, _DAMPING_RANGE = (0.1, 4.0), (0.1, 1000.0)
@@ -94,7 +95,7 @@ class SmoothReversal(OtherReversal):
         return self.shape[1]
 
     def turned(self, fastest: float) -> float:
-        return _TURNED * max(self.shape[0], 1.0) + abs(self.lead_s) * fastest
+        return TURNED * max(self.shape[0], 1.0) + abs(self.lead_s) * fastest
 
     def in_words(self, width: float, unit: str) -> str:
         lead = self.lead_s
@@ -127,7 +128,7 @@ class DitheredReversal(OtherReversal):
 
     The jitter's variance is (s w)^2 / (1 + r / cosh(v/w)^2): where friction grows with the speed it
     damps the jitter, as white noise drives it in proportion to 1 / (damping of the loop and of
-    friction).
+    friction). Where much of a large jitter is damped, friction may fall before it has turned.
     """
 
     name = "dithered_reversal"
@@ -140,19 +141,28 @@ class DitheredReversal(OtherReversal):
         )
 
     def direction(self, v: np.ndarray, a: np.ndarray, width: float) -> np.ndarray:
-        s, r = self.shape
-        nodes, weights = hermegauss(_NODES)
-        x = np.linspace(0.0, _FAST, 500)
-        jitter = s / np.sqrt(1.0 + r / np.cosh(x) ** 2)
-        mean = np.tanh(x[:, None] + jitter[:, None] * nodes) @ (weights / weights.sum())
+        x, mean = _mean_over_jitter(*self.shape)
         return np.sign(v) * np.interp(np.abs(v) / width, x, mean)
 
     def turned(self, fastest: float) -> float:
-        return _TURNED + 2.0 * self.shape[0]
+        return TURNED + 2.0 * self.shape[0]
 
     def in_words(self, width: float, unit: str) -> str:
-        jitter = number(self.shape[0] * width, 2)
-        return f"is the mean over a jitter of the speed of {jitter} {unit} (standard deviation)"
+        s, r = self.shape
+        away, at = (number(one * width, 2) for one in (s, s / np.sqrt(1.0 + r)))
+        return (
+            f"is the mean over a jitter of the speed, of {away} {unit} (standard deviation) away "
+            f"from the reversal and {at} {unit} at it"
+        )
+
+
+@lru_cache(maxsize=64)
+def _mean_over_jitter(s: float, r: float) -> tuple[np.ndarray, np.ndarray]:
+    """Speeds over the width, and dry friction over its level there."""
+    nodes, weights = hermegauss(_NODES)
+    x = np.linspace(0.0, _FAST, 500)
+    jitter = s / np.sqrt(1.0 + r / np.cosh(x) ** 2)
+    return x, np.tanh(x[:, None] + jitter[:, None] * nodes) @ (weights / weights.sum())
 
 
 LAWS = (SmoothReversal, StraightReversal, DitheredReversal)

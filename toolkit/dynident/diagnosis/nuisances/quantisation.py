@@ -21,7 +21,7 @@ from dynident.fitting.sampling import sample
 from dynident.recording import Dataset, Recording, resolution, uniform
 
 _FADED = 1.0
-"""Steps of noise from which on rounding does not repeat: it is 4e-9 of a step in the mean."""
+"""Steps of noise from which on rounding does not repeat: it is 1e-9 of a step in the mean."""
 
 
 def with_rounding(judged: HeldOut, fitted: EvidenceFit, dataset: Dataset) -> HeldOut:
@@ -62,8 +62,10 @@ def rounding_power(
 
     The filtered motion is rounded again, on a lattice that is moved, in the mean over the noise
     that the recording has, for noise is another in each repetition: what that does to the
-    prediction is what repeats. How much it is depends on where the motion lies between the steps,
-    which nobody knows: it is said from the mean and the spread over several places.
+    prediction is what repeats, to first order: what noise itself does to columns that bend, as dry
+    friction's do, is none of the encoders' steps. How much it is depends on where the motion lies
+    between the steps, which nobody knows: it is said from the mean and the spread over several
+    places.
 
     Parameters
     ----------

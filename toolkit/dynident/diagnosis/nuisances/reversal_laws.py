@@ -19,20 +19,24 @@ import numpy as np
 from scipy.optimize import minimize
 
 from dynident.diagnosis.nuisances.friction_width import missed_instead
-from dynident.diagnosis.nuisances.other_reversals import AT_ONCE, LATEST, LAWS, OtherReversal
+from dynident.diagnosis.nuisances.other_reversals import (
+    AT_ONCE,
+    LATEST,
+    LAWS,
+    TURNED,
+    OtherReversal,
+)
 from dynident.diagnosis.search.ranking import joints_below_noise, rank
 from dynident.diagnosis.search.scoring import Score
 from dynident.effects import Effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, signal_by_joint
-from dynident.robot import Robot
+from dynident.model import Model
 
 _STEP, _STEP_OF_RANGE = 0.3, 0.025
 """First steps of a search for a shape, of a logarithm or of the range."""
 _USUAL = 99.0
 """Percentile of a joint's acceleration that counts as its highest."""
-_OF_A_SIZE = 3.0
-"""Factor within which shapes are alike."""
 _AS_MUCH = 0.5
 """Share of what an effect explains that a law must explain at least, to stand in for it."""
 _AT_MOST, _NOISE = 2.0, 3.0
@@ -100,21 +104,22 @@ def laws_that_do_as_well(
         return ()
     beside = fit_evidence(evidence, fitted.model + tuple(law.column for law in found), fitted)
     again = rank(evidence, beside, added, only=(one.effect,)).passing
-    if any(_is_like(one.effect, other.effect, model.robot) for other in again):
+    if any(not _is_one_more_law(other.effect, model) for other in again):
         return ()  # it explains something else than they do
     return tuple(found)
 
 
-def _is_like(one: Effect, other: Effect, robot: Robot) -> bool:
-    """Whether two shapes of an effect are of a size, by the first of their shape parameters.
+def _is_one_more_law(effect: Effect, model: Model) -> bool:
+    """Whether an effect that falls with the speed does so within that of a reversal.
 
-    Beside another law of dry friction, Stribeck friction over a speed like its width would only be
-    one more law.
+    Such is Stribeck friction over a speed like the friction width.
     """
-    sizes = zip(one.shape_parameters(robot), one.shape, other.shape, strict=True)
-    return all(
-        abs(p.coordinate(x) - p.coordinate(y)) <= p.reach(_OF_A_SIZE) for p, x, y in [*sizes][:1]
-    )
+    if effect.joint is None or not effect.shape:
+        return False
+    at = model.robot.names.index(effect.joint)
+    first, *_ = effect.shape_parameters(model.robot)
+    is_speed = first.unit == f"{model.robot.units[at]}/s"
+    return is_speed and effect.shape[0] <= TURNED * float(model.friction_widths[at])
 
 
 def _laws_at(

@@ -7,7 +7,7 @@ the others have made superfluous are dropped.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -79,17 +79,7 @@ def choose(evidence: Evidence, fitted: EvidenceFit, ranking: Ranking) -> AddedEf
     as_good = [s for s in likely if s.drop >= criteria.simpler_share * best.drop]
     chosen = min(as_good, key=_size)  # the first of the simplest: they stand in order
     rivals = alternatives(evidence, fitted, chosen, [s for s in likely if s is not chosen])
-    named = (*(s.effect for s in rivals), *_with_its_column(chosen.effect, passing))
-    return AddedEffect(chosen, ranking.corrected(chosen), tuple(dict.fromkeys(named)))
-
-
-def _with_its_column(effect: Effect, passing: Sequence[Score]) -> Iterator[Effect]:
-    """Effects that may be there with the column alone that is all of a simpler one's."""
-    for one in passing:
-        other = one.effect
-        shared = {*other.contains} & {*other.stands_in_for}
-        if effect.name in shared and other.joint == effect.joint:
-            yield other
+    return AddedEffect(chosen, ranking.corrected(chosen), tuple(s.effect for s in rivals))
 
 
 def at_other_joints(

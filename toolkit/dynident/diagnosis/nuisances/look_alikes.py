@@ -1,0 +1,127 @@
+"""What is said of effects that something else than a single rival may be.
+
+Rivals are compared one by one, as effects of the catalogue, on what the description says. What
+several of them do together, one column of them, or a part of the description that no recording
+showed before, is none of these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from dynident.effects import Effect, catalogue
+from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of
+from dynident.robot import Robot
+from dynident.tables import listed
+
+_LIKE_A_WEIGHT = ("joint_spring", "torque_ripple", "torque_offset", "joint_zero")
+"""Effects that a sine of the joint's position resembles."""
+_SLOW = 2.0
+"""Cycles per revolution below which a ripple resembles a weight, whose torque has one."""
+_VERTICAL = 0.02
+"""Sine of the angle to gravity below which an axis is vertical."""
+_ARM = 0.5
+"""m, by which a link's centre of mass may lie beside its axis; a description is no measure."""
+
+
+def look_alike_notes(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
+    """Return what else the effects that were added may be, in plain words.
+
+    Parameters
+    ----------
+    evidence : the training recordings; its model is the one that was given.
+    fitted : the final model.
+
+    Returns
+    -------
+    A sentence for each doubt.
+    """
+    added = [one for one in fitted.model.effects if one not in evidence.model]
+    return (
+        *_constants(added, fitted),
+        *_offsets_instead(added, evidence, fitted),
+        *_hidden_weights(added, evidence, fitted),
+        *_other_ends(fitted.model.robot),
+    )
+
+
+def _constants(added: list[Effect], fitted: EvidenceFit) -> Iterator[str]:
+    """Offsets are one column of friction that differs between the directions."""
+    for effect in added:
+        other = f"asymmetric_friction@{effect.joint}"
+        if effect.name == "torque_offset" and other not in fitted.model.slices:
+            yield (
+                f"{effect.title} may also be dry friction that is larger in one direction than in "
+                "the other (dFc of asymmetric friction): the torque is the same, and no motion "
+                "tells them apart."
+            )
+
+
+def _offsets_instead(added: list[Effect], evidence: Evidence, fitted: EvidenceFit) -> Iterator[str]:
+    """Effects of the whole robot in whose place offsets at several joints fit as well."""
+    robot, offset = fitted.model.robot, catalogue()["torque_offset"]
+    for effect in added:
+        joints = [robot.names[j] for j in effect.acting_at(robot)]
+        if effect.place != "robot" or effect.is_payload or len(joints) < 2:
+            continue
+        other = fitted.model - effect.label
+        offsets = [offset(joint).on(robot) for joint in joints]
+        other = other + tuple(one for one in offsets if one not in other)
+        rival = in_metric_of(evidence, fit_evidence(evidence, other, fitted), fitted)
+        if rival.error_signal - fitted.error_signal <= 2.0 * np.log(fitted.rows):
+            yield (
+                f"Torque offsets at {listed(joints)} together fit these recordings as well as "
+                f"{effect.title}."
+            )
+
+
+def _hidden_weights(added: list[Effect], evidence: Evidence, fitted: EvidenceFit) -> Iterator[str]:
+    """Effects beside a tilted base that may be a weight that an upright base hides.
+
+    About a vertical axis gravity turns nothing: how far from it the centre of mass lies, no
+    recording of an upright robot tells, and the columns of a tilt take it from the description.
+    """
+    model, robot = fitted.model, fitted.model.robot
+    if "base_tilt" not in model.slices or not np.any(robot.gravity):
+        return
+    down = np.array(robot.gravity) / np.linalg.norm(robot.gravity)
+    tilt = float(np.linalg.norm(fitted.values[model.slices["base_tilt"]]))
+    for effect in added:
+        if effect.joint is None or effect.name not in _LIKE_A_WEIGHT:
+            continue
+        if effect.name == "torque_ripple" and effect.shape[0] >= _SLOW:
+            continue
+        at = robot.names.index(effect.joint)
+        joint = robot.joints[at]
+        across = float(np.linalg.norm(np.cross(joint.R @ joint.axis, down)))
+        if joint.parent != -1 or joint.kind != "revolute" or across > _VERTICAL:
+            continue
+        weight = robot.theta[10 * at] * float(np.linalg.norm(robot.gravity))
+        if _largest(effect, evidence, fitted) <= weight * tilt * _ARM:
+            yield (
+                f"{effect.title} may be the weight of {robot.bodies[at]}: on an upright base "
+                f"nothing shows how far its centre of mass lies from the axis of {effect.joint}, "
+                "the tilted one does, and the diagnosis takes it from the description."
+            )
+
+
+def _largest(effect: Effect, evidence: Evidence, fitted: EvidenceFit) -> float:
+    """Largest torque of an effect at the first joint where it acts, N m."""
+    values = fitted.values[fitted.model.slices[effect.label]]
+    every = [
+        signal[:, 0] @ values
+        for run in range(len(evidence.runs))
+        for signal in evidence.of(effect, run, fitted.model, fitted.values)
+    ]
+    return float(np.max(np.abs(np.concatenate(every))))
+
+
+def _other_ends(robot: Robot) -> Iterator[str]:
+    """On which of a branched robot's links no payload is sought."""
+    others = [robot.bodies[one] for one in robot.ends if one != robot.tip]
+    if others:
+        tip = robot.bodies[robot.tip]
+        yield f"A payload is modelled on {tip} alone, not on {listed(others, 'or')}."
