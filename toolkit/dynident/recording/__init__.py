@@ -8,8 +8,8 @@ wrench sensor's columns as the torques of six joints that stand still.
 `Motion`, `MotionInParts` as much of it as is asked for; `ParallelFilter` passes regressor columns
 and torque through one low-pass and decimation, in blocks if asked; both follow a `Filter`.
 `usable` and `usable_rows` decide which rows count, `within` and `moving` pick some of them;
-`periods` lays repetitions side by side; `require_motion` and `require_torque` refuse recordings
-that show nothing.
+`periods` lays repetitions side by side; `within_limits` brings together angles that were kept
+within a turn; `require_motion` and `require_torque` refuse recordings that show nothing.
 """
 
 from dynident.recording.dataset import Dataset, Noise, numbered, without_ends
@@ -54,6 +54,7 @@ from dynident.recording.usable_rows import (
     usable,
     usable_rows,
 )
+from dynident.recording.whole_turns import within_limits
 
 __all__ = [
     "COMPONENTS",
@@ -105,6 +106,7 @@ __all__ = [
     "usable_rows",
     "warn_of_missing_torque",
     "within",
+    "within_limits",
     "without_ends",
     "write",
 ]

@@ -340,7 +340,7 @@ def _read(logs: Sequence[Log], reading: Reading) -> tuple[Recording, ...]:
                 log.file,
                 robot.names,
                 reading.columns,
-                robot.kinds,
+                robot.stated_kinds,
                 log.record or None,
                 layout=log.layout,
             )
