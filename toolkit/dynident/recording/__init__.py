@@ -54,7 +54,7 @@ from dynident.recording.usable_rows import (
     usable,
     usable_rows,
 )
-from dynident.recording.whole_turns import within_limits
+from dynident.recording.whole_turns import as_points, turning_round, turns_between, within_limits
 
 __all__ = [
     "COMPONENTS",
@@ -77,6 +77,7 @@ __all__ = [
     "Recording",
     "RowCount",
     "WrenchColumns",
+    "as_points",
     "central_difference",
     "choose_factor",
     "count_rows",
@@ -101,6 +102,8 @@ __all__ = [
     "rows_in_words",
     "sensed_frames",
     "sound_part",
+    "turning_round",
+    "turns_between",
     "uniform",
     "usable",
     "usable_rows",

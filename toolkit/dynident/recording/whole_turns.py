@@ -6,7 +6,7 @@ one turn, as in [-pi, pi), so that it jumps by 2 pi where it crosses the end: no
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from dynident.recording.recording import Recording
 from dynident.recording.spooled import Spool
 
-UNWRAPPED = "jumps by whole turns between samples, and is read as going on: no torque changes"
+UNWRAPPED = "jumps by whole turns between samples, and is read as going on (no torque changes)"
 """What is said of a position that `unwrapped` has changed."""
 TURNING = ("revolute", "continuous")
 """Kinds of joints whose positions are angles."""
@@ -190,3 +190,61 @@ def _sum(recording: Recording, signal: str, added: Mapping[int, _Added]) -> np.n
                 part[:, joint] += one.of(rows)
             spool.add({signal: part})
         return spool.arrays()[signal]
+
+
+def unwrapped_notes(recordings: Iterable[tuple[str, Sequence[str]]]) -> tuple[str, ...]:
+    """Say of which recordings positions jumped by whole turns, a sentence for each joint.
+
+    Parameters
+    ----------
+    recordings : name, and the joints that `Provenance.unwrapped` names.
+    """
+    names: dict[str, dict[str, None]] = {}
+    for name, joints in recordings:
+        for joint in joints:
+            names.setdefault(joint, {})[name] = None
+    return tuple(f"q.{joint} {UNWRAPPED}: {', '.join(some)}." for joint, some in names.items())
+
+
+def turning_round(recording: Recording) -> np.ndarray:
+    """Joints that turn without end, and go farther than once around, (n,) mask.
+
+    Parameters
+    ----------
+    recording : which says which joints are continuous.
+    """
+    endless = np.isin(recording.joints, recording.continuous)
+    return endless & (np.ptp(recording.q, axis=0) > _TURNS[-1])
+
+
+def as_points(q: np.ndarray, turning: np.ndarray) -> np.ndarray:
+    """Return positions in which whole turns make no difference: points of a circle for angles.
+
+    Parameters
+    ----------
+    q : (T, n) rad or m.
+    turning : (n,) mask of the joints whose whole turns are to make none.
+
+    Returns
+    -------
+    (T, n + k): the positions, those of the k joints as their cosines, and their sines after all.
+    """
+    if not turning.any():
+        return q
+    return np.hstack([np.where(turning, np.cos(q), q), np.sin(q[:, turning])])
+
+
+def turns_between(folded: np.ndarray, turning: np.ndarray) -> np.ndarray:
+    """Whole turns, in rad, that each repetition of a motion is ahead of the first one.
+
+    Parameters
+    ----------
+    folded : (P, S, n) positions, see `Periods.fold`.
+    turning : (n,) mask of the joints that turn on from one repetition to the next.
+
+    Returns
+    -------
+    (P, 1, n), zero at the other joints.
+    """
+    ahead = (folded - folded[:1]).mean(axis=1, keepdims=True)
+    return np.where(turning, _TURNS[-1] * np.round(ahead / _TURNS[-1]), 0.0)

@@ -148,8 +148,7 @@ def recordings_of(
                 number=number,
             )
         )
-    limits = {one.name: (one.lower, one.upper) for one in robot.joints}
-    return within_limits(found, limits), loads
+    return within_limits(found, robot.position_limits), loads
 
 
 @dataclass(frozen=True, kw_only=True)
