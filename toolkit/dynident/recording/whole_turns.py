@@ -30,6 +30,8 @@ _UNEVEN = 0.1
 """The same where the motion about it is uneven, at most."""
 _MOST_OF_THEM = 0.9
 """Share of the jumps of a position that must be whole turns."""
+_LOOKED_AT = 200
+"""Jumps that are looked at first: in another unit, most steps may be as large as one."""
 _BESIDE = 3
 """Steps on either side of a jump that tell how fast the joint is there."""
 _AT_ONCE = 1 << 18
@@ -147,7 +149,7 @@ class _Added:
 
 
 def _jumps(t: np.ndarray, x: np.ndarray) -> _Added | None:
-    """Jumps by whole turns of a position (T,) at times t; None where there are none."""
+    """What makes a position (T,) at times t go on where it jumps; None if nowhere."""
     for turn in _TURNS:
         before = [
             start + np.flatnonzero(np.abs(np.diff(x[start : start + _AT_ONCE + 1])) > turn / 2)
@@ -155,8 +157,15 @@ def _jumps(t: np.ndarray, x: np.ndarray) -> _Added | None:
         ]
         rows = np.concatenate(before)
         jumps = set(rows.tolist())
-        turns = np.array([_whole_turns(t, x, int(row), jumps, turn) for row in rows])
-        if len(rows) and np.mean(turns != 0) >= _MOST_OF_THEM:
+
+        def turns_at(some: np.ndarray, jumps: set[int] = jumps, turn: float = turn) -> np.ndarray:
+            return np.array([_whole_turns(t, x, int(row), jumps, turn) for row in some])
+
+        few = turns_at(rows[:: len(rows) // _LOOKED_AT + 1])
+        if not len(rows) or np.mean(few != 0) < _MOST_OF_THEM:
+            continue
+        turns = turns_at(rows)
+        if np.mean(turns != 0) >= _MOST_OF_THEM:
             return _Added(rows + 1, -turns, turn)
     return None
 
@@ -214,6 +223,8 @@ def turning_round(recording: Recording) -> np.ndarray:
     recording : which says which joints are continuous.
     """
     endless = np.isin(recording.joints, recording.continuous)
+    if not endless.any():  # then no file need be gone through
+        return endless
     return endless & (np.ptp(recording.q, axis=0) > _TURNS[-1])
 
 
