@@ -21,8 +21,8 @@ from dynident.recording import (
     within_limits,
     write,
 )
-from dynident.recording import whole_turns as module
-from dynident.recording.whole_turns import unwrapped, unwrapped_notes
+from dynident.recording.formats import whole_turns as module
+from dynident.recording.formats.whole_turns import unwrapped, unwrapped_notes
 from dynident.study_draft.timing import period_of
 
 TURN = 2 * np.pi

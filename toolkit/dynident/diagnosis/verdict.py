@@ -16,8 +16,8 @@ from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut
 from dynident.fitting.estimate import nearly_hidden
+from dynident.recording import unwrapped_notes
 from dynident.recording.dataset import NoiseSource
-from dynident.recording.whole_turns import unwrapped_notes
 from dynident.tables import listed
 
 

@@ -26,6 +26,7 @@ from dynident.recording.formats.column_table import ColumnTable, FileLayout
 from dynident.recording.formats.open_table import READABLE, open_table
 from dynident.recording.formats.read import SUFFIXES, read
 from dynident.recording.formats.sound_stretch import sound_part
+from dynident.recording.formats.whole_turns import UNWRAPPED, unwrapped_notes, within_limits
 from dynident.recording.formats.wrench_file import (
     COMPONENTS,
     WrenchColumns,
@@ -46,6 +47,7 @@ from dynident.recording.plausibility import (
     warn_of_missing_torque,
 )
 from dynident.recording.recording import SIGNALS, LeftOut, Provenance, Recording
+from dynident.recording.repetition import as_points, turning_round, turns_between
 from dynident.recording.uniform import uniform
 from dynident.recording.usable_rows import (
     RowCount,
@@ -54,13 +56,13 @@ from dynident.recording.usable_rows import (
     usable,
     usable_rows,
 )
-from dynident.recording.whole_turns import as_points, turning_round, turns_between, within_limits
 
 __all__ = [
     "COMPONENTS",
     "READABLE",
     "SIGNALS",
     "SUFFIXES",
+    "UNWRAPPED",
     "Column",
     "ColumnTable",
     "Dataset",
@@ -105,6 +107,7 @@ __all__ = [
     "turning_round",
     "turns_between",
     "uniform",
+    "unwrapped_notes",
     "usable",
     "usable_rows",
     "warn_of_missing_torque",

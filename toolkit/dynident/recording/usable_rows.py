@@ -20,8 +20,8 @@ from dynident.recording.filters import Filter
 from dynident.recording.masks import within
 from dynident.recording.parallel import ParallelFilter
 from dynident.recording.recording import LeftOut, Recording
+from dynident.recording.repetition import as_points, turning_round
 from dynident.recording.white_noise import encoder_noise_std
-from dynident.recording.whole_turns import as_points, turning_round
 
 _IDLE = 0.25  # s of standing still at an end that are worth leaving out
 _MOVES = 1e-3  # of a joint's travel by which it must leave its place at an end

@@ -18,9 +18,9 @@ from dynident.recording import (
     default_filter,
     turning_round,
     uniform,
+    unwrapped_notes,
 )
 from dynident.recording.repetition import shift_mismatch
-from dynident.recording.whole_turns import unwrapped_notes
 from dynident.reporting.pictures.recordings_picture import by_record, recordings_figure
 from dynident.study import Study
 from dynident.tables import Table, percent

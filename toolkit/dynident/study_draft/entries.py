@@ -6,8 +6,7 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from dynident.recording import Recording, usable
-from dynident.recording.whole_turns import UNWRAPPED
+from dynident.recording import UNWRAPPED, Recording, usable
 from dynident.study_draft.draft import DraftedRecording
 from dynident.study_draft.log import Log
 from dynident.study_draft.log_facts import LogFacts, carried_by

@@ -23,9 +23,9 @@ from dynident.recording.formats.column_table import ColumnTable, FileLayout
 from dynident.recording.formats.joint_state_table import prefixed
 from dynident.recording.formats.open_table import DEFAULT_LAYOUT, open_table
 from dynident.recording.formats.recorded import Wanted, recorded
+from dynident.recording.formats.whole_turns import UNWRAPPED, unwrapped
 from dynident.recording.plausibility import warn_of_units
 from dynident.recording.recording import Recording, _joint_names
-from dynident.recording.whole_turns import UNWRAPPED, unwrapped
 
 SUFFIXES = (".csv", ".npz", ".mat", ".parquet")
 """Suffixes of the files that are read and written; more are read, see `open_table.READABLE`."""

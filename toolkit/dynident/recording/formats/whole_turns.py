@@ -12,13 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dynident.recording.recording import Recording
+from dynident.recording.repetition import TURN
 from dynident.recording.spooled import Spool
 
 UNWRAPPED = "jumps by whole turns between samples, and is read as going on (no torque changes)"
 """What is said of a position that `unwrapped` has changed."""
 TURNING = ("revolute", "continuous")
 """Kinds of joints whose positions are angles."""
-_TURNS = (360.0, 2 * np.pi)
+_TURNS = (360.0, TURN)
 """A whole turn in degrees, where these are still to be found out, and in rad."""
 _MOST = 16
 """Whole turns after which encoders of many turns begin anew, at most."""
@@ -99,7 +100,7 @@ def within_limits(
         for name in jumped:
             count = _turns_off(one.q[:, one.joints.index(name)], *limits[name])
             if count:
-                turns[one.joints.index(name)] = _Added.everywhere(count, _TURNS[-1])
+                turns[one.joints.index(name)] = _Added.everywhere(count, TURN)
         if turns and id(one.q) not in known:  # windows of one file go on sharing their samples
             signals = [x for x in ("q", "q_ref") if getattr(one, x) is not None]
             known[id(one.q)] = one.replace(**{x: _sum(one, x, turns) for x in signals})
@@ -113,12 +114,12 @@ def _turns_off(q: np.ndarray, lower: float, upper: float) -> int:
     low, high = float(q.min()), float(q.max())
 
     def beyond(turns: int) -> float:
-        moved = turns * _TURNS[-1]
+        moved = turns * TURN
         return max(lower - low - moved, 0.0) + max(high + moved - upper, 0.0)
 
     if not np.isfinite(upper - lower) or not beyond(0):
         return 0
-    count = round(((lower + upper) - (low + high)) / (2 * _TURNS[-1]))
+    count = round(((lower + upper) - (low + high)) / (2 * TURN))
     return count if beyond(count) < beyond(0) else 0
 
 
@@ -213,49 +214,3 @@ def unwrapped_notes(recordings: Iterable[tuple[str, Sequence[str]]]) -> tuple[st
         for joint in joints:
             names.setdefault(joint, {})[name] = None
     return tuple(f"q.{joint} {UNWRAPPED}: {', '.join(some)}." for joint, some in names.items())
-
-
-def turning_round(recording: Recording) -> np.ndarray:
-    """Joints that turn without end, and go farther than once around, (n,) mask.
-
-    Parameters
-    ----------
-    recording : which says which joints are continuous.
-    """
-    endless = np.isin(recording.joints, recording.continuous)
-    if not endless.any():  # then no file need be gone through
-        return endless
-    return endless & (np.ptp(recording.q, axis=0) > _TURNS[-1])
-
-
-def as_points(q: np.ndarray, turning: np.ndarray) -> np.ndarray:
-    """Return positions in which whole turns make no difference: points of a circle for angles.
-
-    Parameters
-    ----------
-    q : (T, n) rad or m.
-    turning : (n,) mask of the joints whose whole turns are to make none.
-
-    Returns
-    -------
-    (T, n + k): the positions, those of the k joints as their cosines, and their sines after all.
-    """
-    if not turning.any():
-        return q
-    return np.hstack([np.where(turning, np.cos(q), q), np.sin(q[:, turning])])
-
-
-def turns_between(folded: np.ndarray, turning: np.ndarray) -> np.ndarray:
-    """Whole turns, in rad, that each repetition of a motion is ahead of the first one.
-
-    Parameters
-    ----------
-    folded : (P, S, n) positions, see `Periods.fold`.
-    turning : (n,) mask of the joints that turn on from one repetition to the next.
-
-    Returns
-    -------
-    (P, 1, n), zero at the other joints.
-    """
-    ahead = (folded - folded[:1]).mean(axis=1, keepdims=True)
-    return np.where(turning, _TURNS[-1] * np.round(ahead / _TURNS[-1]), 0.0)
