@@ -207,3 +207,7 @@ def test_urdf_attached_to_a_world_link():
     joint = robot.joints[0]
     assert joint.upper == joint.velocity == joint.effort == np.inf
     assert joint.kind == "revolute"
+    assert joint.continuous
+    assert robot.stated_kinds == ("continuous",)
+    # Of a joint that only has no limits it is not known.
+    assert not Robot.from_text(text.replace("continuous", "revolute")).joints[0].continuous

@@ -14,7 +14,7 @@ from dynident.cli import main
 from dynident.recording import Dataset, Recording, write
 from dynident.wiring import check_wiring
 from study_files import edited, recording, true_model, write_study
-from synthetic import smooth_motion, true_values
+from synthetic import ARM, smooth_motion, true_values
 from wiring_faults import Injected, broken, column_faults, data_faults
 
 FAULTS = [*column_faults(2), *data_faults(2)]
@@ -67,6 +67,20 @@ def test_noise_of_a_joint_at_rest_is_no_position_in_degrees(seed: int) -> None:
     q, tau = (x + std * rng.normal(size=x.shape) for x, std in ((q, 1e-3), (tau, 0.05)))
     one = Recording(t, q, tau, model.robot.names, period=8.0, name="shoulder at rest")
     assert check_wiring(model, Dataset((one,))) == ()
+
+
+@pytest.mark.parametrize(("kind", "faults"), [("continuous", 0), ("revolute", 1)])
+def test_how_far_a_continuous_joint_turns_is_no_fault(kind: str, faults: int) -> None:
+    """Its torque tells nothing: friction alone, as of a joint about a vertical axis."""
+    limits = '<limit lower="-2.5" upper="2.5" velocity="6" effort="200"/>'
+    text = ARM.replace(limits, "").replace('rpy="1.5707963267948966 0 0"', "")
+    text = text.replace('name="shoulder" type="revolute"', f'name="shoulder" type="{kind}"')
+    model = di.Model(di.Robot.from_text(text, joints=["shoulder"]))
+    t = np.arange(1600) / 100.0
+    q = 1.5 * t + np.sin(2 * t)
+    tau = np.random.default_rng(0).standard_normal(len(t))
+    found = check_wiring(model, Dataset((Recording(t, q, tau, ("shoulder",)),)))
+    assert [fault.kind for fault in found] == ["degrees"] * faults
 
 
 @pytest.mark.slow

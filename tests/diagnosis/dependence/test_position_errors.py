@@ -12,9 +12,10 @@ from dynident.criteria import DEFAULTS
 from dynident.diagnosis.dependence.position_errors import position_error_columns
 from dynident.diagnosis.dependence.residual_record import FittedBody, ResidualRecord
 from dynident.recording import Dataset, Recording
+from dynident.robot import Robot
 from residuals import record
 from study_files import true_model
-from synthetic import arm, synthetic, true_values
+from synthetic import ARM, arm, synthetic, true_values
 
 SIZE = 1e-4
 BODY = FittedBody(arm(), np.zeros(2))
@@ -29,6 +30,23 @@ def moved_by(one: ResidualRecord, joint: int, error, slope, bend) -> np.ndarray:
     a[:, joint] += SIZE * (bend(at) * speed**2 + slope(at) * one.a[:, joint])
     robot = arm()
     return robot.inverse_dynamics(q, v, a) - robot.inverse_dynamics(one.q, one.v, one.a)
+
+
+ROUND = FittedBody(Robot.from_text(ARM.replace('"revolute"', '"continuous"')), np.zeros(2))
+
+
+def test_the_error_of_a_sensor_is_the_same_after_each_turn_of_its_joint() -> None:
+    one = record(1, {})
+    q = one.q + 2.0 * one.t[:, None]
+    records = (replace(one, q=q, v=one.v + 2.0, body=ROUND),)
+    waves = [lambda q: np.sin(3 * q), lambda q: 3 * np.cos(3 * q), lambda q: -9 * np.sin(3 * q)]
+    rows = np.arange(0, len(one.t), 7)
+    torque = moved_by(records[0], 1, *waves)[rows, 1]
+    columns = position_error_columns(records, rows, 1)
+    q, v, a = (x[rows] for x in (records[0].q, records[0].v, records[0].a))
+    known = np.column_stack([columns, ROUND.robot.regressor(q, v, a)[:, 1], a[:, [1]]])
+    left = torque - known @ np.linalg.lstsq(known, torque, rcond=None)[0]
+    assert np.linalg.norm(left) < 0.01 * np.linalg.norm(torque)
 
 
 @pytest.mark.parametrize("sensor", [0, 1])

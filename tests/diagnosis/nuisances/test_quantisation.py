@@ -67,6 +67,18 @@ def test_steps_much_smaller_than_the_noise_leave_nothing_that_repeats(model: Mod
     np.testing.assert_array_equal(rounding_power(fitted, runs), np.zeros(2))
 
 
+def test_jumps_of_a_position_are_no_noise_that_could_repeat(model: Model) -> None:
+    """As of an angle that is kept within a turn: what a filter takes off them is no noise."""
+    one = recordings(model, STEP, 0.1, 1)[0]
+    jumped = np.array(one.q)
+    jumped[len(jumped) // 2 :, 0] += 5000 * STEP
+    evidence = Evidence(model, gather(Dataset((one,))))
+    fitted = fit_evidence(evidence, model)
+    usual = rounding_power(fitted, Dataset((one,)))
+    found = rounding_power(fitted, Dataset((replace(one, q=jumped),)))
+    assert np.all(found <= 2.0 * usual)
+
+
 def test_there_is_none_without_steps(model: Model) -> None:
     runs = Dataset(recordings(model, 0.0, 1e-3, 1))
     evidence = Evidence(model, gather(runs))

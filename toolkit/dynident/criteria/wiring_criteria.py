@@ -44,7 +44,10 @@ class WiringCriteria(CriteriaGroup):
         1.2, "1", "travel over the room between a joint's limits that no joint has", over=1
     )
     widest_turn: float = criterion(
-        15.0, "rad", "travel that no revolute joint has whose limits are not known", over=0
+        15.0,
+        "rad",
+        "travel that no revolute joint has whose limits are not known; a continuous one may",
+        over=0,
     )
     described_z: float = criterion(
         6.0, "1", "standard deviations by which the described torque shows in the measured one"

@@ -17,6 +17,7 @@ from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut
 from dynident.fitting.estimate import nearly_hidden
+from dynident.recording import unwrapped_notes
 from dynident.recording.dataset import NoiseSource
 from dynident.tables import listed
 
@@ -122,7 +123,8 @@ def notes_on(
     source : where the noise floor comes from.
     doubtful : joints whose reversals are left out as their dry friction may follow another law.
     """
-    notes = []
+    recordings = [run.recording for run in (*evidence.runs, *(held.runs if held else ()))]
+    notes = [*unwrapped_notes((one.name, one.provenance.unwrapped) for one in recordings)]
     if held is None:
         notes.append("No test recordings: errors are those of held-out blocks of time.")
     elif source != "unknown" and all(run.kind == "single" for run in held.runs):

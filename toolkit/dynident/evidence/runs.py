@@ -25,9 +25,11 @@ from dynident.recording import (
     Dataset,
     Noise,
     Recording,
+    as_points,
     periods,
     require_repetition,
     require_torque,
+    turning_round,
     uniform,
 )
 
@@ -189,7 +191,8 @@ def gather(
         if recording.period:
             where = recording.where
             found = periods(len(usable), first.rate_hz, recording.period, where)
-            require_repetition(first.q[criteria.order :], found, where)
+            points = as_points(first.q[criteria.order :], turning_round(recording))
+            require_repetition(points, found, where)
             index = criteria.order + found.index
             kind: Kind = "repeated"
             replicates: tuple[Sampled, ...] = (first,)

@@ -8,8 +8,8 @@ wrench sensor's columns as the torques of six joints that stand still.
 `Motion`, `MotionInParts` as much of it as is asked for; `ParallelFilter` passes regressor columns
 and torque through one low-pass and decimation, in blocks if asked; both follow a `Filter`.
 `usable` and `usable_rows` decide which rows count, `within` and `moving` pick some of them;
-`periods` lays repetitions side by side; `require_motion` and `require_torque` refuse recordings
-that show nothing.
+`periods` lays repetitions side by side; `within_limits` brings together angles that were kept
+within a turn; `require_motion` and `require_torque` refuse recordings that show nothing.
 """
 
 from dynident.recording.dataset import Dataset, Noise, numbered, without_ends
@@ -26,6 +26,7 @@ from dynident.recording.formats.column_table import ColumnTable, FileLayout
 from dynident.recording.formats.open_table import READABLE, open_table
 from dynident.recording.formats.read import SUFFIXES, read
 from dynident.recording.formats.sound_stretch import sound_part
+from dynident.recording.formats.whole_turns import UNWRAPPED, unwrapped_notes, within_limits
 from dynident.recording.formats.wrench_file import (
     COMPONENTS,
     WrenchColumns,
@@ -46,6 +47,7 @@ from dynident.recording.plausibility import (
     warn_of_missing_torque,
 )
 from dynident.recording.recording import SIGNALS, LeftOut, Provenance, Recording
+from dynident.recording.repetition import as_points, turning_round, turns_between
 from dynident.recording.uniform import uniform
 from dynident.recording.usable_rows import (
     RowCount,
@@ -60,6 +62,7 @@ __all__ = [
     "READABLE",
     "SIGNALS",
     "SUFFIXES",
+    "UNWRAPPED",
     "Column",
     "ColumnTable",
     "Dataset",
@@ -76,6 +79,7 @@ __all__ = [
     "Recording",
     "RowCount",
     "WrenchColumns",
+    "as_points",
     "central_difference",
     "choose_factor",
     "count_rows",
@@ -100,11 +104,15 @@ __all__ = [
     "rows_in_words",
     "sensed_frames",
     "sound_part",
+    "turning_round",
+    "turns_between",
     "uniform",
+    "unwrapped_notes",
     "usable",
     "usable_rows",
     "warn_of_missing_torque",
     "within",
+    "within_limits",
     "without_ends",
     "write",
 ]

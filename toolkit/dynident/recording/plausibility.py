@@ -34,7 +34,8 @@ def warn_of_units(recording: Recording, kinds: Sequence[str] | None = None) -> N
     Parameters
     ----------
     recording : to look at.
-    kinds : "revolute" or "prismatic" for each joint; without them positions are not judged.
+    kinds : "revolute", "continuous" (which may turn as far as it likes) or "prismatic" for each
+        joint; without them positions are not judged.
 
     Warns
     -----

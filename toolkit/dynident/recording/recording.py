@@ -42,6 +42,7 @@ class Provenance:
     first_line : line of the first sample in a text file, from 1; 0 where lines are not counted.
     comment_lines : lines of comment, ascending; those above that one do not count.
     place : where the samples were put if they were too many for the memory, in words.
+    unwrapped : joints whose positions jumped by whole turns, and are read as going on.
     """
 
     file: str = ""
@@ -54,6 +55,7 @@ class Provenance:
     first_line: int = 2
     comment_lines: tuple[int, ...] = ()
     place: str = ""
+    unwrapped: tuple[str, ...] = ()
 
     def line(self, index: int) -> int:
         """Return the line of a sample in a text file, given its index from 0; 0 if unknown."""
@@ -110,6 +112,7 @@ class Recording:
     number : its place among the recordings of a study, from 1; 0 where that does not matter.
     name : for tables; the file's name without its suffix by default.
     provenance : file, hash, filter.
+    continuous : joints that turn without end, as their robot says.
     left_out : stretches that `usable_rows.usable` has found to be of no use, which its window then
         excludes; None where nobody has looked.
 
@@ -139,6 +142,7 @@ class Recording:
     torque: Literal["measured", "held_command"] = "measured"
     number: int = 0
     name: str = ""
+    continuous: tuple[str, ...] = ()
     provenance: Provenance = field(default_factory=Provenance)
     left_out: tuple[LeftOut, ...] | None = None
 
@@ -230,7 +234,9 @@ class Recording:
                 f"no joint '{missing[0]}'", self.where, f"joints: {', '.join(self.joints)}"
             )
         picked = [self.joints.index(joint) for joint in joints]
-        return self.replace(joints=tuple(joints), **self._mapped(lambda x: _columns(x, picked)))
+        continuous = tuple(name for name in self.continuous if name in joints)
+        signals = self._mapped(lambda x: _columns(x, picked))
+        return self.replace(joints=tuple(joints), continuous=continuous, **signals)
 
     def cut(self, t0: float | None = None, t1: float | None = None) -> Recording:
         """Return the samples with t0 <= t < t1 (s, as in `t`); None leaves that side open.

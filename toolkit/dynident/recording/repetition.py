@@ -1,9 +1,13 @@
-"""After which time a motion repeats, by its correlation with itself."""
+"""After which time a motion repeats, by its correlation with itself, whole turns aside."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from dynident.recording.recording import Recording
+
+TURN = 2 * np.pi
+"""rad"""
 _SAMPLES = 4000  # at which a motion is looked at first
 _FAR = 0.3  # difference, of the motion's power, after which a return is no longer its start
 _BACK = 0.05  # that a return may leave
@@ -67,3 +71,49 @@ def repeats_after(q: np.ndarray, longest: int) -> float | None:
         return float(around[k])
     bend = off[k - 1] - 2 * off[k] + off[k + 1]
     return float(around[k] + (0.5 * (off[k - 1] - off[k + 1]) / bend if bend > 0 else 0.0))
+
+
+def turning_round(recording: Recording) -> np.ndarray:
+    """Joints that turn without end, and go farther than once around, (n,) mask.
+
+    Parameters
+    ----------
+    recording : which says which joints are continuous.
+    """
+    endless = np.isin(recording.joints, recording.continuous)
+    if not endless.any():  # then no file need be gone through
+        return endless
+    return endless & (np.ptp(recording.q, axis=0) > TURN)
+
+
+def as_points(q: np.ndarray, turning: np.ndarray) -> np.ndarray:
+    """Return positions in which whole turns make no difference: points of a circle for angles.
+
+    Parameters
+    ----------
+    q : (T, n) rad or m.
+    turning : (n,) mask of the joints whose whole turns are to make none.
+
+    Returns
+    -------
+    (T, n + k): the positions, those of the k joints as their cosines, and their sines after all.
+    """
+    if not turning.any():
+        return q
+    return np.hstack([np.where(turning, np.cos(q), q), np.sin(q[:, turning])])
+
+
+def turns_between(folded: np.ndarray, turning: np.ndarray) -> np.ndarray:
+    """Whole turns, in rad, that each repetition of a motion is ahead of the first one.
+
+    Parameters
+    ----------
+    folded : (P, S, n) positions, see `Periods.fold`.
+    turning : (n,) mask of the joints that turn on from one repetition to the next.
+
+    Returns
+    -------
+    (P, 1, n), zero at the other joints.
+    """
+    ahead = (folded - folded[:1]).mean(axis=1, keepdims=True)
+    return np.where(turning, TURN * np.round(ahead / TURN), 0.0)

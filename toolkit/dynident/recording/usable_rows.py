@@ -20,6 +20,7 @@ from dynident.recording.filters import Filter
 from dynident.recording.masks import within
 from dynident.recording.parallel import ParallelFilter
 from dynident.recording.recording import LeftOut, Recording
+from dynident.recording.repetition import as_points, turning_round
 from dynident.recording.white_noise import encoder_noise_std
 
 _IDLE = 0.25  # s of standing still at an end that are worth leaving out
@@ -269,7 +270,8 @@ def _settled(recording: Recording) -> float:
     later = slice(head, count) if count - head > count // 4 else slice(count // 2, count)
     squares = sum(np.sum(apart**2, axis=0) for apart in _apart(recording, later))
     usual = np.sqrt(squares / (later.stop - later.start))
-    least = np.maximum(_SETTLED * usual, _FINE * np.ptp(recording.q, axis=0))
+    travel = np.ptp(as_points(recording.q, turning_round(recording)), axis=0)
+    least = np.maximum(_SETTLED * usual, _FINE * travel)
     parts = [np.any(apart > least, axis=1) for apart in _apart(recording, slice(0, head))]
     far = np.flatnonzero(np.concatenate(parts))
     if not len(far) or t[far[0]] - start > _QUIET:
@@ -285,13 +287,14 @@ def _settled(recording: Recording) -> float:
 
 
 def _apart(recording: Recording, rows: slice) -> Iterator[np.ndarray]:
-    """How far the positions of some rows are from those a period later, (T, n) part by part."""
-    t, q = recording.t, recording.q
+    """How far the positions of some rows are from those a period later, as points, part by part."""
+    t, q, turning = recording.t, recording.q, turning_round(recording)
     for start in range(rows.start, rows.stop, _COMPARED):
         stop = min(start + _COMPARED, rows.stop)
         later = t[start:stop] + recording.period
         low = max(0, int(np.searchsorted(t, later[0], side="right")) - 1)
         high = int(np.searchsorted(t, later[-1])) + 1
         there = t[low:high]
-        again = [np.interp(later, there, column) for column in q[low:high].T]
-        yield np.abs(np.stack(again, axis=1) - q[start:stop])
+        points = as_points(q[low:high], turning)
+        again = [np.interp(later, there, column) for column in points.T]
+        yield np.abs(np.stack(again, axis=1) - as_points(q[start:stop], turning))

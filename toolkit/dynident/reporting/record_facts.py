@@ -11,7 +11,15 @@ from typing import Any
 import numpy as np
 
 from dynident import files
-from dynident.recording import Recording, count_rows, default_filter, uniform
+from dynident.recording import (
+    Recording,
+    as_points,
+    count_rows,
+    default_filter,
+    turning_round,
+    uniform,
+    unwrapped_notes,
+)
 from dynident.recording.repetition import shift_mismatch
 from dynident.reporting.pictures.recordings_picture import by_record, recordings_figure
 from dynident.study import Study
@@ -34,6 +42,7 @@ class RecordFacts:
     left_out : stretches that are not used, and why.
     rows : that pass the filter and count, of all entries.
     not_read : what else the file holds, in words each.
+    unwrapped : joints whose positions jumped by whole turns, and are read as going on.
     """
 
     name: str
@@ -47,6 +56,7 @@ class RecordFacts:
     left_out: tuple[str, ...]
     rows: int
     not_read: tuple[str, ...] = ()
+    unwrapped: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """The facts as JSON has them."""
@@ -81,13 +91,15 @@ def record_facts(study: Study) -> tuple[RecordFacts, ...]:
                 left_out=tuple(gone),
                 rows=sum(rows),
                 not_read=one.provenance.skipped,
+                unwrapped=one.provenance.unwrapped,
             )
         )
     return tuple(found)
 
 
 def _repeats_to(one: Recording) -> float | None:
-    q = one.q[:, np.ptp(one.q, axis=0) > 0]
+    q = as_points(one.q, turning_round(one))
+    q = q[:, np.ptp(q, axis=0) > 0]
     if one.period is None or not q.shape[1]:
         return None
     off = shift_mismatch((q - q.mean(axis=0)) / np.std(q, axis=0), one.period * one.rate_hz)
@@ -114,6 +126,7 @@ def recordings_table(facts: Sequence[RecordFacts]) -> Table:
     notes = (
         "Rows are those that pass the filter; jitter is the largest of a time step.",
         *(f"Not read of {one.name}: {'; '.join(one.not_read)}." for one in facts if one.not_read),
+        *unwrapped_notes((one.name, one.unwrapped) for one in facts),
     )
     return Table("Recordings as they were read", columns, rows, notes)
 

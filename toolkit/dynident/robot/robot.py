@@ -165,6 +165,16 @@ class Robot:
         return tuple(joint.kind for joint in self.joints)
 
     @property
+    def stated_kinds(self) -> tuple[str, ...]:
+        """The same, with "continuous" for those that are said to turn without end."""
+        return tuple("continuous" if one.continuous else one.kind for one in self.joints)
+
+    @property
+    def position_limits(self) -> dict[str, tuple[float, float]]:
+        """Lower and upper limit of each joint's position, rad or m; infinite where none is."""
+        return {one.name: (one.lower, one.upper) for one in self.joints}
+
+    @property
     def units(self) -> tuple[str, ...]:
         """Unit of each joint's position, "rad" or "m"."""
         return tuple("rad" if kind == "revolute" else "m" for kind in self.kinds)

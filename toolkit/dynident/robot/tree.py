@@ -65,6 +65,9 @@ class Joint:
         stated one is not positive (a common way of saying "unknown").
     child : str
         Name of the link that the joint drives; if empty, the first link it carries.
+    continuous : bool
+        Whether the description says that a revolute joint turns without end. Of one that only has
+        no limits that is not known.
     """
 
     name: str
@@ -78,6 +81,7 @@ class Joint:
     velocity: float = np.inf
     effort: float = np.inf
     child: str = ""
+    continuous: bool = False
 
     def __post_init__(self) -> None:
         where = f"joint '{self.name}'"

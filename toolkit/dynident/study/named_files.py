@@ -22,6 +22,7 @@ from dynident.recording import (
     frame_of,
     read,
     sound_part,
+    within_limits,
 )
 from dynident.robot import Robot
 from dynident.study.study_file import FilterEntry, RecordingEntry, StudyFile
@@ -115,7 +116,7 @@ def recordings_of(
             one.file,
             robot.names,
             columns,
-            robot.kinds,
+            robot.stated_kinds,
             one.record,
             layout=one.layout,
             sound_in=sound_in,
@@ -147,7 +148,7 @@ def recordings_of(
                 number=number,
             )
         )
-    return found, loads
+    return within_limits(found, robot.position_limits), loads
 
 
 @dataclass(frozen=True, kw_only=True)

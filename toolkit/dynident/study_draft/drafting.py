@@ -26,6 +26,7 @@ from dynident.recording import (
     read,
     read_wrench,
     uniform,
+    within_limits,
 )
 from dynident.robot import Robot
 from dynident.study_draft.by_numbers import named_by_numbers
@@ -335,17 +336,18 @@ def _read(logs: Sequence[Log], reading: Reading) -> tuple[Recording, ...]:
     with warnings.catch_warnings():
         # The draft looks for other units itself, and says what it finds.
         warnings.simplefilter("ignore", DynidentWarning)
-        return tuple(
+        each = [
             read(
                 log.file,
                 robot.names,
                 reading.columns,
-                robot.kinds,
+                robot.stated_kinds,
                 log.record or None,
                 layout=log.layout,
             )
             for log in logs
-        )
+        ]
+    return tuple(within_limits(each, robot.position_limits))
 
 
 def _without_gaps(recordings: tuple[Recording, ...]) -> tuple[Recording, ...]:

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from dynident.recording import Recording, usable
+from dynident.recording import UNWRAPPED, Recording, usable
 from dynident.study_draft.draft import DraftedRecording
 from dynident.study_draft.log import Log
 from dynident.study_draft.log_facts import LogFacts, carried_by
@@ -88,6 +88,7 @@ def _remark(recording: Recording, period: float | None) -> str:
         said.append(f"time steps vary by {100 * recording.jitter:.2g} %")
     if period:
         said.append(f"{recording.duration / period:.3g} repetitions")
+    said += [f"q.{joint} {UNWRAPPED}" for joint in recording.provenance.unwrapped]
     looked = usable(replace(recording, period=period))
     said += [
         f"{one.reason} from {one.start:.4g} to {one.stop:.4g} s is left out by itself"

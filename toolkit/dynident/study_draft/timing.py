@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dynident.recording import Recording
+from dynident.recording import Recording, as_points, turning_round
 from dynident.recording.plausibility import LONGEST_STEP
 from dynident.recording.repetition import repeats_after, shift_mismatch
 
@@ -97,10 +97,11 @@ def period_of(recording: Recording) -> float | None:
     ----------
     recording : on any clock; jitter counts as none.
     """
-    moves = np.ptp(recording.q, axis=0) > 0
+    positions = as_points(recording.q, turning_round(recording))
+    moves = np.ptp(positions, axis=0) > 0
     if recording.samples < 40 or not moves.any():
         return None
-    q = recording.q[:, moves] - recording.q[:, moves].mean(axis=0)
+    q = positions[:, moves] - positions[:, moves].mean(axis=0)
     q = q / np.std(q, axis=0)
     lag = repeats_after(q, recording.samples // 2 + 1)
     if lag is None or shift_mismatch(q, lag) > _REPEATS:

@@ -13,7 +13,18 @@ from dynident.criteria import LoopCriteria
 from dynident.errors import RecordingError
 from dynident.fitting.sampling import Sampled, sample
 from dynident.model import Model
-from dynident.recording import Dataset, Noise, Recording, mismatch, periods, within, without_ends
+from dynident.recording import (
+    Dataset,
+    Noise,
+    Recording,
+    as_points,
+    mismatch,
+    periods,
+    turning_round,
+    turns_between,
+    within,
+    without_ends,
+)
 from dynident.recording.white_noise import white_variance
 from dynident.validation.control_law import law_torque
 from dynident.validation.loop_errors import QUANTITIES, LoopRun, Signals
@@ -153,13 +164,16 @@ def _repeated(recording: Recording, criteria: LoopCriteria) -> Recording | None:
     except RecordingError:
         return None
     rows = inside[found.index]
-    if mismatch(recording.q[rows]) > criteria.repeats:
+    turning = turning_round(recording)
+    if mismatch(as_points(recording.q, turning)[rows]) > criteria.repeats:
         return None
     grown = np.sqrt(found.count / (found.count - 1))
     changes = {}
     for name in ("q", "tau"):
         measured = getattr(recording, name)
         folded = measured[rows]
+        if name == "q":
+            folded = folded - turns_between(folded, turning)
         noise = np.zeros_like(measured)
         noise[rows] = (folded - folded.mean(axis=0)) * grown
         changes[name] = noise

@@ -186,7 +186,8 @@ def turns_too_far(
     room = limits.upper - limits.lower
     if np.isfinite(room) and room > 0:
         return travel > criteria.beyond_limits * room
-    return model.robot.kinds[joint] == "revolute" and travel > criteria.widest_turn
+    # How far a continuous joint travels says nothing of its unit: the torques alone do.
+    return model.robot.stated_kinds[joint] == "revolute" and travel > criteria.widest_turn
 
 
 def _refined(at, middle: float, reach: float) -> Tried:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.criteria import WiringCriteria
-from dynident.recording import Dataset, Recording
+from dynident.recording import Dataset, Recording, as_points, turning_round
 from dynident.recording.repetition import repeats_after, shift_mismatch
 from dynident.tables import percent
 from dynident.wiring.fault import Fault
@@ -55,9 +55,10 @@ def _better(
     recording: Recording, period: float, criteria: WiringCriteria
 ) -> tuple[float, float, float] | None:
     """Mismatch at the period, the least one, and where that is (s); None where nothing is wrong."""
-    q = recording.q - recording.q.mean(axis=0)
+    positions = as_points(recording.q, turning_round(recording))
+    q = positions - positions.mean(axis=0)
     q = q / np.maximum(np.std(q, axis=0), 1e-12)
-    q = q[:, np.ptp(recording.q, axis=0) > 0]
+    q = q[:, np.ptp(positions, axis=0) > 0]
     step = recording.duration / (recording.samples - 1)
     stated = period / step
     longest = recording.samples * 2 // 3

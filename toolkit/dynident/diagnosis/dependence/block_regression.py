@@ -60,7 +60,7 @@ def of_past(x: JointInputs) -> np.ndarray:
 
 def of_speeds(x: JointInputs) -> np.ndarray:
     """Kernel of what the speeds of other joints add: with that of the joint, and their products."""
-    others = [one[:, 1:2] for one in x.others]
+    others = [one[:, :1] for one in x.others]
     if not others:
         return np.zeros((len(x.time),) * 2)
     together = _mean([kernel(x.velocity, one) for one in others])
@@ -78,7 +78,7 @@ def of_others(x: JointInputs) -> np.ndarray:
     """Kernel of what the motion of each other joint adds, at any velocity."""
     found = []
     for one in x.others:
-        position, velocity, direction, acceleration = np.split(one, 4, axis=1)
+        velocity, direction, acceleration, position = np.split(one, [1, 2, 3], axis=1)
         found += [kernel(position), kernel(velocity, direction), kernel(acceleration)]
     return _at_any_state(x, _mean(found)) if found else np.zeros((len(x.time),) * 2)
 

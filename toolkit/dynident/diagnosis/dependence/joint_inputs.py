@@ -14,12 +14,15 @@ from itertools import accumulate
 
 import numpy as np
 
-from dynident.diagnosis.dependence.residual_record import ResidualRecord
+from dynident.diagnosis.dependence.residual_record import ResidualRecord, turning_round
+from dynident.recording import as_points
 
 LAGS_S = (0.025, 0.1, 0.4)
 """How far lags look back, s: from the sample time of a slow recording to a slow elastic mode."""
 STOPS = (0.003, 0.03, 0.3)
 """Distances of stop operators over the spread of the position: from bristles to backlash."""
+CIRCLE = np.pi / np.sqrt(3)
+"""Spread of an angle that is anywhere on a circle, rad."""
 REVERSAL = 0.02
 """Part of a joint's root mean square speed within which its direction counts as changing."""
 
@@ -30,10 +33,12 @@ class JointInputs:
 
     Attributes
     ----------
-    position, velocity, direction, acceleration, load : (T, 1) of the joint; the direction is the
-        sign of the velocity, smooth across zero.
+    position : (T, 1) of the joint; of one that turns round, (T, 2) the point of a circle.
+    velocity, direction, acceleration, load : (T, 1) of the joint; the direction is the sign of the
+        velocity, smooth across zero.
     past : (T, k) of the joint.
-    others : for each other joint that moves, (T, 4): position, velocity, direction, acceleration.
+    others : for each other joint that moves, (T, 4 or 5): velocity, direction, acceleration, and
+        the position.
     time : (T, 1) on the clock of the session.
     record : (T,) number of the record.
     position_errors : (T, k) what errors of the measured positions do to its torque; k may be 0.
@@ -70,14 +75,16 @@ def joint_inputs(records: tuple[ResidualRecord, ...], joint: int) -> JointInputs
     own = motion[joint]
     load = np.concatenate([one.load[:, joint] for one in records])
     spread = float(np.std(np.concatenate([one.q[:, joint] for one in records])))
+    if turning_round(records)[joint]:
+        spread = min(spread, CIRCLE)
     past = np.concatenate([_past(one, joint, spread) for one in records])
     session = np.concatenate([one.session for one in records])
     numbers = [np.full(len(one.t), i) for i, one in enumerate(records)]
     return JointInputs(
-        position=own[:, :1],
-        velocity=own[:, 1:2],
-        direction=own[:, 2:3],
-        acceleration=own[:, 3:],
+        velocity=own[:, :1],
+        direction=own[:, 1:2],
+        acceleration=own[:, 2:3],
+        position=own[:, 3:],
         load=_scaled(load[:, None]),
         past=_scaled(past),
         others=tuple(x for i, x in enumerate(motion) if i != joint and np.any(x)),
@@ -88,13 +95,12 @@ def joint_inputs(records: tuple[ResidualRecord, ...], joint: int) -> JointInputs
 
 
 def _motion(records: tuple[ResidualRecord, ...], joint: int) -> np.ndarray:
-    """Position, velocity, direction and acceleration of a joint, (T, 4)."""
+    """Velocity, direction, acceleration and position of a joint, (T, 4), or (T, 5) of a point."""
     q, v, a = (np.concatenate([getattr(one, name)[:, joint] for one in records]) for name in "qva")
     speed = float(np.sqrt(np.mean(v**2)))
     direction = np.tanh(v / (REVERSAL * speed)) if speed > 0 else np.zeros_like(v)
-    return np.column_stack(
-        [_scaled(q[:, None]), _scaled(v[:, None]), direction, _scaled(a[:, None])]
-    )
+    position = as_points(q[:, None], turning_round(records)[[joint]])
+    return np.column_stack([_scaled(v[:, None]), direction, _scaled(a[:, None]), _scaled(position)])
 
 
 def _scaled(x: np.ndarray) -> np.ndarray:

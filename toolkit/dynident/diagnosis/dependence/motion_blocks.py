@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynident.diagnosis.dependence.residual_record import ResidualRecord
+from dynident.diagnosis.dependence.residual_record import ResidualRecord, turning_round
+from dynident.recording import as_points
 
 MOST_BLOCKS = 24
 FEWEST_BLOCKS = 16
@@ -171,6 +172,11 @@ def _earliest_of_motion(records: tuple[ResidualRecord, ...], block: np.ndarray) 
     moving = spread > 1e-6 * size
     if moving.sum() <= 2:
         return block
+    turning = turning_round(records)
+    if turning.any():
+        angles = np.concatenate([np.hstack([as_points(one.q, turning), one.v]) for one in records])
+        state, spread = angles, angles.std(axis=0)
+        moving = spread > 1e-6 * np.abs(angles).max(axis=0)
     state = state[:, moving] / spread[moving]
     kept = np.linspace(0, len(state) - 1, min(len(state), _STATES)).round().astype(int)
     asked = kept[:: max(len(kept) // _ASKED, 1)]

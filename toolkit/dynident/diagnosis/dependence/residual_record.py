@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -65,6 +65,22 @@ class ResidualRecord:
             body=self.body,
             **{name: getattr(self, name)[index] for name in _ARRAYS},
         )
+
+
+def turning_round(records: Sequence[ResidualRecord]) -> np.ndarray:
+    """Joints that turn without end, and go farther than once around, (n,) mask.
+
+    Whole turns tell nothing of their residual: what is a function of the angle comes again.
+
+    Parameters
+    ----------
+    records : all records; where no robot is known, no joint is one.
+    """
+    n = records[0].q.shape[1]
+    body = records[0].body
+    endless = np.zeros(n, bool) if body is None else [j.continuous for j in body.robot.joints]
+    ends = [x for one in records for x in (one.q.min(axis=0), one.q.max(axis=0))]
+    return np.asarray(endless) & (np.ptp(ends, axis=0) > 2 * np.pi)
 
 
 _OF_THE_WHOLE = ("source", "period", "body")

@@ -13,7 +13,17 @@ import numpy as np
 from dynident.errors import FitError
 from dynident.fitting.instrumental.source import Guess, Instruments, InstrumentSource, prepared
 from dynident.model import Model
-from dynident.recording import SIGNALS, Dataset, Recording, lowpass, periods, require_repetition
+from dynident.recording import (
+    SIGNALS,
+    Dataset,
+    Recording,
+    as_points,
+    lowpass,
+    periods,
+    require_repetition,
+    turning_round,
+    turns_between,
+)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -139,8 +149,11 @@ def _swapped(recording: Recording) -> tuple[Recording, Recording]:
     # Counted from the end, where the transient has decayed furthest.
     rows = slice(recording.samples - count * whole, recording.samples)
     folded = found.fold(recording.q[rows])
-    require_repetition(recording.q[rows], found, where)
-    others = (folded.sum(axis=0) - folded) / (count - 1)
+    turning = turning_round(recording)
+    require_repetition(as_points(recording.q[rows], turning), found, where)
+    turns = turns_between(folded, turning)
+    folded = folded - turns  # the mean of angles that are whole turns apart may be any angle
+    others = (folded.sum(axis=0) - folded) / (count - 1) + turns
     own = recording.replace(
         **{
             name: None if (x := getattr(recording, name)) is None else x[rows]

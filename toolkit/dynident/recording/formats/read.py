@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from dynident.arguments import checked
-from dynident.errors import RecordingError
+from dynident.errors import DynidentWarning, RecordingError
 from dynident.recording.formats.column_names import (
     OPTIONAL,
     PARTIAL,
@@ -22,6 +23,7 @@ from dynident.recording.formats.column_table import ColumnTable, FileLayout
 from dynident.recording.formats.joint_state_table import prefixed
 from dynident.recording.formats.open_table import DEFAULT_LAYOUT, open_table
 from dynident.recording.formats.recorded import Wanted, recorded
+from dynident.recording.formats.whole_turns import UNWRAPPED, unwrapped
 from dynident.recording.plausibility import warn_of_units
 from dynident.recording.recording import Recording, _joint_names
 
@@ -53,7 +55,9 @@ def read(
     joints : names, the order of the columns; by default every joint of the file, in its order.
     columns : ours -> theirs, or a linear expression of theirs, for files with other names or
         units, as `{"tau.a": Column("vir", 35.15), "q.a": "x/32"}`; what it leaves out is ours.
-    kinds : "revolute" or "prismatic" for each joint, for warnings of units.
+    kinds : "revolute", "continuous" or "prismatic" for each joint, for warnings of units. An angle
+        that jumps by whole turns, as one does that is kept in [-pi, pi), is read as going on: that
+        changes no torque. The provenance names the joints.
     record : which one of an NPZ or MAT file that holds several: a two-dimensional array each, a row
         a sample, and one array of text, `columns`, that names the columns of all.
     layout : what the file does not say of itself: names of columns without a header line, the rate
@@ -81,7 +85,8 @@ def read(
     Warns
     -----
     DynidentWarning
-        If time stamps, positions or velocities do not look like SI units.
+        If time stamps, positions or velocities do not look like SI units, or positions jumped by
+        whole turns.
     """
     path = Path(path)
     where = str(path)
@@ -98,8 +103,21 @@ def read(
         record=record or "",
     )
     recording = recorded(table, wanted, sound_in)
+    if kinds is not None:
+        recording = _turned(recording, names, kinds)
     warn_of_units(recording, kinds)
     return recording
+
+
+def _turned(recording: Recording, names: Sequence[str], kinds: Sequence[str]) -> Recording:
+    """The recording without jumps by whole turns, which says which joints turn without end."""
+    found = unwrapped(recording, kinds)
+    if found.provenance.unwrapped:
+        columns = ", ".join(f"q.{name}" for name in found.provenance.unwrapped)
+        what = f"{found.where}, column {columns}: {UNWRAPPED}"
+        warnings.warn(what, DynidentWarning, stacklevel=3)
+    turn = tuple(name for name, kind in zip(names, kinds, strict=True) if kind == "continuous")
+    return found.replace(continuous=turn)
 
 
 def _signals(found: Mapping[str, np.ndarray], joints: Sequence[str]) -> dict[str, Any]:

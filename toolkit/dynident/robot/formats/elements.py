@@ -73,6 +73,17 @@ def mimics_of(joints: Mapping[str, Element], place: str) -> dict[str, str]:
     return found
 
 
+def continuous_of(joints: Mapping[str, Element]) -> frozenset[str]:
+    """Return the names of the joints that turn without end.
+
+    Parameters
+    ----------
+    joints : dict
+        Name -> element of a joint.
+    """
+    return frozenset(name for name, one in joints.items() if one.get("type") == "continuous")
+
+
 def refuse_closed_chains(joints: Iterable[tuple[str, str, str]], where: str) -> dict[str, str]:
     """Return child -> parent, of joints as (name, parent, child).
 

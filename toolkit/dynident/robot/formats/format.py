@@ -42,6 +42,8 @@ class Contents:
         m/s^2, in the world's axes, if the description states it.
     mimics : dict
         Joint name -> the joint that it follows, as the fingers of a gripper do.
+    continuous : frozenset of str
+        Names of the joints that turn without end, as the description says.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Contents:
     efforts: dict[str, float]
     gravity: Array | None = None
     mimics: dict[str, str] = field(default_factory=dict)
+    continuous: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -19,6 +19,7 @@ from dynident.robot.formats.elements import (
     ShapeWords,
     absent,
     bounded,
+    continuous_of,
     digits,
     from_quaternion,
     from_rpy,
@@ -101,6 +102,7 @@ def _read(root: Element, where: str) -> Contents:
         efforts=efforts,
         gravity=gravity,
         mimics=mimics_of(joints, "axis"),
+        continuous=continuous_of(joints),
     )
 
 

@@ -159,7 +159,8 @@ def assemble(
                 offset = RigidTransform(X_CM.translation())
                 index = wanted.index(one.name())
                 effort = contents.efforts.get(one.name(), np.inf)
-                joints[index] = _joint(one, number, X @ offset, effort)
+                continuous = one.name() in contents.continuous
+                joints[index] = _joint(one, number, X @ offset, effort, continuous=continuous)
                 number, X = index, offset.inverse()
             child = one.child_body().name()
             places[child] = (number, X)
@@ -233,7 +234,7 @@ def _refuse_mimics(contents: Contents, wanted: tuple[str, ...], where: str) -> N
             )
 
 
-def _joint(one: Any, parent: int, X: Any, effort: float) -> Joint:
+def _joint(one: Any, parent: int, X: Any, effort: float, *, continuous: bool) -> Joint:
     """Return a joint of Drake's, whose frame has the pose X in that of the parent's joint."""
     kind = one.type_name()
     axis = one.revolute_axis() if kind == "revolute" else one.translation_axis()
@@ -250,4 +251,5 @@ def _joint(one: Any, parent: int, X: Any, effort: float) -> Joint:
         velocity=velocity if velocity > 0.0 else np.inf,
         effort=effort,
         child=one.child_body().name(),
+        continuous=continuous,
     )

@@ -16,6 +16,7 @@ from dynident.robot.formats.elements import (
     ShapeWords,
     absent,
     bounded,
+    continuous_of,
     digits,
     from_rpy,
     keep,
@@ -80,6 +81,7 @@ def _read(root: Element, where: str) -> Contents:
         joints=tuple(n for n, joint in joints.items() if joint.get("type") in MOVING),
         efforts=efforts,
         mimics=mimics_of(joints, "."),
+        continuous=continuous_of(joints),
     )
 
 
