@@ -112,7 +112,8 @@ class Effect(EffectTraits, SimulatedEffect, ABC):
         names = robot.names
         if cls.place in ("robot", "joint or robot"):
             yield cls()
-        if cls.place in ("joint", "joint or robot"):
+        common = cls.place == "joint or robot" and robot.n == 1
+        if cls.place in ("joint", "joint or robot") and not common:
             for joint in names:
                 yield cls(joint)
         if cls.place == "pair":

@@ -164,6 +164,14 @@ class Estimate(Shown):
 
     # --- in words ------------------------------------------------------------------------------
 
+    def _unidentified(self, i: int) -> str:
+        """Why a parameter has no value: it does nothing here, or nothing of its own."""
+        basis = self.basis
+        column = basis.K[:, basis.dependent.index(i)] if i in basis.dependent else np.ones(1)
+        if not basis.scale[i] > 0 or not np.any(column):
+            return "without influence on these torques"
+        return "not identified on its own, only in combinations"
+
     def parameter_table(self) -> Table:
         """Values, standard deviations and what each parameter is a combination of."""
         words = self.model.stands_for(self.basis)
@@ -174,7 +182,7 @@ class Estimate(Shown):
         values[~self.identified] = np.nan
         rows = []
         for i, name in enumerate(self.names):
-            stands_for = heads.get(i, "not identified on its own, only in combinations")
+            stands_for = heads[i] if i in heads else self._unidentified(i)
             if name in self.trading_off:
                 stands_for = "not determined: size and shape trade off"
             rows.append(
