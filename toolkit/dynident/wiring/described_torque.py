@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,6 +77,11 @@ class DescribedScale:
         if len(known) < max(1, len(self.known) / 2):
             return False
         return bool(np.abs(np.log(self._typical(known))) < np.log(criteria.as_described))
+
+    def near(self, joints: Sequence[int], criteria: WiringCriteria) -> bool:
+        """Whether no torque of these joints is far from the described one, as far as it shows."""
+        known = self.factor[[j for j in joints if self.known[j]]]
+        return bool(np.all(np.abs(np.log(known)) < np.log(criteria.as_described)))
 
     def hypothesis(self, now: Assignment, criteria: WiringCriteria) -> Hypothesis | None:
         """Another unit, or the motor side of gears, where the torques are far from described.

@@ -31,7 +31,7 @@ from dynident.wiring.wiring_rows import WiringRows
 _LEAST_RATIO = 3.0  # of gears and units; below it is another torque constant
 _OF_SIZE = ("torque_scale", "motor_side")
 """Faults that say of which size a torque is already."""
-_SMALLER = ("degrees", "motor_side")
+_SMALLER = ("degrees", "millimetres", "motor_side")
 """Faults whose mend makes a position smaller."""
 _ALIKE = 0.8
 """Share of the best gain with which scales of other joints stay in question."""
@@ -81,7 +81,7 @@ def search(model: Model, rows: WiringRows, criteria: WiringCriteria) -> SearchRe
         here = _Fits(model, rows, now)
         if len(accepted) == criteria.most_faults:
             break
-        tried = here.but_excused(here.all_plain(), criteria)
+        tried = here.but_excused(here.all_plain(criteria), criteria)
         best = _best(tried, here.start, criteria.tie)
         if not _settled(best, here, criteria):
             gears = motor_side_hypotheses(model, rows, now, here.start, criteria)
@@ -108,16 +108,23 @@ class _Fits:
         self.regression = WiringRegression.of(model, rows.moved(now.change))
         self.start = self.regression.fit(now.torque_of, now.torque_scale)
 
-    def all_plain(self) -> list[tuple[Hypothesis, TorqueFit]]:
+    def all_plain(self, criteria: WiringCriteria) -> list[tuple[Hypothesis, TorqueFit]]:
         """Hypotheses with their fits, the plainest first."""
         own = torque_hypotheses(self.now)
         found = [(one, _fit(self.regression, one)) for one in own]
         kinds = self.model.robot.kinds
-        revolute = tuple(i for i, kind in enumerate(kinds) if kind == "revolute")
-        for group in position_hypotheses(self.now, revolute):
+        revolute, prismatic = (
+            tuple(i for i, kind in enumerate(kinds) if kind == one)
+            for one in ("revolute", "prismatic")
+        )
+        for group in position_hypotheses(self.now, revolute, prismatic):
             motion = self.rows.moved(group[0].mended.change)
             regression = WiringRegression.of(self.model, motion)
-            found += [(one, _fit(regression, one)) for one in group]
+            found += [
+                (one, _fit(regression, one))
+                for one in group
+                if one.kind != "millimetres" or self._sized_as_described(one, criteria)
+            ]
         scales = torque_scale_hypotheses(self.regression, self.now, self.start)
         return [*found, *(one for one in scales if _is_no_gain(one[0], self.model))]
 
@@ -141,6 +148,18 @@ class _Fits:
             ):
                 found.append((one, fit))
         return found
+
+    def _sized_as_described(self, one: Hypothesis, criteria: WiringCriteria) -> bool:
+        """Whether limits or forces contradict lengths in m, and the described forces none in mm.
+
+        The scale of a length is that of a mass, which a fit makes up for: other screws fit alike.
+        """
+        as_recorded, mended = (
+            DescribedScale.of(self.model, self.rows, each, criteria).near(one.joints, criteria)
+            for each in (self.now, one.mended)
+        )
+        far = (turns_too_far(self.model, self.rows, self.now, j, criteria) for j in one.joints)
+        return mended and (any(far) or not as_recorded)
 
     def _at_rest(self, one: Hypothesis) -> float:
         """Gain of a position that stays where it is.
