@@ -14,12 +14,17 @@ import numpy as np
 from dynident.criteria import WiringCriteria
 from dynident.model import Model
 from dynident.wiring.assignment import (
+    MILLI,
     Assignment,
     Hypothesis,
     position_hypotheses,
     torque_hypotheses,
 )
-from dynident.wiring.described_torque import DescribedScale, far_from_described
+from dynident.wiring.described_torque import (
+    DescribedScale,
+    far_from_described,
+    moves_as_described,
+)
 from dynident.wiring.gear_ratios import (
     motor_side_hypotheses,
     torque_scale_hypotheses,
@@ -92,6 +97,9 @@ def search(model: Model, rows: WiringRows, criteria: WiringCriteria) -> SearchRe
         best = _nearest_described(best, tried, here)
         accepted.append(Accepted(hypothesis=best[0], before=here.start, after=best[1]))
         now = best[0].mended
+    if lengths := here.unit_of_slides(criteria):
+        accepted.append(Accepted(hypothesis=lengths, before=here.start, after=here.start))
+        now = lengths.mended
     if not any(one.hypothesis.kind in _OF_SIZE for one in accepted):
         unit = DescribedScale.of(model, rows, now, criteria).hypothesis(now, criteria)
         if unit is not None:
@@ -120,10 +128,12 @@ class _Fits:
         for group in position_hypotheses(self.now, revolute, prismatic):
             motion = self.rows.moved(group[0].mended.change)
             regression = WiringRegression.of(self.model, motion)
+            fits = [(one, _fit(regression, one)) for one in group]
             found += [
-                (one, _fit(regression, one))
-                for one in group
-                if one.kind != "millimetres" or self._sized_as_described(one, criteria)
+                (one, fit)
+                for one, fit in fits
+                if one.kind != "millimetres"
+                or self._sized_as_described(one, regression, fit, criteria)
             ]
         scales = torque_scale_hypotheses(self.regression, self.now, self.start)
         return [*found, *(one for one in scales if _is_no_gain(one[0], self.model))]
@@ -149,17 +159,36 @@ class _Fits:
                 found.append((one, fit))
         return found
 
-    def _sized_as_described(self, one: Hypothesis, criteria: WiringCriteria) -> bool:
-        """Whether limits or forces contradict lengths in m, and the described forces none in mm.
+    def unit_of_slides(self, criteria: WiringCriteria) -> Hypothesis | None:
+        """Lengths that are in mm by limits and forces alone, where a fit tells no scale."""
+        kinds = enumerate(self.model.robot.kinds)
+        slides = tuple(j for j, kind in kinds if kind == "prismatic" and self._far(j, criteria))
+        if not slides:
+            return None
+        mended = self.now.positions_scaled(MILLI, *slides)
+        one = Hypothesis(kind="millimetres", joints=slides, mended=mended)
+        regression = WiringRegression.of(self.model, self.rows.moved(mended.change))
+        sized = self._sized_as_described(one, regression, _fit(regression, one), criteria)
+        return one if sized else None
+
+    def _sized_as_described(
+        self,
+        one: Hypothesis,
+        regression: WiringRegression,
+        fit: TorqueFit,
+        criteria: WiringCriteria,
+    ) -> bool:
+        """Whether limits or masses contradict lengths in m, and the masses none in mm.
 
         The scale of a length is that of a mass, which a fit makes up for: other screws fit alike.
         """
-        as_recorded, mended = (
-            DescribedScale.of(self.model, self.rows, each, criteria).near(one.joints, criteria)
-            for each in (self.now, one.mended)
-        )
-        far = (turns_too_far(self.model, self.rows, self.now, j, criteria) for j in one.joints)
-        return mended and (any(far) or not as_recorded)
+        model, joints = self.model, one.joints
+        as_recorded = moves_as_described(model, self.regression, self.start.inertia, joints)
+        mended = moves_as_described(model, regression, fit.inertia, joints)
+        return mended and (any(self._far(j, criteria) for j in joints) or not as_recorded)
+
+    def _far(self, joint: int, criteria: WiringCriteria) -> bool:
+        return turns_too_far(self.model, self.rows, self.now, joint, criteria)
 
     def _at_rest(self, one: Hypothesis) -> float:
         """Gain of a position that stays where it is.
