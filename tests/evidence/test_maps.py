@@ -8,6 +8,7 @@ import pytest
 from dynident.evidence.held_out import HeldOut, HeldOutRun
 from dynident.evidence.maps import residual_maps
 from dynident.model import Model
+from slides import gantry
 from synthetic import arm
 
 MODEL = Model(arm()) + "viscous_friction" + "coulomb_friction"
@@ -82,3 +83,34 @@ def test_a_shape_upside_down_is_not_that_of_an_effect_without_negative_values() 
 def test_a_residual_that_no_processing_resolves_has_no_name() -> None:
     assert sentences(judged(1, 2.0, drag=8.0))
     assert sentences(judged(1, 2.0, drag=8.0, size=1e-5)) == []
+
+
+def on_a_slide(cycles: float) -> HeldOut:
+    """A wave over the 1 m that a slide travels, and a little noise."""
+    stream = np.random.default_rng(0)
+    q = 0.5 * np.stack([np.sin(0.7 * T), np.sin(1.1 * T)], axis=1)
+    rest = np.zeros_like(q)
+    rest[:, 1] = np.sin(2 * np.pi * cycles * q[:, 1])
+    still = np.zeros_like(q)
+    run = HeldOutRun(
+        name="run",
+        certain=np.ones(q.shape, dtype=bool),
+        t=T,
+        q=q,
+        v=np.gradient(q, T, axis=0),
+        a=still,
+        measured=rest + 0.01 * stream.standard_normal(q.shape),
+        predicted=still,
+        block=np.arange(len(T)) * 20 // len(T),
+    )
+    noise = np.full(2, 0.01)
+    return HeldOut(runs=(run,), noise_std=noise, ratio=None, least_ratio=None, inflation=np.ones(2))
+
+
+def test_a_line_along_a_slide_is_in_cycles_per_metre() -> None:
+    def lines(one: HeldOut) -> list[tuple[str, str]]:
+        every = residual_maps(gantry(), one, one)
+        return [(m.joint, m.sentence) for m in every if m.against == "cycles per metre"]
+
+    assert lines(on_a_slide(16.0)) == [("x", ""), ("y", "a line at 16 cycles per metre: ripple")]
+    assert lines(on_a_slide(1.5)) == [("x", ""), ("y", "")]  # a spring or a load

@@ -102,7 +102,7 @@ def test_a_rejected_model_has_wider_intervals_and_says_so(found):
     rejected = replace(found, verdict="unexplained", joints=joints)
     text = Elements(page(rejected)).text
     assert "Birge ratio" in text and "elbow 2.24" in text  # root of 1 + 2^2
-    assert "Look at the pictures of shoulder and elbow below" in text
+    assert "Look at the pictures of shoulder and elbow in the report" in text
     assert "what is left is 2 times the noise" in text
 
 

@@ -114,11 +114,19 @@ class MapCriteria(CriteriaGroup):
     harmonics: int = criterion(
         60,
         "1",
-        "largest number of cycles per revolution at which the residual is looked at",
+        "largest number of cycles at which the residual is looked at, in a revolution or over the "
+        "travel of a prismatic joint",
         least=4,
     )
     slowest_ripple: int = criterion(
         3, "1", "cycles per revolution from which a line is ripple, and no load or spring", least=1
+    )
+    slowest_on_a_slide: int = criterion(
+        6,
+        "1",
+        "the same over the travel of a prismatic joint: shapes that are smooth leak into fewer",
+        "taste",
+        least=1,
     )
     level: float = criterion(1e-3, "1", "level of the tests behind a sentence", over=0, most=1)
     share: float = criterion(

@@ -12,6 +12,8 @@ from dynident.effects import Effect
 from dynident.tables import points
 
 Status = Literal["material", "not_material", "absorbed"]
+IMPOSSIBLE = "makes the impossible"
+"""Begins the remark on an effect whose fit has values that no robot has."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +49,13 @@ class Candidate:
             case "absorbed":
                 return "not identifiable"
         return self.remark or "not significant"
+
+    @property
+    def finding_of_added(self) -> str:
+        """The same of an effect that was added, though an earlier fit with it may be refused."""
+        if self.finding.startswith(IMPOSSIBLE):
+            return f"a first fit with it {self.finding}; the one that is taken does not; added"
+        return f"{self.finding}; added"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,7 +14,7 @@ from dynident.diagnosis.details import JointResult, Trace
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.switches import Switches
 from dynident.errors import FitError, StudyError
-from dynident.evidence.maps import ResidualMap
+from dynident.evidence.maps import SPECTRA, ResidualMap
 from dynident.fitting.drive_gains import (
     DriveGains,
     GainProblem,
@@ -117,7 +117,7 @@ def in_recorded_units(diagnosis: Diagnosis, drives: DriveGains | None) -> Diagno
     def of_map(one: ResidualMap) -> ResidualMap:
         gain = float(gains[one.joint])
         # An amplitude has no sign, and neither has the width of a band.
-        spectrum = one.against == "cycles per revolution"
+        spectrum = one.against in SPECTRA
         by = abs(gain) if spectrum else gain
         before, after, band = one.before / by, one.after / by, one.band / abs(gain)
         return replace(one, torque_unit=unit, before=before, after=after, band=band)

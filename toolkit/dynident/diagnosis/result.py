@@ -180,7 +180,7 @@ class Diagnosis(Answer, Shown):
                 c.effect.label,
                 p_value(c.p_value),
                 points(c.test_gain),
-                f"{c.finding}; added" if c.effect.label in added else c.finding,
+                c.finding_of_added if c.effect.label in added else c.finding,
             )
             for c in shown
         )

@@ -112,7 +112,8 @@ class Effect(EffectTraits, SimulatedEffect, ABC):
         names = robot.names
         if cls.place in ("robot", "joint or robot"):
             yield cls()
-        if cls.place in ("joint", "joint or robot"):
+        common = cls.place == "joint or robot" and robot.n == 1
+        if cls.place in ("joint", "joint or robot") and not common:
             for joint in names:
                 yield cls(joint)
         if cls.place == "pair":
@@ -178,6 +179,14 @@ class Effect(EffectTraits, SimulatedEffect, ABC):
         Empty, the default, for effects whose variants are near enough to any shape.
         """
         return ()
+
+    def line_over_position(self, robot: Robot) -> bool:
+        """Whether its one shape is the phase of a wave per unit of its joint's position.
+
+        Of such a wave a spectrum over the positions tells where to look between the values of the
+        grid; False, the default, where the grid is near enough to every shape.
+        """
+        return False
 
     def unresolved(self, values: Sequence[float], step: float) -> str:
         """Why such values say nothing at a time of `step` s between samples; empty if they do."""

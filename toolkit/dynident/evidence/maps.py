@@ -21,6 +21,9 @@ _LEAST_BLOCKS = 4
 Space = Literal["linear", "root"]
 """In what classes of a quantity are of equal width."""
 
+SPECTRA = ("cycles per revolution", "cycles per metre")
+"""What spectra are against: of revolute joints, and of prismatic ones."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ResidualMap:
@@ -29,7 +32,7 @@ class ResidualMap:
     Attributes
     ----------
     joint, torque_unit : the joint, and N m or N.
-    against : "velocity", "position", "acceleration", "load", "time" or "cycles per revolution".
+    against : "velocity", "position", "acceleration", "load", "time" or one of `SPECTRA`.
     unit : of that quantity.
     at : (B,) centres of the bins (or frequencies).
     before, after : (B,) mean residual (amplitude for a spectrum) of the model as given, and of
@@ -273,11 +276,18 @@ def _spectrum(
     residuals: tuple[np.ndarray, np.ndarray],
     criteria: MapCriteria,
 ) -> ResidualMap:
-    """Amplitudes of the residuals before and after by cycles per revolution, over certain rows."""
+    """Amplitudes of the residuals before and after by cycles of position, over certain rows.
+
+    In a turn, or over the travel of a prismatic joint: what comes fewer times is no line there.
+    """
     harmonics = np.arange(1, criteria.harmonics + 1)
     q = np.concatenate([run.q[run.certain[:, j], j] for run in before.runs])
+    against, once, slowest = SPECTRA[0], 2.0 * np.pi, criteria.slowest_ripple
+    if robot.kinds[j] == "prismatic" and np.ptp(q) > 0:
+        against, once, slowest = SPECTRA[1], float(np.ptp(q)), criteria.slowest_on_a_slide
+    at = harmonics if against == SPECTRA[0] else harmonics / once
     noise = None if before.noise_std is None else float(before.noise_std[j])
-    waves = np.exp(-1j * np.outer(harmonics, q))
+    waves = np.exp(-2j * np.pi / once * np.outer(harmonics, q))
     amplitudes = [2.0 * np.abs(waves @ (e - e.mean())) / len(q) for e in residuals]
     size = len(harmonics)
     level = np.full(size, np.nan)
@@ -292,15 +302,14 @@ def _spectrum(
         stands_out = amplitudes[0][peak] > max(
             level[peak], criteria.line * float(np.median(others))
         )
-        if stands_out and harmonics[peak] >= criteria.slowest_ripple:
-            sentence = f"a line at {harmonics[peak]} cycles per revolution: ripple"
-    unit = "cycles per revolution" if robot.kinds[j] == "revolute" else "cycles per 2 pi m"
+        if stands_out and harmonics[peak] >= slowest:
+            sentence = f"a line at {at[peak]:.3g} {against}: ripple"
     return ResidualMap(
         joint=robot.names[j],
         torque_unit=robot.torque_units[j],
-        against="cycles per revolution",
-        unit=unit,
-        at=harmonics.astype(float),
+        against=against,
+        unit=against,
+        at=at.astype(float),
         before=amplitudes[0],
         after=amplitudes[1],
         band=level,

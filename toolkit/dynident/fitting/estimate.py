@@ -143,7 +143,9 @@ class Estimate(Shown):
         return tuple(
             "not determined: size and shape trade off"
             if name in self.trading_off
-            else heads.get(i, "not identified on its own, only in combinations")
+            else heads[i]
+            if i in heads
+            else self._unidentified(i)
             for i, name in enumerate(self.names)
         )
 
@@ -187,6 +189,14 @@ class Estimate(Shown):
         return float(self.values[self.names.index(name)])
 
     # --- in words ------------------------------------------------------------------------------
+
+    def _unidentified(self, i: int) -> str:
+        """Why a parameter has no value: it does nothing here, or nothing of its own."""
+        basis = self.basis
+        column = basis.K[:, basis.dependent.index(i)] if i in basis.dependent else np.ones(1)
+        if not basis.scale[i] > 0 or not np.any(column):
+            return "without influence on these torques"
+        return "not identified on its own, only in combinations"
 
     def parameter_table(self) -> Table:
         """Values, standard deviations and what each parameter is a combination of."""

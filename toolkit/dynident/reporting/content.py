@@ -15,7 +15,7 @@ from dynident.diagnosis.effect_groups import grouped_title
 from dynident.diagnosis.result import Diagnosis
 from dynident.effects import Effect
 from dynident.errors import DynidentError
-from dynident.evidence.maps import ResidualMap
+from dynident.evidence.maps import SPECTRA, ResidualMap
 
 GIVEN = "model as given"
 BAND = "noise band"
@@ -210,7 +210,7 @@ def y_title(one: ResidualMap) -> str:
 
 def is_spectrum(one: ResidualMap) -> bool:
     """Whether a map shows amplitudes, which have no sign."""
-    return one.against == "cycles per revolution"
+    return one.against in SPECTRA
 
 
 def seen(one: ResidualMap) -> str:

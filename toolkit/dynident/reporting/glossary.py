@@ -16,6 +16,8 @@ _SHOWS: dict[str, str] = {
     "time": "Warming up, drifting and single disturbance pulses show here.",
     "cycles per revolution": "What comes back several times in each turn, as teeth and magnets do, "
     "shows here as a narrow peak.",
+    "cycles per metre": "What comes back at equal distances, as the poles of a linear motor and "
+    "the turns of a screw do, shows here as a narrow peak.",
 }
 
 _CONCEPTS: dict[str, str] = {

@@ -302,10 +302,11 @@ def _unexplained(diagnosis: Diagnosis) -> Advice:
     if diagnosis.only_withdrawn:
         explained = "for which what training recordings call for was withdrawn"
     return Advice(
-        f"Look at the pictures of {where} below: something is left there {explained}.",
+        f"Look at the pictures of {where} in the report: something is left there {explained}.",
         "The shape in the pictures is what is known of it. Rule out the simple causes first: a "
         "wrong unit or scale of a column, a clock that jitters, a filter that cuts too low, a "
         "cable, a hand on the robot.",
+        ("dynident explain STUDY --report report.html",),
     )
 
 

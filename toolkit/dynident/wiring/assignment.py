@@ -10,6 +10,7 @@ import numpy as np
 from dynident.wiring.fault import FaultKind
 
 DEGREE = float(np.pi / 180)
+MILLI = 1e-3
 _NEARLY_WHOLE = 5e-3
 
 
@@ -136,22 +137,26 @@ def torque_hypotheses(now: Assignment) -> list[Hypothesis]:
     return found
 
 
-def position_hypotheses(now: Assignment, revolute: tuple[int, ...]) -> list[list[Hypothesis]]:
+def position_hypotheses(
+    now: Assignment, revolute: tuple[int, ...], prismatic: tuple[int, ...]
+) -> list[list[Hypothesis]]:
     """Faults of positions, in groups that share their motion.
 
     Parameters
     ----------
     now : what they are faults of.
-    revolute : numbers of the joints whose positions are angles.
+    revolute, prismatic : numbers of the joints whose positions are angles, and lengths.
     """
     n = len(now.position_of)
     groups = []
-    if len(revolute) > 1:
-        mended = now.positions_scaled(DEGREE, *revolute)
-        groups.append([Hypothesis(kind="degrees", joints=revolute, mended=mended)])
-    for i in revolute:
-        mended = now.positions_scaled(DEGREE, i)
-        groups.append([Hypothesis(kind="degrees", joints=(i,), mended=mended)])
+    units: tuple[tuple[FaultKind, float, tuple[int, ...]], ...] = (
+        ("degrees", DEGREE, revolute),
+        ("millimetres", MILLI, prismatic),
+    )
+    for kind, factor, joints in units:
+        for some in ([joints] if len(joints) > 1 else []) + [(i,) for i in joints]:
+            mended = now.positions_scaled(factor, *some)
+            groups.append([Hypothesis(kind=kind, joints=some, mended=mended)])
     for i in range(n):
         mended = now.positions_scaled(-1.0, i)
         groups.append([Hypothesis(kind="position_sign", joints=(i,), mended=mended)])

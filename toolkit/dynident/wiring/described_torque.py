@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,10 @@ from dynident.model import Model
 from dynident.wiring.assignment import Assignment, Hypothesis
 from dynident.wiring.wiring_regression import WiringRegression
 from dynident.wiring.wiring_rows import WiringRows
+
+_ABOUT = 2.5
+"""Factor within which an inertia is about the described one: a rotor may weigh as much again, and
+a radian of the motor behind a usual screw is 3 mm or more."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -137,9 +142,30 @@ def far_from_described(model: Model, regression: WiringRegression, inertia: np.n
     -------
     Zero where they are as described.
     """
-    kept = len(model.base.independent)
-    described = regression.inertia_of[:, :kept] @ model.given_values()[:kept]
+    described = _described(model, regression)
     known = (described > 0) & (inertia > 0)
     if not known.any():
         return 0.0
     return float(np.mean(np.abs(np.log(inertia[known] / described[known]))))
+
+
+def moves_as_described(
+    model: Model, regression: WiringRegression, inertia: np.ndarray, joints: Sequence[int]
+) -> bool:
+    """Whether what joints move is about what the description says, rotors and all.
+
+    Parameters
+    ----------
+    model, regression, inertia : as for `far_from_described`.
+    joints : their numbers; those whose bodies the description does not know count for nothing.
+    """
+    described = _described(model, regression)
+    known = [j for j in joints if described[j] > 0]
+    ratio = inertia[known] / described[known]
+    return bool(np.all((ratio > 1 / _ABOUT) & (ratio < _ABOUT)))
+
+
+def _described(model: Model, regression: WiringRegression) -> np.ndarray:
+    """Mean inertia at each joint (n,) of the described bodies."""
+    kept = len(model.base.independent)
+    return np.asarray(regression.inertia_of[:, :kept] @ model.given_values()[:kept])

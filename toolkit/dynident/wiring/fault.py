@@ -13,6 +13,7 @@ FaultKind = Literal[
     "positions_exchanged",
     "joints_exchanged",
     "degrees",
+    "millimetres",
     "torque_unit",
     "motor_side",
     "motor_side_position",

@@ -14,6 +14,12 @@ from dynident.wiring.fault import Fault, FaultKind
 from dynident.wiring.hypothesis_search import Accepted, SearchResult
 
 IN_COLUMNS = "Write in [columns] of the study, in place of lines for the same columns"
+_OF_SCREWS = (
+    "The ratio at {0} is none that torques tell, as another mass makes up for it: take it from the "
+    "drive's data. In [columns] the scale of q.{0} is then the metres for one unit of the recorded "
+    "position (of a motor's rad: the lead of the screw over 2 pi), and that of tau.{0} one over "
+    "it where the torque is the motor's"
+)
 _MILLI = (5e-4, 2e-3)
 """Factors of a torque that are rather a unit than a gear."""
 
@@ -36,22 +42,44 @@ def faults_of(model: Model, result: SearchResult, recording: Recording) -> tuple
         if one.kind == "torque_scale" and is_milli(one):
             for joint, factor in zip(one.joints, one.ratios, strict=True):
                 assignment = assignment.torques_scaled(1e-3 / factor, joint)
+        for joint in _slides(model, one):
+            assignment = _as_recorded(assignment, joint)
     lines = column_lines(assignment, recording)
     found = []
     for one in result.accepted:
         kind, what = _named(model, one.hypothesis)
         joints = tuple(model.robot.names[j] for j in one.hypothesis.joints)
+        slides = [model.robot.names[j] for j in _slides(model, one.hypothesis)]
+        only = bool(slides) and len(slides) == len(joints)
+        where = [] if only else [IN_COLUMNS]
         found.append(
             Fault(
                 kind=kind,
                 joints=joints,
                 what=what,
                 evidence=_evidence(model, one, kind),
-                mend=lines,
-                where=IN_COLUMNS,
+                mend=() if only else lines,
+                where=". ".join([_OF_SCREWS.format(name) for name in slides] + where),
             )
         )
     return tuple(found)
+
+
+def _slides(model: Model, one: Hypothesis) -> tuple[int, ...]:
+    """Prismatic joints on the motor side: of a screw's ratio a fit tells next to nothing.
+
+    Whatever the ratio, another mass makes up for it; a line with one that fits as well as another
+    would give bodies that are not there.
+    """
+    if one.kind not in ("motor_side", "motor_side_position"):
+        return ()
+    return tuple(j for j in one.joints if model.robot.kinds[j] == "prismatic")
+
+
+def _as_recorded(assignment: Assignment, joint: int) -> Assignment:
+    position = 1.0 / float(assignment.position_scale[joint])
+    torque = 1.0 / float(assignment.torque_scale[joint])
+    return assignment.positions_scaled(position, joint).torques_scaled(torque, joint)
 
 
 def _named(model: Model, one: Hypothesis) -> tuple[FaultKind, str]:
@@ -73,12 +101,22 @@ def _named(model: Model, one: Hypothesis) -> tuple[FaultKind, str]:
             return one.kind, f"the joints {names[0]} and {names[1]} are exchanged, q and tau"
         case "degrees":
             return one.kind, f"{', '.join(positions)}: in degrees, not rad"
+        case "millimetres":
+            return one.kind, f"{', '.join(positions)}: in mm, not m"
         case "motor_side" | "motor_side_position":
             which = positions
             if one.kind == "motor_side":
                 which = [name for pair in zip(positions, torques, strict=True) for name in pair]
+            told = [
+                ratio
+                for joint, ratio in zip(one.joints, one.ratios, strict=True)
+                if model.robot.kinds[joint] != "prismatic"
+            ]
+            if not told:
+                side = f"{', '.join(positions)}: on the motor side of a screw, a rack or a belt"
+                return one.kind, f"{side}, or in another unit than m"
             side = f"{', '.join(which)}: on the motor side of a gear"
-            return one.kind, f"{side} (likely ratio {_listed(one.ratios)})"
+            return one.kind, f"{side} (likely ratio {_listed(tuple(told))})"
     return _torque_scale(one, torques, model)
 
 

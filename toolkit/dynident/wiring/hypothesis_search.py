@@ -14,12 +14,17 @@ import numpy as np
 from dynident.criteria import WiringCriteria
 from dynident.model import Model
 from dynident.wiring.assignment import (
+    MILLI,
     Assignment,
     Hypothesis,
     position_hypotheses,
     torque_hypotheses,
 )
-from dynident.wiring.described_torque import DescribedScale, far_from_described
+from dynident.wiring.described_torque import (
+    DescribedScale,
+    far_from_described,
+    moves_as_described,
+)
 from dynident.wiring.gear_ratios import (
     motor_side_hypotheses,
     torque_scale_hypotheses,
@@ -31,7 +36,7 @@ from dynident.wiring.wiring_rows import WiringRows
 _LEAST_RATIO = 3.0  # of gears and units; below it is another torque constant
 _OF_SIZE = ("torque_scale", "motor_side")
 """Faults that say of which size a torque is already."""
-_SMALLER = ("degrees", "motor_side")
+_SMALLER = ("degrees", "millimetres", "motor_side")
 """Faults whose mend makes a position smaller."""
 _ALIKE = 0.8
 """Share of the best gain with which scales of other joints stay in question."""
@@ -81,7 +86,7 @@ def search(model: Model, rows: WiringRows, criteria: WiringCriteria) -> SearchRe
         here = _Fits(model, rows, now)
         if len(accepted) == criteria.most_faults:
             break
-        tried = here.but_excused(here.all_plain(), criteria)
+        tried = here.but_excused(here.all_plain(criteria), criteria)
         best = _best(tried, here.start, criteria.tie)
         if not _settled(best, here, criteria):
             gears = motor_side_hypotheses(model, rows, now, here.start, criteria)
@@ -92,6 +97,9 @@ def search(model: Model, rows: WiringRows, criteria: WiringCriteria) -> SearchRe
         best = _nearest_described(best, tried, here)
         accepted.append(Accepted(hypothesis=best[0], before=here.start, after=best[1]))
         now = best[0].mended
+    if lengths := here.unit_of_slides(criteria):
+        accepted.append(Accepted(hypothesis=lengths, before=here.start, after=here.start))
+        now = lengths.mended
     if not any(one.hypothesis.kind in _OF_SIZE for one in accepted):
         unit = DescribedScale.of(model, rows, now, criteria).hypothesis(now, criteria)
         if unit is not None:
@@ -108,16 +116,25 @@ class _Fits:
         self.regression = WiringRegression.of(model, rows.moved(now.change))
         self.start = self.regression.fit(now.torque_of, now.torque_scale)
 
-    def all_plain(self) -> list[tuple[Hypothesis, TorqueFit]]:
+    def all_plain(self, criteria: WiringCriteria) -> list[tuple[Hypothesis, TorqueFit]]:
         """Hypotheses with their fits, the plainest first."""
         own = torque_hypotheses(self.now)
         found = [(one, _fit(self.regression, one)) for one in own]
         kinds = self.model.robot.kinds
-        revolute = tuple(i for i, kind in enumerate(kinds) if kind == "revolute")
-        for group in position_hypotheses(self.now, revolute):
+        revolute, prismatic = (
+            tuple(i for i, kind in enumerate(kinds) if kind == one)
+            for one in ("revolute", "prismatic")
+        )
+        for group in position_hypotheses(self.now, revolute, prismatic):
             motion = self.rows.moved(group[0].mended.change)
             regression = WiringRegression.of(self.model, motion)
-            found += [(one, _fit(regression, one)) for one in group]
+            fits = [(one, _fit(regression, one)) for one in group]
+            found += [
+                (one, fit)
+                for one, fit in fits
+                if one.kind != "millimetres"
+                or self._sized_as_described(one, regression, fit, criteria)
+            ]
         scales = torque_scale_hypotheses(self.regression, self.now, self.start)
         return [*found, *(one for one in scales if _is_no_gain(one[0], self.model))]
 
@@ -141,6 +158,37 @@ class _Fits:
             ):
                 found.append((one, fit))
         return found
+
+    def unit_of_slides(self, criteria: WiringCriteria) -> Hypothesis | None:
+        """Lengths that are in mm by limits and forces alone, where a fit tells no scale."""
+        kinds = enumerate(self.model.robot.kinds)
+        slides = tuple(j for j, kind in kinds if kind == "prismatic" and self._far(j, criteria))
+        if not slides:
+            return None
+        mended = self.now.positions_scaled(MILLI, *slides)
+        one = Hypothesis(kind="millimetres", joints=slides, mended=mended)
+        regression = WiringRegression.of(self.model, self.rows.moved(mended.change))
+        sized = self._sized_as_described(one, regression, _fit(regression, one), criteria)
+        return one if sized else None
+
+    def _sized_as_described(
+        self,
+        one: Hypothesis,
+        regression: WiringRegression,
+        fit: TorqueFit,
+        criteria: WiringCriteria,
+    ) -> bool:
+        """Whether limits or masses contradict lengths in m, and the masses none in mm.
+
+        The scale of a length is that of a mass, which a fit makes up for: other screws fit alike.
+        """
+        model, joints = self.model, one.joints
+        as_recorded = moves_as_described(model, self.regression, self.start.inertia, joints)
+        mended = moves_as_described(model, regression, fit.inertia, joints)
+        return mended and (any(self._far(j, criteria) for j in joints) or not as_recorded)
+
+    def _far(self, joint: int, criteria: WiringCriteria) -> bool:
+        return turns_too_far(self.model, self.rows, self.now, joint, criteria)
 
     def _at_rest(self, one: Hypothesis) -> float:
         """Gain of a position that stays where it is.

@@ -8,13 +8,20 @@ from dynident.criteria import DEFAULTS, WiringCriteria
 from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.threads import single_threaded
-from dynident.wiring.fault import Fault
+from dynident.wiring.assignment import DEGREE, MILLI
+from dynident.wiring.fault import Fault, FaultKind
 from dynident.wiring.fault_words import IN_COLUMNS, column_lines, faults_of
 from dynident.wiring.gear_ratios import turns_too_far
 from dynident.wiring.hypothesis_search import SearchResult, search
 from dynident.wiring.same_data import shared_recordings, twice_recorded
 from dynident.wiring.stated_period import wrong_periods
 from dynident.wiring.wiring_rows import WiringRows, rows_of
+
+_SMALL_UNITS: dict[str, tuple[FaultKind, str, float, str]] = {
+    "revolute": ("degrees", "degrees", DEGREE, "gear"),
+    "prismatic": ("millimetres", "mm", MILLI, "screw or a rack"),
+}
+"""What a position that is too large may be in, with its factor, and what may be in between."""
 
 
 @single_threaded
@@ -65,21 +72,24 @@ def _out_of_range(
     now, robot = result.assignment, model.robot
     found = []
     for j, name in enumerate(robot.names):
-        if robot.kinds[j] != "revolute" or not turns_too_far(model, rows, now, j, criteria):
+        if not turns_too_far(model, rows, now, j, criteria):
             continue
         travel = float(np.ptp(rows.q[:, now.position_of[j]])) * abs(float(now.position_scale[j]))
         limits = robot.joints[j]
         room = limits.upper - limits.lower
-        limit = f", and its limits leave {room:.3g} rad" if np.isfinite(room) else ""
-        mended = now.positions_scaled(float(np.pi / 180), j)
+        unit = robot.units[j]
+        kind, small, factor, gear = _SMALL_UNITS[robot.kinds[j]]
+        limit = f", and its limits leave {room:.3g} {unit}" if np.isfinite(room) else ""
+        mended = now.positions_scaled(factor, j)
         found.append(
             Fault(
-                kind="degrees",
+                kind=kind,
                 joints=(name,),
-                what=f"q.{name}: in degrees, not rad, or on the motor side of a gear",
-                evidence=f"it travels {travel:.4g} rad{limit}, which the torques do not tell apart",
+                what=f"q.{name}: in {small}, not {unit}, or on the motor side of a {gear}",
+                evidence=f"it travels {travel:.4g} {unit}{limit}, which the torques do not tell "
+                "apart",
                 mend=column_lines(mended, train.recordings[0]),
-                where=f"If in degrees, {IN_COLUMNS[0].lower()}{IN_COLUMNS[1:]}",
+                where=f"If in {small}, {IN_COLUMNS[0].lower()}{IN_COLUMNS[1:]}",
             )
         )
     return tuple(found)

@@ -8,13 +8,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dynident.diagnosis.search.moment_objective import MomentObjective
+from dynident.diagnosis.search.position_lines import line_width, lines
 from dynident.diagnosis.search.scoring import Columns, Score, candidate_moments, score
-from dynident.effects import Effect
+from dynident.effects import Effect, ShapeParameter
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.runs import Signals
 from dynident.fitting.shape_search import Bracket, Simplex, TrustRegion, search
 from dynident.model import Model
+
+_OF_A_LINE = 1e-4
+"""Share of the width of a line over position to which its place is sought: noise tells a strong
+line's far better than the precision of other shapes."""
+_AT_END = 2.0
+"""Precisions from an end of a bracket within which the best lies beyond it."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +73,9 @@ def refined(
         solver = Bracket(evaluations=criteria.values_tried)
         found = search(objective.by_value(criteria.value_range), solver).best
         objective = replace(objective, one=_better(one, *(trial.found for trial in found)))
-    if type(one.effect).sensitivities is not Effect.sensitivities:
+    differentiable = type(one.effect).sensitivities is not Effect.sensitivities
+    # What depends on the time has instruments of its own, which no derivative has.
+    if differentiable and not one.effect.time_varying:
         # A flat metric hides what matters in a sharp one: hence the small fall.
         solver = TrustRegion(
             precision=criteria.gradient_precision,
@@ -108,16 +117,34 @@ def _within_bounds(one: Score, fitted: EvidenceFit) -> list[float]:
 
 def _by_trial(objective: MomentObjective) -> Score:
     """The best score where no derivatives are known; of one shape, between its neighbours."""
-    effect, precision = objective.one.effect, objective.fitted.criteria.shapes.precision
+    effect = objective.one.effect
     shapes = effect.shape_parameters(objective.fitted.model.robot)
     if len(shapes) == 1:
-        limits, solver = [_neighbours(shapes[0], effect.shape[0])], Bracket(2 * precision)
-    else:
-        limits, solver = [(s.lower, s.upper) for s in shapes], Simplex()
-    lower, upper = np.array(
-        [[s.coordinate(x) for x in pair] for s, pair in zip(shapes, limits, strict=True)]
-    ).T
-    return search(objective.by_trial(lower, upper), solver).best[0].found
+        return _by_bracket(objective, shapes[0])
+    lower, upper = np.array([[s.coordinate(x) for x in (s.lower, s.upper)] for s in shapes]).T
+    return search(objective.by_trial(lower, upper), Simplex()).best[0].found
+
+
+def _by_bracket(objective: MomentObjective, shape: ShapeParameter) -> Score:
+    """The best score of one shape between its neighbours, or beyond where it ends at one."""
+    effect, precision = objective.one.effect, 2.0 * objective.fitted.criteria.shapes.precision
+    near = _neighbours(shape, effect.shape[0])
+    if width := line_width(objective.evidence, effect):
+        # Further away there are side lobes, which lead astray.
+        near = max(near[0], effect.shape[0] - 2 * width), min(near[1], effect.shape[0] + 2 * width)
+        precision = min(precision, _OF_A_LINE * width / effect.shape[0])
+    low, high = (shape.coordinate(x) for x in near)
+    ends = shape.coordinate(shape.lower), shape.coordinate(shape.upper)
+    while True:
+        problem = objective.by_trial(np.array([low]), np.array([high]))
+        found = search(problem, Bracket(precision)).best[0].found
+        at, reach = shape.coordinate(found.effect.shape[0]), high - low
+        if at - low < _AT_END * precision and low > ends[0]:
+            low, high = max(low - reach, ends[0]), at
+        elif high - at < _AT_END * precision and high < ends[1]:
+            low, high = at, min(high + reach, ends[1])
+        else:
+            return found
 
 
 def reshaped(evidence: Evidence, others: EvidenceFit, whole: EvidenceFit, effect: Effect) -> Score:
@@ -143,7 +170,8 @@ def best_shape(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> Effec
     fitted : the model without the effect.
     effect : with the shape that is tried first.
     """
-    tried = [effect, *effect.variants(fitted.model.robot)]
+    found = lines(evidence, fitted, effect)
+    tried = [effect, *effect.variants(fitted.model.robot), *found]
     found = candidate_moments(evidence, fitted, tried)
     scores = (score(fitted, one, *parts, 1) for one, parts in zip(tried, found, strict=True))
     best = max(scores, key=lambda one: one.drop_at_point)

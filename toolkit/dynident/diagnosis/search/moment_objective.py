@@ -14,6 +14,7 @@ from typing import ClassVar
 import numpy as np
 from scipy.linalg import block_diag
 
+from dynident.diagnosis.search.position_lines import shapes_tried
 from dynident.diagnosis.search.scoring import (
     Columns,
     Score,
@@ -135,7 +136,7 @@ class MomentObjective:
     @cached_property
     def grid(self) -> int:
         """Number of shapes that are tried of the effect."""
-        return sum(1 for _ in self.one.effect.variants(self.fitted.model.robot))
+        return shapes_tried(self.evidence, self.one.effect)
 
     def score_at(self, effect: Effect) -> Score:
         """Score the effect with another shape, or taken at another value."""

@@ -10,6 +10,7 @@ import numpy as np
 from dynident.diagnosis.search.candidate_shapes import refined
 from dynident.diagnosis.search.cross_validation import cross_validate
 from dynident.diagnosis.search.payload_recordings import payload_scores, unconfirmed
+from dynident.diagnosis.search.position_lines import lines, shapes_tried
 from dynident.diagnosis.search.scoring import (
     Score,
     candidate_moments,
@@ -108,7 +109,7 @@ def rank(
             continue
         progress(effect.label)
         tried = list(_score_variants(evidence, fitted, effect))
-        tests += len(tried)
+        tests += max(len(tried), shapes_tried(evidence, effect))
         best.append(max(tried, key=lambda s: s.penalised))
     alike = _ALIKE * fitted.error_total
     order = best_first([one.penalised for one in best], alike)
@@ -182,9 +183,11 @@ def _score_variants(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> 
     if effect.point:
         # Found before, where no variant may be near enough.
         shapes = list(dict.fromkeys([*shapes, effect]))
+    count = max(len(shapes), shapes_tried(evidence, effect))
+    shapes = list(dict.fromkeys([*shapes, *lines(evidence, fitted, effect)]))
     found = candidate_moments(evidence, fitted, shapes, evidence.first_look)
     for shaped, parts in zip(shapes, found, strict=True):
-        yield _possible(score(fitted, shaped, *parts, grid=len(shapes)), evidence, fitted)
+        yield _possible(score(fitted, shaped, *parts, grid=count), evidence, fitted)
 
 
 def _possible(one: Score, evidence: Evidence, fitted: EvidenceFit) -> Score:

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from dynident.criteria import GateCriteria
+from dynident.diagnosis.details import IMPOSSIBLE
 from dynident.diagnosis.search.payload_recordings import marked
 from dynident.effects import Block, Effect
 from dynident.errors import RecordingError
@@ -108,7 +109,7 @@ def newly_impossible(evidence: Evidence, fitted: EvidenceFit, wider: EvidenceFit
     doubtful = replace(gates, beyond_bounds=min(gates.doubtful, gates.beyond_bounds))
     before = impossible_in(evidence, fitted, doubtful)
     new = [one.what for one in found if not any(_was(old, one, gates) for old in before)]
-    return f"makes the impossible: {'; '.join(new)}" if new else ""
+    return f"{IMPOSSIBLE}: {'; '.join(new)}" if new else ""
 
 
 def _was(old: Impossible, new: Impossible, gates: GateCriteria) -> bool:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from dynident.diagnosis.search.candidate_shapes import best_shape, reshaped
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
+from dynident.fitting.uncertainty.shape_slopes import ShapeSlope
 from dynident.model import Model
 
 
@@ -52,4 +55,32 @@ def refitted(evidence: Evidence, model: Model, near: EvidenceFit | None = None) 
         had, has = before.misfit(before), fitted.misfit(before)
         if had - has < criteria.gained * had + criteria.negligible * before.noise_known:
             break
+    for label in with_shapes:
+        fitted = _of_the_time(evidence, fitted, label)
+    return fitted
+
+
+def _of_the_time(evidence: Evidence, fitted: EvidenceFit, label: str) -> EvidenceFit:
+    """Return the fit with the shape of a time-varying effect estimated as the parameters are.
+
+    With instruments of another time what a column takes away is largest beside the shape that
+    makes residual and instruments orthogonal, of which sigma is: Gauss-Newton steps lead there.
+    """
+    criteria, robot = evidence.criteria.shapes, fitted.model.robot
+    for _ in range(criteria.linearisations):
+        effect = next(e for e in fitted.model.effects if e.label == label)
+        shapes = effect.shape_parameters(robot)
+        if not effect.time_varying or len(shapes) != 1:
+            break
+        values = tuple(fitted.values[fitted.model.slices[label]].tolist())
+        slope = ShapeSlope(effect.joint, effect.source, of=effect, values=values)
+        wider = fit_evidence(evidence, fitted.model + slope, fitted)
+        (at,) = range(*wider.model.slices[slope.label].indices(wider.model.size))
+        step, sigma = float(wider.values[at]), float(np.sqrt(wider.covariance[at, at]))
+        known = wider.solution.rank > fitted.solution.rank
+        if not known or abs(step) <= criteria.precision or sigma > np.log(criteria.furthest):
+            break
+        step = float(np.clip(step, -np.log(criteria.furthest), np.log(criteria.furthest)))
+        better = effect.shaped(shapes[0].at(shapes[0].coordinate(effect.shape[0]) + step))
+        fitted = fit_evidence(evidence, fitted.model.with_shapes((better,)), fitted)
     return fitted

@@ -41,7 +41,8 @@ class TorqueRipple(JointEffect):
 
     def shape_parameters(self, robot):
         if motion_unit(robot, self.joint) == "m":
-            # As close as lines of a quarter of a metre's travel are wide, 25 rad/m.
+            # As close as lines of a quarter of a metre's travel are wide, 25 rad/m: over a longer
+            # one, what lies between is looked for in a spectrum.
             grid = tuple(float(k) for k in range(30, 3001, 10))
             return (
                 ShapeParameter(
@@ -54,6 +55,10 @@ class TorqueRipple(JointEffect):
                 "k", "1/rev", grid, lower=1.0, upper=500.0, means="ripples per revolution"
             ),
         )
+
+    def line_over_position(self, robot):
+        # In a turn, what teeth and magnets make comes a whole number of times.
+        return motion_unit(robot, self.joint) == "m"
 
     def at_joint(self, block: Block) -> np.ndarray:
         phase = self.shape[0] * block.q[:, [block.index(self.joint)]]

@@ -25,6 +25,12 @@ from dynident.model import Model
 _KNOWN = "sigma takes {} as known, which they are not."
 _QUANTILE = 1.959964
 """Standard errors to each side of a 95 % interval."""
+_AT_BOUND = (
+    "{} = {:.4g} {} is the end of where it is sought: the best may lie beyond, and its sigma "
+)
+_AT_BOUND += "says nothing of that."
+_TO_BOUND = 0.01
+"""Coordinate (relative, for a positive shape) from its bound within which a shape is at it."""
 _MADE_OF = 0.1
 """Share (in norm) of a shape's derivative from which the column of a parameter makes it."""
 
@@ -60,12 +66,15 @@ def with_shape_errors(
         estimate = _widened(estimate, whole, [model.slices[s.effect.label] for s in slopes])
         spread = whole.sigma
         sigma = {s.effect.label: spread[whole.model.slices[s.label]] for s in slopes}
-    found = []
+    found, ends = [], []
     for effect in shaped:
         parameters = effect.shape_parameters(robot)
         each = sigma.get(effect.label, np.full(len(parameters), np.nan))
         names = model.shape_names[effect.label]
         for name, parameter, value, one in zip(names, parameters, effect.shape, each, strict=True):
+            bounds = [parameter.coordinate(end) for end in (parameter.lower, parameter.upper)]
+            if np.abs(np.subtract(bounds, parameter.coordinate(value))).min() < _TO_BOUND:
+                ends.append(_AT_BOUND.format(name, value, parameter.unit))
             found.append(
                 ShapeValue(
                     name=name,
@@ -74,7 +83,7 @@ def with_shape_errors(
                     unit=parameter.unit,
                 )
             )
-    notes = estimate.notes
+    notes = (*estimate.notes, *ends)
     if known and np.any(estimate.covariance):
         notes = (*notes, _KNOWN.format(f"the shapes of {', '.join(known)}"))
     return replace(estimate, shapes=tuple(found), notes=notes)

@@ -54,6 +54,21 @@ class ShapeSlope(Effect):
         """As the effect."""
         return self.effect.time_varying
 
+    def time_factor(self, block: Block) -> np.ndarray:
+        """The derivative of the effect's by its shape: it goes another way in the course of time.
+
+        That of the effect itself where its shapes are several, or its factor has none of them.
+        """
+        factor = self.effect.time_factor(block)
+        if len(self.shapes) != 1:
+            return factor
+        (shape,) = self.shapes
+        middle = shape.coordinate(self.effect.shape[0])
+        ends = [shape.at(middle + side * _STEP) for side in (1.0, -1.0)]
+        high, low = (self.effect.shaped(end).time_factor(block) for end in ends)
+        slope = (high - low) / (shape.coordinate(ends[0]) - shape.coordinate(ends[1]))
+        return slope if np.any(slope) else factor
+
     def on(self, robot) -> ShapeSlope:
         return replace(self, shapes=self.effect.shape_parameters(robot))
 

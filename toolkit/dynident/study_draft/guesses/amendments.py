@@ -144,6 +144,8 @@ def _ratios_to_give(reading: Reading) -> str:
     names = reading.robot.names
     how = "turns of the motor for one of the joint, a minus where they turn against each other"
     ratios = ",".join(f"N{k}" for k in range(1, len(names) + 1))
+    if "prismatic" in reading.robot.kinds:
+        how += "; of a slide rad of the motor for a metre: 2 pi over the lead of its screw"
     given = f"give them, as the arm's manual has them: --gears {ratios} ({how})"
     if len(names) < 2:
         return given

@@ -34,7 +34,7 @@ class WiringGuess:
     left : share of the torque that a fit then leaves.
     gears : whether anything was found on the motor side of a gear.
     unknown_gears : joints whose positions are on the motor side of gears, of which the data do not
-        tell the ratios: inertia and friction are as free as they are.
+        tell the ratios: inertia and friction are as free as they are. Of a screw they never do.
     """
 
     findings: tuple[str, ...]
@@ -74,11 +74,13 @@ def guess_wiring(reading: Reading, rows: WiringRows, recording: Recording) -> Wi
         now = replace(now, torque_scale=np.ones(robot.n))
     if not faults:
         return None
-    several = {
+    untold = {
         robot.names[j]
         for one in (accepted.hypothesis for accepted in result.accepted)
-        if one.kind.startswith("motor_side") and len(one.joints) > 1
+        if one.kind.startswith("motor_side")
         for j in one.joints
+        if len(one.joints) > 1
+        or (robot.kinds[j] == "prismatic" and one.kind != "motor_side_torque")
     }
     return WiringGuess(
         findings=tuple(fault.what for fault in faults),
@@ -87,7 +89,7 @@ def guess_wiring(reading: Reading, rows: WiringRows, recording: Recording) -> Wi
         motors=None if reading.motors is None else now.motors(reading.motors),
         left=float(np.sqrt(np.mean(result.fit.unexplained))),
         gears=any("side" in fault.kind for fault in faults),
-        unknown_gears=tuple(name for name in robot.names if name in several),
+        unknown_gears=tuple(name for name in robot.names if name in untold),
     )
 
 
