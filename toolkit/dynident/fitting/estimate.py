@@ -138,15 +138,11 @@ class Estimate(Shown):
     @property
     def stands_for(self) -> tuple[str, ...]:
         """What is identified under each parameter's name, (p,): it, a combination, or why none."""
-        words = self.model.stands_for(self.basis)
-        heads = dict(zip(self.basis.independent, words, strict=True))
+        heads = dict(zip(self.basis.independent, self.model.stands_for(self.basis), strict=True))
+        words = (heads[i] if i in heads else self._unidentified(i) for i in range(len(self.names)))
         return tuple(
-            "not determined: size and shape trade off"
-            if name in self.trading_off
-            else heads[i]
-            if i in heads
-            else self._unidentified(i)
-            for i, name in enumerate(self.names)
+            "not determined: size and shape trade off" if name in self.trading_off else one
+            for name, one in zip(self.names, words, strict=True)
         )
 
     @property
