@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dynident.diagnosis.search.position_lines import line_width, lines, shapes_tried
 from dynident.diagnosis.search.ranking import rank
+from dynident.diagnosis.search.shapes.position_lines import line_width, lines, shapes_tried
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather

@@ -146,6 +146,10 @@ def position_hypotheses(
     ----------
     now : what they are faults of.
     revolute, prismatic : numbers of the joints whose positions are angles, and lengths.
+
+    Returns
+    -------
+    The plainest first.
     """
     n = len(now.position_of)
     groups = []

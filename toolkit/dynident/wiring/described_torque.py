@@ -158,6 +158,10 @@ def moves_as_described(
     ----------
     model, regression, inertia : as for `far_from_described`.
     joints : their numbers; those whose bodies the description does not know count for nothing.
+
+    Returns
+    -------
+    False where one of them is far from it.
     """
     described = _described(model, regression)
     known = [j for j in joints if described[j] > 0]

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dynident.diagnosis.search.moment_objective import MomentObjective
-from dynident.diagnosis.search.position_lines import line_width, lines
 from dynident.diagnosis.search.scoring import Columns, Score, candidate_moments, score
+from dynident.diagnosis.search.shapes.position_lines import line_width, lines
 from dynident.effects import Effect, ShapeParameter
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit

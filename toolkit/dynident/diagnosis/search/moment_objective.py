@@ -14,7 +14,6 @@ from typing import ClassVar
 import numpy as np
 from scipy.linalg import block_diag
 
-from dynident.diagnosis.search.position_lines import shapes_tried
 from dynident.diagnosis.search.scoring import (
     Columns,
     Score,
@@ -23,6 +22,7 @@ from dynident.diagnosis.search.scoring import (
     moments_with_payload,
     score,
 )
+from dynident.diagnosis.search.shapes.position_lines import shapes_tried
 from dynident.effects import Block, Effect, Needs, Parameter, ShapeParameter
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit

@@ -10,7 +10,6 @@ import numpy as np
 from dynident.diagnosis.search.candidate_shapes import refined
 from dynident.diagnosis.search.cross_validation import cross_validate
 from dynident.diagnosis.search.payload_recordings import payload_scores, unconfirmed
-from dynident.diagnosis.search.position_lines import lines, shapes_tried
 from dynident.diagnosis.search.scoring import (
     Score,
     candidate_moments,
@@ -18,6 +17,7 @@ from dynident.diagnosis.search.scoring import (
     moments_with_payload,
     score,
 )
+from dynident.diagnosis.search.shapes.position_lines import lines, shapes_tried
 from dynident.effects import Block, Effect, catalogue, law_effect
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, residuals
