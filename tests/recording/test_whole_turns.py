@@ -59,6 +59,7 @@ def test_angles_go_on_where_they_jumped(
     apart = found.q[:, 0] / turn - whole.q[:, 0] / TURN
     np.testing.assert_allclose(apart, np.round(apart[0]), atol=1e-9)
     np.testing.assert_array_equal(found.q[:, 1], whole.q[:, 1])
+    assert found.q_ref is not None
     np.testing.assert_allclose(found.q_ref, found.q)
 
 
