@@ -59,6 +59,7 @@ def test_angles_go_on_where_they_jumped(
     apart = found.q[:, 0] / turn - whole.q[:, 0] / TURN
     np.testing.assert_allclose(apart, np.round(apart[0]), atol=1e-9)
     np.testing.assert_array_equal(found.q[:, 1], whole.q[:, 1])
+    assert found.q_ref is not None
     np.testing.assert_allclose(found.q_ref, found.q)
 
 
@@ -115,6 +116,10 @@ def test_recordings_come_within_the_limits_of_a_joint() -> None:
     for one, q in zip(found, truth, strict=True):
         np.testing.assert_allclose(one.q[:, 0], q, atol=1e-9)
     assert within_limits(logged, {"a": (-2.5, 2.5)})[2] is logged[2]  # nothing has jumped
+    degrees = unwrapped(logged[0].replace(q=np.degrees(logged[0].q)), ("revolute",))
+    assert degrees.provenance.unwrapped == ("a",)
+    degrees = degrees.replace(q=degrees.q + 360.0)
+    assert within_limits([degrees], {"a": (-2.5, 2.5)})[0] is degrees
 
 
 def test_a_motion_that_is_whole_turns_ahead_repeats() -> None:

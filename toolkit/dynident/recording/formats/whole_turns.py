@@ -31,6 +31,8 @@ _UNEVEN = 0.1
 """The same where the motion about it is uneven, at most."""
 _MOST_OF_THEM = 0.9
 """Share of the jumps of a position that must be whole turns."""
+_OFF = 2
+"""Whole turns by which a joint with limits may seem to be beyond them; more is another unit."""
 _LOOKED_AT = 200
 """Jumps that are looked at first: in another unit, most steps may be as large as one."""
 _BESIDE = 3
@@ -120,7 +122,7 @@ def _turns_off(q: np.ndarray, lower: float, upper: float) -> int:
     if not np.isfinite(upper - lower) or not beyond(0):
         return 0
     count = round(((lower + upper) - (low + high)) / (2 * TURN))
-    return count if beyond(count) < beyond(0) else 0
+    return count if abs(count) <= _OFF and beyond(count) < beyond(0) else 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,12 +153,16 @@ class _Added:
 
 def _jumps(t: np.ndarray, x: np.ndarray) -> _Added | None:
     """What makes a position (T,) at times t go on where it jumps; None if nowhere."""
+    parts = range(0, len(x) - 1, _AT_ONCE)
+    steps = (np.abs(np.diff(x[start : start + _AT_ONCE + 1])) for start in parts)
+    large = [
+        start + np.flatnonzero(one > min(_TURNS) / 2)
+        for start, one in zip(parts, steps, strict=True)
+    ]
+    every = np.concatenate(large)
+    size = np.abs(x[every + 1] - x[every])
     for turn in _TURNS:
-        before = [
-            start + np.flatnonzero(np.abs(np.diff(x[start : start + _AT_ONCE + 1])) > turn / 2)
-            for start in range(0, len(x) - 1, _AT_ONCE)
-        ]
-        rows = np.concatenate(before)
+        rows = every[size > turn / 2]
         jumps = set(rows.tolist())
 
         def turns_at(some: np.ndarray, jumps: set[int] = jumps, turn: float = turn) -> np.ndarray:
