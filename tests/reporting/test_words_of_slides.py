@@ -5,6 +5,8 @@ from __future__ import annotations
 from dynident import fit as fit_model
 from dynident.diagnosis.details import IMPOSSIBLE, Candidate
 from dynident.effects import catalogue
+from dynident.fitting import LeastSquares
+from dynident.fitting.uncertainty.shape_errors import with_shape_errors
 from dynident.recording import Dataset
 from reporting.fabricated import arm
 from slides import at, gantry, recorded
@@ -36,3 +38,12 @@ def test_a_payload_that_never_turns_has_moments_without_influence() -> None:
     words = {row[0]: row[-1] for row in rows}
     assert words["payload.mx"] == "without influence on these torques"
     assert words["payload.mass"] == "not identified on its own, only in combinations"
+
+
+def test_a_shape_at_the_end_of_where_it_is_sought_is_said_to_be() -> None:
+    def notes(k: float) -> str:
+        model = gantry() + at("torque_ripple@y", k)
+        return " ".join(with_shape_errors(LeastSquares().fit(model, recorded()), None).notes)
+
+    assert "k@y = 10 rad/m is the end of where it is sought" in notes(10.0)
+    assert "the end of where" not in notes(100.0)
