@@ -150,3 +150,45 @@ def test_instruments_are_means_over_periods_at_the_same_angle() -> None:
     found = SwappedPeriods().prepare(None, Dataset((one,)), None)  # type: ignore[arg-type]
     instruments = found.instruments.recordings[0]  # type: ignore[union-attr]
     np.testing.assert_allclose(instruments.q, one.q, atol=2e-3)
+
+
+def test_a_motor_that_turns_about_a_turn_a_sample_is_left_alone() -> None:
+    """6000 rpm at 100 Hz: between its ramps every step is a whole turn, and none is a jump."""
+    t = np.arange(600) / 100.0
+    speed = 628.0 * np.clip(np.minimum(t, 6.0 - t) / 0.1, 0.0, 1.0)
+    q = np.cumsum(speed)[:, None] / 100.0
+    motor = Recording(t, q, q, ("motor",), name="fast")
+    assert unwrapped(motor, ("revolute",)) is motor
+
+
+def test_what_moved_in_a_gap_is_no_jump() -> None:
+    t = np.concatenate([np.arange(200) / 100.0, 4.0 + np.arange(200) / 100.0])
+    q = np.where(t < 3.0, 0.0, 6.2)[:, None] + 0.05 * np.sin(t)[:, None]
+    gap = Recording(t, q, q, ("joint",), name="gap")
+    assert unwrapped(gap, ("revolute",)) is gap
+
+
+def test_jumps_that_are_no_whole_turns_are_said_and_stay() -> None:
+    one = kept_within(turning(7.3), -np.pi)
+    q = np.array(one.q)
+    crossing = int(np.flatnonzero(np.abs(np.diff(q[:, 0])) > np.pi)[3])
+    q[crossing, 0] = 0.0  # a logger that interpolates between both ends
+    with pytest.warns(DynidentWarning, match="jumps . times by what is no whole turn"):
+        unwrapped(one.replace(q=q), ("revolute", "prismatic"))
+
+
+def test_angles_in_degrees_are_not_moved_towards_limits_in_rad() -> None:
+    some = [kept_within(turning(0.4), -180.0, 360.0), turning(0.1)]
+    read_ = [unwrapped(one, ("revolute", "prismatic")) for one in some]
+    moved = within_limits(read_, {"rotor": (-3.0, 3.0), "slide": (-5.0, 5.0)})
+    for before, after in zip(read_, moved, strict=True):
+        np.testing.assert_array_equal(before.q, after.q)
+
+
+def test_a_reference_alone_that_jumps_names_no_position() -> None:
+    whole = turning(0.4)
+    one = whole.replace(q_ref=kept_within(whole, -np.pi).q)
+    found = unwrapped(one, ("revolute", "prismatic"))
+    assert found.provenance.unwrapped == ()
+    assert found.q_ref is not None and whole.q_ref is not None
+    np.testing.assert_allclose(found.q_ref, whole.q_ref, atol=1e-9)

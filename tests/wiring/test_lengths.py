@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -21,6 +23,13 @@ def changed(q: np.ndarray, tau: np.ndarray) -> Dataset:
 
 def test_lengths_in_m_are_no_fault() -> None:
     assert check_wiring(gantry(), TRUE) == ()
+
+
+def test_a_slide_beyond_narrow_limits_is_in_m_where_its_mass_says_so() -> None:
+    model, robot = gantry(), gantry().robot
+    joints = (replace(robot.joints[0], lower=-0.5, upper=0.6), *robot.joints[1:])
+    narrow = replace(model, robot=replace(robot, joints=joints))
+    assert check_wiring(narrow, TRUE) == ()
 
 
 @pytest.mark.parametrize("joints", [("x", "y"), ("x",), ("y",)])

@@ -11,7 +11,7 @@ from dynident.diagnosis.dependence.motion_blocks import motion_blocks
 from dynident.diagnosis.dependence.residual_record import (
     FittedBody,
     ResidualRecord,
-    turning_round,
+    joints_turning_round,
 )
 from dynident.robot import Robot
 from residuals import record, rough_friction, shares_of
@@ -33,7 +33,7 @@ def turning(seed: int) -> ResidualRecord:
 
 def test_a_law_of_the_angle_is_found() -> None:
     one = turning(1)
-    assert turning_round((one,)).tolist() == [True, False]
+    assert joints_turning_round((one,)).tolist() == [True, False]
     share = shares_of(one).by["position and velocity"]
     assert share.told
     blind = shares_of(replace(one, body=FittedBody(arm(), np.zeros(2))))

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
+import pytest
+
+from dynident.criteria import DEFAULTS
+from dynident.diagnosis.search import candidate_shapes
+from dynident.diagnosis.search.moment_objective import ScoreTrial
 from dynident.diagnosis.search.ranking import rank
 from dynident.diagnosis.search.shaped_fit import refitted
 from dynident.evidence.columns import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
+from dynident.fitting.shape_search import ShapeProblem
 from dynident.fitting.uncertainty.shape_slopes import ShapeSlope
 from slides import at, gantry, recorded
 
@@ -32,3 +41,39 @@ def test_it_is_sought_below_its_grid_and_known_as_well_as_is_said() -> None:
     assert 0 < sigma < 0.1
     assert abs(np.log(effect.shape[0] / TRUE)) < 3.0 * sigma
     assert abs(wider.values[at_slope]) < 0.2 * sigma  # sigma is that of this estimate
+
+
+@pytest.mark.parametrize("off", [-0.3, -0.003, -0.001, 0.0, 0.001, 0.0039, 0.3])
+def test_a_bracket_ends_wherever_the_best_lies_beside_its_end(
+    off: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A bracket that went on from its end would find the best at the other one, and turn back."""
+    monkeypatch.setattr(candidate_shapes, "line_width", lambda *_: None)
+    effect, robot = at("thermal_friction@x", 30.0), gantry().robot
+    (shape,) = effect.shape_parameters(robot)
+    low, _ = candidate_shapes._neighbours(shape, 30.0)
+    best, asked = shape.coordinate(low) + off, []
+
+    def by_trial(lower: np.ndarray, upper: np.ndarray) -> ShapeProblem:
+        asked.append((lower[0], upper[0]))
+        assert len(asked) < 20
+
+        def trial(x: np.ndarray) -> ScoreTrial:
+            drop = -float((x[0] - best) ** 2)
+            score: Any = SimpleNamespace(effect=effect.shaped(shape.at(x[0])), drop=drop)
+            return ScoreTrial(found=score, loss=-drop)
+
+        def evaluate(points: Sequence[np.ndarray]) -> list[ScoreTrial]:
+            return [trial(x) for x in points]
+
+        start = np.array([shape.coordinate(30.0)])
+        return ShapeProblem(lower=lower, upper=upper, start=start, evaluate=evaluate)
+
+    objective: Any = SimpleNamespace(
+        one=SimpleNamespace(effect=effect),
+        fitted=SimpleNamespace(criteria=DEFAULTS, model=gantry()),
+        evidence=None,
+        by_trial=by_trial,
+    )
+    found = candidate_shapes._by_bracket(objective, shape)
+    assert abs(shape.coordinate(found.effect.shape[0]) - best) < 0.01

@@ -283,7 +283,7 @@ def _spectrum(
     harmonics = np.arange(1, criteria.harmonics + 1)
     q = np.concatenate([run.q[run.certain[:, j], j] for run in before.runs])
     against, once, slowest = SPECTRA[0], 2.0 * np.pi, criteria.slowest_ripple
-    if robot.kinds[j] == "prismatic" and np.ptp(q) > 0:
+    if robot.kinds[j] == "prismatic" and len(q) and np.ptp(q) > 0:
         against, once, slowest = SPECTRA[1], float(np.ptp(q)), criteria.slowest_on_a_slide
     at = harmonics if against == SPECTRA[0] else harmonics / once
     noise = None if before.noise_std is None else float(before.noise_std[j])

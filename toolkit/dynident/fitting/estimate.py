@@ -139,10 +139,12 @@ class Estimate(Shown):
     def stands_for(self) -> tuple[str, ...]:
         """What is identified under each parameter's name, (p,): it, a combination, or why none."""
         heads = dict(zip(self.basis.independent, self.model.stands_for(self.basis), strict=True))
-        words = (heads[i] if i in heads else self._unidentified(i) for i in range(len(self.names)))
+        idle = dict.fromkeys(self.basis.unidentifiable, "without influence on these torques")
+        trading = dict.fromkeys(self.trading_off, "not determined: size and shape trade off")
+        shared = "not identified on its own, only in combinations"
         return tuple(
-            "not determined: size and shape trade off" if name in self.trading_off else one
-            for name, one in zip(self.names, words, strict=True)
+            trading.get(name) or heads.get(i) or idle.get(name, shared)
+            for i, name in enumerate(self.names)
         )
 
     @property
@@ -185,14 +187,6 @@ class Estimate(Shown):
         return float(self.values[self.names.index(name)])
 
     # --- in words ------------------------------------------------------------------------------
-
-    def _unidentified(self, i: int) -> str:
-        """Why a parameter has no value: it does nothing here, or nothing of its own."""
-        basis = self.basis
-        column = basis.K[:, basis.dependent.index(i)] if i in basis.dependent else np.ones(1)
-        if not basis.scale[i] > 0 or not np.any(column):
-            return "without influence on these torques"
-        return "not identified on its own, only in combinations"
 
     def parameter_table(self) -> Table:
         """Values, standard deviations and what each parameter is a combination of."""
@@ -368,11 +362,14 @@ def unidentified(basis: BaseParameters) -> tuple[str, ...]:
     """Return the caveat that data leave parameters open; empty where they identify all."""
     if not basis.dependent:
         return ()
-    lost = ", ".join(basis.names[i] for i in basis.dependent)
-    return (
-        f"The data do not excite every parameter: rank {basis.rank} of {len(basis.names)}. Not "
-        f"identified on their own, only in combination: {lost}.",
-    )
+    idle = basis.unidentifiable
+    shared = [basis.names[i] for i in basis.dependent if basis.names[i] not in idle]
+    words = f"The data do not excite every parameter: rank {basis.rank} of {len(basis.names)}."
+    if shared:
+        words += f" Not identified on their own, only in combination: {', '.join(shared)}."
+    if idle:
+        words += f" Without influence on these torques: {', '.join(idle)}."
+    return (words,)
 
 
 def nearly_hidden(base: BaseParameters) -> tuple[str, ...]:

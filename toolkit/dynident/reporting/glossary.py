@@ -17,7 +17,7 @@ _SHOWS: dict[str, str] = {
     "cycles per revolution": "What comes back several times in each turn, as teeth and magnets do, "
     "shows here as a narrow peak.",
     "cycles per metre": "What comes back at equal distances, as the poles of a linear motor and "
-    "the turns of a screw do, shows here as a narrow peak.",
+    "the turns of a screw do, shows here as a narrow peak, up to 60 of them over the travel.",
 }
 
 _CONCEPTS: dict[str, str] = {

@@ -170,6 +170,11 @@ class Robot:
         return tuple("continuous" if one.continuous else one.kind for one in self.joints)
 
     @property
+    def continuous(self) -> tuple[str, ...]:
+        """Names of the joints that are said to turn without end."""
+        return tuple(one.name for one in self.joints if one.continuous)
+
+    @property
     def position_limits(self) -> dict[str, tuple[float, float]]:
         """Lower and upper limit of each joint's position, rad or m; infinite where none is."""
         return {one.name: (one.lower, one.upper) for one in self.joints}

@@ -161,12 +161,12 @@ def moves_as_described(
 
     Returns
     -------
-    False where one of them is far from it.
+    False where one of them is far from it, or none is known.
     """
     described = _described(model, regression)
     known = [j for j in joints if described[j] > 0]
     ratio = inertia[known] / described[known]
-    return bool(np.all((ratio > 1 / _ABOUT) & (ratio < _ABOUT)))
+    return bool(known) and bool(np.all((ratio > 1 / _ABOUT) & (ratio < _ABOUT)))
 
 
 def _described(model: Model, regression: WiringRegression) -> np.ndarray:

@@ -9,12 +9,14 @@ from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.threads import single_threaded
 from dynident.wiring.assignment import DEGREE, MILLI
+from dynident.wiring.described_torque import moves_as_described
 from dynident.wiring.fault import Fault, FaultKind
 from dynident.wiring.fault_words import IN_COLUMNS, column_lines, faults_of
 from dynident.wiring.gear_ratios import turns_too_far
 from dynident.wiring.hypothesis_search import SearchResult, search
 from dynident.wiring.same_data import shared_recordings, twice_recorded
 from dynident.wiring.stated_period import wrong_periods
+from dynident.wiring.wiring_regression import WiringRegression
 from dynident.wiring.wiring_rows import WiringRows, rows_of
 
 _SMALL_UNITS: dict[str, tuple[FaultKind, str, float, str]] = {
@@ -65,6 +67,12 @@ def check_wiring(
     return (*found, *named, *far)
 
 
+def _weighs_as_described(model: Model, rows: WiringRows, result: SearchResult, joint: int) -> bool:
+    """Whether the mass that a slide moves, by its force, is about that of the description."""
+    regression = WiringRegression.of(model, rows.moved(result.assignment.change))
+    return moves_as_described(model, regression, result.fit.inertia, (joint,))
+
+
 def _out_of_range(
     model: Model, rows: WiringRows, result: SearchResult, train: Dataset, criteria: WiringCriteria
 ) -> tuple[Fault, ...]:
@@ -74,6 +82,8 @@ def _out_of_range(
     for j, name in enumerate(robot.names):
         if not turns_too_far(model, rows, now, j, criteria):
             continue
+        if robot.kinds[j] == "prismatic" and _weighs_as_described(model, rows, result, j):
+            continue  # its limits are narrower than it is
         travel = float(np.ptp(rows.q[:, now.position_of[j]])) * abs(float(now.position_scale[j]))
         limits = robot.joints[j]
         room = limits.upper - limits.lower

@@ -202,6 +202,7 @@ class Experiment:
             q=rollout.q_measured,
             tau=rounded(tau, self.sensors.each("torque_resolution", n)),
             joints=self.robot.names,
+            continuous=self.robot.continuous,
             temperature=self._temperature(index, rollout),
             # The reference is known in steps of the encoder too.
             q_ref=rounded(rollout.q_ref, self.sensors.each("position_resolution", n)),

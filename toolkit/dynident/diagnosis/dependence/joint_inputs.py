@@ -14,7 +14,7 @@ from itertools import accumulate
 
 import numpy as np
 
-from dynident.diagnosis.dependence.residual_record import ResidualRecord, turning_round
+from dynident.diagnosis.dependence.residual_record import ResidualRecord, joints_turning_round
 from dynident.recording import as_points
 
 LAGS_S = (0.025, 0.1, 0.4)
@@ -75,7 +75,7 @@ def joint_inputs(records: tuple[ResidualRecord, ...], joint: int) -> JointInputs
     own = motion[joint]
     load = np.concatenate([one.load[:, joint] for one in records])
     spread = float(np.std(np.concatenate([one.q[:, joint] for one in records])))
-    if turning_round(records)[joint]:
+    if joints_turning_round(records)[joint]:
         spread = min(spread, CIRCLE)
     past = np.concatenate([_past(one, joint, spread) for one in records])
     session = np.concatenate([one.session for one in records])
@@ -99,7 +99,7 @@ def _motion(records: tuple[ResidualRecord, ...], joint: int) -> np.ndarray:
     q, v, a = (np.concatenate([getattr(one, name)[:, joint] for one in records]) for name in "qva")
     speed = float(np.sqrt(np.mean(v**2)))
     direction = np.tanh(v / (REVERSAL * speed)) if speed > 0 else np.zeros_like(v)
-    position = as_points(q[:, None], turning_round(records)[[joint]])
+    position = as_points(q[:, None], joints_turning_round(records)[[joint]])
     return np.column_stack([_scaled(v[:, None]), direction, _scaled(a[:, None]), _scaled(position)])
 
 

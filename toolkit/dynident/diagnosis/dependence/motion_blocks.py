@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynident.diagnosis.dependence.residual_record import ResidualRecord, turning_round
+from dynident.diagnosis.dependence.residual_record import ResidualRecord, joints_turning_round
 from dynident.recording import as_points
 
 MOST_BLOCKS = 24
@@ -172,7 +172,7 @@ def _earliest_of_motion(records: tuple[ResidualRecord, ...], block: np.ndarray) 
     moving = spread > 1e-6 * size
     if moving.sum() <= 2:
         return block
-    turning = turning_round(records)
+    turning = joints_turning_round(records)
     if turning.any():
         angles = np.concatenate([np.hstack([as_points(one.q, turning), one.v]) for one in records])
         state, spread = angles, angles.std(axis=0)

@@ -18,7 +18,7 @@ from scipy.linalg import orth
 from dynident.diagnosis.dependence.residual_record import (
     FittedBody,
     ResidualRecord,
-    turning_round,
+    joints_turning_round,
 )
 
 DEGREE = 6
@@ -59,7 +59,7 @@ def position_error_columns(
     moving = np.flatnonzero(high - low > _NOTHING * np.abs(q).max(axis=0))
     motion = q[rows], v[rows], a[rows]
     first, regressor = bodies[0], bodies[0].robot.regressor(*motion)[:, joint]
-    round_and_round = turning_round(records)
+    round_and_round = joints_turning_round(records)
     errors = {
         int(k): _waves() if round_and_round[k] else _polynomials(low[k], high[k]) for k in moving
     }

@@ -67,7 +67,7 @@ class ResidualRecord:
         )
 
 
-def turning_round(records: Sequence[ResidualRecord]) -> np.ndarray:
+def joints_turning_round(records: Sequence[ResidualRecord]) -> np.ndarray:
     """Joints that turn without end, and go farther than once around, (n,) mask.
 
     Whole turns tell nothing of their residual: what is a function of the angle comes again.

@@ -62,6 +62,7 @@ class ReversalLaw:
 
     @property
     def joint(self) -> str:
+        """Where."""
         return str(self.column.joint)
 
     @property
@@ -183,7 +184,9 @@ def _best_law(evidence: Evidence, fitted: EvidenceFit, joint: str) -> ReversalLa
 
 def _law_that_misses_least(evidence: Evidence, fitted: EvidenceFit, joint: str) -> ReversalLaw:
     each = [_shaped(evidence, fitted, kind(joint)) for kind in LAWS]
-    missed, column = min(each, key=lambda one: one[0])
+    # One that wants more than the latest moment is none, and must not hide another.
+    laws = [one for one in each if abs(one[1].lead_s) < LATEST]
+    missed, column = min(laws or each, key=lambda one: one[0])
     at = fitted.model.robot.names.index(joint)
     own = float(fitted.model.friction_widths[at])
     fastest = max(float(np.percentile(np.abs(a), _USUAL)) for a in _accelerations(evidence, at))

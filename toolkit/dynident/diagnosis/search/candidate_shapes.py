@@ -135,16 +135,19 @@ def _by_bracket(objective: MomentObjective, shape: ShapeParameter) -> Score:
         precision = min(precision, _OF_A_LINE * width / effect.shape[0])
     low, high = (shape.coordinate(x) for x in near)
     ends = shape.coordinate(shape.lower), shape.coordinate(shape.upper)
+    tried = []
     while True:
         problem = objective.by_trial(np.array([low]), np.array([high]))
         found = search(problem, Bracket(precision)).best[0].found
+        tried.append(found)
         at, reach = shape.coordinate(found.effect.shape[0]), high - low
+        # A bracket only grows, so that the best is inside the next one.
         if at - low < _AT_END * precision and low > ends[0]:
-            low, high = max(low - reach, ends[0]), at
+            low = max(low - reach, ends[0])
         elif high - at < _AT_END * precision and high < ends[1]:
-            low, high = at, min(high + reach, ends[1])
+            high = min(high + reach, ends[1])
         else:
-            return found
+            return max(tried, key=lambda one: one.drop)
 
 
 def reshaped(evidence: Evidence, others: EvidenceFit, whole: EvidenceFit, effect: Effect) -> Score:

@@ -67,6 +67,7 @@ def _of_the_time(evidence: Evidence, fitted: EvidenceFit, label: str) -> Evidenc
     makes residual and instruments orthogonal, of which sigma is: Gauss-Newton steps lead there.
     """
     criteria, robot = evidence.criteria.shapes, fitted.model.robot
+    earlier, last = fitted, np.inf
     for _ in range(criteria.linearisations):
         effect = next(e for e in fitted.model.effects if e.label == label)
         shapes = effect.shape_parameters(robot)
@@ -80,7 +81,12 @@ def _of_the_time(evidence: Evidence, fitted: EvidenceFit, label: str) -> Evidenc
         known = wider.solution.rank > fitted.solution.rank
         if not known or abs(step) <= criteria.precision or sigma > np.log(criteria.furthest):
             break
+        if abs(step) >= last:
+            return earlier  # the last step led away
+        earlier, last = fitted, abs(step)
         step = float(np.clip(step, -np.log(criteria.furthest), np.log(criteria.furthest)))
         better = effect.shaped(shapes[0].at(shapes[0].coordinate(effect.shape[0]) + step))
+        if better.shape == effect.shape:
+            break  # at its bound
         fitted = fit_evidence(evidence, fitted.model.with_shapes((better,)), fitted)
     return fitted

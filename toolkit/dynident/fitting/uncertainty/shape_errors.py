@@ -25,10 +25,7 @@ from dynident.model import Model
 _KNOWN = "sigma takes {} as known, which they are not."
 _QUANTILE = 1.959964
 """Standard errors to each side of a 95 % interval."""
-_AT_BOUND = (
-    "{} = {:.4g} {} is the end of where it is sought: the best may lie beyond, and its sigma "
-)
-_AT_BOUND += "says nothing of that."
+_AT_BOUND = "{} = {:.4g} {} is at the end of where it is sought: the best may lie beyond."
 _TO_BOUND = 0.01
 """Coordinate (relative, for a positive shape) from its bound within which a shape is at it."""
 _MADE_OF = 0.1

@@ -6,11 +6,13 @@ one turn, as in [-pi, pi), so that it jumps by 2 pi where it crosses the end: no
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dynident.errors import DynidentWarning
 from dynident.recording.recording import Recording
 from dynident.recording.repetition import TURN
 from dynident.recording.spooled import Spool
@@ -37,6 +39,12 @@ _LOOKED_AT = 200
 """Jumps that are looked at first: in another unit, most steps may be as large as one."""
 _BESIDE = 3
 """Steps on either side of a jump that tell how fast the joint is there."""
+_PARTS = 3
+"""Part of a turn from which a step is a jump: a sample between both ends makes two of a half."""
+_CHATTER = 1.5
+"""Turns within which a joint stays that rests where its angle jumps to and fro."""
+_LATE = 1.5
+"""Of the time steps about it, beyond which a step is a gap."""
 _AT_ONCE = 1 << 18
 """Samples that are looked at."""
 
@@ -65,8 +73,10 @@ def unwrapped(recording: Recording, kinds: Sequence[str]) -> Recording:
     joints = sorted({*found["q"], *found["q_ref"]})
     if not joints:
         return recording
+    for joint, one in found["q"].items():
+        _warn_of_others(recording, joint, one)
     source = replace(
-        recording.provenance, unwrapped=tuple(recording.joints[joint] for joint in joints)
+        recording.provenance, unwrapped=tuple(recording.joints[joint] for joint in found["q"])
     )
     changed = recording.replace(
         **{signal: _sum(recording, signal, added) for signal, added in found.items() if added},
@@ -82,6 +92,17 @@ def unwrapped(recording: Recording, kinds: Sequence[str]) -> Recording:
     return changed.replace(q_ref=_sum(changed, "q_ref", behind))
 
 
+def _warn_of_others(recording: Recording, joint: int, added: _Added) -> None:
+    """Say of jumps that are no whole turns, and stay: samples between two ends, as a rule."""
+    others = added.rows[added.turns == 0]
+    if len(others):
+        what = (
+            f"{recording.where}: q.{recording.joints[joint]} jumps {len(others)} times by what is "
+            f"no whole turn, first at t = {recording.t[others[0]]:.6g} s, and that is left as it is"
+        )
+        warnings.warn(what, DynidentWarning, stacklevel=3)
+
+
 def within_limits(
     recordings: Sequence[Recording], limits: Mapping[str, tuple[float, float]]
 ) -> list[Recording]:
@@ -95,6 +116,7 @@ def within_limits(
     limits : lower and upper one of each joint, rad; infinite where there are none.
     """
     jumped = {name for one in recordings for name in one.provenance.unwrapped}
+    jumped = {name for name in jumped if _may_be_rad(name, recordings, *limits[name])}
     known: dict[int, Recording] = {}
     found = []
     for one in recordings:
@@ -109,6 +131,13 @@ def within_limits(
         moved = known.get(id(one.q))
         found.append(one if moved is None else one.replace(q=moved.q, q_ref=moved.q_ref))
     return found
+
+
+def _may_be_rad(name: str, recordings: Sequence[Recording], lower: float, upper: float) -> bool:
+    """Whether no recording of a joint travels farther than its limits and a turn leave."""
+    return all(
+        np.ptp(one.q[:, one.joints.index(name)]) <= upper - lower + TURN for one in recordings
+    )
 
 
 def _turns_off(q: np.ndarray, lower: float, upper: float) -> int:
@@ -156,36 +185,41 @@ def _jumps(t: np.ndarray, x: np.ndarray) -> _Added | None:
     parts = range(0, len(x) - 1, _AT_ONCE)
     steps = (np.abs(np.diff(x[start : start + _AT_ONCE + 1])) for start in parts)
     large = [
-        start + np.flatnonzero(one > min(_TURNS) / 2)
+        start + np.flatnonzero(one > min(_TURNS) / _PARTS)
         for start, one in zip(parts, steps, strict=True)
     ]
     every = np.concatenate(large)
     size = np.abs(x[every + 1] - x[every])
     for turn in _TURNS:
-        rows = every[size > turn / 2]
-        jumps = set(rows.tolist())
-
-        def turns_at(some: np.ndarray, jumps: set[int] = jumps, turn: float = turn) -> np.ndarray:
-            return np.array([_whole_turns(t, x, int(row), jumps, turn) for row in some])
-
-        few = turns_at(rows[:: len(rows) // _LOOKED_AT + 1])
+        rows = every[size > turn / _PARTS]
+        few = _turns_at(t, x, rows, rows[:: len(rows) // _LOOKED_AT + 1], turn)
         if not len(rows) or np.mean(few != 0) < _MOST_OF_THEM:
             continue
-        turns = turns_at(rows)
+        turns = _turns_at(t, x, rows, rows, turn)
         if np.mean(turns != 0) >= _MOST_OF_THEM:
             return _Added(rows + 1, -turns, turn)
     return None
 
 
-def _whole_turns(t: np.ndarray, x: np.ndarray, row: int, jumps: set[int], turn: float) -> int:
+def _turns_at(
+    t: np.ndarray, x: np.ndarray, jumps: np.ndarray, some: np.ndarray, turn: float
+) -> np.ndarray:
+    """How many whole turns a position (T,) jumps by after some of the rows at which it jumps."""
+    return np.array([_whole_turns(t, x, int(row), jumps, turn) for row in some], dtype=int)
+
+
+def _whole_turns(t: np.ndarray, x: np.ndarray, row: int, jumps: np.ndarray, turn: float) -> int:
     """How many whole turns a position jumps by after a row; 0 where that is none."""
-    beside = [
-        k
-        for k in range(max(0, row - _BESIDE), min(len(x) - 1, row + _BESIDE + 1))
-        if k not in jumps
-    ]
+    first, last = max(0, row - _BESIDE), min(len(x) - 2, row + _BESIDE)
+    near = jumps[np.searchsorted(jumps, first) : np.searchsorted(jumps, last, side="right")]
+    beside = np.setdiff1d(np.arange(first, last + 1), near)
+    if not len(beside) and abs(x[last + 1] - x[first]) > _CHATTER * turn:
+        return 0  # it turns as fast: one that rests at the end of its turn jumps to and fro
     step = float(t[row + 1] - t[row])
-    steps = np.array([(x[k + 1] - x[k]) / (t[k + 1] - t[k]) for k in beside] or [0.0]) * step
+    if step > _LATE * float(np.median(np.diff(t[first : last + 2]))):
+        return 0  # nobody knows what it did meanwhile
+    steps = (x[beside + 1] - x[beside]) / (t[beside + 1] - t[beside]) * step
+    steps = steps if len(steps) else np.zeros(1)
     usual = float(np.median(steps))
     if abs(usual) > _FASTEST * turn:
         return 0
