@@ -45,5 +45,5 @@ def test_a_shape_at_the_end_of_where_it_is_sought_is_said_to_be() -> None:
         model = gantry() + at("torque_ripple@y", k)
         return " ".join(with_shape_errors(LeastSquares().fit(model, recorded()), None).notes)
 
-    assert "k@y = 10 rad/m is the end of where it is sought" in notes(10.0)
+    assert "k@y = 10 rad/m is at the end of where it is sought" in notes(10.0)
     assert "the end of where" not in notes(100.0)
