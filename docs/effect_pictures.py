@@ -68,6 +68,7 @@ SHOWN: dict[str, Shown] = {
     "torque_drift": Shown((0.001,), "time"),
     "torque_offset": Shown((0.6,), "velocity"),
     "torque_ripple": Shown((0.4, 0.0), "position", "", (12.0,)),
+    "unbalance": Shown((0.5, 0.3), "position"),
     "viscous_friction": Shown((0.7,), "velocity"),
 }
 GROUPS = {

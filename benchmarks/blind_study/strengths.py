@@ -190,4 +190,4 @@ KNOWN = tuple(
         )
     )
 )
-"""The 22 effects of the catalogue."""
+"""Effects of the catalogue that are hidden."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import islice
 
 import numpy as np
 import pytest
@@ -185,7 +184,7 @@ def single_precision():
     return columns_of(lambda self, block, right: right.astype(np.float32))
 
 
-@breaks("finite columns", "has the shape (25, 3, 2) where (25, 3, 1) is due")
+@breaks("finite columns", "has the shape (25, 4, 2) where (25, 4, 1) is due")
 def a_column_too_many():
     return columns_of(lambda self, block, right: np.hstack([right, right]))
 
@@ -308,7 +307,10 @@ def any_shape():
 def acts_elsewhere():
     def columns(self, block):
         right = Wave.columns(self, block)
-        return right + right[:, ::-1] * (np.arange(3) != block.index(self.joint))[:, None]
+        return (
+            right
+            + right[:, ::-1] * (np.arange(len(block.names)) != block.index(self.joint))[:, None]
+        )
 
     return {"columns": columns, "sensitivities": Effect.sensitivities}
 
@@ -381,7 +383,7 @@ def a_wrong_derivative():
     return {"sensitivities": lambda self, block: 0.5 * Wave.sensitivities(self, block)}
 
 
-@breaks("derivatives", "sensitivities() has the shape (25, 3, 1) where (25, 3, 1, 1) is due")
+@breaks("derivatives", "sensitivities() has the shape (25, 4, 1) where (25, 4, 1, 1) is due")
 def a_derivative_of_another_shape():
     return {"sensitivities": lambda self, block: Wave.columns(self, block)}
 
@@ -500,15 +502,17 @@ def test_the_crane_in_other_units_is_the_same_crane():
 
 def test_most_columns_are_powers_of_the_units():
     """Else the rule of scaling would pass over them."""
-    found = []
+    shares = []
     for kind in catalogue().values():
-        for effect in islice(places(kind), 2):
+        for effect in places(kind):
+            found = []
             for base in ("time", "force", "length"):
                 worlds = (PLAIN, World(**{base: 2.0}), World(**{base: 4.0}))
                 columns = [_columns(effect, world) for world in worlds]
                 for j in effect.acting_at(crane()):
                     found.append(_power(*(one[:, j, 0] for one in columns)) is not None)
-    assert np.mean(found) > 0.85
+            shares.append(np.mean(found))
+    assert np.mean(shares) > 0.9
 
 
 @pytest.mark.parametrize(

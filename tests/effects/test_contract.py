@@ -33,7 +33,7 @@ def test_units_of_the_catalogue_are_of_the_usual_forms(effect: Effect) -> None:
     if effect.joint is None:
         return
     force = force_unit(ROBOT, effect.joint)
-    assert force == ("N m" if effect.joint == "swing" else "N")
+    assert force == ("N m" if effect.joint in ("slew", "swing") else "N")
     length = motion_unit(ROBOT, effect.source or effect.joint)
     inertia = {"N m": "kg m^2", "N": "kg"}[force]
     power = r"(\^2)?"
@@ -72,10 +72,11 @@ def test_true_effects_refuse_wrong_values(kind: type[Effect]) -> None:
 def test_labels_without_a_joint_stand_for_every_place() -> None:
     assert [one.label for one in effects_of("viscous_friction", ROBOT)] == [
         "viscous_friction@travel",
+        "viscous_friction@slew",
         "viscous_friction@swing",
         "viscous_friction@hoist",
     ]
-    assert len(effects_of("joint_coupling", ROBOT)) == 6
+    assert len(effects_of("joint_coupling", ROBOT)) == 12
     assert [one.label for one in effects_of("payload", ROBOT)] == ["payload"]
     (pair,) = effects_of("joint_coupling@swing:hoist", ROBOT)
     assert (pair.joint, pair.source) == ("swing", "hoist")

@@ -14,23 +14,27 @@ CRANE = """<robot name="crane">
   <link name="rail"/>
   <link name="trolley"><inertial><origin xyz="0.05 0 0.1"/><mass value="6"/>
     <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.2" iyz="0" izz="0.15"/></inertial></link>
+  <link name="cab"><inertial><origin xyz="0.1 0.03 0.2"/><mass value="4"/>
+    <inertia ixx="0.06" ixy="0" ixz="0.002" iyy="0.07" iyz="0" izz="0.05"/></inertial></link>
   <link name="boom"><inertial><origin xyz="0.3 0.02 -0.05"/><mass value="3"/>
     <inertia ixx="0.02" ixy="0.001" ixz="0" iyy="0.05" iyz="0" izz="0.06"/></inertial></link>
   <link name="hook"><inertial><origin xyz="0 0.01 -0.2"/><mass value="1.5"/>
     <inertia ixx="0.01" ixy="0" ixz="0.001" iyy="0.012" iyz="0" izz="0.004"/></inertial></link>
   <joint name="travel" type="prismatic"><parent link="rail"/><child link="trolley"/>
     <axis xyz="1 0 0"/><limit lower="-1" upper="1" velocity="1" effort="500"/></joint>
-  <joint name="swing" type="revolute"><parent link="trolley"/><child link="boom"/>
+  <joint name="slew" type="revolute"><parent link="trolley"/><child link="cab"/>
+    <axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="2" effort="150"/></joint>
+  <joint name="swing" type="revolute"><parent link="cab"/><child link="boom"/>
     <origin xyz="0 0 0.3" rpy="0.2 0 0"/><axis xyz="0 1 0"/>
     <limit lower="-2" upper="2" velocity="3" effort="100"/></joint>
   <joint name="hoist" type="prismatic"><parent link="boom"/><child link="hook"/>
     <origin xyz="0.5 0 0"/><axis xyz="0 0 1"/>
     <limit lower="-0.5" upper="0.5" velocity="1" effort="200"/></joint>
 </robot>"""
-"""A trolley, a boom that swings below it, and a hook that is drawn along the boom."""
+"""A trolley, a cab that turns on it, a boom that swings below, and a hook drawn along the boom."""
 
 SAMPLES = 25
-ROTOR = np.array([0.5, 0.02, 0.1])
+ROTOR = np.array([0.5, 0.03, 0.02, 0.1])
 """kg or kg m^2, of each joint."""
 ARRAYS = ("t", "q", "v", "a", "rigid", "torque", "temperature")
 """What a block holds sample by sample."""

@@ -93,6 +93,8 @@ class Effect(EffectTraits, SimulatedEffect, ABC):
     stands_in_for: ClassVar[tuple[str, ...]] = ()
     """Simpler effects whose columns it has, or may seem to have: they are named first where they do
     most of the work."""
+    requires: ClassVar[tuple[str, ...]] = ()
+    """Labels of effects without which it makes no torque: a diagnosis asks for it beside them."""
     found_by: ClassVar[Literal["residual", "repetition"]] = "residual"
     """Where it shows: in what repetitions have in common, or in what differs between them."""
 

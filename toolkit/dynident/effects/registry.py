@@ -97,8 +97,8 @@ def effects_of(label: str, robot, laws: Sequence[Law] = ()) -> tuple[Effect, ...
         return (effect().on(robot),)
     if not place:
         found = tuple(one.on(robot) for one in effect.candidates(robot))
-        if not found and issubclass(effect, LawEffect):
-            why = effect.elsewhere(robot)
+        if not found:
+            why = effect.elsewhere(robot) if issubclass(effect, LawEffect) else None
             raise why or EffectError("fits no joint of the robot", label)
         return found
     joint, source = _joints(place, robot.names)

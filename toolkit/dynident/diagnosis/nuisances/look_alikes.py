@@ -1,8 +1,7 @@
 """What is said of effects that something else than a single rival may be.
 
 Rivals are compared one by one, as effects of the catalogue, on what the description says. What
-several of them do together, one column of them, or a part of the description that no recording
-showed before, is none of these.
+several of them do together, or one column of them, is none of these.
 """
 
 from __future__ import annotations
@@ -17,12 +16,6 @@ from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_
 from dynident.robot import Robot
 from dynident.tables import listed
 
-_LIKE_A_WEIGHT = ("joint_spring", "torque_ripple", "torque_offset", "joint_zero")
-"""Effects that a sine of the joint's position resembles."""
-_SLOW = 2.0
-"""Cycles per revolution below which a ripple resembles a weight, whose torque has one."""
-_VERTICAL = 0.02
-"""Sine of the angle to gravity below which an axis is vertical."""
 _ARM = 0.5
 """m, by which a link's centre of mass may lie beside its axis; a description is no measure."""
 
@@ -43,7 +36,7 @@ def look_alike_notes(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]
     return (
         *_constants(added, fitted),
         *_offsets_instead(added, evidence, fitted),
-        *_hidden_weights(added, evidence, fitted),
+        *_hardly_weights(added, evidence, fitted),
         *_other_ends(fitted.model.robot),
     )
 
@@ -78,33 +71,20 @@ def _offsets_instead(added: list[Effect], evidence: Evidence, fitted: EvidenceFi
             )
 
 
-def _hidden_weights(added: list[Effect], evidence: Evidence, fitted: EvidenceFit) -> Iterator[str]:
-    """Effects beside a tilted base that may be a weight that an upright base hides.
-
-    About a vertical axis gravity turns nothing: how far from it the centre of mass lies, no
-    recording of an upright robot tells, and the columns of a tilt take it from the description.
-    """
+def _hardly_weights(added: list[Effect], evidence: Evidence, fitted: EvidenceFit) -> Iterator[str]:
+    """Unbalances beside a tilted base that are more than the weight of their link can make."""
     model, robot = fitted.model, fitted.model.robot
-    if "base_tilt" not in model.slices or not np.any(robot.gravity):
-        return
-    down = np.array(robot.gravity) / np.linalg.norm(robot.gravity)
-    tilt = float(np.linalg.norm(fitted.values[model.slices["base_tilt"]]))
     for effect in added:
-        if effect.joint is None or effect.name not in _LIKE_A_WEIGHT:
+        if effect.name != "unbalance":
             continue
-        if effect.name == "torque_ripple" and effect.shape[0] >= _SLOW:
-            continue
-        at = robot.names.index(effect.joint)
-        joint = robot.joints[at]
-        across = float(np.linalg.norm(np.cross(joint.R @ joint.axis, down)))
-        if joint.parent != -1 or joint.kind != "revolute" or across > _VERTICAL:
-            continue
+        tilt = float(np.linalg.norm(fitted.values[model.slices["base_tilt"]]))
+        at = robot.names.index(str(effect.joint))
         weight = robot.theta[10 * at] * float(np.linalg.norm(robot.gravity))
-        if _largest(effect, evidence, fitted) <= weight * tilt * _ARM:
+        if _largest(effect, evidence, fitted) > weight * tilt * _ARM:
             yield (
-                f"{effect.title} may be the weight of {robot.bodies[at]}: on an upright base "
-                f"nothing shows how far its centre of mass lies from the axis of {effect.joint}, "
-                "the tilted one does, and the diagnosis takes it from the description."
+                f"{effect.title} is hardly one: the weight of {robot.bodies[at]} would have to act "
+                f"more than {_ARM:g} m beside the axis. A ripple of one cycle per revolution makes "
+                "the same torque."
             )
 
 

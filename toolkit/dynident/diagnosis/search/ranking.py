@@ -65,11 +65,14 @@ class Ranking:
 
 
 def candidates(model: Model) -> list[Effect]:
-    """Every effect that shows in residuals, wherever the model has none of its label."""
+    """Every effect that shows in residuals, wherever the model has none of its label.
+
+    Of those that require others, the ones that have these in the model.
+    """
     found = []
     laws = (law_effect(law) for law in model.laws)
     for effect in (*catalogue().values(), *laws):
-        if effect.found_by == "residual":
+        if effect.found_by == "residual" and all(one in model for one in effect.requires):
             found += [e.on(model.robot) for e in effect.candidates(model.robot) if e not in model]
     return found
 
