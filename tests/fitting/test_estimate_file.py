@@ -152,3 +152,6 @@ def test_a_value_and_its_sigma_are_of_the_same_combination() -> None:
     assert abs(inertia["identified"] - both) < 4.0 * inertia["sigma"] < 0.01 * both
     assert "Ia@shoulder" in inertia["stands_for"]
     assert rotor["sigma"] is None and rotor["identified"] is None
+    assert rotor["stands_for"] == "not identified on its own, only in combinations"
+    for name in ("my.upper", "mx.fore", "my.fore"):  # each is a column of its own
+        assert rows[name]["identified"] == rows[name]["value"] and rows[name]["stands_for"] == ""

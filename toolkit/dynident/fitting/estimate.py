@@ -137,15 +137,16 @@ class Estimate(Shown):
 
     @property
     def stands_for(self) -> tuple[str, ...]:
-        """What is identified under each parameter's name, (p,): it, a combination, or why none."""
-        heads = dict(zip(self.basis.independent, self.model.stands_for(self.basis), strict=True))
-        idle = dict.fromkeys(self.basis.unidentifiable, "without influence on these torques")
-        trading = dict.fromkeys(self.trading_off, "not determined: size and shape trade off")
-        shared = "not identified on its own, only in combinations"
-        return tuple(
-            trading.get(name) or heads.get(i) or idle.get(name, shared)
-            for i, name in enumerate(self.names)
-        )
+        """What is identified under each parameter's name, (p,): a combination, or why nothing.
+
+        Empty where it is the parameter alone.
+        """
+        found = dict.fromkeys(self.names, "not identified on its own, only in combinations")
+        found |= dict.fromkeys(self.basis.unidentifiable, "without influence on these torques")
+        heads = [self.names[i] for i in self.basis.independent]
+        found |= dict(zip(heads, self.model.stands_for(self.basis), strict=True))
+        found |= dict.fromkeys(self.trading_off, "not determined: size and shape trade off")
+        return tuple(found[name] for name in self.names)
 
     @property
     def sigma(self) -> np.ndarray:
