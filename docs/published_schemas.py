@@ -5,8 +5,13 @@ Settings are TOML, which has no null: what may be left out is left out.
 
 from __future__ import annotations
 
+import ast
+import inspect
 import json
+import textwrap
 from collections.abc import Mapping
+from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +26,35 @@ from dynident.study.study_file import StudyFile
 FOLDER = Path(__file__).resolve().parent / "schemas"
 
 
+@cache
+def words_of_keys(model: type[BaseModel]) -> dict[str, str]:
+    """Return what stands below each key in the source of a model and of those it derives from.
+
+    Read here: pydantic would read all sources whenever a model is imported.
+    """
+    found = {}
+    for kind in reversed(model.__mro__):
+        if not issubclass(kind, BaseModel) or kind is BaseModel:
+            continue
+        body = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0].body  # type: ignore[attr-defined]
+        for key, said in pairwise(body):
+            if isinstance(key, ast.AnnAssign) and isinstance(said, ast.Expr):
+                found[key.target.id] = inspect.cleandoc(said.value.value)  # type: ignore[attr-defined]
+    return found
+
+
 class UntitledSchema(GenerateJsonSchema):
-    """Without a title that repeats each key."""
+    """Without a title that repeats each key, and with what stands under it in the source."""
 
     def field_title_should_be_set(self, schema: Any) -> bool:
         return False
+
+    def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
+        found, words = super().model_schema(schema), words_of_keys(schema["cls"])
+        for key, one in found.get("properties", {}).items():
+            if key in words:
+                one["description"] = words[key]
+        return found
 
 
 class SettingsSchema(UntitledSchema):

@@ -21,11 +21,12 @@ from dynident.words import close_word
 class SettingsTable(BaseModel):
     """A table of a settings file: unknown keys and numbers that are not finite are refused.
 
-    What stands under a key in the class says what the key means: in the published schema, in the
-    reference and in `pydoc`. Units are there as `unit`.
+    What stands under a key in the class says what the key means: in the published schema and in the
+    reference. Units are there as `unit`.
     """
 
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+    # Built when a file is read: most commands read one kind of many.
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, defer_build=True)
 
 
 def in_unit(unit: str) -> dict[str, JsonValue]:

@@ -48,7 +48,7 @@ _Index = Annotated[int, Field(ge=0)]
 
 class _Part(BaseModel):
     # What stands under a key is what the published schema says of it.
-    model_config = ConfigDict(strict=True, use_attribute_docstrings=True)
+    model_config = ConfigDict(strict=True, defer_build=True)
 
 
 class _Parameter(_Part):
