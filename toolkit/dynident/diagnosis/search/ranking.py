@@ -67,13 +67,18 @@ class Ranking:
 def candidates(model: Model) -> list[Effect]:
     """Every effect that shows in residuals, wherever the model has none of its label.
 
-    Of those that require others, the ones that have these in the model.
+    Of those that require others, the ones that have these in the model; of those that may be
+    common to all joints, no more than there are joints: with them, one more says nothing new.
     """
     found = []
     laws = (law_effect(law) for law in model.laws)
     for effect in (*catalogue().values(), *laws):
-        if effect.found_by == "residual" and all(one in model for one in effect.requires):
-            found += [e.on(model.robot) for e in effect.candidates(model.robot) if e not in model]
+        if effect.found_by != "residual" or not all(one in model for one in effect.requires):
+            continue
+        own = sum(one.name == effect.name for one in model.effects)
+        if effect.place == "joint or robot" and own >= model.robot.n:
+            continue
+        found += [e.on(model.robot) for e in effect.candidates(model.robot) if e not in model]
     return found
 
 
