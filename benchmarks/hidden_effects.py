@@ -158,7 +158,7 @@ def _recordings(
 
 def _scaled(case: Case, robot: Robot, known: list[TrueEffect], hidden: TrueEffect) -> TrueEffect:
     """Scale an effect so that it leaves `strength` times the noise in the residual."""
-    from dynident.evidence.columns import Evidence
+    from dynident.evidence.evidence import Evidence
     from dynident.evidence.evidence_fit import fit_evidence
     from dynident.evidence.held_out import on_recordings
     from dynident.evidence.runs import gather

@@ -13,7 +13,7 @@ from dynident.diagnosis.search.scoring import Score
 from dynident.diagnosis.search.selection import AddedEffect
 from dynident.diagnosis.search.shaped_fit import refitted
 from dynident.effects import Law, law_effect
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.runs import gather
 from dynident.model import Model

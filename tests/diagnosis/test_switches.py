@@ -12,7 +12,7 @@ from dynident import diagnose
 from dynident.criteria import DEFAULTS
 from dynident.diagnosis import Diagnosis
 from dynident.diagnosis.recorded_units import in_recorded_units
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.runs import gather

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dynident.evidence.column_cache import ColumnCache
+from dynident.evidence.columns.column_cache import ColumnCache
 
 
 def test_answers_belong_to_the_very_objects_that_were_asked() -> None:

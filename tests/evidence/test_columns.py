@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.effects import catalogue
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.runs import gather
 from dynident.model import Model
 from dynident.recording import Dataset

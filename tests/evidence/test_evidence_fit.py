@@ -9,9 +9,9 @@ import pytest
 
 import dynident as di
 from dynident.effects import catalogue
-from dynident.evidence.columns import Evidence
+from dynident.evidence.columns.joint_columns import WhiteColumns
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of
-from dynident.evidence.joint_columns import WhiteColumns
 from dynident.evidence.noise_model import flat_noise
 from dynident.evidence.runs import gather
 from problem_scripts import PROBLEMS

@@ -12,7 +12,7 @@ from dynident.closed_loop import ExperimentRun as Motion
 from dynident.diagnosis import diagnose
 from dynident.effects import effects_of
 from dynident.effects.transmissions.along import mean_inertia
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.model_columns import model_columns
 from dynident.evidence.runs import gather

@@ -9,7 +9,7 @@ import pytest
 
 from dynident.diagnosis.search.scoring import candidate_moments, score
 from dynident.effects import Effect, catalogue
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.runs import gather
 from dynident.evidence.time_varying import time_varying_variants

@@ -8,10 +8,10 @@ import numpy as np
 
 from dynident.effects import Block, catalogue
 from dynident.effects.effect import Effect
-from dynident.evidence.column_cache import Tried
-from dynident.evidence.columns import Evidence
+from dynident.evidence.columns.column_cache import Tried
+from dynident.evidence.columns.windows import sources
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.runs import gather
-from dynident.evidence.windows import sources
 from dynident.model import Model
 from dynident.recording import Dataset, Noise, Recording, numbered
 from synthetic import arm, synthetic, true_values

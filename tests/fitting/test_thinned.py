@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dynident.diagnosis.verdict import notes_on
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
 from dynident.fitting.sampling import Sampled, sample

@@ -11,7 +11,7 @@ from dynident.criteria import DEFAULTS
 from dynident.diagnosis.nuisances.quantisation import rounding_power
 from dynident.diagnosis.nuisances.width_notes import friction_width_notes
 from dynident.effects import effects_of
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.held_out import HeldOut, on_recordings, with_noise_of
 from dynident.evidence.maps import residual_maps

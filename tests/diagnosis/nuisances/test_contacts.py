@@ -20,7 +20,7 @@ from dynident.diagnosis.nuisances.pulse_search import (
     pulses_in,
     without,
 )
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import Run, gather
 from dynident.recording import Dataset

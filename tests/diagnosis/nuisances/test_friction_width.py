@@ -12,7 +12,7 @@ from dynident.diagnosis.nuisances.friction_width import (
     with_friction_width,
 )
 from dynident.diagnosis.nuisances.width_notes import friction_width_notes
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.runs import gather

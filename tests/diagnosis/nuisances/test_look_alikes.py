@@ -9,7 +9,7 @@ import pytest
 
 from dynident import diagnose as find
 from dynident.diagnosis.nuisances.look_alikes import look_alike_notes
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
 from dynident.model import Model

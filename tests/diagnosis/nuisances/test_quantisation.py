@@ -9,7 +9,7 @@ import pytest
 
 from dynident import diagnose as find
 from dynident.diagnosis.nuisances.quantisation import mean_rounding, rounding_power
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.runs import gather

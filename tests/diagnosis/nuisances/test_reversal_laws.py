@@ -18,7 +18,7 @@ from dynident.diagnosis.nuisances.reversal_laws import (
 from dynident.diagnosis.search.ranking import rank
 from dynident.effects import effects_of
 from dynident.effects.friction.stribeck_friction import StribeckFriction
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence, signal_by_joint
 from dynident.evidence.runs import gather
 from dynident.model import Model

@@ -16,7 +16,7 @@ from dynident.diagnosis.nuisances.sticking import (
     without_sticking,
 )
 from dynident.effects import effects_of
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
 from dynident.fitting.sampling import sample

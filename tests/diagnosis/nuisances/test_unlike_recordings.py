@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from dynident.diagnosis.nuisances.unlike_recordings import unlike_notes
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
 from dynident.recording import Dataset, Recording

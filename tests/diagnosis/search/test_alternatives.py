@@ -8,7 +8,7 @@ import pytest
 from dynident.diagnosis.search.ranking import Ranking, rank
 from dynident.diagnosis.search.selection import AddedEffect, choose
 from dynident.effects import effects_of
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.runs import gather
 from dynident.model import Model

@@ -6,7 +6,7 @@ import pytest
 
 from dynident.criteria import DEFAULTS
 from dynident.diagnosis.search.refusal import follows_the_filter
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
 from dynident.model import Model

@@ -8,7 +8,7 @@ from dynident.diagnosis.search.path import responses_in_place
 from dynident.diagnosis.search.scoring import candidate_moments, score
 from dynident.diagnosis.search.selection import AddedEffect
 from dynident.effects import effects_of
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
 from dynident.model import Model

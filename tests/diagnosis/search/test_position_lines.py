@@ -7,7 +7,7 @@ import pytest
 
 from dynident.diagnosis.search.ranking import rank
 from dynident.diagnosis.search.shapes.position_lines import line_width, lines, shapes_tried
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
 from slides import at, gantry, recorded

@@ -11,7 +11,7 @@ from dynident.diagnosis.search.path import path_of
 from dynident.diagnosis.search.ranking import candidates, rank
 from dynident.diagnosis.search.selection import AddedEffect, choose, without_superfluous
 from dynident.effects import effects_of
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.runs import gather
 from dynident.model import Model

@@ -9,7 +9,7 @@ import pytest
 
 from dynident.diagnosis.search.ranking import best_first, rank
 from dynident.effects import effects_of
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
 from dynident.model import Model

@@ -14,7 +14,7 @@ from dynident.diagnosis.search.refusal import newly_impossible
 from dynident.diagnosis.search.scoring import Score, impossible
 from dynident.diagnosis.search.selection import breaks_its_promise
 from dynident.effects import effects_of
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.runs import gather
 from dynident.model import Model

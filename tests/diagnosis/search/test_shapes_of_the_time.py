@@ -14,7 +14,7 @@ from dynident.diagnosis.search import candidate_shapes
 from dynident.diagnosis.search.moment_objective import ScoreTrial
 from dynident.diagnosis.search.ranking import rank
 from dynident.diagnosis.search.shaped_fit import refitted
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
 from dynident.fitting.shape_search import ShapeProblem

@@ -39,7 +39,7 @@ from dynident.diagnosis.verdict import (
     within_noise,
 )
 from dynident.errors import FitError
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import HeldOut, on_recordings
 from dynident.evidence.maps import residual_maps

@@ -15,7 +15,7 @@ from dynident.diagnosis.search.payload_recordings import with_payload, with_payl
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.search.scoring import Score
 from dynident.errors import FitError
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 
 

@@ -16,7 +16,7 @@ from dynident.diagnosis.details import place
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.search.scoring import Score
 from dynident.effects import Effect
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut
 from dynident.tables import Table, number

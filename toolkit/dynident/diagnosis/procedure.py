@@ -67,7 +67,7 @@ from dynident.diagnosis.stage import AskedSwitches, DiagnosisTask, Propose, Stag
 from dynident.diagnosis.switches import switches_of
 from dynident.effects import Effect
 from dynident.errors import FitError
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.runs import gather

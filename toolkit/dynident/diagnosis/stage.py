@@ -11,7 +11,7 @@ from dynident.diagnosis.nuisances.contacts import Contacts
 from dynident.diagnosis.search.global_search import RankedModel
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.search.selection import AddedEffect
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.simulated_motion import SimulatedMotion
 from dynident.recording import Dataset

@@ -17,7 +17,7 @@ from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.search.path import Path, judged_on
 from dynident.effects import Effect
 from dynident.errors import FitError
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import HeldOut
 

@@ -13,7 +13,7 @@ from dynident.diagnosis.nuisances.look_alikes import look_alike_notes
 from dynident.diagnosis.nuisances.sticking import sticking_notes
 from dynident.diagnosis.nuisances.width_notes import friction_width_notes
 from dynident.diagnosis.search.ranking import Ranking
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut
 from dynident.fitting.estimate import nearly_hidden

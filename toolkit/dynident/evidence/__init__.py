@@ -4,7 +4,7 @@ In: a model or an estimate, recordings, and the criteria that judge them. Record
 in replicates that can be compared (`runs`): the repetitions of a period, copies with more of the
 stated noise, or the same motion simulated in its loop (`simulated_motion`).
 
-On the way: frozen `Evidence` (`columns`) is the model, the runs, and the columns of the model and
+On the way: frozen `Evidence` (`evidence`) is the model, the runs, and the columns of the model and
 of every candidate along them. Who carries the payload, which instants are left out or which
 motion is simulated is another evidence, made by `with_runs`. All that was made of one another
 share a `ColumnCache`, whose keys say everything that columns depend on: the effect with its

@@ -10,7 +10,7 @@ from dynident.arguments import checked
 from dynident.closed_loop import Controller
 from dynident.criteria import DEFAULTS, Criteria
 from dynident.errors import FitError
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.held_out import HeldOut, on_blocks, on_recordings
 from dynident.evidence.maps import residual_maps

@@ -10,8 +10,8 @@ from operator import add
 import numpy as np
 
 from dynident.criteria import Criteria
-from dynident.evidence.columns import Evidence
-from dynident.evidence.joint_columns import JointColumns, WhiteColumns
+from dynident.evidence.columns.joint_columns import JointColumns, WhiteColumns
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.joint_residual import JointResidual
 from dynident.evidence.model_columns import joint_columns
 from dynident.evidence.noise_model import NoiseModel, flat_noise

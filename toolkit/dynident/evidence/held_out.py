@@ -9,9 +9,9 @@ import numpy as np
 from scipy import special
 
 from dynident.criteria import NoiseCriteria
-from dynident.evidence.columns import Evidence
+from dynident.evidence.columns.joint_columns import JointColumns
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
-from dynident.evidence.joint_columns import JointColumns
 from dynident.evidence.model_columns import joint_columns
 from dynident.evidence.noise_model import differences, inflation, systematic_square
 from dynident.fitting.estimate import Estimate

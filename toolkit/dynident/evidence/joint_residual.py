@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynident.criteria import Criteria
-from dynident.evidence.columns import Evidence
-from dynident.evidence.joint_columns import JointColumns
+from dynident.evidence.columns.joint_columns import JointColumns
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.noise_model import (
     NoiseModel,
     SpeedClasses,

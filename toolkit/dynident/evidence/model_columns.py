@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from dynident.evidence.columns import Evidence
-from dynident.evidence.joint_columns import JointColumns
+from dynident.evidence.columns.joint_columns import JointColumns
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.runs import Signals
 from dynident.model import Model
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from dynident.criteria import DEFAULTS, NoiseCriteria
 from dynident.effects import Block
-from dynident.evidence.windows import shared_motion
+from dynident.evidence.columns.windows import shared_motion
 from dynident.fitting.sampling import Sampled, flagged, sample
 from dynident.model import Model
 from dynident.moments.replicates import Kind

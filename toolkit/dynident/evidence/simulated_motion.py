@@ -17,7 +17,7 @@ from dynident.closed_loop import Controller
 from dynident.criteria import DEFAULTS, Criteria
 from dynident.effects import Effect
 from dynident.errors import DynidentError
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.runs import Run, gather, resimulated
 from dynident.fitting.history import Ending

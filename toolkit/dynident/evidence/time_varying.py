@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dynident.effects import Effect
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.noise_model import NoiseModel
 from dynident.evidence.stacks import Stack
 from dynident.model import Model

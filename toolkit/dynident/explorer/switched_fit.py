@@ -12,7 +12,7 @@ import numpy as np
 from dynident.diagnosis.search.refusal import impossible_in
 from dynident.effects import Effect
 from dynident.evidence import ResidualMap
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.held_out import HeldOut, on_blocks, on_recordings
 from dynident.evidence.maps import residual_maps

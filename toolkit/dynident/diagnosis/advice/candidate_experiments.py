@@ -10,7 +10,7 @@ import numpy as np
 from dynident.closed_loop.trajectories import UNLIMITED, Fourier
 from dynident.criteria import DEFAULTS, Criteria
 from dynident.effects import Block, Effect
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.model import Model
 
 _EVERY = 5  # samples: rows that are compared

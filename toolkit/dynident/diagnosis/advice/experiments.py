@@ -14,7 +14,7 @@ from dynident.diagnosis.advice.candidate_experiments import (
 )
 from dynident.effects import Effect
 from dynident.errors import DynidentError
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.tables import percent
 

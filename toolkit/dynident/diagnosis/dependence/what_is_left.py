@@ -30,7 +30,7 @@ from dynident.diagnosis.nuisances.friction_width import at_best_widths
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.path import Path
 from dynident.diagnosis.search.payload_recordings import marked
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import HeldOut, on_blocks, on_recordings
 

@@ -9,7 +9,7 @@ from dynident.criteria import ContactCriteria
 from dynident.diagnosis.details import Candidate, Step
 from dynident.diagnosis.nuisances.pulse_search import DisturbancePulse, find_contacts, without
 from dynident.effects import Effect, catalogue
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.runs import Run

@@ -23,7 +23,7 @@ from dynident.criteria import DEFAULTS
 from dynident.diagnosis.search.ranking import rank
 from dynident.diagnosis.search.scoring import candidate_moments
 from dynident.effects import Block, Effect, JointEffect, Parameter, ShapeParameter, catalogue
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of
 from dynident.model import Model
 from dynident.moments.second_moments import SecondMoments

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from dynident.effects import Effect, catalogue
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of
 from dynident.robot import Robot
 from dynident.tables import listed

@@ -24,7 +24,7 @@ from dynident.diagnosis.nuisances.changes import (
     degrees_of_freedom,
     scanned,
 )
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, residuals
 from dynident.evidence.runs import Run
 

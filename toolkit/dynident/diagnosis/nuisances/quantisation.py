@@ -14,9 +14,9 @@ from scipy.special import ndtr
 
 from dynident.criteria import VerdictCriteria
 from dynident.diagnosis.verdict import within_noise
+from dynident.evidence.columns.windows import shared_motion
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut, HeldOutRun
-from dynident.evidence.windows import shared_motion
 from dynident.fitting.sampling import sample
 from dynident.recording import Dataset, Recording, resolution, uniform
 

@@ -20,7 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from dynident.criteria import StickingCriteria
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.runs import Run
 from dynident.fitting.sampling import Sampled

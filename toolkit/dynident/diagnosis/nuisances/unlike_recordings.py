@@ -17,7 +17,7 @@ from scipy.special import chdtri
 
 from dynident.criteria import VerdictCriteria
 from dynident.diagnosis.verdict import beyond_noise
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut, HeldOutRun, on_recordings, prediction_variance
 from dynident.evidence.model_columns import joint_columns

@@ -6,7 +6,7 @@ import numpy as np
 
 from dynident.diagnosis.nuisances.friction_width import WidthProfile
 from dynident.diagnosis.nuisances.sticking import left_out_at
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.formulas import quoted_joint
 from dynident.tables import number

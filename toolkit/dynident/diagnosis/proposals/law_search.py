@@ -18,7 +18,7 @@ from dynident.diagnosis.search.scoring import Score, candidate_moments, score
 from dynident.diagnosis.search.shaped_fit import refitted
 from dynident.diagnosis.verdict import within_noise
 from dynident.effects import Effect, LawEffect, law_effect
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of
 from dynident.evidence.held_out import HeldOut
 from dynident.fitting.uncertainty.shape_slopes import ShapeSlope

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from dynident.diagnosis.proposals.term_library import Factor, LibraryTerm
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.model_columns import model_columns
 from dynident.evidence.runs import Run

@@ -24,7 +24,7 @@ from dynident.diagnosis.search.scoring import (
     score,
 )
 from dynident.effects import Effect
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of
 
 

@@ -11,7 +11,7 @@ from dynident.diagnosis.search.moment_objective import MomentObjective
 from dynident.diagnosis.search.scoring import Columns, Score, candidate_moments, score
 from dynident.diagnosis.search.shapes.position_lines import line_width, lines
 from dynident.effects import Effect, ShapeParameter
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.runs import Signals
 from dynident.fitting.shape_search import Bracket, Simplex, TrustRegion, search

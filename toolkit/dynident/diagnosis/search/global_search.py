@@ -20,7 +20,7 @@ from dynident.diagnosis.search.ranking import Ranking, candidates, joints_below_
 from dynident.diagnosis.search.scoring import Score, candidate_moments, impossible, score
 from dynident.diagnosis.verdict import within_noise
 from dynident.effects import Effect
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, residuals
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.noise_model import systematic_square

@@ -24,7 +24,7 @@ from dynident.diagnosis.search.scoring import (
 )
 from dynident.diagnosis.search.shapes.position_lines import shapes_tried
 from dynident.effects import Block, Effect, Needs, Parameter, ShapeParameter
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.fitting.shape_search import ShapeProblem
 from dynident.robot import Robot

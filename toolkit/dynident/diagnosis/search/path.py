@@ -20,7 +20,7 @@ from dynident.diagnosis.details import Withdrawn
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.search.refusal import newly_impossible
 from dynident.diagnosis.search.selection import AddedEffect
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import HeldOut, on_blocks, on_recordings, with_noise_of
 from dynident.tables import two_percent

@@ -24,7 +24,7 @@ from dynident.diagnosis.search.scoring import (
     score,
 )
 from dynident.effects import Effect, catalogue
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, residuals
 from dynident.evidence.runs import Run, flagged_run
 from dynident.moments.second_moments import SecondMoments

@@ -19,7 +19,7 @@ from dynident.diagnosis.search.scoring import (
 )
 from dynident.diagnosis.search.shapes.position_lines import lines, shapes_tried
 from dynident.effects import Block, Effect, catalogue, law_effect
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, residuals
 from dynident.evidence.noise_model import differences, systematic_square
 from dynident.model import Model

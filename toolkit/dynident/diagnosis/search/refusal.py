@@ -16,7 +16,7 @@ from dynident.diagnosis.details import IMPOSSIBLE
 from dynident.diagnosis.search.payload_recordings import marked
 from dynident.effects import Block, Effect
 from dynident.errors import RecordingError
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, friction_reach
 from dynident.evidence.runs import gather
 from dynident.model import (

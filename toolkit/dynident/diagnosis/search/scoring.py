@@ -13,7 +13,7 @@ from scipy import special
 
 from dynident.diagnosis.search.cleared_columns import cleared
 from dynident.effects import Effect
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.runs import Signals
 from dynident.evidence.time_varying import (

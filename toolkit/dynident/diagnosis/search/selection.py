@@ -17,7 +17,7 @@ from dynident.diagnosis.search.alternatives import alternatives, as_likely
 from dynident.diagnosis.search.ranking import Ranking, rank
 from dynident.diagnosis.search.scoring import Score
 from dynident.effects import Effect
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import on_recordings
 from dynident.model import Model

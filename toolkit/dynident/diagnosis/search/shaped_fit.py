@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynident.diagnosis.search.candidate_shapes import best_shape, reshaped
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.fitting.uncertainty.shape_slopes import ShapeSlope
 from dynident.model import Model

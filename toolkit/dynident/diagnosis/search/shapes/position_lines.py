@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from dynident.effects import Effect
-from dynident.evidence.columns import Evidence
+from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.model_columns import joint_columns
 
