@@ -113,18 +113,14 @@ class Evidence:
         """Which of the base parameters load a joint, (u,)."""
         known, key = self.cache.rows_of(sampled), (self.model.robot, "loading", joint)
         if key not in known:
-            known[key] = self._motion.rigid(sampled).places[joint]
+            known[key] = self.motion.rigid(sampled).places[joint]
         return known[key]
-
-    def plain_parts(self, sampled: Sampled, model: Model, joint: int) -> tuple[np.ndarray, ...]:
-        """Columns of a model at a joint that follow from the motion; see `MotionColumns.parts`."""
-        return self._motion.parts(sampled, model, joint)
 
     # --- of runs --------------------------------------------------------------------------------
 
     def rigid(self, run: int) -> list[RigidColumns]:
         """Columns of the base parameters for each replicate."""
-        return [self._motion.rigid(sampled) for sampled in self.runs[run].replicates]
+        return [self.motion.rigid(sampled) for sampled in self.runs[run].replicates]
 
     def of(self, effect: Effect, run: int, model: Model, values: np.ndarray | None) -> Signals:
         """Columns of an effect at the joints where it acts in one run.
@@ -170,7 +166,7 @@ class Evidence:
             of, shapes = self._fitted.of, variants
             evaluated = [[of(one, each, model, values) for one in shapes] for each in every]
         else:
-            evaluated = self._motion.of(variants, every, model)
+            evaluated = self.motion.of(variants, every, model)
         of_replicates = iter(evaluated)
         return [
             [list(signals) for signals in zip(*islice(of_replicates, len(some)), strict=True)]
@@ -237,7 +233,8 @@ class Evidence:
         return every[-1:] if self.is_simulated and effect not in model else every
 
     @cached_property
-    def _motion(self) -> MotionColumns:
+    def motion(self) -> MotionColumns:
+        """Columns that follow from the motions alone."""
         last = frozenset(run.replicates[-1] for run in self.runs)
         return MotionColumns(
             model=self.model,
@@ -249,4 +246,4 @@ class Evidence:
 
     @cached_property
     def _fitted(self) -> FittedColumns:
-        return FittedColumns(self._motion)
+        return FittedColumns(self.motion)

@@ -56,7 +56,7 @@ def joint_columns(
             model.size + 1,
             places,
             (
-                *evidence.plain_parts(one, model, joint),
+                *evidence.motion.parts(one, model, joint),
                 *(each[r][:, at] for each, at in moved),
                 evidence.torque(one, joint),
             ),

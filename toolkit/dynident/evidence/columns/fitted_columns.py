@@ -33,13 +33,17 @@ class FittedColumns:
     motion: MotionColumns
 
     def of(self, effect: Effect, sampled: Sampled, model: Model, values: np.ndarray) -> np.ndarray:
-        """Columns of any effect at the joints where it acts, (T, J, k).
+        """Columns of any effect at the joints where it acts.
 
         Parameters
         ----------
         effect : of the model, or a candidate for it.
         sampled : the recording.
         model, values : (p,) whose torque and bodies some columns depend on.
+
+        Returns
+        -------
+        (T, J, k).
         """
         if not effect.depends_on_fit:
             return self.motion.of([effect], [sampled], model)[0][0]

@@ -16,7 +16,7 @@ from dynident.fitting.sampling import Sampled, decimate_each
 from dynident.model import Model
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class MotionColumns:
     """Columns along recordings that are the same whatever is fitted.
 
