@@ -105,3 +105,15 @@ class WiringCriteria(CriteriaGroup):
     period_left: float = criterion(
         0.1, "1", "difference of positions, over the motion, with which a motion repeats", over=0
     )
+    filter_ratio: float = criterion(
+        1.5,
+        "1",
+        "residual of a fit over that with the usual low-pass of positions above which [filter] is "
+        "named",
+        "measured: 1.7 to 10 where a filter makes up effects of healthy arms, at most 1.3 in the "
+        "problems and behind filters that do no harm",
+        over=1,
+    )
+    filter_error: float = criterion(
+        0.003, "1", "residual over torque from which that is said", over=0
+    )

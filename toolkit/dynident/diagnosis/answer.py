@@ -145,7 +145,8 @@ class Answer:
         """The verdict in plain words."""
         if self.wiring:
             faults = " ".join(fault.sentence for fault in self.wiring)
-            return f"The recordings are not what the study says, and nothing was sought. {faults}"
+            said = "The recordings and the study contradict each other, and nothing was sought."
+            return f"{said} {faults}"
         said = " ".join(
             [
                 *self.whose_position,

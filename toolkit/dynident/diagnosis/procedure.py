@@ -150,11 +150,13 @@ def diagnose(
     start = _compare(given, controller, criteria, task)
     extended = _extend(_rank(start, task), task)
     settled, path = _settle(_search_globally(start, extended, task), task)
-    found = _judge(settled, path, task).answered_by(faults)
+    found = _judge(settled, path, task)
+    if faults:
+        return found.answered_by(faults)
     # The data that judge a regression, or a law, show nothing of what only training leaves.
     left = found.verdict == "unexplained" and not found.training_only
     asked = left or propose == "always"
-    if asked and not faults:
+    if asked:
         progress("looking for what the residual depends on")
         found = with_dependence(found, settled.evidence, _decided(settled), path)
     found = replace(found, notes=(*found.notes, *alike_notes(found)))

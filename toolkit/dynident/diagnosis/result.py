@@ -24,14 +24,8 @@ class Diagnosis(Answer, Shown):
 
         Parameters
         ----------
-        faults : of the wiring, from `check_wiring`; where there are any, nothing was added.
-
-        Returns
-        -------
-        As it is where there are none.
+        faults : of the wiring, from `check_wiring`: nothing was added.
         """
-        if not faults:
-            return self
         return replace(
             self,
             wiring=faults,
@@ -40,6 +34,9 @@ class Diagnosis(Answer, Shown):
             steps=(),
             candidates=(),
             remaining=(),
+            notes=(),  # of residuals that the fault has made
+            following_motion=(),
+            training_only=(),
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -51,7 +51,7 @@ class Headline:
 def headline(diagnosis: Diagnosis) -> Headline:
     """Return the verdict of a diagnosis in short."""
     if diagnosis.wiring:
-        return Headline("!", "recordings to mend", "The recordings are not what the study says.")
+        return Headline("!", "study to mend", "The recordings and the study contradict each other.")
     if diagnosis.impossible:
         values = ", ".join(diagnosis.impossible[:2])
         more = len(diagnosis.impossible) - 2

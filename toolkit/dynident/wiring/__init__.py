@@ -17,7 +17,8 @@ seen. It is accepted where it wins by far (`hypothesis_search`, `gear_ratios`); 
 tells, the unit of all torques, is judged by the described bodies (`described_torque`).
 
 Of data: the same samples in training and test recordings, one source of two columns (`same_data`),
-a period after which the motion does not repeat (`stated_period`).
+a period after which the motion does not repeat (`stated_period`), a low-pass of the positions that
+takes away motion which the torque shows, or leaves their noise (`position_filter`).
 """
 
 from dynident.wiring.fault import Fault

@@ -22,6 +22,7 @@ FaultKind = Literal[
     "same_data",
     "one_source",
     "period",
+    "position_filter",
 ]
 
 

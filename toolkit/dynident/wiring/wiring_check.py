@@ -14,6 +14,7 @@ from dynident.wiring.fault import Fault, FaultKind
 from dynident.wiring.fault_words import IN_COLUMNS, column_lines, faults_of
 from dynident.wiring.gear_ratios import turns_too_far
 from dynident.wiring.hypothesis_search import SearchResult, search
+from dynident.wiring.position_filter import unsuitable_position_filter
 from dynident.wiring.same_data import shared_recordings, twice_recorded
 from dynident.wiring.stated_period import wrong_periods
 from dynident.wiring.wiring_regression import WiringRegression
@@ -64,7 +65,9 @@ def check_wiring(
     result = search(model, rows, criteria)
     named = faults_of(model, result, train.recordings[0])
     far = _out_of_range(model, rows, result, train, criteria)
-    return (*found, *named, *far)
+    faults = (*found, *named, *far)
+    # Where a column is not what it is called, no filter makes it so.
+    return faults or unsuitable_position_filter(model, train, criteria)
 
 
 def _weighs_as_described(model: Model, rows: WiringRows, result: SearchResult, joint: int) -> bool:
