@@ -45,3 +45,16 @@ def test_a_parameter_alone_stands_for_itself() -> None:
     model = Model(chain(1)) + "viscous_friction"
     alone = base_parameters(np.eye(model.size), model.names)
     assert model.stands_for(alone)[-1] == ""
+
+
+def test_what_no_torque_tells_makes_no_combination() -> None:
+    """As a right angle written with seven digits leaves it: a load used to be "not told apart"."""
+    rng = np.random.default_rng(1)
+    mass, rotor, inertia = rng.normal(size=(3, 500))
+    same = rotor + 1e-6 * mass
+    X = np.stack([mass, inertia + 0.3 * rotor, rotor, same], axis=1)
+    basis = base_parameters(X, ("mass", "inertia", "rotor", "same"), 3e-5)
+    assert basis.rank == 3
+    alone = np.count_nonzero(basis.told, axis=1) == 1
+    assert [basis.names[i] for i in np.array(basis.independent)[alone]] == ["mass", "inertia"]
+    np.testing.assert_allclose(basis.told, basis.combination, atol=2e-6)

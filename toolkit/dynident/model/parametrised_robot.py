@@ -206,13 +206,13 @@ class ParametrisedRobot:
         every = (*self.base.names, *self._effect_names)
         place = {name: k for k, name in enumerate(every)}
         told = np.zeros((len(basis.names), len(every)))
-        heads = dict(zip(self.names, self.base.combination, strict=False))
+        heads = dict(zip(self.names, self.base.told, strict=False))
         for row, name in enumerate(basis.names):
             if name in heads:
                 told[row, : len(self.base.names)] = heads[name]
             else:
                 told[row, place[name]] = 1.0
-        total, terms = basis.combination @ told, np.abs(basis.combination) @ np.abs(told)
+        total, terms = basis.told @ told, np.abs(basis.told) @ np.abs(told)
         total[np.abs(total) <= _CANCELLED * terms] = 0.0
         found = []
         for row, head in zip(total, basis.independent, strict=True):

@@ -107,6 +107,17 @@ class BaseParameters:
         B[:, list(self.dependent)] = self.K
         return B
 
+    @property
+    def told(self) -> Array:
+        """`combination` without what is too small to be told by any torque, (r, p).
+
+        Of a parameter that is identified on its own one row has a one, and nothing else.
+        """
+        B = self.combination
+        size = self.scale[list(self.independent)]
+        B[np.abs(B) * self.scale < RANK_TOLERANCE * size[:, None]] = 0.0
+        return B
+
     def coordinates(self, theta: ArrayLike) -> Array:
         """Return the base values (r,) of standard parameters (p,)."""
         theta = self._vector(theta, len(self.names), "theta")

@@ -127,5 +127,5 @@ def _told_apart(solution: GainSolution) -> np.ndarray:
     """Which linear parameters are identified on their own, (size,) bool."""
     basis = solution.basis
     alone = np.zeros(len(solution.values), dtype=bool)
-    alone[list(basis.independent)] = ~np.any(basis.K != 0.0, axis=1)
+    alone[list(basis.independent)] = np.count_nonzero(basis.told, axis=1) == 1
     return alone
