@@ -52,7 +52,7 @@ from dynident.diagnosis.search.payload_recordings import (
     with_payload,
     with_payload_decided,
 )
-from dynident.diagnosis.search.ranking import candidates, rank
+from dynident.diagnosis.search.ranking import candidates, rank, unresolved
 from dynident.diagnosis.search.refusal import follows_the_filter, narrower, newly_impossible
 from dynident.diagnosis.search.selection import (
     AddedEffect,
@@ -257,6 +257,7 @@ def _tried(stage: Stage, best: AddedEffect, task: DiagnosisTask) -> tuple[Stage,
         return added, why
     wider = _seen_anew(stage, added)
     why = newly_impossible(wider.evidence, stage.fitted, wider.fitted)
+    why = why or unresolved(wider.evidence, wider.fitted, best.score.effect.label)
     narrow = _behind_lower_filters(stage, wider.evidence)
     why = why or follows_the_filter(wider.evidence, narrow, wider.fitted, best.score.effect)
     return wider, why

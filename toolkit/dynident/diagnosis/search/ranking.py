@@ -281,9 +281,8 @@ def _refusal(one: Score, evidence: Evidence, fitted: EvidenceFit, tests: int, le
         return "explains less than its parameters cost"
     if one.share < least:
         return f"explains only {100 * one.share:.2g} % of the squared residual"
-    unresolved = one.effect.unresolved(one.values, _step(evidence))
-    if unresolved:
-        return unresolved
+    if why := one.effect.unresolved(one.values, _step(evidence)):
+        return why
     if one.gains is None:
         return "other effects explain more"
     assert one.losses is not None
@@ -314,6 +313,19 @@ def _like_noise(
         best = _confirm(free, fitted, best)
     why = _refusal(best, free, fitted, tests + len(tried), least)
     return f"along the simulated motion, which has no noise of positions: {why}" if why else ""
+
+
+def unresolved(evidence: Evidence, fitted: EvidenceFit, label: str) -> str:
+    """Return why the samples do not tell an effect with the values of a fit; empty if they do.
+
+    Parameters
+    ----------
+    evidence : the recordings.
+    fitted : the model with the effect.
+    label : of the effect.
+    """
+    (effect,) = (one for one in fitted.model.effects if one.label == label)
+    return effect.unresolved(fitted.values[fitted.model.slices[label]].tolist(), _step(evidence))
 
 
 def _step(evidence: Evidence) -> float:

@@ -63,6 +63,12 @@ class FlexibleJoint(Forceless):
         share = share_of_rotor(block, block.index(self.joint))
         return self if share is None else self.shaped(*self.shape[:2], share)
 
+    def unresolved(self, values: Sequence[float], step: float) -> str:
+        resonance, most = self.shape[0], 0.5 / step
+        if resonance <= most:
+            return ""
+        return f"resonates at {resonance:.3g} Hz, above the {most:.3g} Hz that the samples tell"
+
     def columns(self, block: Block) -> np.ndarray:
         return self._column(self._link(block))
 
