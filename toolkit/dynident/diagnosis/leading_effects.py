@@ -31,7 +31,11 @@ class LeadingEffects:
 
     @classmethod
     def of(cls, steps: Sequence[Step]) -> LeadingEffects:
-        """Divide the effects of a path: the largest falls first, until they make most of it."""
+        """Divide the effects of a path: the largest falls first, until they make most of it.
+
+        What makes no torque without one of these goes with it: the values of both are right only
+        together.
+        """
         groups = [tuple(group) for group in together(steps)]
         falls = [_fall(group) for group in groups]
         order = sorted(range(len(groups)), key=lambda k: -falls[k])
@@ -39,7 +43,10 @@ class LeadingEffects:
         while many < len(groups) and (many == 0 or carried < MOST_OF_IT * sum(falls)):
             carried += falls[order[many]]
             many += 1
-        first, last = sorted(order[:many]), sorted(order[many:])
+        led = {step.effect.label for k in order[:many] for step in groups[k]}
+        needing = [k for k in order[many:] if led & set(groups[k][0].effect.requires)]
+        first = sorted([*order[:many], *needing])
+        last = [k for k in range(len(groups)) if k not in first]
         return cls(leading=tuple(groups[k] for k in first), smaller=tuple(groups[k] for k in last))
 
     @property

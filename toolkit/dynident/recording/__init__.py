@@ -44,6 +44,7 @@ from dynident.recording.plausibility import (
     require_motion,
     require_torque,
     resolution,
+    warn_of_limited_torque,
     warn_of_missing_torque,
 )
 from dynident.recording.recording import SIGNALS, LeftOut, Provenance, Recording
@@ -110,6 +111,7 @@ __all__ = [
     "unwrapped_notes",
     "usable",
     "usable_rows",
+    "warn_of_limited_torque",
     "warn_of_missing_torque",
     "within",
     "within_limits",

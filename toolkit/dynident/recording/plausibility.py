@@ -13,6 +13,7 @@ import numpy as np
 from dynident.errors import DynidentWarning, RecordingError
 from dynident.recording.masks import within
 from dynident.recording.recording import Recording
+from dynident.tables import percent
 
 LONGEST_STEP = 0.25
 """s between samples beyond which the time stamps are rather milliseconds."""
@@ -24,6 +25,10 @@ HOTTEST = 200.0
 """Degrees Celsius of a motor beyond which its temperature is rather in kelvin."""
 LEAST_TRAVEL = {"revolute": 1e-3, "prismatic": 1e-4}
 """rad and m below which a joint, over all recordings, counts as standing still."""
+_AT_A_LIMIT = 0.005
+"""Share of samples at one and the same torque from which that is a limit."""
+_OFTEN = 4.0
+"""Times as many samples as at the next value that are at a limit."""
 _WHOLE = 0.05
 """Steps by which a position may miss a whole number of them."""
 
@@ -114,6 +119,56 @@ def warn_of_missing_torque(recordings: Sequence[Recording]) -> None:
     if missing:
         what = f"{recordings[0].where}: the torque of {', '.join(missing)} is zero throughout"
         warnings.warn(f"{what}. Is it the right column?", DynidentWarning, stacklevel=3)
+
+
+def warn_of_limited_torque(recordings: Sequence[Recording]) -> None:
+    """Warn of torques that end at a value at which they stay while the joint moves.
+
+    A drive that gives no more than its limit is recorded rightly; a log that holds no more is not,
+    and no model predicts it.
+
+    Warns
+    -----
+    DynidentWarning
+        Naming the joints, the values and the largest share of samples at them.
+    """
+    found: dict[str, tuple[float, float]] = {}
+    for sign in (1.0, -1.0):
+        ends = np.max([np.max(sign * one.tau, axis=0) for one in recordings], axis=0)
+        for joint, name in enumerate(recordings[0].joints):
+            share = _share_at(recordings, joint, sign, float(ends[joint]))
+            if share > max(_AT_A_LIMIT, found.get(name, (0.0, 0.0))[1]):
+                found[name] = sign * float(ends[joint]), share
+    for name, (value, share) in found.items():
+        what = (
+            f"{recordings[0].where}: tau.{name} is {value:.4g} in {percent(share)} of the samples, "
+            "over all recordings, and never beyond, while the joint moves: is that the limit of "
+            "the drive, or of the log? What a log cuts off no model predicts: if so, record within "
+            "its range, or leave these times out by a window"
+        )
+        warnings.warn(what, DynidentWarning, stacklevel=3)
+
+
+def _share_at(recordings: Sequence[Recording], joint: int, sign: float, end: float) -> float:
+    """Share of samples at a value where the torque stays, moving; zero if it only passes there."""
+    if end <= 0.0:
+        return 0.0  # nothing is cut off at no torque
+    at = staying = below = samples = 0
+    second = max(
+        float(np.max(x[x < end], initial=-np.inf)) for x in _signed(recordings, joint, sign)
+    )
+    for one, tau in zip(recordings, _signed(recordings, joint, sign), strict=True):
+        here, moves = tau == end, np.diff(one.q[:, joint], prepend=np.nan) != 0.0
+        at += int(np.count_nonzero(here))
+        staying += int(np.count_nonzero(here & moves & np.roll(here, 1)))
+        below += int(np.count_nonzero(tau == second))
+        samples += len(tau)
+    # Of a torque in coarse steps the last one is seldom reached more often than the one before.
+    return at / samples if staying > 0.5 * at and at > _OFTEN * below else 0.0
+
+
+def _signed(recordings: Sequence[Recording], joint: int, sign: float) -> list[np.ndarray]:
+    return [sign * one.tau[:, joint] for one in recordings]
 
 
 def require_motion(recordings: Sequence[Recording], kinds: Sequence[str]) -> None:

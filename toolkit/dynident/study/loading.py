@@ -26,6 +26,7 @@ from dynident.recording import (
     Noise,
     require_motion,
     require_torque,
+    warn_of_limited_torque,
     warn_of_missing_torque,
 )
 from dynident.robot import Robot
@@ -145,6 +146,7 @@ def load(path: str | Path, *, modules: Permission = "trusted") -> Study:
     for dataset in sets.values():
         require_torque(dataset.recordings)
     warn_of_missing_torque(recordings)
+    warn_of_limited_torque(recordings)
     require_motion(sets["train"].recordings, robot.kinds)
     controller = None
     if said.controller:
