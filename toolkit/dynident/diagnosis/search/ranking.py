@@ -118,7 +118,7 @@ def rank(
         progress(effect.label)
         tried = list(_score_variants(evidence, fitted, effect))
         tests += max(len(tried), shapes_tried(evidence, effect))
-        best.append(max(tried, key=lambda s: s.penalised))
+        best.append(_best_of(tried, evidence, fitted))
     alike = _ALIKE * fitted.error_total
     order = best_first([one.penalised for one in best], alike)
     for i in order[: len(only) or criteria.search.contenders]:
@@ -196,6 +196,31 @@ def _score_variants(evidence: Evidence, fitted: EvidenceFit, effect: Effect) -> 
     found = candidate_moments(evidence, fitted, shapes, evidence.first_look)
     for shaped, parts in zip(shapes, found, strict=True):
         yield _possible(score(fitted, shaped, *parts, grid=count), evidence, fitted)
+
+
+def _best_of(tried: list[Score], evidence: Evidence, fitted: EvidenceFit) -> Score:
+    """The score of the best shape; of a change in time, of those that a fit finds best.
+
+    With instruments of another time, what a slow change takes away need not grow with how well it
+    fits: beside friction that is its own opposite it may take away the most. A fit of the whole
+    tells.
+    """
+    best = max(tried, key=lambda s: s.penalised)
+    if not best.effect.time_varying or not best.penalised > 0:
+        return best
+    ends = [-np.inf, *(one.penalised for one in tried), -np.inf]
+    tops = [
+        one
+        for before, one, after in zip(ends, tried, ends[2:], strict=False)
+        if one.penalised > max(0.0, before, after)
+    ]
+    if len(tops) < 2:
+        return best
+
+    def misfit(one: Score) -> float:
+        return fit_evidence(evidence, fitted.model + one.effect, fitted).misfit(fitted)
+
+    return min(tops, key=misfit)
 
 
 def _possible(one: Score, evidence: Evidence, fitted: EvidenceFit) -> Score:
