@@ -114,6 +114,19 @@ def test_a_tilted_base_shows_where_the_description_is_wrong_about_the_first_link
     assert not any("is hardly one" in note for note in said.notes)
 
 
+@pytest.mark.parametrize(("per_turn", "said"), [(2.0, True), (12.0, False)])
+def test_a_ripple_of_few_waves_may_be_any_curve_over_the_position(
+    per_turn: float, said: bool
+) -> None:
+    given = Model(arm()) + "viscous_friction"
+    run = synthetic(given, true_values(given), 1, rate_hz=250.0, torque_std=0.05)
+    evidence = Evidence(given, gather(Dataset((run,))))
+    wider = given + "torque_ripple@elbow"
+    wider = wider.with_shapes((wider.effects[-1].shaped(per_turn),))
+    notes = look_alike_notes(evidence, fit_evidence(evidence, wider))
+    assert any("elbow travels through" in x and "a balancer" in x for x in notes) == said
+
+
 @pytest.mark.parametrize(("distance", "said"), [(0.1, False), (0.9, True)])
 def test_an_unbalance_that_no_link_can_have_is_said_to_be_hardly_one(
     distance: float, said: bool

@@ -16,6 +16,8 @@ from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_
 from dynident.robot import Robot
 from dynident.tables import listed
 
+_FEW_WAVES = 1.5
+"""Waves of a ripple over a joint's travel below which any smooth curve looks like it."""
 _ARM = 0.5
 """m, by which a link's centre of mass may lie beside its axis; a description is no measure."""
 
@@ -36,6 +38,7 @@ def look_alike_notes(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]
     return (
         *_constants(added, fitted),
         *_offsets_instead(added, evidence, fitted),
+        *_slow_waves(added, evidence),
         *_hardly_weights(added, evidence, fitted),
         *_other_ends(fitted.model.robot),
     )
@@ -68,6 +71,23 @@ def _offsets_instead(added: list[Effect], evidence: Evidence, fitted: EvidenceFi
             yield (
                 f"Torque offsets at {listed(joints)} together fit these recordings as well as "
                 f"{effect.title}."
+            )
+
+
+def _slow_waves(added: list[Effect], evidence: Evidence) -> Iterator[str]:
+    """Ripples of which a joint travels through so few that they are a curve over its position."""
+    names = evidence.model.robot.names
+    for effect in added:
+        if effect.name != "torque_ripple":
+            continue
+        joint = names.index(str(effect.joint))
+        q = np.concatenate([run.replicates[0].q[:, joint] for run in evidence.runs])
+        waves = effect.shape[0] * float(np.ptp(q)) / (2.0 * np.pi)
+        if waves < _FEW_WAVES:
+            yield (
+                f"{effect.joint} travels through {waves:.2g} waves of what is called "
+                f"{effect.title}: of so few, any smooth curve over the position makes the same, as "
+                "a balancer, a spring that is not linear, or a cable."
             )
 
 
