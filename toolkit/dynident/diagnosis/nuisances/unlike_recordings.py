@@ -91,9 +91,11 @@ def training_notes(
     for j in (int(place) for place in np.flatnonzero(there)):
         run = max(trained.runs, key=lambda one: float(np.max(np.abs(_judged_rows(one, j)))))
         t = float(run.t[np.argmax(np.abs(_judged_rows(run, j)))])
+        doubt = ", no more than parameters fitted to these make" if after.ratio[j] > 1.0 else ""
         found.append(
-            f"{names[j]} ({trained.ratio[j]:.2g} times the noise, {after.ratio[j]:.2g} in "
-            f"the test recordings; largest in {run.name} at t = {t:.4g} s)"
+            f"{names[j]} ({trained.ratio[j]:.3g} times the noise, "
+            f"{after.ratio[j]:.3g} in the test recordings{doubt}; largest in {run.name} at "
+            f"t = {t:.4g} s)"
         )
     return (
         f"The training recordings show what the test recordings do not, at {', '.join(found)}: the "
