@@ -21,7 +21,11 @@ def broken(array, row, column, value):
         ({"t": T[:, None]}, r"t has the shape \(5, 1\)"),
         ({"t": T[:1], "q": Q[:1], "tau": Q[:1]}, "holds 1 sample;|holds 1 sample"),
         ({"t": []}, "holds 0 samples"),
-        ({"t": [0, 0.1, 0.1, 0.3, 0.4]}, r"row 3, column t: the time stamp 0.1 s is there twice"),
+        (
+            {"t": [0, 0.1, 0.1, 0.3, 0.4]},
+            r"row 3, column t: the time stamp 0.1 s is there twice. drop one",
+        ),
+        ({"t": [0, 0.1, 0.1, 0.2, 0.2]}, r"there twice \(2 such rows\). log it with more digits"),
         ({"t": [0, 0.2, 0.1, 0.3, 0.4]}, r"row 3, column t: time goes back from 0.2 to 0.1 s"),
         ({"t": [0, 0.1, np.nan, 0.3, 0.4]}, "row 3, column t: nan is not a finite number"),
         ({"q": Q[:4]}, r"q has the shape \(4, 2\) where 5 time stamps and 2 joints"),

@@ -23,6 +23,7 @@ TEXTS = (".csv", ".txt", ".dat", ".tsv")
 LARGEST = 1e30
 """Magnitude beyond which a number can be no measurement, and powers of it overflow."""
 _AT_ONCE = 1 << 18  # time stamps that are looked at
+_ROUNDED = 0.2  # share of time stamps that are there twice from which they are rounded
 SIGNALS = ("q", "tau", "v", "a", "q_ref", "temperature")
 """What a sample holds at each joint."""
 
@@ -334,6 +335,8 @@ class Recording:
         before, here = float(self.t[row - 1]), float(self.t[row])
         if before == here:
             what, remedy = f"the time stamp {here!r} s is there twice", "drop one of the two rows"
+            if len(late) > _ROUNDED * len(self.t):
+                remedy = "log it with more digits: it is rounded to more than a sample"
         else:
             what, remedy = f"time goes back from {before!r} to {here!r} s", "sort the rows by time"
         more = f" ({len(late)} such rows)" if len(late) > 1 else ""
