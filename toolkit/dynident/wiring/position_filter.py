@@ -55,7 +55,11 @@ def unsuitable_position_filter(
         return ()
     usual = replace(stated, position_cutoff_hz=usual_hz)
     try:
-        left, least = (_unexplained(_usual_model(model), dataset, one) for one in (stated, usual))
+        whole = _usual_model(model)
+        left, least = (
+            _unexplained(whole, replace(dataset, filter=one), criteria.rows)
+            for one in (stated, usual)
+        )
     except RecordingError:
         return ()  # too little is left behind one of them: whoever fits says so
     worse = (left > criteria.filter_ratio * least) & (left > criteria.filter_error)
@@ -101,9 +105,9 @@ def _usual_model(model: Model) -> Model:
     return found
 
 
-def _unexplained(model: Model, dataset: Dataset, filter: Filter) -> np.ndarray:
-    """What the best fit leaves of each joint's torque, (n,) relative."""
-    columns, torque = (np.concatenate(x) for x in zip(*_rows(model, dataset, filter), strict=True))
+def _unexplained(model: Model, dataset: Dataset, most: int) -> np.ndarray:
+    """What the best fit to so many rows leaves of each joint's torque, (n,) relative."""
+    columns, torque = (np.concatenate(x) for x in zip(*_rows(model, dataset, most), strict=True))
     power = np.mean(torque**2, axis=0)
     weight, moves = np.sqrt(power), power > 0
     left = np.zeros(len(power))
@@ -118,20 +122,21 @@ def _unexplained(model: Model, dataset: Dataset, filter: Filter) -> np.ndarray:
     return np.where(moves, left / np.sqrt(np.where(moves, power, 1.0)), 0.0)
 
 
-def _rows(
-    model: Model, dataset: Dataset, filter: Filter
-) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield columns (T, n, p) and torques (T, n) of rows, of as many recordings as suffice."""
-    seconds = 0.0
+def _rows(model: Model, dataset: Dataset, most: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yield columns (T, n, p) and torques (T, n) of about so many rows, evenly in time."""
+    every, seconds = [], 0.0
     for recording in dataset.recordings:
+        if recording.window is None and recording.duration > _SECONDS:
+            first = float(recording.t[0])
+            recording = recording.replace(window=(first, first + _SECONDS))
         with warnings.catch_warnings():
             # Whoever fits the recording is the one to warn of its clock.
             warnings.simplefilter("ignore", DynidentWarning)
-            one = sample(recording.replace(period=None), filter)
-        # As many rows a second as are independent behind the usual filter, not one at each sample.
-        step = max(1, int(one.rate_hz / 50.0))
+            every.append(sample(recording.replace(period=None), dataset.filter))
+        seconds += every[-1].count / every[-1].rate_hz
+        if seconds >= _SECONDS:
+            break
+    for one in every:
+        step = max(1, int(one.rate_hz * seconds / most))
         for columns, torque in one.rows(model):
             yield np.array(columns[::step]), np.array(torque[::step])
-        seconds += recording.duration
-        if seconds > _SECONDS:
-            return
