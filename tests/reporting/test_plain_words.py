@@ -54,6 +54,15 @@ def test_what_to_do_names_commands_and_the_experiment_that_separates(found):
     assert "cannot show" in not_identifiable.what
 
 
+def test_what_may_be_chance_is_asked_of_another_recording_before_it_is_added(found):
+    (step,) = found.steps
+    doubtful = replace(step, fall_standard_error=0.6 * step.fall)
+    first = next_steps(replace(found, steps=(doubtful,)))[0]
+    assert first.what.startswith("Before you add stribeck friction at elbow, hold out another")
+    assert "may be chance" in first.why
+    assert first.commands == ("dynident compare STUDY --with stribeck_friction@elbow",)
+
+
 @pytest.mark.parametrize("fall", [0.0005, -0.0005])
 def test_what_a_study_cannot_take_up_or_what_brings_nothing_is_no_command(found, fall):
     (step,) = found.steps

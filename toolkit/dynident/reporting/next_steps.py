@@ -170,7 +170,11 @@ def _to_add(diagnosis: Diagnosis) -> list[Advice]:
     if unclear and error.before - error.after < _LITTLE * error.before:
         why += " Most of the error stays."
     if all(step.uncertain for group in first for step in group):
-        why += " It is within two standard errors, and may be chance: another recording tells."
+        asked = " ".join(f"--with {shlex.quote(label)}" for label in labels)
+        it = "them" if labels[1:] else "it"
+        what = f"Before you add {names}, hold out another recording, and see if the error falls."
+        why += f" The fall with {it} is within two standard errors, and may be chance."
+        return [Advice(what, why, (f"dynident compare STUDY {asked}",))]
     commands = (f"dynident add STUDY {shlex.join(labels)}", "dynident fit STUDY")
     return [Advice(f"Add {names} to the model, and fit it.", why, commands)]
 
