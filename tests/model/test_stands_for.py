@@ -53,8 +53,16 @@ def test_what_no_torque_tells_makes_no_combination() -> None:
     mass, rotor, inertia = rng.normal(size=(3, 500))
     same = rotor + 1e-6 * mass
     X = np.stack([mass, inertia + 0.3 * rotor, rotor, same], axis=1)
+    X = X * [2.0, 30.0, 0.1, 0.1]  # columns of unlike sizes, as parameters have
     basis = base_parameters(X, ("mass", "inertia", "rotor", "same"), 3e-5)
     assert basis.rank == 3
     alone = np.count_nonzero(basis.told, axis=1) == 1
     assert [basis.names[i] for i in np.array(basis.independent)[alone]] == ["mass", "inertia"]
-    np.testing.assert_allclose(basis.told, basis.combination, atol=2e-6)
+    np.testing.assert_allclose(basis.told, basis.combination, atol=1e-6)
+
+
+def test_a_small_share_that_is_the_whole_of_a_parameter_is_told() -> None:
+    """A mass behind an offset of 4 mm makes little torque, and is part of the moment."""
+    moment = np.random.default_rng(2).normal(size=500)
+    basis = base_parameters(np.stack([moment, 0.004 * moment], axis=1), ("mx", "mass"), 3e-5)
+    np.testing.assert_allclose(basis.told, [[1.0, 0.004]])

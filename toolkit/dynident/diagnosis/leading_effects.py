@@ -33,8 +33,8 @@ class LeadingEffects:
     def of(cls, steps: Sequence[Step]) -> LeadingEffects:
         """Divide the effects of a path: the largest falls first, until they make most of it.
 
-        What makes no torque without one of these goes with it: the values of both are right only
-        together.
+        What makes no torque without one of these goes with it, and what one of these requires:
+        the values of both are right only together.
         """
         groups = [tuple(group) for group in together(steps)]
         falls = [_fall(group) for group in groups]
@@ -43,9 +43,16 @@ class LeadingEffects:
         while many < len(groups) and (many == 0 or carried < MOST_OF_IT * sum(falls)):
             carried += falls[order[many]]
             many += 1
-        led = {step.effect.label for k in order[:many] for step in groups[k]}
-        needing = [k for k in order[many:] if led & set(groups[k][0].effect.requires)]
-        first = sorted([*order[:many], *needing])
+        led = [step.effect for k in order[:many] for step in groups[k]]
+        needed = {label for effect in led for label in effect.requires}
+        needing = {effect.label for effect in led}
+        with_them = [
+            k
+            for k in order[many:]
+            if needed & {step.effect.label for step in groups[k]}
+            or needing & set(groups[k][0].effect.requires)
+        ]
+        first = sorted([*order[:many], *with_them])
         last = [k for k in range(len(groups)) if k not in first]
         return cls(leading=tuple(groups[k] for k in first), smaller=tuple(groups[k] for k in last))
 

@@ -134,7 +134,8 @@ def warn_of_limited_torque(recordings: Sequence[Recording]) -> None:
     """
     found: dict[str, tuple[float, float]] = {}
     for sign in (1.0, -1.0):
-        ends = np.max([np.max(sign * one.tau, axis=0) for one in recordings], axis=0)
+        furthest = np.max if sign > 0 else np.min
+        ends = sign * furthest([furthest(one.tau, axis=0) for one in recordings], axis=0)
         for joint, name in enumerate(recordings[0].joints):
             share = _share_at(recordings, joint, sign, float(ends[joint]))
             if share > max(_AT_A_LIMIT, found.get(name, (0.0, 0.0))[1]):
@@ -143,8 +144,8 @@ def warn_of_limited_torque(recordings: Sequence[Recording]) -> None:
         what = (
             f"{recordings[0].where}: tau.{name} is {value:.4g} in {percent(share)} of the samples, "
             "over all recordings, and never beyond, while the joint moves: is that the limit of "
-            "the drive, or of the log? What a log cuts off no model predicts: if so, record within "
-            "its range, or leave these times out by a window"
+            "the drive, or of the log, or a steady motion? What a log cuts off no model predicts: "
+            "if so, record within its range, or leave these times out by a window"
         )
         warnings.warn(what, DynidentWarning, stacklevel=3)
 

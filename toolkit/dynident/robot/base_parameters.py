@@ -115,7 +115,8 @@ class BaseParameters:
         """
         B = self.combination
         size = self.scale[list(self.independent)]
-        B[np.abs(B) * self.scale < RANK_TOLERANCE * size[:, None]] = 0.0
+        # In units of the columns' norms: the part of a parameter's torque that the row's makes.
+        B[np.abs(B) * size[:, None] < RANK_TOLERANCE * self.scale] = 0.0
         return B
 
     def coordinates(self, theta: ArrayLike) -> Array:

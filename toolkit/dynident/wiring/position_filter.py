@@ -32,7 +32,7 @@ _RANK = 1e-8
 
 
 def unsuitable_position_filter(
-    model: Model, dataset: Dataset, criteria: WiringCriteria
+    model: Model, dataset: Dataset, rate_hz: float, criteria: WiringCriteria
 ) -> tuple[Fault, ...]:
     """Compare the positions' low-pass with the usual one, on the torque as it is filtered.
 
@@ -40,6 +40,7 @@ def unsuitable_position_filter(
     ----------
     model : whose effects that follow from a sample alone are fitted, with usual ones beside them.
     dataset : the recordings.
+    rate_hz : of the slowest recording of the study, which the usual low-pass has to suit.
     criteria : by how much another filter must do better.
 
     Returns
@@ -49,7 +50,6 @@ def unsuitable_position_filter(
     stated = dataset.filter
     if stated is None:
         return ()
-    rate_hz = min(one.rate_hz for one in dataset.recordings)
     usual_hz = default_position_cutoff(rate_hz, stated.cutoff_hz)
     if stated.position_cutoff_hz == usual_hz:
         return ()
@@ -66,7 +66,8 @@ def unsuitable_position_filter(
     if not worse.any():
         return ()
     names = [name for name, is_worse in zip(model.robot.names, worse, strict=True) if is_worse]
-    worst = int(np.argmax(np.where(worse, left / least, 0.0)))
+    times = np.divide(left, least, out=np.full_like(left, np.inf), where=least > 0)
+    worst = int(np.argmax(np.where(worse, times, 0.0)))
     now = "unfiltered" if stated.position_cutoff_hz is None else "low-passed at "
     if stated.position_cutoff_hz is not None:
         now += f"{stated.position_cutoff_hz:g} Hz"

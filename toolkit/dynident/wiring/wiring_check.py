@@ -38,7 +38,7 @@ def check_wiring(
 
     Parameters
     ----------
-    model : of which the robot counts; which effects it names does not.
+    model : of which the robot counts, and for the filter what its effects say of an instant.
     train : recordings to fit.
     test : recordings to judge by, which must be others.
     criteria : by how much another assignment must win.
@@ -67,7 +67,8 @@ def check_wiring(
     far = _out_of_range(model, rows, result, train, criteria)
     faults = (*found, *named, *far)
     # Where a column is not what it is called, no filter makes it so.
-    return faults or unsuitable_position_filter(model, train, criteria)
+    slowest = min(one.rate_hz for one in every.recordings)
+    return faults or unsuitable_position_filter(model, train, slowest, criteria)
 
 
 def _weighs_as_described(model: Model, rows: WiringRows, result: SearchResult, joint: int) -> bool:

@@ -95,17 +95,26 @@ def _hardly_weights(added: list[Effect], evidence: Evidence, fitted: EvidenceFit
     """Unbalances beside a tilted base that are more than the weight of their link can make."""
     model, robot = fitted.model, fitted.model.robot
     for effect in added:
-        if effect.name != "unbalance":
+        if effect.name != "unbalance" or "base_tilt" not in model.slices:
             continue
         tilt = float(np.linalg.norm(fitted.values[model.slices["base_tilt"]]))
-        at = robot.names.index(str(effect.joint))
-        weight = robot.theta[10 * at] * float(np.linalg.norm(robot.gravity))
-        if _largest(effect, evidence, fitted) > weight * tilt * _ARM:
+        mass = _carried(robot, robot.names.index(str(effect.joint)))
+        weight = mass * float(np.linalg.norm(robot.gravity))
+        if 0.0 < weight * tilt * _ARM < _largest(effect, evidence, fitted):
             yield (
-                f"{effect.title} is hardly one: the weight of {robot.bodies[at]} would have to act "
-                f"more than {_ARM:g} m beside the axis. A ripple of one cycle per revolution makes "
-                "the same torque."
+                f"{effect.title} is hardly one: the weight of all that {effect.joint} turns would "
+                f"have to act more than {_ARM:g} m farther beside the axis than described. A "
+                "ripple of one cycle per revolution makes the same torque."
             )
+
+
+def _carried(robot: Robot, joint: int) -> float:
+    """Mass of a joint's link and of all that it carries, as described, kg."""
+    moved = {joint}
+    for number, one in enumerate(robot.joints):  # a parent comes before what it carries
+        if one.parent in moved:
+            moved.add(number)
+    return float(sum(robot.theta[10 * one] for one in moved))
 
 
 def _largest(effect: Effect, evidence: Evidence, fitted: EvidenceFit) -> float:

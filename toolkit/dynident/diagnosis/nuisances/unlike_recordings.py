@@ -91,7 +91,11 @@ def training_notes(
     for j in (int(place) for place in np.flatnonzero(there)):
         run = max(trained.runs, key=lambda one: float(np.max(np.abs(_judged_rows(one, j)))))
         t = float(run.t[np.argmax(np.abs(_judged_rows(run, j)))])
-        doubt = ", no more than parameters fitted to these make" if after.ratio[j] > 1.0 else ""
+        doubt = ""
+        if after.least_ratio is not None and after.ratio[j] > criteria.most_left:
+            doubt = ", no more than rounding and the processing leave"
+            if after.least_ratio[j] <= criteria.most_left:
+                doubt = ", no more than the errors of parameters fitted to training make"
         found.append(
             f"{names[j]} ({trained.ratio[j]:.3g} times the noise, "
             f"{after.ratio[j]:.3g} in the test recordings{doubt}; largest in {run.name} at "

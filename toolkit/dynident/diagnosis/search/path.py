@@ -14,7 +14,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import groupby, pairwise
+from operator import sub
 
 from dynident.diagnosis.details import Withdrawn
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
@@ -103,6 +105,7 @@ def path_of(
         one = found[wrong]
         label = one.score.effect.label
         others = (*found[:wrong], *found[wrong + 1 :])
+        left = tuple(o for o in others if label not in o.score.effect.requires)
         if wrong < len(found) - 1 and label not in late:
             late.add(label)
             found = (*others, one)
@@ -110,11 +113,16 @@ def path_of(
         progress(f"withdrawing {label}")
         alike = () if impossible[wrong] else one.alternatives_to(fitted.model)
         taken_back = Withdrawn(effect=one.score.effect, why=reasons[wrong], with_it=alike)
-        withdrawn = (*withdrawn, taken_back)
-        found = others
+        why = f"makes no torque without {label}"
+        with_it = (Withdrawn(effect=o.score.effect, why=why) for o in others if o not in left)
+        withdrawn = (*withdrawn, taken_back, *with_it)
+        found = left
         known = {(): known[()]}
-        effect = next(e for e in fitted.model.effects if e.label == label)
-        rest = fit_evidence(evidence, fitted.model - effect, fitted) if found else start
+        rest = start
+        if found:
+            kept = {*(o.score.effect.label for o in found), *(e.label for e in start.model.effects)}
+            gone = [e for e in fitted.model.effects if e.label not in kept]
+            rest = fit_evidence(evidence, reduce(sub, gone, fitted.model), fitted)
         fitted = with_friction_width(evidence, rest) if found else start
 
 

@@ -206,13 +206,15 @@ def _best_of(tried: list[Score], evidence: Evidence, fitted: EvidenceFit) -> Sco
     tells.
     """
     best = max(tried, key=lambda s: s.penalised)
-    if not best.effect.time_varying or not best.penalised > 0:
+    effect = best.effect
+    if not effect.time_varying or len(effect.shape) != 1 or not best.penalised > 0:
         return best
-    ends = [-np.inf, *(one.penalised for one in tried), -np.inf]
+    along = sorted(tried, key=lambda s: s.effect.shape)
+    ends = [-np.inf, *(one.penalised for one in along), -np.inf]
     tops = [
         one
-        for before, one, after in zip(ends, tried, ends[2:], strict=False)
-        if one.penalised > max(0.0, before, after)
+        for before, one, after in zip(ends, along, ends[2:], strict=False)
+        if one is best or one.penalised > max(0.0, before, after)
     ]
     if len(tops) < 2:
         return best

@@ -234,6 +234,9 @@ def _helps(held: Evidence | None, without: EvidenceFit, fitted: EvidenceFit) -> 
 
 
 def _belongs(effect: Effect, found: list[AddedEffect]) -> bool:
-    """Whether an effect is part of another one: without it the other would bring it back."""
+    """Whether an effect is part of another one, which would bring it back, or required by one."""
     others = (one.score.effect for one in found)
-    return any(effect.name in o.contains and effect.joint == o.joint for o in others)
+    return any(
+        effect.label in o.requires or (effect.name in o.contains and effect.joint == o.joint)
+        for o in others
+    )
