@@ -74,6 +74,15 @@ def test_no_effect_is_called_small_that_is_needed_for_most_of_the_fall() -> None
     assert carried >= MOST_OF_IT * 0.1 and [len(found.leading), len(found.smaller)] == [1, 2]
 
 
+@pytest.mark.parametrize("falls", [(9.0, 0.1, 0.1), (0.1, 9.0, 0.1)])
+def test_what_requires_another_effect_leads_with_it(falls: tuple[float, float, float]) -> None:
+    steps = along(falls).steps
+    pair = effect("base_tilt"), effect("unbalance", "elbow")
+    steps = (*(replace(s, effect=e) for s, e in zip(steps, pair, strict=False)), steps[2])
+    leading = [step.effect.label for group in LeadingEffects.of(steps).leading for step in group]
+    assert leading == ["base_tilt", "unbalance@elbow"]
+
+
 def test_what_cannot_be_told_apart_is_named_together_in_either_part() -> None:
     found = along((6.0, 0.1))
     twins = (effect("asymmetric_friction", "elbow"),)

@@ -9,6 +9,8 @@ import pytest
 
 from dynident import diagnose as find
 from dynident.diagnosis.nuisances.look_alikes import look_alike_notes
+from dynident.diagnosis.search.scoring import Score
+from dynident.diagnosis.search.selection import AddedEffect, without_superfluous
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
@@ -137,6 +139,20 @@ def test_an_unbalance_that_no_link_can_have_is_said_to_be_hardly_one(
     fitted = fit_evidence(evidence, evidence.model + "base_tilt" + "unbalance@waist")
     notes = look_alike_notes(evidence, fitted)
     assert any("unbalance at waist is hardly one: the weight of all" in x for x in notes) == said
+
+
+def test_a_tilt_stays_while_what_it_makes_felt_is_there() -> None:
+    """And an unbalance without one, as a study may have it, is no matter."""
+    evidence = Evidence(Model(Robot.from_text(WAIST)), gather(Dataset(tuple(on_a_tilt(0.4)[:1]))))
+    tilted = fit_evidence(evidence, evidence.model + "base_tilt" + "unbalance@waist")
+    found = [
+        AddedEffect(Score(effect=one, payload_recordings=None, not_identifiable=False), 0.0, ())
+        for one in tilted.model.effects[-2:]
+    ]
+    kept = without_superfluous(evidence, None, tilted, found, lambda _: None)
+    assert [one.score.effect.name for one in kept.found] == ["base_tilt", "unbalance"]
+    alone = fit_evidence(evidence, evidence.model + "unbalance@waist")
+    assert look_alike_notes(evidence, alone) == ()
 
 
 def test_an_offset_may_be_friction_that_differs_between_the_directions() -> None:
