@@ -190,4 +190,4 @@ KNOWN = tuple(
         )
     )
 )
-"""Effects of the catalogue that are hidden."""
+"""Effects of the catalogue that are hidden: all that make a torque without another one."""
