@@ -1,22 +1,26 @@
-"""How often 95 % intervals hold the truth, on a two-link arm that shares no code with the package.
+"""How often 95 % intervals hold the truth, on arms that share no code with the package.
 
     python benchmarks/coverage.py --seeds 200
 
-Each seed is another motion and another draw of noise. Beside the intervals that `fit` gives stand
-those of errors taken as independent from row to row.
+Two links move by equations of their own, six axes by MuJoCo. Each seed is another motion and
+another draw of noise. Beside the intervals that `fit` gives stand those of errors taken as
+independent from row to row.
 """
 
 from __future__ import annotations
 
 import argparse
 from dataclasses import dataclass, field
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 import dynident as di
+import six_axis_loop
 import two_link_loop
 from dynident.recording import Dataset, Filter
+from six_axis_loop import SixAxisLab
 from two_link_loop import Lab
 
 _TORQUE = (2.0, 0.8)
@@ -29,11 +33,13 @@ class Case:
 
     Attributes
     ----------
+    arm : module of the arm that is recorded: its model and its true parameters.
     inertial : whether only inertial parameters are.
     """
 
     name: str
-    lab: Lab
+    lab: Lab | SixAxisLab
+    arm: ModuleType = two_link_loop
     filter: Filter | None = None
     method: Any = None
     inertial: bool = False
@@ -64,13 +70,26 @@ def cases() -> tuple[Case, ...]:
             name = f"IV, noise measured, encoder {std:g} rad, {words}, inertial"
             case = Case(name=name, lab=lab, filter=settings, method=loop, inertial=True, rival=None)
             found.append(case)
+    for colour in (0.05, 0.2):
+        noise = f"torque noise over {colour:g} s, default filter"
+        lab = Lab(torque_std=_TORQUE, colour_s=colour)
+        found.append(Case(name=f"LS, {noise}", lab=lab))
+    for words, lab in (
+        ("torque noise", SixAxisLab()),
+        ("encoder 3e-05 rad too", SixAxisLab(position_std=3e-5)),
+        ("torque noise over 0.05 s", SixAxisLab(colour_s=0.05)),
+        ("torque noise over 0.2 s", SixAxisLab(colour_s=0.2)),
+    ):
+        found.append(
+            Case(name=f"LS, six axes, {words}, default filter", lab=lab, arm=six_axis_loop)
+        )
     return tuple(found)
 
 
 def coverage(case: Case, seeds: range) -> tuple[float, float]:
     """Share of the truth within 1.96 sigma, of the method and of its rival (NaN if none)."""
-    model = two_link_loop.model()
-    truth = two_link_loop.truth(model)
+    model = case.arm.model()
+    truth = case.arm.truth(model)
     part = slice(0, model.base.rank if case.inertial else model.size)
     recordings = [
         one

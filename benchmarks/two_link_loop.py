@@ -11,6 +11,7 @@ from functools import cache
 
 import casadi
 import numpy as np
+import scipy.signal
 
 from dynident.closed_loop import Controller
 from dynident.model import Model
@@ -50,7 +51,8 @@ class Lab:
     Attributes
     ----------
     position_std : of the encoders' white noise, rad; it is fed back.
-    torque_std : (2,) of the white noise on the recorded torque, N m.
+    torque_std : (2,) of the noise on the recorded torque, N m.
+    colour_s : time over which that noise forgets itself; zero for white noise.
     stribeck : share of the Coulomb level that friction rises by at rest.
     offset : N m, of the elbow's torque.
     spring : N m/rad, at the elbow about its zero.
@@ -63,6 +65,7 @@ class Lab:
 
     position_std: float = 0.0
     torque_std: tuple[float, float] = (0.0, 0.0)
+    colour_s: float = 0.0
     stribeck: float = 0.0
     offset: float = 0.0
     spring: float = 0.0
@@ -89,7 +92,7 @@ class Lab:
             Recording(
                 t,
                 q[i],
-                tau[i] + std * rng.normal(size=tau[i].shape),
+                tau[i] + std * torque_noise(rng, tau[i].shape, self.colour_s),
                 ("shoulder", "elbow"),
                 q_ref=q_ref[i],
                 torque="held_command",
@@ -156,6 +159,15 @@ def _rate(x: casadi.SX, tau: casadi.SX, hidden: casadi.SX) -> casadi.SX:
     b2 = left[1] + slope * v1**2 - fore - elbow
     det = m11 * m22 - m12**2
     return casadi.vertcat(v1, v2, (m22 * b1 - m12 * b2) / det, (m11 * b2 - m12 * b1) / det)
+
+
+def torque_noise(rng: np.random.Generator, shape: tuple[int, ...], colour_s: float) -> np.ndarray:
+    """Noise of unit variance, (T, n), that forgets itself over a time (s); white if that is 0."""
+    white = rng.normal(size=shape)
+    if not colour_s:
+        return white
+    kept = np.exp(-1.0 / (RATE * colour_s))
+    return np.asarray(scipy.signal.lfilter([np.sqrt(1.0 - kept**2)], [1.0, -kept], white, axis=0))
 
 
 def controller() -> Controller:

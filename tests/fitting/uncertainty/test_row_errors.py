@@ -35,7 +35,7 @@ def drawn(model: Model, clean: Recording, settings: Filter | None, seed: int) ->
 def test_white_unfiltered_noise_gives_the_ordinary_covariance(model: Model) -> None:
     """In the mean of noise draws, in every direction of the parameters."""
     truth = true_values(model, Fv__shoulder=0.5, Fv__elbow=0.2)
-    clean = synthetic(model, truth, 3, rate_hz=100.0, duration=8.0, period=None)
+    clean = synthetic(model, truth, 3, rate_hz=100.0, duration=64.0, period=None)
     ratios = []
     for seed in range(20):
         data = drawn(model, clean, Filter(), seed)
@@ -45,9 +45,12 @@ def test_white_unfiltered_noise_gives_the_ordinary_covariance(model: Model) -> N
 
 
 def test_behind_a_low_pass_variances_are_those_of_the_errors(model: Model) -> None:
-    """Without the noise's colour they are too small by a third."""
+    """Without the noise's colour they are too small by a third.
+
+    Of a record so long that they are not widened for how little is known of the colour.
+    """
     truth = true_values(model, Fv__shoulder=0.5, Fv__elbow=0.2)
-    clean = synthetic(model, truth, 3, rate_hz=200.0, duration=8.0, period=None)
+    clean = synthetic(model, truth, 3, rate_hz=200.0, duration=64.0, period=None)
     sampled = sample(clean, None)
     X = np.concatenate(list(sampled.columns(model)))
     weights = 1.0 / np.array(STD)
@@ -98,6 +101,20 @@ def test_scaling_torques_scales_sigma(model: Model) -> None:
     data = synthetic(model, truth, 1, rate_hz=200.0, torque_std=0.5)
     loud = data.replace(tau=1e3 * data.tau)
     np.testing.assert_allclose(fit(model, loud).sigma, 1e3 * fit(model, data).sigma, rtol=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("seconds", "colour_s"), [(5.0, 0.0), (12.0, 0.05)], ids=["short records", "slow noise"]
+)
+def test_intervals_cover_where_the_noise_of_the_motions_band_is_hard_to_know(
+    seconds: float, colour_s: float
+) -> None:
+    """Of 100 recordings of a foreign simulator; with even bands the slow noise has 0.86."""
+    model = lab.model()
+    there = lab.Lab(torque_std=STD, seconds=seconds, colour_s=colour_s)
+    found = [fit(model, one) for one in there.recordings(range(7200, 7300))]
+    assert 0.93 <= covered(found, lab.truth(model)) <= 0.97
 
 
 @pytest.fixture(scope="module")

@@ -36,8 +36,7 @@ class DriveGains(Shown):
     residual_std : (n,) in the recorded unit.
     loads : as they were identified; those that are wholly known too.
     joint_errors : (n,) norm of what the model leaves of the current, over that of the current.
-    lacking : whether sigma rests on the scatter between blocks of time, for noise does not explain
-        what the model leaves.
+    lacking : whether what the model leaves is as slow as the motion, as of `ScatteredErrors`.
     rows, effective_rows : equations, and independent ones that would say as much.
     sources : the recordings.
     """
@@ -137,9 +136,9 @@ class DriveGains(Shown):
         found = []
         if self.lacking:
             found.append(
-                "Stretches of the motion differ by more than noise explains: the model lacks "
-                "something, sigma is that scatter, and gains may be further off. `explain` looks "
-                "for what is missing."
+                "What is left of the currents is as slow as the motion, unlike most noise: the "
+                "model lacks something, or the noise is as slow. sigma holds it, and gains may be "
+                "further off. `explain` looks for what is missing."
             )
         spread = zip(self.joints, self.relative_sigma, strict=True)
         weak = [f"{name} ({percent(x, 0)})" for name, x in spread if x > _WEAK]

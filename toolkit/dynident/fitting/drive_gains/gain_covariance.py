@@ -28,8 +28,7 @@ class GainCovariance:
         geometric mean of their group, and parameters to the same. Rows of what is given, or
         not identified on its own, are zero.
     errors : of the rows, in the recorded unit.
-    lacking : whether some variances are those of the scatter between blocks of time, which noise
-        does not explain: the model lacks something.
+    lacking : as of `ScatteredErrors`.
     """
 
     matrix: np.ndarray

@@ -6,21 +6,30 @@ that it has passed are known: of its spectrum only the shape before them has to 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
+
 import numpy as np
 
 from dynident.fitting.sampling import Sampled
 from dynident.recording.filters import butterworth
 from dynident.recording.sections import response
 
-_BANDS = 4
-"""Of constant density before the filters. Taste: fewer average over more of the spectrum, more
-have less data each; coverage on trials is the same with 2 to 5."""
+HALVING = (0.0, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
+"""Of bands of constant density before the filters, as shares of the passband. They halve towards
+zero, where motions are, and where torque noise that is not white has most of its power: with four
+even bands 95 % intervals of six joints held 0.86 under noise with a corner of 3 Hz, with these
+0.94; half or twice the lowest edge does as well (measured)."""
 _OPEN = 1e-3
 """Share of the power below which a filter counts as closed, and bands end."""
 _GRID = 2048
 
 
-def noise_shapes(sampled: Sampled, lags: int) -> np.ndarray:
+EVEN = (0.0, 1.0)
+"""One band: what noise is that was white before the filters."""
+
+
+def noise_shapes(sampled: Sampled, lags: int, edges: Sequence[float] = HALVING) -> np.ndarray:
     """Return autocorrelations that noise in rows may be made of, (S, lags + 1), each 1 at lag 0.
 
     White noise in bands of frequency, and the first and second difference of white noise of the
@@ -31,6 +40,7 @@ def noise_shapes(sampled: Sampled, lags: int) -> np.ndarray:
     ----------
     sampled : a recording with its filters.
     lags : longest lag, in decimated rows.
+    edges : of the bands, as shares of the passband, in ascending order.
     """
     parallel, rate = sampled.parallel, sampled.source.rate_hz
     limit = rate / 2
@@ -42,8 +52,8 @@ def noise_shapes(sampled: Sampled, lags: int) -> np.ndarray:
             break
         # A narrow passband needs a grid of its own, or bands in it would be empty.
         limit = 16 * top
-    band = np.minimum((f / top * _BANDS).astype(int), _BANDS - 1)
-    spectra = [power * (band == b) for b in range(_BANDS)]
+    share = f / top
+    spectra = [power * ((low <= share) & (share < high)) for low, high in pairwise(edges)]
     slope = np.sin(2 * np.pi * f / rate) ** 2  # central differences
     spectra += [encoder * slope, encoder * slope**2]
     cosines = np.cos(2 * np.pi * np.outer(f / parallel.output_rate_hz, np.arange(lags + 1)))

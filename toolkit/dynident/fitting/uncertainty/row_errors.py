@@ -6,7 +6,8 @@ the estimate: C = G [sum over joints j and lags k of r_j(k) sum over t of x_tj x
 with G = (X' W^2 X)^-1.
 
 Source: the form is that of H. White, "Asymptotic Theory for Econometricians" (1984), for stationary
-errors. That a fit takes freedom from its residual is accounted for exactly (`_seen`).
+errors. That a fit takes freedom from its residual is accounted for exactly (`_seen`), and that the
+colour is known from few values by wider intervals (`known_spectrum`).
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from scipy.optimize import nnls
 from dynident.clusters import over_recordings
 from dynident.fitting.linear_solution import LinearSolution, solve_factors
 from dynident.fitting.sampling import rows, sample
+from dynident.fitting.uncertainty.known_spectrum import MeasuredSpectrum
 from dynident.fitting.uncertainty.lagged_rows import (
     LAGS,
     gather_columns,
@@ -242,11 +244,21 @@ def errors_of(
     basis = np.kron(np.eye(n), shapes.T)  # (n (K + 1), n S)
     amounts = nnls(seen @ basis / count, left.ravel() / count)[0]
     found = (basis @ amounts).reshape(left.shape)
+    there = amounts > 0.0
+    spectrum = MeasuredSpectrum(
+        seen=seen @ basis[:, there] / count,
+        shapes=basis[:, there],
+        amounts=amounts[there],
+        pairs=counts,
+        count=count,
+    )
     found[exact] = 0.0
     found[exact, 0] = left[exact, 0] / np.maximum(counts[exact], 1.0)
     inside = np.einsum("jk,jkab->ab", found, both)
     values, vectors = np.linalg.eigh((inside + inside.T) / 2)
     values = np.maximum(values, _LEAST * found[:, 0].mean())
+    each = np.einsum("ai,jkab,bi->ijk", vectors, both, vectors, optimize=True)
+    values = values * spectrum.widths(each.reshape(len(values), -1)) ** 2
     half = turn @ (vectors * np.sqrt(values))
     covariance = half @ half.T
     plain = turn @ turn.T * float(left[:, 0].sum() / (total - rank))

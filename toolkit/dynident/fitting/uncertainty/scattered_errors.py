@@ -1,7 +1,8 @@
 """Errors of a fit whose rows no `Model` makes: noise with its colour, or scatter between blocks.
 
-Noise explains how estimates of two stretches of a motion differ; what the model lacks makes them
-differ by more, and then that scatter is their error.
+What the model lacks moves as slowly as the motion: in its band there is more left than noise of
+even density leaves. Noise that is as slow looks the same. Where stretches of a motion differ by
+more than either explains, that scatter is the error.
 """
 
 from __future__ import annotations
@@ -19,10 +20,13 @@ from dynident.fitting.uncertainty.cluster_sandwich import (
     time_blocks,
 )
 from dynident.fitting.uncertainty.lagged_rows import LAGS
-from dynident.fitting.uncertainty.noise_shapes import noise_shapes
+from dynident.fitting.uncertainty.noise_shapes import EVEN, HALVING, noise_shapes
 from dynident.fitting.uncertainty.row_errors import RowErrors, errors_of
 from dynident.moments.lagged import RowBlock, lagged_products
 from dynident.robot import base_parameters
+
+_SLOW = 4.0
+"""Times the variance that errors of even density would give, above which what is left is slow."""
 
 RowsOf = Callable[[Sampled], Iterator[tuple[np.ndarray, np.ndarray]]]
 """Of a recording: derivatives (T, m, r) of its rows by r unknowns, and what is left (T, m)."""
@@ -52,8 +56,8 @@ class ScatteredErrors:
     ----------
     covariance : (r, r).
     errors : of the rows.
-    lacking : whether some variances are those of the scatter between blocks of time, which noise
-        does not explain: the model lacks something.
+    lacking : whether something is left that moves as slowly as the motion, or makes blocks of time
+        differ by more than noise of its colour does.
     """
 
     covariance: np.ndarray
@@ -102,10 +106,14 @@ def scattered_errors(
         inverse=solved.inverse,
     )
     products = lagged_products(blocks(), lags)
-    errors = errors_of(products, noise_shapes(samples[0], lags), linear, solved.squares)
+    errors, even = (
+        errors_of(products, noise_shapes(samples[0], lags, edges), linear, solved.squares)
+        for edges in (HALVING, EVEN)
+    )
     wider = scatter_factors(errors.covariance, bread, scores)
+    slow = np.diag(errors.covariance) > _SLOW * np.diag(even.covariance)
     return ScatteredErrors(
         covariance=errors.covariance * np.outer(wider, wider),
         errors=errors,
-        lacking=bool(np.any(wider > 1.0)),
+        lacking=bool(np.any(wider > 1.0) or np.any(slow)),
     )

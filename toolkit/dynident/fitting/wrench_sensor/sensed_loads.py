@@ -29,8 +29,7 @@ class SensedLoads(Shown):
     sigma : (6,) of them.
     residual_std : (6,) N and N m.
     wrench_rms : (6,) root mean square of what was recorded, less what was given of loads.
-    lacking : whether sigma rests on the scatter between blocks of time, for noise does not explain
-        what the model leaves.
+    lacking : whether what a load leaves is as slow as the motion, as of `ScatteredErrors`.
     rows, effective_rows : equations, and independent ones that would say as much.
     sources : the recordings.
     """
@@ -75,9 +74,10 @@ class SensedLoads(Shown):
         notes = [f"The sensor records {self.records}.", *filter(None, [self.remedy])]
         if self.lacking:
             notes.append(
-                "Stretches of the motion differ by more than noise explains: the load moves on the "
-                "sensor, something touches or pulls it, or positions and wrench are not of one "
-                "time. sigma is that scatter, and values may be further off."
+                "What is left of the wrench is as slow as the motion, unlike most noise: the load "
+                "moves on the sensor, something touches or pulls it, positions and wrench are not "
+                "of one time, or the noise is as slow. sigma holds it, and values may be further "
+                "off."
             )
         much = [
             f"{name} ({percent(left / whole, 0)})"
