@@ -95,8 +95,8 @@ def test_dates_are_a_clock(tmp_path: Path, kind: str) -> None:
     rows = [";".join([date, *rest]) for date, rest in zip(dates, values, strict=True)]
     (path := tmp_path / "run.csv").write_text("\n".join(["t;q.a;tau.a", *rows]))
     one = read(path, ["a"])
-    np.testing.assert_allclose(one.t - one.t[0], T, atol=1e-6)
-    assert one.t[0] == pytest.approx(1772705472.0, abs=1e-6)
+    np.testing.assert_allclose(one.t, T, atol=1e-6)
+    assert one.provenance.began == pytest.approx(1772705472.0, abs=1e-6)
 
 
 def test_a_file_of_many_dates_is_read_in_pieces(tmp_path: Path) -> None:

@@ -36,6 +36,8 @@ def in_unit(unit: str) -> dict[str, JsonValue]:
 
 LONGEST_TIME = 1e9
 """s: no recording, period or session lasts longer, and none begins earlier before another."""
+LONGEST_SESSION = 1e5
+"""s: a clock that shows more at the first sample counts from something else, as from 1970."""
 FASTEST = 1e7
 """Hz: nothing in a robot is sampled, filtered or controlled faster."""
 SLOWEST = 1e-6

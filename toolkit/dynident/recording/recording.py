@@ -44,6 +44,7 @@ class Provenance:
     comment_lines : lines of comment, ascending; those above that one do not count.
     place : where the samples were put if they were too many for the memory, in words.
     unwrapped : joints whose positions jumped by whole turns, and are read as going on.
+    began : s that the clock of the file showed at t = 0; zero where t is that clock.
     """
 
     file: str = ""
@@ -57,6 +58,7 @@ class Provenance:
     comment_lines: tuple[int, ...] = ()
     place: str = ""
     unwrapped: tuple[str, ...] = ()
+    began: float = 0.0
 
     def line(self, index: int) -> int:
         """Return the line of a sample in a text file, given its index from 0; 0 if unknown."""

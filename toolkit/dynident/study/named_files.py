@@ -25,6 +25,7 @@ from dynident.recording import (
     within_limits,
 )
 from dynident.robot import Robot
+from dynident.settings import LONGEST_SESSION
 from dynident.study.study_file import FilterEntry, RecordingEntry, StudyFile
 
 
@@ -148,7 +149,20 @@ def recordings_of(
                 number=number,
             )
         )
-    return within_limits(found, robot.position_limits), loads
+    return within_limits(_started(found), robot.position_limits), loads
+
+
+def _started(recordings: list[Recording]) -> list[Recording]:
+    """Say when recordings on wall clocks began, after the earliest one, where none states it.
+
+    Those that are further apart than a session lasts are left alone.
+    """
+    began = [one.provenance.began for one in recordings]
+    if any(one.start for one in recordings) or not min(began, default=0.0):
+        return recordings
+    if max(began) - min(began) > LONGEST_SESSION:
+        return recordings
+    return [one.replace(start=one.provenance.began - min(began)) for one in recordings]
 
 
 @dataclass(frozen=True, kw_only=True)

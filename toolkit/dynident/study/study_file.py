@@ -41,10 +41,12 @@ class RecordingEntry(SettingsTable):
     period: Duration | None = None
     """After which the excitation repeats: what differs between repetitions is the noise."""
     start: Time = 0.0
-    """When the recording began in the session, for what warms up or drifts."""
+    """When the recording began in the session, for what warms up or drifts. Files on a wall clock,
+    as seconds since 1970, tell it where no recording states it."""
     window: tuple[Time, Time] | None = None
-    """[t0, t1] of the file's clock: what is used of it once the whole is filtered. Outside of it
-    the file may have faults: then no more is read than up to them."""
+    """[t0, t1] of the file's clock, or from its first sample where that is a wall clock: what is
+    used of it once the whole is filtered. Outside of it the file may have faults: then no more is
+    read than up to them."""
     payload: PayloadEntry = None
     """Whether the load under study was on board, true or false; `"unknown"` asks for it. Or the
     name of one of several loads, see [loads.NAME], or what is known of a load without a name:

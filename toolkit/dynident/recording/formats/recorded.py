@@ -14,7 +14,8 @@ from dynident.recording.formats.column_names import LocatedColumn
 from dynident.recording.formats.column_table import ColumnTable, left_of
 from dynident.recording.formats.column_values import gather
 from dynident.recording.formats.sound_stretch import said_of, sound_part, sound_stretch
-from dynident.recording.recording import Provenance, Recording
+from dynident.recording.recording import LARGEST, Provenance, Recording
+from dynident.settings import LONGEST_SESSION
 
 Window = tuple[float, float]
 
@@ -69,6 +70,9 @@ def recorded(table: ColumnTable, wanted: Wanted, sound_in: Window | None) -> Rec
 def _read(table: ColumnTable, wanted: Wanted) -> tuple[dict[str, Any], Provenance]:
     """Signals of all rows, and where they are from."""
     found, place = gather(table, wanted.columns, wanted.signals)
+    began = _began(found["t"])
+    if began:
+        found["t"] = found["t"] - began
     first_line, comment_lines = table.lines()
     used = [term.name for one in wanted.columns.values() for term in one.terms]
     return found, Provenance(
@@ -80,7 +84,14 @@ def _read(table: ColumnTable, wanted: Wanted) -> tuple[dict[str, Any], Provenanc
         first_line=first_line,
         comment_lines=comment_lines,
         place=place,
+        began=began,
     )
+
+
+def _began(t: np.ndarray) -> float:
+    """What a clock that is none of a session shows at first, s; else zero."""
+    first = float(t[0]) if len(t) else 0.0
+    return first if LONGEST_SESSION < first < LARGEST else 0.0
 
 
 def _recording(found: Mapping[str, Any], source: Provenance, wanted: Wanted) -> Recording:
