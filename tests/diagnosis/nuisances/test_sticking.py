@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 
 import dynident as di
 from dynident.diagnosis.nuisances.sticking import (
+    left_out_at,
+    seen_alike,
     speed_noise,
     sticking_joints,
     sticking_notes,
@@ -21,7 +24,7 @@ from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
 from dynident.fitting.sampling import sample
 from dynident.model import Model
-from dynident.recording import Dataset, Recording
+from dynident.recording import Dataset, Recording, default_filter
 from synthetic import arm, smooth_motion, synthetic, true_values
 
 RATE_HZ = 500.0
@@ -62,6 +65,22 @@ def record(seed: int, stands: float, stribeck: float = 0.0, rate_hz: float = RAT
 
 def evidence(stands: float) -> Evidence:
     return Evidence(given(), gather(Dataset(tuple(record(seed, stands) for seed in (0, 1)))))
+
+
+def test_recordings_whose_reversals_cannot_be_left_out_are_not_the_same_seen_otherwise() -> None:
+    """A low cut-off spreads a reversal over so many rows that too few would be left."""
+    data = Dataset(tuple(record(seed, STOPPED) for seed in (0, 1)))
+    usual = Evidence(given(), gather(data))
+    without = without_reversals(usual, ("elbow",))
+    lower = [
+        Evidence(
+            given(), gather(replace(data, filter=default_filter(RATE_HZ).narrowed(share, RATE_HZ)))
+        )
+        for share in (0.7, 0.05)
+    ]
+    (seen,) = seen_alike(lower, without)
+    assert left_out_at(seen) == ("elbow",)
+    assert len(seen_alike(lower, usual)) == 2
 
 
 def test_only_the_joint_that_stands_sticks() -> None:

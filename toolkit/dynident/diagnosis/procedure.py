@@ -40,7 +40,7 @@ from dynident.diagnosis.nuisances.contacts import Contacts
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.nuisances.quantisation import nothing_but_rounding
 from dynident.diagnosis.nuisances.reversal_laws import laws_of_the_rest, laws_that_do_as_well
-from dynident.diagnosis.nuisances.sticking import left_out_at, without_reversals, without_sticking
+from dynident.diagnosis.nuisances.sticking import seen_alike, without_sticking
 from dynident.diagnosis.proposals.law_search import LawSearch
 from dynident.diagnosis.proposals.proposals_of import proposals_of
 from dynident.diagnosis.result import Diagnosis
@@ -258,15 +258,9 @@ def _tried(stage: Stage, best: AddedEffect, task: DiagnosisTask) -> tuple[Stage,
     wider = _seen_anew(stage, added)
     why = newly_impossible(wider.evidence, stage.fitted, wider.fitted)
     why = why or unresolved(wider.evidence, wider.fitted, best.score.effect.label)
-    narrow = _behind_lower_filters(stage, wider.evidence)
+    narrow = seen_alike(stage.narrow, wider.evidence, stage.doubtful)
     why = why or follows_the_filter(wider.evidence, narrow, wider.fitted, best.score.effect)
     return wider, why
-
-
-def _behind_lower_filters(stage: Stage, evidence: Evidence) -> tuple[Evidence, ...]:
-    """Recordings behind lower cut-offs, without the reversals that the evidence leaves out."""
-    gone = left_out_at(evidence)
-    return tuple(without_reversals(one, gone, stage.doubtful) for one in stage.narrow)
 
 
 def _add_and_refit(stage: Stage, best: AddedEffect, task: DiagnosisTask) -> Stage:
@@ -398,7 +392,7 @@ def _judge(stage: Stage, path: Path, task: DiagnosisTask) -> Diagnosis:
     answer = assemble(search, task.train, task.test, held)
     if answer.noise_source == "unknown" and task.most:
         task.progress("looking for what the residual depends on")
-        narrow = _behind_lower_filters(stage, stage.evidence)
+        narrow = seen_alike(stage.narrow, stage.evidence, stage.doubtful)
         answer = doubted(answer, stage.evidence, narrow, path)
     if task.switches == "all":
         task.progress("switching effects on and off")

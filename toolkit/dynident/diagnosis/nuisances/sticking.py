@@ -14,7 +14,7 @@ until the next one is the mean of a friction that reverses there, and no frictio
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -118,6 +118,25 @@ def without_reversals(
             uncertain[:, j] |= _near_stops(evidence, run, j, least)
         runs.append(replace(run, uncertain=uncertain))
     return evidence.with_runs(tuple(runs))
+
+
+def seen_alike(
+    others: Sequence[Evidence], evidence: Evidence, within: Mapping[str, float] | None = None
+) -> tuple[Evidence, ...]:
+    """Return the same recordings behind other filters, without the same reversals.
+
+    The lower a cut-off, the more rows a reversal takes with it. Where too few would be left they
+    stay in, and these are not the same recordings seen through another filter: they are dropped.
+
+    Parameters
+    ----------
+    others : recordings of the evidence behind other filters.
+    evidence : which leaves reversals out.
+    within : as of `without_reversals`.
+    """
+    joints = left_out_at(evidence)
+    found = (without_reversals(one, joints, within) for one in others)
+    return tuple(one for one in found if set(joints) <= set(left_out_at(one)))
 
 
 def left_out_at(evidence: Evidence) -> tuple[str, ...]:
