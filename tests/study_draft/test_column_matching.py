@@ -53,6 +53,7 @@ LAYOUTS = {
     "long names": ("arm_shoulder_position arm_elbow_position", "arm_shoulder_trq arm_elbow_trq"),
     "camel case": ("jointPosition1 jointPosition2", "jointTorque1 jointTorque2"),
     "units alone": ("axis1_deg axis2_deg", "axis1_Nm axis2_Nm"),
+    "an angle and a length": ("J1_position_deg J2_position_mm", "J1_torque_Nm J2_force_N"),
     "units in brackets": ("J1[rad] J2[rad]", "J1[Nm] J2[Nm]"),
     "a drive's": ("motorPos_1 motorPos_2", "motorCurrent_1 motorCurrent_2"),
 }
@@ -104,6 +105,9 @@ def test_measured_torques_come_before_commands_and_the_others_are_told() -> None
         ("tau1_mNm", 1e-3),
         ("axis1_deg", np.pi / 180),
         ("axis1_rpm", np.pi / 30),
+        ("J1_pos [mm]", 1e-3),
+        ("axis1_mm", 1e-3),
+        ("J1 [mm/s]", 1e-3),
         ("axis1_mNm", 1e-3),
     ],
 )

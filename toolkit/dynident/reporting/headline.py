@@ -159,7 +159,7 @@ def _nothing_added(diagnosis: Diagnosis, known: bool) -> Headline:
         said = f"Nothing is missing: what remains is {rest}."
         return Headline("\u2713", "nothing is missing", said)
     error = percent(diagnosis.test_error.after)
-    none = "No effect of the catalogue would be of use"
+    none = "No effect of the catalogue was found to be of use"
     said = f"{none}, and the torque error is {error}. {_NOT_KNOWN}"
     return Headline("?", "nothing found, noise unknown", said)
 

@@ -176,7 +176,13 @@ def _to_add(diagnosis: Diagnosis) -> list[Advice]:
         why += f" The fall with {it} is within two standard errors, and may be chance."
         return [Advice(what, why, (f"dynident compare STUDY {asked}",))]
     commands = (f"dynident add STUDY {shlex.join(labels)}", "dynident fit STUDY")
-    return [Advice(f"Add {names} to the model, and fit it.", why, commands)]
+    what = f"Add {names} to the model, and fit it."
+    if any(step.effect.is_payload for group in first for step in group):
+        what += (
+            " The study must say first which recordings carry the payload: payload = true or false "
+            "in each of [[recordings]]."
+        )
+    return [Advice(what, why, commands)]
 
 
 def _addable(diagnosis: Diagnosis) -> list[Step]:

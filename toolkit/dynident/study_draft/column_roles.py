@@ -45,22 +45,27 @@ _OTHER = _set(
 """Words of what is no signal of a joint, or is worked out by a controller: left alone."""
 _SCALES: dict[str, tuple[Signal, float]] = {
     **dict.fromkeys(_set("deg degree degrees dps"), ("q", math.pi / 180)),
+    **dict.fromkeys(_set("mm millimetre millimetres millimeter millimeters"), ("q", 1e-3)),
+    "cm": ("q", 1e-2),
     "rpm": ("v", math.pi / 30),
     **dict.fromkeys(_set("mnm nmm"), ("tau", 1e-3)),
     **dict.fromkeys(_set("ms msec msecs milliseconds"), ("t", 1e-3)),
     **dict.fromkeys(_set("us usec usecs microseconds"), ("t", 1e-6)),
     **dict.fromkeys(_set("ns nsec nsecs nanosec nanosecs nanoseconds"), ("t", 1e-9)),
 }
-"""Words for units, of which signal, and what makes ours of them; degrees are of speeds too."""
+"""Words for units, of which signal, and what makes ours of them; degrees and millimetres may be of
+speeds."""
 _UNITS = _set("rad radian radians nm s sec secs second seconds m n")
 _ANGLES = _set("deg degree degrees rad radian radians")
+_LENGTHS = _set("mm millimetre millimetres millimeter millimeters cm")
 _SECONDS = _set("s sec secs second seconds")
 _SIGNAL_OF_UNIT: dict[str, Signal] = {
     **dict.fromkeys(_set("rpm dps"), "v"),
     **dict.fromkeys(_set("nm mnm nmm"), "tau"),
     **dict.fromkeys(_set("ampere amperes"), "current"),
 }
-"""What a unit alone tells, where no word of a name says more; angles go by the seconds behind."""
+"""What a unit alone tells, where no word of a name says more; angles and lengths go by the seconds
+behind."""
 _SQUARED = re.compile(
     r"((?:deg(?:rees?)?|rad(?:ians?)?)(?:\W|_|p)s)(?:\^|\*\*)?2(?!\d)", re.IGNORECASE
 )
@@ -173,7 +178,7 @@ def _words(name: str) -> list[str]:
 def _by_unit(words: Sequence[str]) -> tuple[Signal, str] | None:
     """Return the signal that a unit among the words tells, and the unit: `axis1_deg`, `J1 [Nm]`."""
     for k, word in enumerate(words):
-        if word in _ANGLES:
+        if word in _ANGLES | _LENGTHS:
             if _NO_ANGLE & set(words[k + 1 : k + 2]):
                 return None
             behind = [one for one in words[k + 1 : k + 4] if one in _SECONDS]

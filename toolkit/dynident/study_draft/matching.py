@@ -228,17 +228,24 @@ def _stated(
 def _groups(
     roles: Sequence[ColumnRole], signal: Signal, origins: Sequence[Origin], robot: Robot
 ) -> list[Group]:
-    """Groups of columns that hold a signal of every joint, the likeliest first."""
-    sets: dict[tuple[Origin, str, tuple[str, ...]], list[ColumnRole]] = {}
-    for role in roles:
-        if role.signal == signal and role.origin in origins:
-            sets.setdefault((role.origin, role.word, role.stem), []).append(role)
-    found = [
-        (origins.index(origin), len(stem), group)
-        for (origin, _, stem), some in sets.items()
-        if (group := _at_joints(some, robot)) is not None
-    ]
-    return [group for _, _, group in sorted(found, key=lambda one: one[:2])]
+    """Groups of columns that hold a signal of every joint, the likeliest first.
+
+    Where none has one word for it, some joints may turn and others slide: angle and position,
+    torque and force.
+    """
+    own = [role for role in roles if role.signal == signal and role.origin in origins]
+    for key in (lambda one: (one.origin, one.stem, one.word), lambda one: (one.origin, one.stem)):
+        sets: dict[tuple, list[ColumnRole]] = {}
+        for role in own:
+            sets.setdefault(key(role), []).append(role)
+        found = [
+            (origins.index(origin), len(stem), group)
+            for (origin, stem, *_), some in sets.items()
+            if (group := _at_joints(some, robot)) is not None
+        ]
+        if found:
+            return [group for _, _, group in sorted(found, key=lambda one: one[:2])]
+    return []
 
 
 def _at_joints(roles: list[ColumnRole], robot: Robot) -> Group | None:

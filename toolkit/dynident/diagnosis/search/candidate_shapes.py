@@ -82,8 +82,13 @@ def refined(
             fall=criteria.gradient_fall,
             evaluations=criteria.evaluations,
         )
-        found = search(objective.by_derivatives(), solver).best
-        return _better(objective.one, *(trial.found for trial in found))
+        while True:
+            found = search(objective.by_derivatives(), solver).best
+            better = _better(objective.one, *(trial.found for trial in found))
+            if better is objective.one or not objective.went_as_far_as_it_may(better):
+                return better
+            # It goes on from there, where nothing led astray.
+            objective = replace(objective, one=better)
     return _better(objective.one, _by_trial(objective))
 
 

@@ -148,18 +148,12 @@ class MomentObjective:
 
     def by_derivatives(self) -> ShapeProblem[ScoreTrial]:
         """Return the search for shapes, and the value at which a column is taken, together."""
-        effect, robot = self.one.effect, self.fitted.model.robot
-        sought = [*effect.shape_parameters(robot)]
-        if effect.point:
-            # A value at which a column is taken is positive, and sought as shapes are.
-            sought += [_as_shape(p) for p in effect.parameters(robot)]
-        start = [
-            s.coordinate(x) for s, x in zip(sought, (*effect.shape, *effect.point), strict=True)
-        ]
+        effect, sought = self.one.effect, self._sought()
+        start = _coordinates(sought, effect)
         # Not further than to the next shapes of the grid: beyond, other peaks lead astray.
         furthest = self.fitted.criteria.shapes.furthest
         reach = np.array([s.reach(furthest) for s in sought])
-        limits = np.array([(s.coordinate(s.lower), s.coordinate(s.upper)) for s in sought]).T
+        lower, upper = _limits(sought)
 
         def trial(coordinates: np.ndarray) -> ScoreTrial:
             x = [s.at(c) for s, c in zip(sought, coordinates, strict=True)]
@@ -167,12 +161,27 @@ class MomentObjective:
             return self._differentiated(effect.shaped(*x[:shapes]).at(x[shapes:]))
 
         return ShapeProblem(
-            lower=np.clip(start - reach, *limits),
-            upper=np.clip(start + reach, *limits),
-            start=np.array(start),
+            lower=np.clip(start - reach, lower, upper),
+            upper=np.clip(start + reach, lower, upper),
+            start=start,
             evaluate=_each(trial),
             differentiable=True,
         )
+
+    def went_as_far_as_it_may(self, found: Score) -> bool:
+        """Whether the best of `by_derivatives` lies where that ends, and its shapes go on."""
+        sought, precision = self._sought(), self.fitted.criteria.shapes.precision
+        at, (lower, upper) = _coordinates(sought, found.effect), _limits(sought)
+        reach = np.array([s.reach(self.fitted.criteria.shapes.furthest) for s in sought])
+        far = np.abs(at - _coordinates(sought, self.one.effect)) > reach - precision
+        return bool(np.any(far & (at > lower + precision) & (at < upper - precision)))
+
+    def _sought(self) -> list[ShapeParameter]:
+        """The shapes of the effect, and the value at which its column is taken, as one."""
+        effect, robot = self.one.effect, self.fitted.model.robot
+        points = effect.parameters(robot) if effect.point else ()
+        # Such a value is positive, and sought as shapes are.
+        return [*effect.shape_parameters(robot), *(_as_shape(p) for p in points)]
 
     def by_trial(self, lower: np.ndarray, upper: np.ndarray) -> ShapeProblem[ScoreTrial]:
         """Return the search for shapes between bounds (s,) whose derivatives are not known."""
@@ -222,6 +231,16 @@ class MomentObjective:
             self.fitted, found, with_model.pooled().signal, with_self.pooled().signal
         )
         return replace(self._judged(found), residual=residual, jacobian=jacobian)
+
+
+def _coordinates(sought: Sequence[ShapeParameter], effect: Effect) -> np.ndarray:
+    every = zip(sought, (*effect.shape, *effect.point), strict=True)
+    return np.array([shape.coordinate(x) for shape, x in every])
+
+
+def _limits(sought: Sequence[ShapeParameter]) -> tuple[np.ndarray, np.ndarray]:
+    every = np.array([(s.coordinate(s.lower), s.coordinate(s.upper)) for s in sought])
+    return every[:, 0], every[:, 1]
 
 
 def _as_shape(value: Parameter) -> ShapeParameter:

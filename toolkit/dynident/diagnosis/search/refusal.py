@@ -222,7 +222,7 @@ def _how_it_changes(
     told = [percent(_size(gram, one) / own if own > 0 else np.inf, 0) for one in others]
     return (
         "changes with the filter: behind lower cut-offs its torque is "
-        f"{' and '.join(told)} of what it is here, so noise in the columns makes it"
+        f"{' and '.join(told)} of what it is here, so noise in the columns may make it"
     )
 
 
