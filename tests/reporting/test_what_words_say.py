@@ -108,6 +108,20 @@ def test_explain_says_above_its_parameters_that_a_model_is_rejected() -> None:
     assert [str(one) for one in rest] == [str(one) for one in printed_parameters(fine)]
 
 
+@pytest.mark.parametrize("at_end", [True, False])
+def test_explain_says_of_a_shape_that_it_is_at_the_end_of_where_it_is_sought(at_end: bool) -> None:
+    found = diagnosis(("shoulder", "elbow"), samples=100)
+    robot = found.after.model.robot
+    (shape,) = effect("thermal_friction", "elbow").shape_parameters(robot)
+    warm = effect("thermal_friction", "elbow", shape=(shape.upper if at_end else 240.0,))
+    model = Model(robot) + warm
+    block = model.block(*motion(robot, 1, 400))
+    after = fitted(model, np.random.default_rng(1).normal(size=block.q.shape), block)
+    one = replace(found, steps=(replace(found.steps[0], effect=warm),), after=after)
+    for table in (*printed_parameters(one), parameter_table(after, None, "replicates")):
+        assert ("the best may lie beyond" in " ".join(str(table).split())) == at_end
+
+
 def test_explain_prints_what_it_added_and_what_that_is() -> None:
     found = diagnosis(("shoulder", "elbow"), samples=100)
     model = Model(found.after.model.robot) + effect("thermal_friction", "elbow", shape=(240.0,))

@@ -10,6 +10,7 @@ import numpy as np
 from dynident.diagnosis.result import Diagnosis
 from dynident.effects import Effect, ShapeParameter
 from dynident.fitting.estimate import Estimate, ShapeValue
+from dynident.fitting.uncertainty.shape_errors import shapes_at_ends
 from dynident.inertia.parameters import MEANINGS, PARAMETERS
 from dynident.recording.dataset import NoiseSource
 from dynident.tables import Table, number, relative
@@ -112,7 +113,8 @@ def parameter_table(estimate: Estimate, widening: Widening | None, noise: NoiseS
         "stands for",
     )
     how, of_sigma = estimate.parameter_table().notes
-    notes = (_in_words(widening, noise), how, *((of_sigma,) if widening is None else ()))
+    ends = shapes_at_ends(model).values()
+    notes = (_in_words(widening, noise), how, *((of_sigma,) if widening is None else ()), *ends)
     return Table("Parameters", columns, rows, notes)
 
 
@@ -184,10 +186,11 @@ def printed_parameters(diagnosis: Diagnosis) -> tuple[Table | str, ...]:
     columns = (*plain.columns[:-1], "what it is", plain.columns[-1])
     if not any(row[-1] for row in rows):
         rows, columns = [row[:-1] for row in rows], columns[:-1]
+    names = {x.name for effect, _, x in _shapes(estimate) if effect.label in added}
+    ends = [said for name, said in shapes_at_ends(estimate.model).items() if name in names]
     elsewhere = "The report (--report) has all parameters of this model."
-    table = Table(
-        "Parameters of the effects added", columns, tuple(rows), (*plain.notes, elsewhere)
-    )
+    notes = (*plain.notes, *ends, elsewhere)
+    table = Table("Parameters of the effects added", columns, tuple(rows), notes)
     return (table,) if widening_after(diagnosis) is None else (_REJECTED, table)
 
 

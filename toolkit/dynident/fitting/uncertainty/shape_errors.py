@@ -63,15 +63,12 @@ def with_shape_errors(
         estimate = _widened(estimate, whole, [model.slices[s.effect.label] for s in slopes])
         spread = whole.sigma
         sigma = {s.effect.label: spread[whole.model.slices[s.label]] for s in slopes}
-    found, ends = [], []
+    found = []
     for effect in shaped:
         parameters = effect.shape_parameters(robot)
         each = sigma.get(effect.label, np.full(len(parameters), np.nan))
         names = model.shape_names[effect.label]
         for name, parameter, value, one in zip(names, parameters, effect.shape, each, strict=True):
-            bounds = [parameter.coordinate(end) for end in (parameter.lower, parameter.upper)]
-            if np.abs(np.subtract(bounds, parameter.coordinate(value))).min() < _TO_BOUND:
-                ends.append(_AT_BOUND.format(name, value, parameter.unit))
             found.append(
                 ShapeValue(
                     name=name,
@@ -80,10 +77,22 @@ def with_shape_errors(
                     unit=parameter.unit,
                 )
             )
-    notes = (*estimate.notes, *ends)
+    notes = (*estimate.notes, *shapes_at_ends(model).values())
     if known and np.any(estimate.covariance):
         notes = (*notes, _KNOWN.format(f"the shapes of {', '.join(known)}"))
     return replace(estimate, shapes=tuple(found), notes=notes)
+
+
+def shapes_at_ends(model: Model) -> dict[str, str]:
+    """Say of the shapes at the end of where they are sought that they are, by their names."""
+    found = {}
+    for effect in shaped_effects(model):
+        shapes = effect.shape_parameters(model.robot)
+        for name, one, x in zip(model.shape_names[effect.label], shapes, effect.shape, strict=True):
+            ends = np.array([one.coordinate(end) for end in (one.lower, one.upper)])
+            if np.abs(ends - one.coordinate(x)).min() < _TO_BOUND:
+                found[name] = _AT_BOUND.format(name, x, one.unit)
+    return found
 
 
 def _widened(estimate: Estimate, whole: Estimate, shaped: Sequence[slice]) -> Estimate:
