@@ -60,6 +60,39 @@ def test_other_clocks_tell_nothing_of_the_session(
         assert one.t[0] == pytest.approx(shift if shift < WALL else 0.0)
 
 
+def test_clocks_around_the_longest_session_go_on(tmp_path: Path) -> None:
+    train, test = study_of(tmp_path, 99_990.0, 100_090.0)
+    assert test.t[0] + test.start - (train.t[0] + train.start) == pytest.approx(100.0)
+
+
+def test_a_start_of_zero_is_stated_too(tmp_path: Path) -> None:
+    text = STUDY.replace("period = 8.0", "period = 8.0\nstart = 0.0")
+    assert [one.start for one in study_of(tmp_path, WALL + 90.0, WALL, text)] == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("stamp", ["nan", "", "oops"])
+def test_a_faulty_first_stamp_does_not_decide_what_a_clock_counts_from(
+    tmp_path: Path, stamp: str
+) -> None:
+    text = STUDY.replace('use = "train"', 'use = "train"\nwindow = [4.0, 12.0]')
+    path = write_study(tmp_path, text)
+    moved(tmp_path / "train.csv", WALL)
+    moved(tmp_path / "test.csv", WALL)
+    header, first, *lines = (tmp_path / "train.csv").read_text().splitlines()
+    faulty = ",".join([stamp, *first.split(",")[1:]])
+    (tmp_path / "train.csv").write_text("\n".join([header, faulty, *lines]) + "\n")
+    (train,) = load(path).train.recordings
+    assert train.window == (4.0, 12.0) and 0.0 <= train.t[0] < 4.0
+
+
+def test_a_window_on_a_clock_that_has_run_for_days_is_one_from_the_first_sample(
+    tmp_path: Path,
+) -> None:
+    text = STUDY.replace('use = "train"', 'use = "train"\nwindow = [250004.0, 250012.0]')
+    train, _ = study_of(tmp_path, 250_000.0, 250_100.0, text)
+    assert train.window == (4.0, 12.0)
+
+
 def test_a_window_counts_from_the_first_sample_of_a_wall_clock(tmp_path: Path) -> None:
     text = STUDY.replace('use = "train"', 'use = "train"\nwindow = [4.0, 12.0]')
     train, _ = study_of(tmp_path, WALL, WALL, text)

@@ -236,7 +236,18 @@ def test_the_number_of_the_sample_is_no_clock() -> None:
     assert match(log_of("q1", "q2", "tau1", "tau2", nr=np.arange(50.0)), two_links()).time is None
 
 
-@pytest.mark.parametrize("name", ["J1_degC", "temp1 [deg C]", "k1 [Nm/rad]", "damping_1_Nm_s"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "J1_degC",
+        "temp1 [deg C]",
+        "k1 [Nm/rad]",
+        "damping_1_Nm_s",
+        "x1 [N mm]",
+        "J1 [N/mm]",
+        "load1_kg_mm",
+    ],
+)
 def test_other_units_are_no_positions_and_no_torques(name: str) -> None:
     role = role_of(name, JOINTS)
     assert role is None or role.signal == "temperature"

@@ -170,6 +170,12 @@ def test_a_body_that_cannot_be_comes_with_the_nearest_that_can() -> None:
     assert one.to_dict()["nearest_possible"]["certificate"]["optimal"]
 
 
+def test_noise_of_short_records_is_no_load_that_moves() -> None:
+    """Of 3 s little is known in the band of the motion: it is large by chance."""
+    short = [weighed(recorded(CRATE, motion(50 + seed, 3.0), seed)) for seed in range(12)]
+    assert sum(one.lacking for one in short) <= 1
+
+
 def test_something_that_pulls_widens_the_errors() -> None:
     """A cable: a force that grows with the position of a joint."""
     one = recorded(CRATE, motion(7), 7)

@@ -258,8 +258,9 @@ def _tried(stage: Stage, best: AddedEffect, task: DiagnosisTask) -> tuple[Stage,
     wider = _seen_anew(stage, added)
     why = newly_impossible(wider.evidence, stage.fitted, wider.fitted)
     why = why or unresolved(wider.evidence, wider.fitted, best.score.effect.label)
-    narrow = seen_alike(stage.narrow, wider.evidence, stage.doubtful)
-    why = why or follows_the_filter(wider.evidence, narrow, wider.fitted, best.score.effect)
+    effect = best.score.effect
+    narrow = seen_alike(stage.narrow, wider.evidence, stage.doubtful, effect.joint)
+    why = why or follows_the_filter(wider.evidence, narrow, wider.fitted, effect)
     return wider, why
 
 

@@ -25,6 +25,7 @@ from dynident.recording.formats.column_names import Column
 from dynident.recording.formats.column_table import ColumnTable, FileLayout
 from dynident.recording.formats.open_table import READABLE, open_table
 from dynident.recording.formats.read import SUFFIXES, read
+from dynident.recording.formats.recorded import counted_window
 from dynident.recording.formats.sound_stretch import sound_part
 from dynident.recording.formats.whole_turns import UNWRAPPED, unwrapped_notes, within_limits
 from dynident.recording.formats.wrench_file import (
@@ -84,6 +85,7 @@ __all__ = [
     "central_difference",
     "choose_factor",
     "count_rows",
+    "counted_window",
     "default_cutoff",
     "default_filter",
     "default_position_cutoff",

@@ -179,8 +179,8 @@ def _to_add(diagnosis: Diagnosis) -> list[Advice]:
     what = f"Add {names} to the model, and fit it."
     if any(step.effect.is_payload for group in first for step in group):
         what += (
-            " The study must say first which recordings carry the payload: payload = true or false "
-            "in each of [[recordings]]."
+            " Where the study does not say yet which recordings carry the payload, write payload = "
+            "true or false into each of [[recordings]] first."
         )
     return [Advice(what, why, commands)]
 

@@ -43,6 +43,7 @@ class RecordFacts:
     rows : that pass the filter and count, of all entries.
     not_read : what else the file holds, in words each.
     unwrapped : joints whose positions jumped by whole turns, and are read as going on.
+    began : s that the clock of the file showed at t = 0; zero where t is that clock.
     """
 
     name: str
@@ -57,6 +58,7 @@ class RecordFacts:
     rows: int
     not_read: tuple[str, ...] = ()
     unwrapped: tuple[str, ...] = ()
+    began: float = 0.0
 
     def to_dict(self) -> dict[str, Any]:
         """The facts as JSON has them."""
@@ -92,6 +94,7 @@ def record_facts(study: Study) -> tuple[RecordFacts, ...]:
                 rows=sum(rows),
                 not_read=one.provenance.skipped,
                 unwrapped=one.provenance.unwrapped,
+                began=one.provenance.began,
             )
         )
     return tuple(found)
@@ -126,6 +129,11 @@ def recordings_table(facts: Sequence[RecordFacts]) -> Table:
     notes = (
         "Rows are those that pass the filter; jitter is the largest of a time step.",
         *(f"Not read of {one.name}: {'; '.join(one.not_read)}." for one in facts if one.not_read),
+        *(
+            f"Times in {one.name} count from its first sample, at {one.began:.0f} s of its clock."
+            for one in facts
+            if one.began
+        ),
         *unwrapped_notes((one.name, one.unwrapped) for one in facts),
     )
     return Table("Recordings as they were read", columns, rows, notes)

@@ -17,6 +17,7 @@ from dynident.recording import (
     FileLayout,
     Filter,
     Recording,
+    counted_window,
     default_cutoff,
     default_position_cutoff,
     frame_of,
@@ -131,38 +132,46 @@ def recordings_of(
             # Entries with windows of one file share its samples where all of it is sound.
             if key not in known:
                 known[key] = read_file(one)
-            recording = sound_part(known[key], entry.window)
+            window = counted_window(entry.window, known[key].provenance.began)
+            recording = sound_part(known[key], window)
         except RecordingError:
             if entry.window is None:
                 raise
             recording = read_file(one, entry.window)
+            window = counted_window(entry.window, recording.provenance.began)
         found.append(
             recording.replace(
                 name=entry.record or one.name,
                 use=entry.use,
                 period=entry.period,
                 start=entry.start,
-                window=entry.window,
+                window=window,
                 payload=entry.payload if isinstance(entry.payload, bool) else None,
                 load=names[one.place],
                 torque=said.torque,
                 number=number,
             )
         )
-    return within_limits(_started(found), robot.position_limits), loads
+    if not any("start" in entry.model_fields_set for entry in said.recordings):
+        found = _started(found)
+    return within_limits(found, robot.position_limits), loads
 
 
 def _started(recordings: list[Recording]) -> list[Recording]:
-    """Say when recordings on wall clocks began, after the earliest one, where none states it.
+    """Say when recordings began whose clocks count from before the session, where none states it.
 
-    Those that are further apart than a session lasts are left alone.
+    After the earliest one; those that are further apart than a session lasts are left alone. Beside
+    clocks that do not, the time that each shows counts.
     """
     began = [one.provenance.began for one in recordings]
-    if any(one.start for one in recordings) or not min(began, default=0.0):
+    shown = [known or float(one.t[0]) for one, known in zip(recordings, began, strict=True)]
+    if not shown or max(shown) - min(shown) > LONGEST_SESSION:
         return recordings
-    if max(began) - min(began) > LONGEST_SESSION:
-        return recordings
-    return [one.replace(start=one.provenance.began - min(began)) for one in recordings]
+    first = min(began)
+    return [
+        one.replace(start=known - first) if known else one
+        for one, known in zip(recordings, began, strict=True)
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)

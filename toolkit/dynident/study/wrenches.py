@@ -10,6 +10,7 @@ from dynident.recording import (
     Dataset,
     Recording,
     WrenchColumns,
+    counted_window,
     frames_in,
     read_wrench,
     sensed_frames,
@@ -70,11 +71,12 @@ def load_wrenches(path: str | Path) -> tuple[WrenchProblem, ...]:
             if frame not in frames_of[one]:
                 continue
             entry = said.recordings[one.place]
+            recording = _read(one, wanted, entry.window)
             recordings.append(
-                _read(one, wanted, entry.window).replace(
+                recording.replace(
                     name=entry.record or one.name,
                     period=entry.period,
-                    window=entry.window,
+                    window=counted_window(entry.window, recording.provenance.began),
                     load=carried[one.place],
                     number=len(recordings) + 1,
                 )

@@ -58,6 +58,8 @@ speeds."""
 _UNITS = _set("rad radian radians nm s sec secs second seconds m n")
 _ANGLES = _set("deg degree degrees rad radian radians")
 _LENGTHS = _set("mm millimetre millimetres millimeter millimeters cm")
+_OF_ANOTHER = _set("n nm kn kg g rpm")
+"""What before a length makes another quantity of it."""
 _SECONDS = _set("s sec secs second seconds")
 _SIGNAL_OF_UNIT: dict[str, Signal] = {
     **dict.fromkeys(_set("rpm dps"), "v"),
@@ -67,7 +69,7 @@ _SIGNAL_OF_UNIT: dict[str, Signal] = {
 """What a unit alone tells, where no word of a name says more; angles and lengths go by the seconds
 behind."""
 _SQUARED = re.compile(
-    r"((?:deg(?:rees?)?|rad(?:ians?)?)(?:\W|_|p)s)(?:\^|\*\*)?2(?!\d)", re.IGNORECASE
+    r"((?:deg(?:rees?)?|rad(?:ians?)?|[mc]m)(?:\W|_|p)s)(?:\^|\*\*)?2(?!\d)", re.IGNORECASE
 )
 _NO_ANGLE = _set("c f celsius fahrenheit")
 """What behind degrees makes a temperature of them."""
@@ -178,6 +180,8 @@ def _words(name: str) -> list[str]:
 def _by_unit(words: Sequence[str]) -> tuple[Signal, str] | None:
     """Return the signal that a unit among the words tells, and the unit: `axis1_deg`, `J1 [Nm]`."""
     for k, word in enumerate(words):
+        if word in _LENGTHS and _OF_ANOTHER & set(words[max(0, k - 1) : k]):
+            return None  # N mm, N/mm, kg mm
         if word in _ANGLES | _LENGTHS:
             if _NO_ANGLE & set(words[k + 1 : k + 2]):
                 return None

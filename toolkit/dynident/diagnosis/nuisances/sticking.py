@@ -14,7 +14,7 @@ until the next one is the mean of a friction that reverses there, and no frictio
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,12 +24,14 @@ from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.runs import Run
 from dynident.fitting.sampling import Sampled
-from dynident.recording.filters import butterworth
-from dynident.recording.sections import response
-from dynident.recording.white_noise import encoder_noise_std
+from dynident.fitting.standing_joints import (
+    is_seen_to_stand,
+    near_stops,
+    speed_noise,
+    speeds,
+    used_samples,
+)
 from dynident.tables import listed, percent
-
-_FREQUENCIES = 4096  # at which a filter's response is taken
 
 
 def without_sticking(
@@ -121,7 +123,10 @@ def without_reversals(
 
 
 def seen_alike(
-    others: Sequence[Evidence], evidence: Evidence, within: Mapping[str, float] | None = None
+    others: Sequence[Evidence],
+    evidence: Evidence,
+    within: Mapping[str, float] | None = None,
+    joint: str | None = None,
 ) -> tuple[Evidence, ...]:
     """Return the same recordings behind other filters, without the same reversals.
 
@@ -133,10 +138,12 @@ def seen_alike(
     others : recordings of the evidence behind other filters.
     evidence : which leaves reversals out.
     within : as of `without_reversals`.
+    joint : whose rows must be the same; None for those of all joints.
     """
     joints = left_out_at(evidence)
+    same = {one for one in joints if joint in (None, one)}
     found = (without_reversals(one, joints, within) for one in others)
-    return tuple(one for one in found if set(joints) <= set(left_out_at(one)))
+    return tuple(one for one in found if same <= set(left_out_at(one)))
 
 
 def left_out_at(evidence: Evidence) -> tuple[str, ...]:
@@ -193,52 +200,27 @@ def _near_stops(evidence: Evidence, run: Run, j: int, least: float = 0.0) -> np.
     known, kept = evidence.cache.along(sampled.motion), sampled.kept
     key = ("near stops", j, least, kept.start, kept.stop)
     if key not in known:
-        v = _speeds(evidence, sampled)[:, j]
-        # Around a reversal the speed is off by what the position's low-pass rounds.
-        rounded = criteria.rounded * float(np.sqrt(np.mean(v[_used(sampled)] ** 2)))
-        reach = max(criteria.noise * _speed_noise(evidence, sampled)[j], rounded, least)
-        near = _recorded(sampled).parallel.apply((np.abs(v) < reach).astype(float))
-        known[key] = np.abs(near[kept]) > criteria.spread
+        v, noise = _speeds(evidence, sampled)[:, j], float(_speed_noise(evidence, sampled)[j])
+        known[key] = near_stops(sampled, v, noise, criteria, least)
     return known[key]
-
-
-def _recorded(sampled: Sampled) -> Sampled:
-    """With all samples of the recording: a stop may be over in a few."""
-    return sampled.unthinned or sampled
 
 
 def _speeds(evidence: Evidence, sampled: Sampled) -> np.ndarray:
     """Speeds in all samples of the recording, (T, n)."""
     known = evidence.cache.along(sampled.motion)
     if "speeds" not in known:
-        source = _recorded(sampled).source
-        known["speeds"] = source.part(slice(0, source.samples)).v
+        known["speeds"] = speeds(sampled)
     return known["speeds"]
 
 
-def _used(sampled: Sampled) -> slice:
-    """Samples of the recording from the first to the last row that is used."""
-    recorded = _recorded(sampled)
-    rows = recorded.parallel.rows(recorded.source.samples)[sampled.kept]
-    return slice(int(rows[0]), int(rows[-1]) + 1)
-
-
 def _stands(evidence: Evidence, j: int, criteria: StickingCriteria) -> bool:
-    """Whether a joint is seen to stand at many of its stops; a rest at an end is none of them.
-
-    Counted in samples, a passage may last one longer within a band than it does, and one shorter on
-    either side of it: a joint that passes from one sample to the next is not seen to stand.
-    """
-    stops = [
-        stop
-        for sampled in (run.replicates[0] for run in evidence.runs)
-        for stop in _stops(
-            _speeds(evidence, sampled)[_used(sampled), j],
-            criteria.noise * _speed_noise(evidence, sampled)[j],
-        )
+    """Whether a joint is seen to stand at many of its stops."""
+    samples = [run.replicates[0] for run in evidence.runs]
+    moved = [
+        (_speeds(evidence, one)[used_samples(one), j], float(_speed_noise(evidence, one)[j]))
+        for one in samples
     ]
-    longer = sum(within - 1 > criteria.longer * (around + 2) for within, around in stops)
-    return longer >= max(criteria.stops, criteria.stops_share * len(stops))
+    return is_seen_to_stand(moved, criteria)
 
 
 def _between_samples(evidence: Evidence, j: int, width: float, criteria: StickingCriteria) -> bool:
@@ -246,23 +228,10 @@ def _between_samples(evidence: Evidence, j: int, width: float, criteria: Stickin
     held = [run.replicates[0] for run in evidence.runs if run.recording.torque == "held_command"]
     if not held:
         return False
-    speeds = [_speeds(evidence, one)[_used(one), j] for one in held]
-    steps = [np.abs(np.diff(v))[v[1:] * v[:-1] < 0] for v in speeds]
+    moved = [_speeds(evidence, one)[used_samples(one), j] for one in held]
+    steps = [np.abs(np.diff(v))[v[1:] * v[:-1] < 0] for v in moved]
     quick = np.concatenate(steps) > criteria.coarse * width
     return bool(np.sum(quick) >= max(criteria.stops, criteria.stops_share * len(quick)))
-
-
-def _stops(v: np.ndarray, reach: float) -> Iterator[tuple[int, int]]:
-    """Samples of each stop within a speed, and between that and three times as much.
-
-    Only of stops before which and after which the joint moves.
-    """
-    wide, narrow = np.abs(v) < 3.0 * reach, np.abs(v) < reach
-    edges = np.diff(np.concatenate([[0], wide.astype(int), [0]]))
-    for start, stop in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
-        within = int(np.count_nonzero(narrow[start:stop]))
-        if within and start > 0 and stop < len(v):
-            yield within, int(stop - start) - within
 
 
 def _speed_noise(evidence: Evidence, sampled: Sampled) -> np.ndarray:
@@ -270,18 +239,3 @@ def _speed_noise(evidence: Evidence, sampled: Sampled) -> np.ndarray:
     if "speed noise" not in known:
         known["speed noise"] = speed_noise(sampled)
     return known["speed noise"]
-
-
-def speed_noise(sampled: Sampled) -> np.ndarray:
-    """Standard deviation of the noise in a recording's speed, (n,) rad/s or m/s.
-
-    White noise of the encoders, through the low-pass of the positions and the central difference.
-    """
-    rate = sampled.recording.rate_hz
-    angle = np.linspace(0.0, np.pi, _FREQUENCIES)
-    gain = np.sin(angle) * rate
-    cutoff = sampled.parallel.filter.position_cutoff_hz
-    if cutoff:
-        gain = gain * np.abs(response(butterworth(rate, cutoff), angle)) ** 2
-    share = float(np.sqrt(np.trapezoid(gain**2, angle) / np.pi))
-    return encoder_noise_std(sampled.recording.q) * share

@@ -24,6 +24,11 @@ particular. Taste."""
 _MOST = 1e6  # beyond which they make no difference
 
 
+def widths(freedom: np.ndarray) -> np.ndarray:
+    """Return factors of standard deviations so known that 1.96 of them hold 95 %."""
+    return stdtrit(freedom, _TAIL) / ndtri(_TAIL)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MeasuredSpectrum:
     """Autocovariances of n joints as sums of shapes with measured amounts.
@@ -43,22 +48,21 @@ class MeasuredSpectrum:
     pairs: np.ndarray
     count: float
 
-    def widths(self, products: np.ndarray) -> np.ndarray:
-        """Return factors (r,) of standard deviations, so that 1.96 of them hold 95 %.
+    def freedom(self, products: np.ndarray) -> np.ndarray:
+        """Return the degrees of freedom with which variances are known, (r,); at least 3.
 
         Parameters
         ----------
         products : (r, n (K + 1)) what each variance is for a unit of each autocovariance.
         """
         each = products @ self.shapes
-        back = np.linalg.pinv(self.seen)
-        spread = each @ back
+        spread = each @ np.linalg.pinv(self.seen)
         own = np.sum((spread @ self._of_lagged_sums()) * spread, axis=1)
         variances = each @ self.amounts
         # Variances that depend on no amount are known.
-        freedom = np.full(len(own), _MOST)
-        np.divide(2.0 * variances**2, own, out=freedom, where=own > 0.0)
-        return stdtrit(np.clip(freedom, _LEAST, _MOST), _TAIL) / ndtri(_TAIL)
+        found = np.full(len(own), _MOST)
+        np.divide(2.0 * variances**2, own, out=found, where=own > 0.0)
+        return np.clip(found, _LEAST, _MOST)
 
     def _of_lagged_sums(self) -> np.ndarray:
         """Covariance of the lagged sums, a pair of rows, (n (K + 1), n (K + 1))."""
@@ -68,7 +72,6 @@ class MeasuredSpectrum:
             lags = len(one)
             both = np.concatenate([one[:0:-1], one])
             squares = np.convolve(both, both)[len(both) - 1 :]
-            squares = np.append(squares, np.zeros(2 * lags))
             found = toeplitz(squares[:lags]) + hankel(
                 squares[:lags], squares[lags - 1 : 2 * lags - 1]
             )

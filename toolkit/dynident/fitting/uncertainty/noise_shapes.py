@@ -20,13 +20,11 @@ HALVING = (0.0, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
 zero, where motions are, and where torque noise that is not white has most of its power: with four
 even bands 95 % intervals of six joints held 0.86 under noise with a corner of 3 Hz, with these
 0.94; half or twice the lowest edge does as well (measured)."""
+EVEN = (0.0, 1.0)
+"""One band: what noise is that was white before the filters."""
 _OPEN = 1e-3
 """Share of the power below which a filter counts as closed, and bands end."""
 _GRID = 2048
-
-
-EVEN = (0.0, 1.0)
-"""One band: what noise is that was white before the filters."""
 
 
 def noise_shapes(sampled: Sampled, lags: int, edges: Sequence[float] = HALVING) -> np.ndarray:
@@ -52,7 +50,7 @@ def noise_shapes(sampled: Sampled, lags: int, edges: Sequence[float] = HALVING) 
             break
         # A narrow passband needs a grid of its own, or bands in it would be empty.
         limit = 16 * top
-    share = f / top
+    share = f / (top * (1 + 1e-9))
     spectra = [power * ((low <= share) & (share < high)) for low, high in pairwise(edges)]
     slope = np.sin(2 * np.pi * f / rate) ** 2  # central differences
     spectra += [encoder * slope, encoder * slope**2]

@@ -22,7 +22,7 @@ from scipy.optimize import nnls
 from dynident.clusters import over_recordings
 from dynident.fitting.linear_solution import LinearSolution, solve_factors
 from dynident.fitting.sampling import rows, sample
-from dynident.fitting.uncertainty.known_spectrum import MeasuredSpectrum
+from dynident.fitting.uncertainty.known_spectrum import MeasuredSpectrum, widths
 from dynident.fitting.uncertainty.lagged_rows import (
     LAGS,
     gather_columns,
@@ -58,8 +58,11 @@ class RowErrors:
     Attributes
     ----------
     autocovariance : (n, K + 1) of each joint's error, (N m)^2 or N^2.
-    meat : (p, p) covariance of the scores of the weighted rows, X' W^2 e.
-    covariance : (r, r) of the independent parameters.
+    meat : (p, p) covariance of the scores of the weighted rows, X' W^2 e, widened as the next one.
+    covariance : (r, r) of the independent parameters, so wide that 1.96 standard deviations hold
+        95 %, see `known_spectrum`.
+    measured : (r, r) the same as it was measured.
+    freedom : degrees of freedom of its least known direction.
     rows : equations.
     effective_rows : independent equations that would say as much.
     """
@@ -67,6 +70,8 @@ class RowErrors:
     autocovariance: np.ndarray
     meat: np.ndarray
     covariance: np.ndarray
+    measured: np.ndarray
+    freedom: float
     rows: int
     effective_rows: float
 
@@ -257,17 +262,21 @@ def errors_of(
     inside = np.einsum("jk,jkab->ab", found, both)
     values, vectors = np.linalg.eigh((inside + inside.T) / 2)
     values = np.maximum(values, _LEAST * found[:, 0].mean())
-    each = np.einsum("ai,jkab,bi->ijk", vectors, both, vectors, optimize=True)
-    values = values * spectrum.widths(each.reshape(len(values), -1)) ** 2
     half = turn @ (vectors * np.sqrt(values))
-    covariance = half @ half.T
+    measured = half @ half.T
     plain = turn @ turn.T * float(left[:, 0].sum() / (total - rank))
-    ratio = np.diag(plain) / np.diag(covariance)
+    ratio = np.diag(plain) / np.diag(measured)
+    each = np.einsum("ai,jkab,bi->ijk", vectors, both, vectors, optimize=True)
+    freedom = spectrum.freedom(each.reshape(len(values), -1))
+    values = values * widths(freedom) ** 2
+    half = turn @ (vectors * np.sqrt(values))
     wide = np.linalg.solve(turn.T, vectors * np.sqrt(values)).T @ solution.basis.combination
     return RowErrors(
         autocovariance=found / (weights**2)[:, None],
         meat=wide.T @ wide,
-        covariance=covariance,
+        covariance=half @ half.T,
+        measured=measured,
+        freedom=float(freedom.min()),
         rows=int(total),
         effective_rows=float(total * np.exp(np.mean(np.log(ratio)))),
     )

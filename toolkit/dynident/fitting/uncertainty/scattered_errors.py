@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import chdtri
 
 from dynident.fitting.linear_solution import LinearSolution
 from dynident.fitting.sampling import Sampled
@@ -27,6 +28,7 @@ from dynident.robot import base_parameters
 
 _SLOW = 4.0
 """Times the variance that errors of even density would give, above which what is left is slow."""
+_CHANCE = 1e-4  # that it is so large by chance
 
 RowsOf = Callable[[Sampled], Iterator[tuple[np.ndarray, np.ndarray]]]
 """Of a recording: derivatives (T, m, r) of its rows by r unknowns, and what is left (T, m)."""
@@ -111,7 +113,9 @@ def scattered_errors(
         for edges in (HALVING, EVEN)
     )
     wider = scatter_factors(errors.covariance, bread, scores)
-    slow = np.diag(errors.covariance) > _SLOW * np.diag(even.covariance)
+    # What is known with little freedom is large by chance.
+    beyond = max(_SLOW, float(chdtri(errors.freedom, _CHANCE)) / errors.freedom)
+    slow = np.diag(errors.measured) > beyond * np.diag(even.measured)
     return ScatteredErrors(
         covariance=errors.covariance * np.outer(wider, wider),
         errors=errors,

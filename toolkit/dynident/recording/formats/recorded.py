@@ -18,6 +18,7 @@ from dynident.recording.recording import LARGEST, Provenance, Recording
 from dynident.settings import LONGEST_SESSION
 
 Window = tuple[float, float]
+_STAMPS = 1000  # that are looked at to tell what a clock counts from
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,10 +62,11 @@ def recorded(table: ColumnTable, wanted: Wanted, sound_in: Window | None) -> Rec
         if sound_in is None:
             raise
         found, source = _read(table.forgiven, wanted)
+        sound_in = counted_window(sound_in, source.began) or sound_in
         if _is_lost(found["t"], sound_in):
             raise  # the first error says more than that the window holds no samples
         return _recording(*_sound(found, source, sound_in), wanted)
-    return sound_part(whole, sound_in)
+    return sound_part(whole, counted_window(sound_in, whole.provenance.began))
 
 
 def _read(table: ColumnTable, wanted: Wanted) -> tuple[dict[str, Any], Provenance]:
@@ -89,9 +91,28 @@ def _read(table: ColumnTable, wanted: Wanted) -> tuple[dict[str, Any], Provenanc
 
 
 def _began(t: np.ndarray) -> float:
-    """What a clock that is none of a session shows at first, s; else zero."""
-    first = float(t[0]) if len(t) else 0.0
-    return first if LONGEST_SESSION < first < LARGEST else 0.0
+    """What a clock that is none of a session shows at first, s; else zero.
+
+    Most of its stamps say so: some may be faulty, also the first.
+    """
+    some = t[:: max(1, len(t) // _STAMPS)]
+    some = some[np.isfinite(some)]
+    if not len(some) or np.median(some) <= LONGEST_SESSION:
+        return 0.0
+    return float(t[np.argmax((t > LONGEST_SESSION) & (t < LARGEST))])
+
+
+def counted_window(window: Window | None, began: float) -> Window | None:
+    """Return a window (s) on the clock of a recording whose file's clock showed `began` at first.
+
+    Parameters
+    ----------
+    window : on that clock, or on the file's where that is none of a session; None for all.
+    began : s, as of `Provenance`.
+    """
+    if window is None or window[0] <= LONGEST_SESSION:
+        return window
+    return window[0] - began, window[1] - began
 
 
 def _recording(found: Mapping[str, Any], source: Provenance, wanted: Wanted) -> Recording:
