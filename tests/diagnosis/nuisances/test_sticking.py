@@ -17,50 +17,14 @@ from dynident.diagnosis.nuisances.sticking import (
     without_reversals,
     without_sticking,
 )
-from dynident.effects import effects_of
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
 from dynident.fitting.sampling import sample
-from dynident.fitting.standing_joints import speed_noise
-from dynident.model import Model
+from dynident.fitting.uncertainty.standing_joints import speed_noise
 from dynident.recording import Dataset, Recording, default_filter
-from synthetic import arm, smooth_motion, synthetic, true_values
-
-RATE_HZ = 500.0
-COULOMB = np.array([3.0, 2.0])
-"""N m"""
-WIDTH = 0.02
-"""rad/s"""
-STOPPED = 0.08
-"""rad/s that the reference moves while the elbow stands."""
-
-
-def given() -> Model:
-    robot, names = arm(), ("viscous_friction", "coulomb_friction")
-    return Model(robot, tuple(e for name in names for e in effects_of(name, robot)), WIDTH)
-
-
-def record(seed: int, stands: float, stribeck: float = 0.0, rate_hz: float = RATE_HZ) -> Recording:
-    """A motion whose elbow stands while the reference is slower than `stands`, rad/s.
-
-    While it stands, its dry friction passes from one side to the other as the reference does: it
-    is no function of the elbow's speed. The shoulder's reverses over the width of the model.
-    """
-    model, rng = given(), np.random.default_rng([seed, 5])
-    t, q, v, _ = smooth_motion(2, seed, rate_hz, 16.0, 16.0)
-    reference = v[:, 1].copy()
-    if stands:
-        v[:, 1] -= np.clip(reference, -stands, stands)
-        q[:, 1] = q[0, 1] + np.concatenate([[0.0], np.cumsum((v[1:, 1] + v[:-1, 1]) / 2)]) / rate_hz
-    a = np.gradient(v, 1.0 / rate_hz, axis=0)
-    values = true_values(model, Fv__shoulder=1.0, Fv__elbow=0.6, Fc__shoulder=COULOMB[0])
-    tau = model.torque(model.block(t, q, v, a), values)
-    share = np.clip(reference / stands, -1, 1) if stands else np.tanh(v[:, 1] / WIDTH)
-    tau[:, 1] += share * (COULOMB[1] + stribeck * np.exp(-((v[:, 1] / 0.3) ** 2)))
-    q = q + 1e-5 * rng.normal(size=q.shape)
-    tau = tau + 0.05 * rng.normal(size=tau.shape)
-    return Recording(t, q, tau, model.robot.names, name=f"{seed}")
+from standing_arm import COULOMB, RATE_HZ, STOPPED, WIDTH, given, record
+from synthetic import synthetic, true_values
 
 
 def evidence(stands: float) -> Evidence:

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+import standing_arm
 from chains import chain, chain_text
 from dynident.effects import effects_of
 from dynident.errors import StudyError
@@ -15,7 +16,7 @@ from dynident.fitting.drive_gains import DriveGains, GainProblem, fit_drive_gain
 from dynident.fitting.loads import Load
 from dynident.inertia import from_com, to_com
 from dynident.model import Model
-from dynident.recording import Dataset, Recording
+from dynident.recording import Dataset, Recording, default_filter
 from dynident.robot import Robot
 from study_files import recording
 from synthetic import arm, smooth_motion
@@ -245,6 +246,23 @@ def test_what_the_model_lacks_is_said_and_widens_the_errors() -> None:
     assert "lacks something" in lacking.doubts[0]
     off = np.abs(np.log(lacking.gains / GAINS)) / lacking.relative_sigma
     assert np.all(lacking.relative_sigma > 2 * whole.relative_sigma) and off.max() < 10
+
+
+def test_rows_around_stops_of_a_joint_that_stands_tell_no_gain() -> None:
+    """There its friction is whatever the other torques ask for; every row counts if asked for."""
+    gains = np.array([20.0, 10.0])
+    found = []
+    for ends in ("drop", "keep"):
+        some = [standing_arm.record(seed, standing_arm.STOPPED) for seed in (0, 1, 2)]
+        settings = replace(default_filter(standing_arm.RATE_HZ), ends=ends)
+        data = Dataset(tuple(one.replace(tau=one.tau / gains) for one in some), settings)
+        problem = GainProblem(standing_arm.given(), data, {"shoulder": gains[0]})
+        found.append(fit_drive_gains(problem))
+    without, every = found
+    off = [abs(one.gains[1] / gains[1] - 1.0) for one in found]
+    assert off[0] < 0.005 and off[0] < off[1] / 3
+    assert off[0] < 2 * without.relative_sigma[1] < every.relative_sigma[1]
+    assert without.rows < every.rows
 
 
 @pytest.mark.parametrize("rotors", [(0.0, 0.0, 0.0), (0.5, 0.25, 0.1), (2.0, 1.0, 0.4)])

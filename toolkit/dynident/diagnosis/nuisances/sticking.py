@@ -24,7 +24,7 @@ from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.runs import Run
 from dynident.fitting.sampling import Sampled
-from dynident.fitting.standing_joints import (
+from dynident.fitting.uncertainty.standing_joints import (
     is_seen_to_stand,
     near_stops,
     speed_noise,

@@ -21,7 +21,7 @@ from dynident.fitting.loads import (
     identified_load,
     placement,
 )
-from dynident.moments.factors import TriangularFactors, factorise
+from dynident.moments.factors import TriangularFactors
 from dynident.threads import single_threaded
 
 _ROUNDS = 10  # of columns that depend on the model's own values
@@ -54,13 +54,13 @@ def fit_drive_gains(problem: GainProblem, unit: str = "A") -> DriveGains:
     """
     if not problem.dataset.recordings:
         raise FitError("no recording to fit", remedy='mark some recordings use = "train"')
-    factors = factorise(problem.rows())
+    factors = problem.factors()
     solution = solve_gains(problem, factors)
     for _ in range(_ROUNDS if problem.model.needs_values else 0):
         before = solution.values
         at = problem.model.at(before[: problem.model.size])
         problem = replace(problem, model=at)
-        factors = factorise(problem.rows(before))
+        factors = problem.factors(before)
         solution = solve_gains(problem, factors)
         if np.linalg.norm(solution.values - before) <= _SETTLED * np.linalg.norm(before):
             break

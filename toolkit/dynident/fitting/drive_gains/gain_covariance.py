@@ -52,10 +52,9 @@ def gain_covariance(
     """
     n, kept = len(solution.gains), list(solution.basis.independent)
     columns = [*_seen_gains(problem, scales), *(n + k for k in kept)]
-    samples = list(problem.samples())
     triangle = _triangle(factors, solution, columns)
     found = scattered_errors(
-        samples,
+        problem.samples,
         lambda sampled: _derivatives(problem, solution, sampled, columns),
         SolvedRows(
             weights=solution.weights,

@@ -7,17 +7,21 @@ the model's columns those of what is unknown of each load, and the torque of wha
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 
+from dynident.criteria import DEFAULTS
 from dynident.effects import effects_of
 from dynident.errors import StudyError
 from dynident.fitting.loads import Load, LoadSplit, placement, split
 from dynident.fitting.sampling import Sampled, sample
+from dynident.fitting.uncertainty.standing_joints import rows_that_tell
 from dynident.inertia import frame_change
 from dynident.model import Model
+from dynident.moments.factors import TriangularFactors, factorise
 from dynident.recording import Dataset
 from dynident.settings import nearest
 
@@ -144,12 +148,22 @@ class GainProblem:
         values[: self.model.size] = self.model.given_values()
         return values
 
-    def samples(self) -> Iterator[Sampled]:
-        """Yield the recordings, those with a load as carrying it."""
+    @cached_property
+    def samples(self) -> tuple[Sampled, ...]:
+        """The recordings, those with a load as carrying it."""
+        found = []
         for recording in self.dataset.recordings:
             if self.loads:
                 recording = recording.replace(payload=bool(recording.load))
-            yield sample(recording, self.dataset.filter)
+            found.append(sample(recording, self.dataset.filter))
+        return tuple(found)
+
+    @cached_property
+    def _telling(self) -> tuple[np.ndarray, ...]:
+        """Rows that count, (T, n) for each recording: none around stops of joints that stand."""
+        if self.dataset.filter and self.dataset.filter.ends == "keep":  # every row is asked for
+            return tuple(np.ones((one.count, self.model.robot.n), bool) for one in self.samples)
+        return rows_that_tell(self.samples, DEFAULTS.sticking)
 
     def rows_of(
         self, sampled: Sampled, values: np.ndarray | None = None
@@ -157,7 +171,8 @@ class GainProblem:
         """Yield blocks (T, n, size + 1) of a recording, and the currents (T, n).
 
         The columns are the torque per unit of parameters, and that of what is known of loads and
-        trusted links.
+        trusted links. Around stops of a joint that stands both are zero at that joint: its dry
+        friction is whatever the other torques ask for there.
 
         Parameters
         ----------
@@ -165,7 +180,9 @@ class GainProblem:
         values : (size,) at which columns that depend on the fitted model are taken.
         """
         p, load = self.model.size, sampled.recording.load
+        telling, start = self._telling[self.samples.index(sampled)], 0
         given = self.model.given_values()
+        telling, start = self._telling[self.samples.index(sampled)], 0
         if values is not None:
             values = np.append(values[:p], np.zeros(10 if self.loads else 0))
         for found, current in sampled.rows(self._carrying, values):
@@ -178,9 +195,18 @@ class GainProblem:
             # A column of zeros is none that is solved for: its parameter stays as described.
             block[:, :, -1] += block[:, :, :p] @ np.where(self.held, given, 0.0)
             block[:, :, :p][:, :, self.held] = 0.0
-            yield block, current
+            counts = telling[start : start + len(current)]
+            start += len(current)
+            yield block * counts[:, :, None], current * counts
 
-    def rows(self, values: np.ndarray | None = None) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Yield the same of all recordings."""
-        for sampled in self.samples():
-            yield from self.rows_of(sampled, values)
+    def factors(self, values: np.ndarray | None = None) -> TriangularFactors:
+        """Factors of the rows [columns, currents] of all recordings that count.
+
+        Parameters
+        ----------
+        values : as of `rows_of`.
+        """
+        rows = chain.from_iterable(self.rows_of(one, values) for one in self.samples)
+        return replace(
+            factorise(rows), counts=np.sum([x.sum(axis=0) for x in self._telling], axis=0)
+        )

@@ -75,7 +75,7 @@ def scattered_errors(
     Parameters
     ----------
     samples : the recordings.
-    rows_of : their rows at the solution.
+    rows_of : their rows at the solution; zero where one was left out.
     solved : what came out.
 
     Returns
@@ -94,7 +94,8 @@ def scattered_errors(
                 own = np.einsum("tjr,tj->tr", found, left * weights**2)
                 scores.add(places[start : start + len(left)], own, first)
                 start += len(left)
-                yield begins, found, left, np.ones(left.shape, dtype=bool)
+                # Rows that were left out are zero.
+                yield begins, found, left, np.any(found != 0.0, axis=2)
                 begins = False
 
     bread = solved.inverse @ solved.inverse.T

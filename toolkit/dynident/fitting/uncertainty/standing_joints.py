@@ -75,7 +75,7 @@ def near_stops(
     criteria: StickingCriteria,
     least: float = 0.0,
 ) -> np.ndarray:
-    """Rows of a joint around its stops, (T,) mask of the rows that are used.
+    """Return the rows of a joint around its stops.
 
     Parameters
     ----------
@@ -84,6 +84,10 @@ def near_stops(
     noise : of these, rad/s or m/s.
     criteria : how far around.
     least : speed within which its friction is not known, where that is more than the noise.
+
+    Returns
+    -------
+    (T,) mask of the rows that are used.
     """
     # Around a reversal the speed is off by what the position's low-pass rounds.
     rounded = criteria.rounded * float(np.sqrt(np.mean(v[used_samples(sampled)] ** 2)))
