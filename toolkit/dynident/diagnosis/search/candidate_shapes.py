@@ -20,6 +20,9 @@ from dynident.model import Model
 _OF_A_LINE = 1e-4
 """Share of the width of a line over position to which its place is sought: noise tells a strong
 line's far better than the precision of other shapes."""
+_GOES_ON = 1.0 + 1e-3
+"""Times as much that must be explained where a search with derivatives ends at its reach, for it to
+go on: along a direction that tells nothing it would leave for shapes that are another law."""
 _AT_END = 2.0
 """Precisions from an end of a bracket within which the best lies beyond it."""
 
@@ -85,9 +88,9 @@ def refined(
         while True:
             found = search(objective.by_derivatives(), solver).best
             better = _better(objective.one, *(trial.found for trial in found))
-            if better is objective.one or not objective.went_as_far_as_it_may(better):
+            gained = better.drop_at_point > _GOES_ON * objective.one.drop_at_point
+            if not gained or not objective.went_as_far_as_it_may(better):
                 return better
-            # It goes on from there, where nothing led astray.
             objective = replace(objective, one=better)
     return _better(objective.one, _by_trial(objective))
 

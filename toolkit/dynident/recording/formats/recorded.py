@@ -14,10 +14,11 @@ from dynident.recording.formats.column_names import LocatedColumn
 from dynident.recording.formats.column_table import ColumnTable, left_of
 from dynident.recording.formats.column_values import gather
 from dynident.recording.formats.sound_stretch import said_of, sound_part, sound_stretch
-from dynident.recording.recording import LARGEST, Provenance, Recording
+from dynident.recording.recording import Provenance, Recording
 from dynident.settings import LONGEST_SESSION
 
 Window = tuple[float, float]
+_LATEST = 1e11  # s, beyond which a number is the time of no clock
 _STAMPS = 1000  # that are looked at to tell what a clock counts from
 
 
@@ -97,9 +98,9 @@ def _began(t: np.ndarray) -> float:
     """
     some = t[:: max(1, len(t) // _STAMPS)]
     some = some[np.isfinite(some)]
-    if not len(some) or np.median(some) <= LONGEST_SESSION:
+    if not len(some) or not LONGEST_SESSION < np.median(some) < _LATEST:
         return 0.0
-    return float(t[np.argmax((t > LONGEST_SESSION) & (t < LARGEST))])
+    return float(t[np.argmax((t > LONGEST_SESSION) & (t < _LATEST))])
 
 
 def counted_window(window: Window | None, began: float) -> Window | None:
