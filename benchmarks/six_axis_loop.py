@@ -9,14 +9,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
-import mujoco
+import mujoco as _mujoco
 import numpy as np
 
 from dynident.model import Model
 from dynident.recording import Recording
 from dynident.robot import Robot
 from two_link_loop import torque_noise
+
+mujoco: Any = _mujoco  # its names come from C
 
 RATE = 1000.0
 ROTOR = np.array([0.5, 0.5, 0.3, 0.06, 0.06, 0.04])
@@ -99,7 +102,7 @@ def _robot() -> Robot:
 
 
 @cache
-def _plant() -> tuple[mujoco.MjModel, mujoco.MjData]:
+def _plant() -> tuple[Any, Any]:
     plant = mujoco.MjModel.from_xml_path(str(_DESCRIPTION))
     plant.dof_armature[:] = ROTOR
     plant.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
