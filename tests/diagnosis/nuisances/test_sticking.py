@@ -21,7 +21,7 @@ from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
 from dynident.fitting.sampling import sample
-from dynident.fitting.uncertainty.standing_joints import speed_noise
+from dynident.fitting.uncertainty.joint_speeds import JointSpeeds
 from dynident.recording import Dataset, Recording, default_filter
 from standing_arm import COULOMB, RATE_HZ, STOPPED, WIDTH, given, record
 from synthetic import synthetic, true_values
@@ -138,7 +138,7 @@ def test_noise_of_the_speed_is_that_of_encoder_and_filter() -> None:
     noise = 1e-4 * np.random.default_rng(3).normal(size=clean.q.shape)
     without, noisy = (sample(clean.replace(q=clean.q + more), None) for more in (0.0, noise))
     expected = np.std(noisy.motion.v - without.motion.v, axis=0)
-    np.testing.assert_allclose(speed_noise(noisy), expected, rtol=0.1)
+    np.testing.assert_allclose(JointSpeeds(noisy).noise, expected, rtol=0.1)
 
 
 @pytest.mark.slow

@@ -17,6 +17,7 @@ from dynident.evidence.maps import residual_maps
 from dynident.evidence.runs import gather
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.row_objective import refine_shapes, shaped_effects
+from dynident.fitting.uncertainty.standing_joints import standing_note, without_stops
 from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.tables import Shown, Table, finite, mostly_noise, percent
@@ -39,6 +40,8 @@ class Comparison(Shown):
         controller or the reference is not known.
     criteria : by which noise was measured, and maps are read.
     wiring : columns and data that are not what the study says, where that was checked.
+    standing : joints that stand, and how many of their rows therefore do not count; empty for
+        none.
     """
 
     names: tuple[str, ...]
@@ -47,6 +50,7 @@ class Comparison(Shown):
     loops: tuple[Loop, ...] = ()
     criteria: Criteria = DEFAULTS
     wiring: tuple[Fault, ...] = ()
+    standing: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON of `compare --json`."""
@@ -101,6 +105,7 @@ class Comparison(Shown):
         notes = (
             *notes,
             *mostly_noise(robot.names, shares),
+            *filter(None, (self.standing,)),
             *(f"Wiring: {fault.sentence}" for fault in self.wiring),
         )
         alone = len(self.names) == 1
@@ -161,6 +166,7 @@ def compare(
     if not dataset.recordings:
         remedy = 'mark some recordings use = "test"'
         raise FitError("no recording to compare with", remedy=remedy)
+    dataset = without_stops([one.model for one in named.values()], dataset, criteria.sticking)
     runs = gather(dataset, criteria.noise)
     results = []
     for estimate in named.values():
@@ -174,6 +180,7 @@ def compare(
             loop_of(Judged.of(e), dataset, controller, criteria.loops) for e in named.values()
         ),
         criteria=criteria,
+        standing=standing_note(dataset),
     )
 
 
@@ -201,6 +208,8 @@ def compare_models(
     -------
     As `compare`, of the fitted models.
     """
+    wiring = check_wiring(next(iter(models.values())), train, test, criteria.wiring)
+    train, test = (without_stops(models.values(), one, criteria.sticking) for one in (train, test))
     runs = gather(train, criteria.noise)
     held = gather(test, criteria.noise) if len(test) else None
     results, compared, loops = [], [], []
@@ -223,5 +232,6 @@ def compare_models(
         results=tuple(results),
         loops=tuple(loops),
         criteria=criteria,
-        wiring=check_wiring(next(iter(models.values())), train, test, criteria.wiring),
+        wiring=wiring,
+        standing=standing_note(test if held else train),
     )

@@ -215,7 +215,10 @@ def gather(
         else:
             replicates, index, kind = (first,), usable[None, :], "single"
         edges = np.linspace(0, index.shape[1], per_run + 1).round().astype(int)
-        runs.append(Run(kind=kind, replicates=replicates, index=index, edges=edges))
+        uncertain = None if first.counting.all() else ~first.counting
+        runs.append(
+            Run(kind=kind, replicates=replicates, index=index, edges=edges, uncertain=uncertain)
+        )
     if simulated is None:
         return tuple(runs)
     return tuple(

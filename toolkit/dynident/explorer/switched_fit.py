@@ -22,6 +22,7 @@ from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import LeastSquares, estimate_of
 from dynident.fitting.linear_solution import solve_factors
 from dynident.fitting.uncertainty.shape_errors import with_shape_errors
+from dynident.fitting.uncertainty.standing_joints import without_stops
 from dynident.model import Model
 from dynident.moments.factors import factorise
 from dynident.study import Study
@@ -68,10 +69,14 @@ class Refitter:
     def __init__(self, study: Study, model: Model | None = None) -> None:
         self.study, self.model = study, study.model if model is None else model
         criteria = study.criteria
-        self._train = Evidence(self.model, gather(study.train, criteria.noise), criteria=criteria)
+        self._recorded, test = (
+            without_stops(self.model, one, criteria.sticking) for one in (study.train, study.test)
+        )
+        runs = gather(self._recorded, criteria.noise)
+        self._train = Evidence(self.model, runs, criteria=criteria)
         self._test = None
-        if len(study.test):
-            runs = gather(study.test, criteria.noise)
+        if len(test):
+            runs = gather(test, criteria.noise)
             self._test = Evidence(self.model, runs, criteria=criteria)
         # What is kept of columns is for one at a time; requests come in threads.
         self._lock, self._slowly = RLock(), RLock()
@@ -126,7 +131,7 @@ class Refitter:
 
     def _estimate(self, model: Model) -> Estimate:
         """Least squares on the columns that are kept."""
-        train = self.study.train
+        train = self._recorded
         if model.needs_values:  # columns depend on the fit, and are taken again and again
             return LeastSquares(errors="independent").fit(model, train)
         factors = factorise(self._rows(model, run) for run in range(len(self._train.runs)))
@@ -142,7 +147,7 @@ class Refitter:
 
     @single_threaded
     def _with_intervals(self, effects: tuple[Effect, ...]) -> Estimate:
-        method, train = LeastSquares(), self.study.train
+        method, train = LeastSquares(), self._recorded
         estimate = method.fit(self.model + effects, train)
         return with_shape_errors(estimate, lambda one: method.fit(one, train))
 

@@ -12,6 +12,11 @@ from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import LeastSquares
 from dynident.fitting.row_objective import refine_shapes, shaped_effects
 from dynident.fitting.uncertainty.shape_errors import with_shape_errors
+from dynident.fitting.uncertainty.standing_joints import (
+    standing_note,
+    too_wide_note,
+    without_stops,
+)
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
 from dynident.threads import single_threaded
@@ -55,7 +60,8 @@ def fit(
     """Identify the parameters of a model.
 
     Shape parameters of effects are refined first, by variable projection; the linear parameters
-    follow from the method.
+    follow from the method. Rows around stops of joints that stand do not count, see
+    `Recording.stops`: no data tell their dry friction.
 
     Parameters
     ----------
@@ -89,6 +95,13 @@ def fit(
 
 
 def _fitted(model: Model, dataset: Dataset, method: Method) -> Estimate:
+    dataset = without_stops(model, dataset)
+    estimate = _with_shapes(model, dataset, method)
+    notes = (standing_note(dataset), too_wide_note(model, dataset))
+    return replace(estimate, notes=(*estimate.notes, *filter(None, notes)))
+
+
+def _with_shapes(model: Model, dataset: Dataset, method: Method) -> Estimate:
     if not shaped_effects(model):
         return method.fit(model, dataset)
     shaped = refine_shapes(model, dataset)

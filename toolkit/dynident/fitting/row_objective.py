@@ -146,13 +146,14 @@ class _RowObjective:
         self.effects = shaped_effects(model)
         self._parameters = [s for e in self.effects for s in e.shape_parameters(model.robot)]
         columns = [np.concatenate(list(s.columns(model, values))) for s in samples]
-        pairs = zip(columns, (s.tau for s in samples), strict=True)
+        torque = [s.counted(s.tau) for s in samples]
+        pairs = zip(columns, torque, strict=True)
         # One weighting throughout, or the weights would be minimised instead of the residual.
         self._weights = 1.0 / solve_factors(model, factorise(pairs)).torque_std
         own = np.concatenate([np.r_[model.slices[e.label]] for e in self.effects])
         rest = np.setdiff1d(np.arange(model.size), own)
         self._basis = _orthonormal(self._rows([c[:, :, rest] for c in columns]))
-        self.torque = self._left([s.tau[:, :, None] for s in samples])[:, 0]
+        self.torque = self._left([one[:, :, None] for one in torque])[:, 0]
         self._blocks = [self._ready(s) for s in samples]
 
     def problem(self, effects: tuple[Effect, ...]) -> ShapeProblem[_RowTrial]:
@@ -242,11 +243,12 @@ class _RowObjective:
         found = []
         for sampled, blocks in zip(self._samples, self._blocks, strict=True):
             if effect.label in blocks:
-                found.append(sampled.filtered(evaluate(blocks[effect.label])))
-                continue
-            found += sampled.decimate(
-                self.model, lambda b: [evaluate(self.model.ready(effect, b, None))]
-            )
+                rows = sampled.filtered(evaluate(blocks[effect.label]))
+            else:
+                (rows,) = sampled.decimate(
+                    self.model, lambda b: [evaluate(self.model.ready(effect, b, None))]
+                )
+            found.append(sampled.counted(rows))
         return found
 
     def _rows(self, parts: Signals) -> np.ndarray:

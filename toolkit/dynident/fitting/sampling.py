@@ -86,6 +86,30 @@ class Sampled:
         rows = self.parallel.rows(self.source.samples, self.kept)
         return self.recording.t[self.source.first + self.source.every * rows]
 
+    @cached_property
+    def counting(self) -> np.ndarray:
+        """Rows that count at each joint, (T, n) mask: not those around its stops."""
+        found = np.ones((self.count, self.recording.n), dtype=bool)
+        for j, stops in enumerate(self.recording.stops):
+            begun = np.searchsorted(stops[:, 0], self.t, side="right") - 1
+            over = self.t > np.append(stops[:, 1], -np.inf)[begun]
+            found[:, j] = (begun < 0) | over
+        return found
+
+    def counted(self, x: np.ndarray, kept: slice | None = None) -> np.ndarray:
+        """Return rows with zeros in place of those that do not count.
+
+        Parameters
+        ----------
+        x : (T, n, ...)
+        kept : which of the decimated rows they are; by default all that are used.
+        """
+        if not any(map(len, self.recording.stops)):
+            return x
+        some = kept or self.kept
+        mask = self.counting[some.start - self.kept.start : some.stop - self.kept.start]
+        return np.where(mask.reshape(*mask.shape, *[1] * (x.ndim - 2)), x, 0.0)
+
     @property
     def q(self) -> np.ndarray:
         """Positions in the decimated rows, (T, n) rad or m."""
@@ -151,14 +175,17 @@ class Sampled:
     def columns(self, model: Model, values: np.ndarray | None = None) -> Iterator[np.ndarray]:
         """Columns of a model block by block, (T, n, p) as decimated rows.
 
-        Effects that need the whole recording see it once; the regressor is made in blocks.
+        Rows that do not count are zero, here and in `rows` and `residuals`. Effects that need the
+        whole recording see it once; the regressor is made in blocks.
 
         Parameters
         ----------
         values : (p,) parameters at which columns that depend on the fitted model are taken.
         """
         for plan, block, known, _ in self._blocks(model, values):
-            yield self.parallel.apply_block(model.columns(block, values, known), plan)
+            columns = self.parallel.apply_block(model.columns(block, values, known), plan)
+            yield self.counted(columns, plan.kept)
+            del columns  # whose memory is used for the next ones
 
     def rows(
         self, model: Model, values: np.ndarray | None = None
@@ -167,8 +194,10 @@ class Sampled:
         for plan, block, known, torque in self._blocks(model, values):
             # No name is left on the columns: their memory is used for the next ones.
             yield (
-                self.parallel.apply_block(model.columns(block, values, known), plan),
-                self.parallel.apply_block(torque, plan),
+                self.counted(
+                    self.parallel.apply_block(model.columns(block, values, known), plan), plan.kept
+                ),
+                self.counted(self.parallel.apply_block(torque, plan), plan.kept),
             )
 
     def residuals(self, model: Model, values: np.ndarray) -> Iterator[tuple[np.ndarray, ...]]:
@@ -185,7 +214,8 @@ class Sampled:
                 predicted = model.torque(block, values, known)
             else:
                 predicted = model.torque_without_loads(block, values, known)
-            yield tuple(self.parallel.apply_each([torque - predicted, torque], plan))
+            found = self.parallel.apply_each([torque - predicted, torque], plan)
+            yield tuple(self.counted(one, plan.kept) for one in found)
 
     def _blocks(
         self, model: Model, values: np.ndarray | None

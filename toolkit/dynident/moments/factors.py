@@ -99,6 +99,8 @@ def factorise(
 ) -> TriangularFactors:
     """Fold blocks of rows into their factors, joint by joint.
 
+    Rows that are zero throughout say nothing, and are not counted.
+
     Parameters
     ----------
     blocks : iterable of (columns (T, n, p), torque (T, n))
@@ -119,11 +121,17 @@ def factorise(
             folded, size, counts = [_Fold() for _ in range(n)], p + 1, np.zeros(n, dtype=int)
         for j, one in enumerate(folded):
             one.add(columns[:, j], torque[:, j])
-        counts += rows
+            counts[j] += rows - _empty(columns[:, j], torque[:, j])
         del columns  # whose memory may be used for the next block
     if not folded:
         raise ValueError("no rows")
     return TriangularFactors(np.stack([one.triangle(size) for one in folded]), counts, instruments)
+
+
+def _empty(columns: np.ndarray, torque: np.ndarray) -> int:
+    """How many rows of columns (T, p) and torque (T,) are zero throughout."""
+    nothing = np.flatnonzero(torque == 0.0)
+    return int(np.count_nonzero(~columns[nothing].any(axis=1))) if len(nothing) else 0
 
 
 class _Fold:

@@ -118,6 +118,8 @@ class Recording:
     continuous : joints that turn without end, as their robot says.
     left_out : stretches that `usable_rows.usable` has found to be of no use, which its window then
         excludes; None where nobody has looked.
+    stops : (k, 2) s for each joint, from when to when rows of that joint do not count, since it
+        stands there; empty where all count. Copies with other positions keep them.
 
     Raises
     ------
@@ -148,6 +150,7 @@ class Recording:
     continuous: tuple[str, ...] = ()
     provenance: Provenance = field(default_factory=Provenance)
     left_out: tuple[LeftOut, ...] | None = None
+    stops: tuple[np.ndarray, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "joints", _joint_names(self.joints, self.where))
@@ -237,9 +240,10 @@ class Recording:
                 f"no joint '{missing[0]}'", self.where, f"joints: {', '.join(self.joints)}"
             )
         picked = [self.joints.index(joint) for joint in joints]
+        stops = tuple(self.stops[j] for j in picked) if self.stops else ()
         continuous = tuple(name for name in self.continuous if name in joints)
         signals = self._mapped(lambda x: _columns(x, picked))
-        return self.replace(joints=tuple(joints), continuous=continuous, **signals)
+        return self.replace(joints=tuple(joints), continuous=continuous, stops=stops, **signals)
 
     def cut(self, t0: float | None = None, t1: float | None = None) -> Recording:
         """Return the samples with t0 <= t < t1 (s, as in `t`); None leaves that side open.

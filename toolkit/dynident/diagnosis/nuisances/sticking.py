@@ -23,15 +23,13 @@ from dynident.criteria import StickingCriteria
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.runs import Run
-from dynident.fitting.sampling import Sampled
+from dynident.fitting.uncertainty.joint_speeds import JointSpeeds
 from dynident.fitting.uncertainty.standing_joints import (
-    is_seen_to_stand,
+    left_out_words,
     near_stops,
-    speed_noise,
-    speeds,
-    used_samples,
+    stands,
 )
-from dynident.tables import listed, percent
+from dynident.tables import listed
 
 
 def without_sticking(
@@ -74,7 +72,8 @@ def sticking_joints(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
         return ()
     criteria, nuisances = evidence.criteria.sticking, evidence.criteria.nuisances
     model, given = fitted.model, evidence.model
-    noise = np.max([_speed_noise(evidence, run.replicates[0]) for run in evidence.runs], axis=0)
+    every = [_speeds(evidence, run) for run in evidence.runs]
+    noise, standing = np.max([one.noise for one in every], axis=0), stands(every, criteria)
     bound = nuisances.at_bound * nuisances.narrowest_width * np.array(given.friction_widths)
     resolved = np.maximum(criteria.resolved * noise, bound)
     return tuple(
@@ -83,7 +82,7 @@ def sticking_joints(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
         if f"coulomb_friction@{joint}" in model.slices
         and (
             model.friction_widths[j] <= resolved[j]
-            or _stands(evidence, j, criteria)
+            or standing[j]
             or _between_samples(evidence, j, model.friction_widths[j], criteria)
         )
         and _share(evidence, j) <= criteria.most
@@ -171,16 +170,11 @@ def sticking_notes(evidence: Evidence, others: Collection[str] = ()) -> tuple[st
     shares = {j: s for j, s in shares_left_out(evidence).items() if j not in others}
     if not shares:
         return ()
-    low, high = (percent(one, 0) for one in (min(shares.values()), max(shares.values())))
-    share = low if low == high else f"{low.removesuffix(' %')} to {high}"
-    stand, their, stops = "stands", "its", "the joint's"
-    if len(shares) > 1:
-        stand, their, stops = "stand", "their", "each joint's"
+    stand, their = ("stands", "its") if len(shares) == 1 else ("stand", "their")
     return (
         f"{listed(list(shares))} {stand} still at many of {their} stops, or {their} dry friction "
-        f"reverses within the noise of {their} speed or within a held command: no data tell that "
-        f"friction, and {share} of {stops} rows, those around {their} stops, count neither in the "
-        "fit nor in the errors.",
+        f"reverses within the noise of {their} speed or within a held command: "
+        f"{left_out_words(shares)}",
     )
 
 
@@ -196,46 +190,30 @@ def _share(evidence: Evidence, j: int, least: float = 0.0) -> float:
 
 def _near_stops(evidence: Evidence, run: Run, j: int, least: float = 0.0) -> np.ndarray:
     """Rows of a joint around its reversals, (T,) mask; asked for with every model."""
-    sampled, criteria = run.replicates[0], evidence.criteria.sticking
+    sampled = run.replicates[0]
     known, kept = evidence.cache.along(sampled.motion), sampled.kept
-    key = ("near stops", j, least, kept.start, kept.stop)
+    key = ("near stops", least, kept.start, kept.stop)
     if key not in known:
-        v, noise = _speeds(evidence, sampled)[:, j], float(_speed_noise(evidence, sampled)[j])
-        known[key] = near_stops(sampled, v, noise, criteria, least)
+        known[key] = near_stops(_speeds(evidence, run), evidence.criteria.sticking, least)
+    return known[key][:, j]
+
+
+def _speeds(evidence: Evidence, run: Run) -> JointSpeeds:
+    """Speeds in all samples of a recording, kept once they are computed."""
+    sampled = run.replicates[0]
+    known, kept = evidence.cache.along(sampled.motion), sampled.kept
+    key = ("speeds", kept.start, kept.stop)
+    if key not in known:
+        known[key] = JointSpeeds(sampled)
     return known[key]
-
-
-def _speeds(evidence: Evidence, sampled: Sampled) -> np.ndarray:
-    """Speeds in all samples of the recording, (T, n)."""
-    known = evidence.cache.along(sampled.motion)
-    if "speeds" not in known:
-        known["speeds"] = speeds(sampled)
-    return known["speeds"]
-
-
-def _stands(evidence: Evidence, j: int, criteria: StickingCriteria) -> bool:
-    """Whether a joint is seen to stand at many of its stops."""
-    samples = [run.replicates[0] for run in evidence.runs]
-    moved = [
-        (_speeds(evidence, one)[used_samples(one), j], float(_speed_noise(evidence, one)[j]))
-        for one in samples
-    ]
-    return is_seen_to_stand(moved, criteria)
 
 
 def _between_samples(evidence: Evidence, j: int, width: float, criteria: StickingCriteria) -> bool:
     """Whether many of a joint's reversals are over while one command is held."""
-    held = [run.replicates[0] for run in evidence.runs if run.recording.torque == "held_command"]
+    held = [run for run in evidence.runs if run.recording.torque == "held_command"]
     if not held:
         return False
-    moved = [_speeds(evidence, one)[used_samples(one), j] for one in held]
+    moved = [np.concatenate([v[:, j] for v in _speeds(evidence, run).used()]) for run in held]
     steps = [np.abs(np.diff(v))[v[1:] * v[:-1] < 0] for v in moved]
     quick = np.concatenate(steps) > criteria.coarse * width
     return bool(np.sum(quick) >= max(criteria.stops, criteria.stops_share * len(quick)))
-
-
-def _speed_noise(evidence: Evidence, sampled: Sampled) -> np.ndarray:
-    known = evidence.cache.along(sampled.motion)
-    if "speed noise" not in known:
-        known["speed noise"] = speed_noise(sampled)
-    return known["speed noise"]

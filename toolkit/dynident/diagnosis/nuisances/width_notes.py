@@ -8,7 +8,7 @@ from dynident.diagnosis.nuisances.friction_width import WidthProfile
 from dynident.diagnosis.nuisances.sticking import left_out_at
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
-from dynident.formulas import quoted_joint
+from dynident.fitting.uncertainty.standing_joints import width_advice
 from dynident.tables import number
 
 
@@ -27,24 +27,17 @@ def friction_width_notes(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, 
         low, high = _interval(profile, stated[joint])
         says = f"the model has {number(stated[joint], 2)}"
         known = f"at {joint} {_in_words(profile.width, (low, high), f'{unit}/s', says)}"
-        if joint in sticking:
-            standing.append(known)
-            continue
-        moving.append(known)
-        wider = wider or profile.width > stated[joint]
-        if low > 0 and np.isfinite(high):
+        sticks = joint in sticking
+        (standing if sticks else moving).append(known)
+        wider = wider or (profile.width > stated[joint] and not sticks)
+        # Where stops are left out "at most" is enough: beyond them friction has reversed.
+        if np.isfinite(high) and (low > 0 or sticks):
             found[joint] = float(number(profile.width, 2))
     notes = []
     if moving:
         noise = ". Noise that a drive feeds into its joint widens it" if wider else ""
-        line = ""
-        if found:
-            line = (
-                " Fits take those of the model: for these write, above the first table of the "
-                f"study, in place of any that it has:\n    {_line(stated | found)}"
-            )
         notes.append(
-            f"Friction width, over which dry friction reverses: {'; '.join(moving)}{noise}.{line}"
+            f"Friction width, over which dry friction reverses: {'; '.join(moving)}{noise}."
         )
     if standing:
         where = "; ".join(standing)
@@ -52,13 +45,10 @@ def friction_width_notes(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, 
             f"Friction width by the rows that count, stops left out: {where}. That is how friction "
             "looks in motion, and no finding of how sharply it reverses."
         )
+    if found:
+        widths = {joint: float(width) for joint, width in (stated | found).items()}
+        notes[-1] += f" Fits take those of the model: for these {width_advice(widths)}"
     return tuple(notes)
-
-
-def _line(widths: dict[str, float]) -> str:
-    """The key of a study; it names every joint, as the others would have the default."""
-    each = (f"{quoted_joint(joint)} = {float(width)!r}" for joint, width in widths.items())
-    return f"friction_width = {{ {', '.join(each)} }}"
 
 
 def _interval(profile: WidthProfile, stated: float) -> tuple[float, float]:

@@ -7,18 +7,17 @@ the model's columns those of what is unknown of each load, and the torque of wha
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import KW_ONLY, dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field
 from functools import cached_property
 from itertools import chain
 
 import numpy as np
 
-from dynident.criteria import DEFAULTS
 from dynident.effects import effects_of
 from dynident.errors import StudyError
 from dynident.fitting.loads import Load, LoadSplit, placement, split
 from dynident.fitting.sampling import Sampled, sample
-from dynident.fitting.uncertainty.standing_joints import rows_that_tell
+from dynident.fitting.uncertainty.standing_joints import without_stops
 from dynident.inertia import frame_change
 from dynident.model import Model
 from dynident.moments.factors import TriangularFactors, factorise
@@ -152,18 +151,11 @@ class GainProblem:
     def samples(self) -> tuple[Sampled, ...]:
         """The recordings, those with a load as carrying it."""
         found = []
-        for recording in self.dataset.recordings:
+        for recording in without_stops(self.model, self.dataset).recordings:
             if self.loads:
                 recording = recording.replace(payload=bool(recording.load))
             found.append(sample(recording, self.dataset.filter))
         return tuple(found)
-
-    @cached_property
-    def _telling(self) -> tuple[np.ndarray, ...]:
-        """Rows that count, (T, n) for each recording: none around stops of joints that stand."""
-        if self.dataset.filter and self.dataset.filter.ends == "keep":  # every row is asked for
-            return tuple(np.ones((one.count, self.model.robot.n), bool) for one in self.samples)
-        return rows_that_tell(self.samples, DEFAULTS.sticking)
 
     def rows_of(
         self, sampled: Sampled, values: np.ndarray | None = None
@@ -171,8 +163,7 @@ class GainProblem:
         """Yield blocks (T, n, size + 1) of a recording, and the currents (T, n).
 
         The columns are the torque per unit of parameters, and that of what is known of loads and
-        trusted links. Around stops of a joint that stands both are zero at that joint: its dry
-        friction is whatever the other torques ask for there.
+        trusted links. Rows of a joint that do not count are zero.
 
         Parameters
         ----------
@@ -180,9 +171,7 @@ class GainProblem:
         values : (size,) at which columns that depend on the fitted model are taken.
         """
         p, load = self.model.size, sampled.recording.load
-        telling, start = self._telling[self.samples.index(sampled)], 0
         given = self.model.given_values()
-        telling, start = self._telling[self.samples.index(sampled)], 0
         if values is not None:
             values = np.append(values[:p], np.zeros(10 if self.loads else 0))
         for found, current in sampled.rows(self._carrying, values):
@@ -195,9 +184,7 @@ class GainProblem:
             # A column of zeros is none that is solved for: its parameter stays as described.
             block[:, :, -1] += block[:, :, :p] @ np.where(self.held, given, 0.0)
             block[:, :, :p][:, :, self.held] = 0.0
-            counts = telling[start : start + len(current)]
-            start += len(current)
-            yield block * counts[:, :, None], current * counts
+            yield block, current
 
     def factors(self, values: np.ndarray | None = None) -> TriangularFactors:
         """Factors of the rows [columns, currents] of all recordings that count.
@@ -206,7 +193,4 @@ class GainProblem:
         ----------
         values : as of `rows_of`.
         """
-        rows = chain.from_iterable(self.rows_of(one, values) for one in self.samples)
-        return replace(
-            factorise(rows), counts=np.sum([x.sum(axis=0) for x in self._telling], axis=0)
-        )
+        return factorise(chain.from_iterable(self.rows_of(one, values) for one in self.samples))

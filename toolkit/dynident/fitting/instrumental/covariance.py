@@ -106,8 +106,10 @@ def _carried(
         here = {label: own[raw] for label, own in known.items()}
         V = model.columns(block, values, here)[:, :, kept]
         weighted = np.zeros_like(V)
-        inside = kept_rows[(kept_rows >= first) & (kept_rows < last)] - first
-        weighted[inside] = parallel.low_pass(V)[inside] * (weights**2)[:, None]
+        taken = (kept_rows >= first) & (kept_rows < last)
+        inside = kept_rows[taken] - first
+        counting = sampled.counting[taken] * weights**2
+        weighted[inside] = parallel.low_pass(V)[inside] * counting[:, :, None]
         back = parallel.low_pass(weighted)
         jacobians = torque_jacobians(model, values, block, noise.position_std * rate)
         acceleration, speed, position = (

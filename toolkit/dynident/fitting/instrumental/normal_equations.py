@@ -45,10 +45,10 @@ def _rows(
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     for one, other in zip(measured.recordings, instruments.recordings, strict=True):
         own, instrument = sample(one, measured.filter), sample(other, instruments.filter)
-        start = 0
+        torque, start = own.counted(own.tau), 0
         for V, W in zip(instrument.columns(model, values), own.columns(model, values), strict=True):
             stop = start + len(W)
-            yield np.concatenate([V, W], axis=2), own.tau[start:stop]
+            yield np.concatenate([V, W], axis=2), torque[start:stop]
             start = stop
 
 

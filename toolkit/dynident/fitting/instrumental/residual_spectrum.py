@@ -81,7 +81,8 @@ def residual_noise(
     for one, other in zip(measured.recordings, instruments.recordings, strict=True):
         own, smooth = sample(one, measured.filter), sample(other, instruments.filter)
         columns = np.concatenate(list(own.columns(model, values)))
-        f, power = _periodogram(own.tau - columns @ values, own.rate_hz)
+        f, power = _periodogram(own.counted(own.tau) - columns @ values, own.rate_hz)
+        power = power / np.maximum(own.counting.mean(axis=0), 1.0 / own.count)
         design = _design(model, values, own, smooth, f, position_std)
         lost = -(-rank // (2 * n * len(measured.recordings))) + 1
         last = np.searchsorted(f, _TRUSTED * own.motion.rate_hz)

@@ -103,7 +103,7 @@ def lack_of_fit(
 
 def _of_recording(
     recording: Recording, model: Model, settings: Filter | None, values: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, int] | None:
+) -> tuple[np.ndarray, ...] | None:
     """What `_apart` says of a recording; None where it does not repeat."""
     if not recording.period:
         return None
@@ -112,7 +112,7 @@ def _of_recording(
     # Less than two periods tell nothing, and are no mistake here.
     with suppress(RecordingError):
         folded = periods(len(left), sampled.rate_hz, recording.period, recording.where)
-        return _apart(folded.fold(left))
+        return _apart(folded.fold(left), folded.fold(sampled.counting))
     return None
 
 
@@ -164,17 +164,18 @@ def _scores_of(
     return scores
 
 
-def _apart(folded: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+def _apart(folded: np.ndarray, counting: np.ndarray) -> tuple[np.ndarray, ...]:
     """Sums over the rows of a period of systematic squares and of noise, and what chance gives.
 
     Parameters
     ----------
-    folded : (P, S, n) residuals.
+    folded : (P, S, n) residuals, zero where they do not count.
+    counting : (P, S, n) where they do.
 
     Returns
     -------
-    (n,) sum of systematic squares, (n,) of squared noise, (n,) variance of the first under noise
-    alone, and S.
+    (n,) sum of systematic squares, of squared noise, variance of the first under noise alone, and
+    rows that count.
     """
     count, rows, _ = folded.shape
     mean = folded.mean(axis=0)
@@ -187,7 +188,7 @@ def _apart(folded: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]
         products = np.sum(noise[:, :-lag] * noise[:, lag:], axis=(0, 1)) / (count - 1)
         alike = alike + 2.0 * (products / np.maximum(squares, np.finfo(float).tiny)) ** 2
     variance = 2.0 * (squares / count) ** 2 / rows * alike * count / (count - 1)
-    return systematic, squares, variance, rows
+    return systematic, squares, variance, np.maximum(counting.mean(axis=0).sum(axis=0), 1.0)
 
 
 def widened(covariance: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -127,14 +127,14 @@ def of_all_rows(
     ----------
     some : (n, K + 1, r, r) of some rows.
     pairs : (K + 1,) behind them.
-    every : (n, K + 1) pairs of all rows.
+    every : (K + 1,) behind all rows.
     solution : least squares over all rows.
 
     Returns
     -------
     (n, K + 1, r, r)
     """
-    columns = some * (every / np.maximum(pairs, 1.0))[:, :, None, None]
+    columns = some * (every / np.maximum(pairs, 1.0))[:, None, None]
     turn, weights = solution.inverse, solution.weights**2
     values, vectors = np.linalg.eigh(turn.T @ np.tensordot(weights, columns[:, 0], axes=1) @ turn)
     if values[0] < _SHOWN:

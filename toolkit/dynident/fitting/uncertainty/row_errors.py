@@ -13,7 +13,7 @@ colour is known from few values by wider intervals (`known_spectrum`).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
@@ -117,7 +117,9 @@ def row_errors(
     kept = list(solution.basis.independent)
     products = columns.columns[:, :, kept][:, :, :, kept]
     if not columns.complete:
-        products = of_all_rows(products, columns.pairs, pairs, solution)
+        counts = [sample(one, dataset.filter).count for one in dataset.recordings]
+        every = [sum(max(0, count - k) for count in counts) for k in range(columns.lags + 1)]
+        products = of_all_rows(products, columns.pairs, np.array(every), solution)
         if products is None:  # what is left out shows more than its share
             columns = LaggedColumns(columns.lags)
             gather_columns(model, dataset, values, columns)
@@ -133,11 +135,11 @@ def _residuals_of(
     squares = np.zeros(model.robot.n)
 
     def residuals() -> Iterator[tuple[bool, np.ndarray, np.ndarray]]:
-        begins = True
-        for left, torque in sample(recording, settings).residuals(model, values):
+        sampled, start = sample(recording, settings), 0
+        for left, torque in sampled.residuals(model, values):
             squares[:] += np.sum(torque**2, axis=0)
-            yield begins, left, np.ones(left.shape, dtype=bool)
-            begins = False
+            yield start == 0, left, sampled.counting[start : start + len(left)]
+            start += len(left)
 
     return *lagged_residuals(residuals(), lags), squares
 
@@ -334,4 +336,4 @@ def _factors(
             yield columns * mask[:, :, None], torque * mask
             start += len(torque)
 
-    return replace(factorise(weighted()), counts=counts.sum(axis=0))
+    return factorise(weighted())

@@ -1,145 +1,262 @@
 """Joints that stand: rows in which dry friction is whatever the other torques ask for.
 
 A joint is seen to stand if its speed stays within its noise for longer than it takes to pass
-through zero. Around a stop no function of the speed tells its friction.
+through zero. Around a stop no function of the speed tells its friction: these rows of that joint
+count neither in fits nor in errors.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dynident.criteria import StickingCriteria
-from dynident.fitting.sampling import Sampled
-from dynident.recording.filters import butterworth
-from dynident.recording.sections import response
-from dynident.recording.white_noise import encoder_noise_std
-
-_FREQUENCIES = 4096  # at which a filter's response is taken
-
-
-def all_samples(sampled: Sampled) -> Sampled:
-    """A recording with all its samples: a stop may be over in a few."""
-    return sampled.unthinned or sampled
+from dynident.criteria import DEFAULTS, StickingCriteria
+from dynident.fitting.sampling import Sampled, sample
+from dynident.fitting.uncertainty.joint_speeds import JointSpeeds
+from dynident.formulas import quoted_joint
+from dynident.model import Model
+from dynident.recording import Dataset, Recording, uniform
+from dynident.tables import listed, number, percent
 
 
-def speeds(sampled: Sampled) -> np.ndarray:
-    """Speeds in all samples of a recording, (T, n) rad/s or m/s."""
-    source = all_samples(sampled).source
-    return source.part(slice(0, source.samples)).v
+def stands(every: Sequence[JointSpeeds], criteria: StickingCriteria) -> np.ndarray:
+    """Return which joints are seen to stand at many of their stops, (n,) mask.
 
-
-def used_samples(sampled: Sampled) -> slice:
-    """Samples of a recording from the first to the last row that is used."""
-    recorded = all_samples(sampled)
-    rows = recorded.parallel.rows(recorded.source.samples)[sampled.kept]
-    return slice(int(rows[0]), int(rows[-1]) + 1)
-
-
-def speed_noise(sampled: Sampled) -> np.ndarray:
-    """Standard deviation of the noise in a recording's speed, (n,) rad/s or m/s.
-
-    White noise of the encoders, through the low-pass of the positions and the central difference.
-    """
-    rate = sampled.recording.rate_hz
-    angle = np.linspace(0.0, np.pi, _FREQUENCIES)
-    gain = np.sin(angle) * rate
-    cutoff = sampled.parallel.filter.position_cutoff_hz
-    if cutoff:
-        gain = gain * np.abs(response(butterworth(rate, cutoff), angle)) ** 2
-    share = float(np.sqrt(np.trapezoid(gain**2, angle) / np.pi))
-    return encoder_noise_std(sampled.recording.q) * share
-
-
-def is_seen_to_stand(moved: Sequence[tuple[np.ndarray, float]], criteria: StickingCriteria) -> bool:
-    """Whether a joint is seen to stand at many of its stops; a rest at an end is none of them.
-
-    Counted in samples, a passage may last one longer within a band than it does, and one shorter on
-    either side of it: a joint that passes from one sample to the next is not seen to stand.
+    A rest at an end of a recording is no stop. Counted in samples, a passage may last one longer
+    within a band than it does, and one shorter on either side of it: a joint that passes from one
+    sample to the next is not seen to stand.
 
     Parameters
     ----------
-    moved : for each recording, the speeds (T,) of the joint in the samples used, and their noise.
+    every : speeds of each recording.
     criteria : what is standing, and at how many stops.
     """
-    stops = [stop for v, noise in moved for stop in _stops(v, criteria.noise * noise)]
-    longer = sum(within - 1 > criteria.longer * (around + 2) for within, around in stops)
-    return longer >= max(criteria.stops, criteria.stops_share * len(stops))
+    n = every[0].sampled.recording.n
+    longer, count = np.zeros(n), np.zeros(n)
+    for speeds in every:
+        for j, stops in enumerate(_stops(speeds.used(), criteria.noise * speeds.noise)):
+            count[j] += len(stops)
+            longer[j] += sum(
+                stop.within - 1 > criteria.longer * (stop.around + 2) for stop in stops
+            )
+    return longer >= np.maximum(criteria.stops, criteria.stops_share * count)
 
 
 def near_stops(
-    sampled: Sampled,
-    v: np.ndarray,
-    noise: float,
-    criteria: StickingCriteria,
-    least: float = 0.0,
+    speeds: JointSpeeds, criteria: StickingCriteria, least: float | np.ndarray = 0.0
 ) -> np.ndarray:
-    """Return the rows of a joint around its stops.
+    """Return the rows of each joint around its stops, (T, n) mask of the rows that are used.
 
     Parameters
     ----------
-    sampled : the recording.
-    v : speeds of the joint in all samples, from `speeds`.
-    noise : of these, rad/s or m/s.
+    speeds : of the recording.
     criteria : how far around.
-    least : speed within which its friction is not known, where that is more than the noise.
-
-    Returns
-    -------
-    (T,) mask of the rows that are used.
+    least : speed within which a joint's friction is not known, where that is more than the noise;
+        one for each joint, or for all.
     """
-    # Around a reversal the speed is off by what the position's low-pass rounds.
-    rounded = criteria.rounded * float(np.sqrt(np.mean(v[used_samples(sampled)] ** 2)))
-    reach = max(criteria.noise * noise, rounded, least)
-    near = all_samples(sampled).parallel.apply((np.abs(v) < reach).astype(float))
-    return np.abs(near[sampled.kept]) > criteria.spread
+    limits = np.maximum(_unknown_within(speeds, criteria), least)
+    near = np.concatenate(list(speeds.slower(limits)))
+    return np.abs(near) > criteria.spread
 
 
-def rows_that_tell(
-    samples: Sequence[Sampled], criteria: StickingCriteria
-) -> tuple[np.ndarray, ...]:
-    """Rows of each joint that are not around a stop of one that stands.
+def without_stops(
+    model: Model | Collection[Model],
+    dataset: Dataset,
+    criteria: StickingCriteria = DEFAULTS.sticking,
+) -> Dataset:
+    """Return a dataset whose recordings say which rows around stops do not count.
+
+    Of joints with dry friction in the model that are seen to stand. Too few rows of a joint would
+    be left: all of them count. So do they where the filter keeps the ends, as published recipes do.
 
     Parameters
     ----------
-    samples : the recordings.
-    criteria : what is standing; a joint of which too few rows would be left keeps all.
+    model : whose dry friction it is; of several models, that of any.
+    dataset : as it was recorded; one that has been looked at comes back as it is.
+    criteria : what is standing.
+
+    Raises
+    ------
+    RecordingError
+        If a recording does not suit its filter.
+    """
+    recordings = dataset.recordings
+    keeps = dataset.filter is not None and dataset.filter.ends == "keep"
+    if not recordings or keeps or any(one.stops for one in recordings):
+        return dataset
+    models = [model] if isinstance(model, Model) else list(model)
+    dry = [
+        any(f"coulomb_friction@{joint}" in one.slices for one in models)
+        for joint in models[0].robot.names
+    ]
+    if not any(dry):
+        return dataset
+    recordings = tuple(uniform(one) for one in recordings)
+    every = [JointSpeeds(sample(one, dataset.filter)) for one in recordings]
+    which = np.array(dry) & stands(every, criteria)
+    if not which.any():
+        return dataset
+    near = [near_stops(speeds, criteria) & which for speeds in every]
+    which = np.mean(np.concatenate(near), axis=0) <= criteria.most
+    pairs = zip(every, near, strict=True)
+    marked = [_with_stops(speeds.sampled, rows & which) for speeds, rows in pairs]
+    return replace(dataset, recordings=tuple(marked))
+
+
+def standing_note(dataset: Dataset) -> str:
+    """Say of which joints rows around stops do not count, and how many; empty for none.
+
+    Parameters
+    ----------
+    dataset : from `without_stops`.
+    """
+    marked = [one for one in dataset.recordings if one.stops]
+    if not marked:
+        return ""
+    counting = np.concatenate([sample(one, dataset.filter).counting for one in marked])
+    shares = dict(zip(marked[0].joints, (1.0 - counting.mean(axis=0)).tolist(), strict=True))
+    shares = {joint: share for joint, share in shares.items() if share > 0}
+    if not shares:
+        return ""
+    verb, their = ("stands", "its") if len(shares) == 1 else ("stand", "their")
+    return (
+        f"{listed(list(shares))} {verb} still at many of {their} stops, where dry friction is "
+        f"whatever the other torques ask for: {left_out_words(shares)}"
+    )
+
+
+def too_wide_note(
+    model: Model, dataset: Dataset, criteria: StickingCriteria = DEFAULTS.sticking
+) -> str:
+    """Say which joints stand at less than their friction width; empty for none.
+
+    A joint whose dry friction reversed over a wider speed would creep where these stand.
+
+    Parameters
+    ----------
+    model : that has the widths.
+    dataset : from `without_stops`.
+    criteria : what is standing.
 
     Returns
     -------
-    (T, n) mask for each recording.
+    With the line of a study that mends it.
     """
-    moved = [(speeds(one), speed_noise(one)) for one in samples]
-    found = [
-        np.ones((one.count, v.shape[1]), dtype=bool)
-        for one, (v, _) in zip(samples, moved, strict=True)
+    marked = [one for one in dataset.recordings if one.stops]
+    if not marked:
+        return ""
+    every = [JointSpeeds(sample(one, dataset.filter)) for one in marked]
+    speed = np.max([_unknown_within(one, criteria) for one in every], axis=0)
+    widths = dict(zip(model.robot.names, map(float, model.friction_widths), strict=True))
+    narrower = {
+        joint: float(number(one / criteria.noise, 1))
+        for j, (joint, one) in enumerate(zip(model.robot.names, speed, strict=True))
+        if one < widths[joint] and any(len(recording.stops[j]) for recording in marked)
+    }
+    if not narrower:
+        return ""
+    return (
+        "The friction width of the model is more than the speed within which "
+        f"{listed(list(narrower))} stood. Friction that reverses over so much lets a joint creep, "
+        f"and Coulomb friction comes out too large: {width_advice(widths | narrower)}"
+    )
+
+
+def width_advice(widths: Mapping[str, float]) -> str:
+    """Say what to write into a study for other friction widths than the model's.
+
+    Parameters
+    ----------
+    widths : of every joint, rad/s or m/s: one that the key does not name would have the default.
+    """
+    each = ", ".join(f"{quoted_joint(joint)} = {width!r}" for joint, width in widths.items())
+    return (
+        "write, above the first table of the study, in place of any that it has:\n"
+        f"    friction_width = {{ {each} }}"
+    )
+
+
+def left_out_words(shares: dict[str, float]) -> str:
+    """Say what rows around stops are good for, and how many they are.
+
+    Parameters
+    ----------
+    shares : of the rows of each joint, by its name.
+    """
+    low, high = (percent(one, 0) for one in (min(shares.values()), max(shares.values())))
+    share = low if low == high else f"{low.removesuffix(' %')} to {high}"
+    stops = "the joint's" if len(shares) == 1 else "each joint's"
+    return (
+        f"no data tell that friction, and {share} of {stops} rows, those around stops, count "
+        "neither in the fit nor in the errors."
+    )
+
+
+def _unknown_within(speeds: JointSpeeds, criteria: StickingCriteria) -> np.ndarray:
+    """Speed within which nothing tells the sign of a joint's dry friction, (n,).
+
+    That of its noise, and around a reversal what the low-pass of the positions rounds.
+    """
+    return np.maximum(criteria.noise * speeds.noise, criteria.rounded * speeds.rms)
+
+
+def _with_stops(sampled: Sampled, rows: np.ndarray) -> Recording:
+    """A recording that says when its rows (T, n) do not count."""
+    half = 0.5 / sampled.rate_hz
+    stops = []
+    for column in rows.T:
+        edges = np.diff(np.concatenate([[0], column.astype(int), [0]]))
+        first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+        stops.append(np.stack([sampled.t[first] - half, sampled.t[last] + half], axis=1))
+    return sampled.recording.replace(stops=tuple(stops))
+
+
+@dataclass(frozen=True)
+class _Stop:
+    """A stop in samples: from the first to before the last below three times a speed.
+
+    Attributes
+    ----------
+    start, stop : samples.
+    within : how many of them are below that speed.
+    """
+
+    start: int
+    stop: int
+    within: int
+
+    @property
+    def around(self) -> int:
+        """How many are above that speed."""
+        return self.stop - self.start - self.within
+
+
+def _stops(parts: Iterable[np.ndarray], limits: np.ndarray) -> list[list[_Stop]]:
+    """Stops of each joint before which and after which it moves.
+
+    Parameters
+    ----------
+    parts : consecutive speeds, (T, n) each.
+    limits : (n,) speed of standing.
+    """
+    found: list[list[_Stop]] = [[] for _ in limits]
+    first = 0
+    for v in parts:
+        wide, narrow = np.abs(v) < 3.0 * limits, np.abs(v) < limits
+        for j, stops in enumerate(found):
+            edges = np.diff(np.concatenate([[0], wide[:, j].astype(int), [0]]))
+            begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+            inside = np.concatenate([[0], np.cumsum(narrow[:, j])])
+            for start, stop in zip(begins.tolist(), ends.tolist(), strict=True):
+                begun, within = first + start, int(inside[stop] - inside[start])
+                if stops and stops[-1].stop == begun:  # it goes on from the part before
+                    before = stops.pop()
+                    begun, within = before.start, before.within + within
+                stops.append(_Stop(begun, first + stop, within))
+        first += len(v)
+    return [
+        [one for one in stops if one.within and one.start > 0 and one.stop < first]
+        for stops in found
     ]
-    for j in range(moved[0][0].shape[1] if moved else 0):
-        own = [
-            (v[used_samples(one), j], float(noise[j]))
-            for one, (v, noise) in zip(samples, moved, strict=True)
-        ]
-        if not is_seen_to_stand(own, criteria):
-            continue
-        near = [
-            near_stops(one, v[:, j], float(noise[j]), criteria)
-            for one, (v, noise) in zip(samples, moved, strict=True)
-        ]
-        if np.mean(np.concatenate(near)) <= criteria.most:
-            for mask, gone in zip(found, near, strict=True):
-                mask[:, j] &= ~gone
-    return tuple(found)
-
-
-def _stops(v: np.ndarray, reach: float) -> Iterator[tuple[int, int]]:
-    """Samples of each stop within a speed, and between that and three times as much.
-
-    Only of stops before which and after which the joint moves.
-    """
-    wide, narrow = np.abs(v) < 3.0 * reach, np.abs(v) < reach
-    edges = np.diff(np.concatenate([[0], wide.astype(int), [0]]))
-    for start, stop in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
-        within = int(np.count_nonzero(narrow[start:stop]))
-        if within and start > 0 and stop < len(v):
-            yield within, int(stop - start) - within

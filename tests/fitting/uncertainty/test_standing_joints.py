@@ -1,0 +1,127 @@
+"""Rows around stops of joints that stand count neither in fits nor in errors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import dynident as di
+from dynident.criteria import DEFAULTS
+from dynident.fitting.instrumental import Filtered
+from dynident.fitting.sampling import BLOCK, sample
+from dynident.fitting.uncertainty.joint_speeds import JointSpeeds
+from dynident.fitting.uncertainty.standing_joints import (
+    near_stops,
+    standing_note,
+    stands,
+    without_stops,
+)
+from dynident.moments.factors import factorise
+from dynident.recording import Dataset, Filter, default_filter
+from standing_arm import COULOMB, RATE_HZ, STOPPED, given, record
+
+ELBOW = 1
+
+
+def sharp() -> di.Model:
+    """The model whose elbow reverses as sharply as one that stands does."""
+    return given().with_friction_width("elbow", 1e-3)
+
+
+def standing(*seeds: int) -> Dataset:
+    return Dataset(tuple(record(seed, STOPPED) for seed in seeds))
+
+
+def test_dry_friction_of_a_joint_that_stands_is_found_away_from_its_stops() -> None:
+    data = standing(0, 1, 2)
+    keeps = replace(data, filter=replace(default_filter(RATE_HZ), ends="keep"))
+    found, every = (di.fit(sharp(), one) for one in (data, keeps))
+    place = given().names.index("Fc@elbow")
+    assert abs(found.values[place] - COULOMB[ELBOW]) < 3.0 * found.sigma[place] < 0.05
+    assert found.joint_errors[ELBOW] < 0.5 * every.joint_errors[ELBOW]
+    assert any("elbow stands still at many of its stops" in one for one in found.notes)
+    assert not any("stands still" in one for one in every.notes)
+
+
+def test_a_comparison_counts_the_rows_that_a_fit_counts() -> None:
+    data = standing(0, 1, 2)
+    fit = di.fit(given(), data)
+    same = di.compare(fit, data)
+    np.testing.assert_allclose(same.results[0].joint_errors, fit.joint_errors, rtol=0.02)
+    assert "elbow stands still" in same.standing
+    assert same.standing in str(same)
+
+
+def test_nothing_is_left_out_where_no_joint_stands_or_none_has_dry_friction() -> None:
+    moving = Dataset((record(0, 0.0), record(1, 0.0)))
+    assert without_stops(given(), moving) is moving
+    frictionless = di.Model(given().robot)
+    assert without_stops(frictionless, standing(0, 1)).recordings[0].stops == ()
+    assert standing_note(moving) == ""
+
+
+def test_what_was_looked_at_comes_back_and_copies_leave_out_the_same_rows() -> None:
+    marked = without_stops(given(), standing(0, 1))
+    assert without_stops(given(), marked) is marked
+    one = marked.recordings[0]
+    counting = sample(one, None).counting
+    expected = near_stops(JointSpeeds(sample(one.replace(stops=()), None)), DEFAULTS.sticking)
+    np.testing.assert_array_equal(counting[:, ELBOW], ~expected[:, ELBOW])
+    assert counting[:, 0].all()
+    moved = one.replace(q=one.q + 0.01 * np.sin(one.t)[:, None])
+    np.testing.assert_array_equal(sample(moved, None).counting, counting)
+    swapped = one.select(tuple(reversed(one.joints)))
+    np.testing.assert_array_equal(sample(swapped, None).counting, counting[:, ::-1])
+
+
+def test_rows_that_do_not_count_are_in_no_factor() -> None:
+    (one,) = without_stops(given(), standing(0)).recordings
+    sampled = sample(one, None)
+    factors = factorise(sampled.rows(given()))
+    np.testing.assert_array_equal(factors.counts, sampled.counting.sum(axis=0))
+    columns = np.concatenate(list(sample(one.replace(stops=()), None).columns(given())))
+    for j, some in enumerate(sampled.counting.T):
+        expected = np.linalg.norm(columns[some, j], axis=0)
+        np.testing.assert_allclose(
+            np.linalg.norm(factors.R[j, :, :-1], axis=0), expected, atol=1e-9 * expected.max()
+        )
+
+
+def test_a_stop_is_one_whichever_part_of_the_recording_it_lies_in(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A recording that is looked at part by part has the stops of the whole."""
+    (one,) = standing(3).recordings
+    whole = JointSpeeds(sample(one, None))
+    expected = near_stops(whole, DEFAULTS.sticking)
+    where = "dynident.fitting.uncertainty.joint_speeds"
+    monkeypatch.setattr(f"{where}.BLOCK", BLOCK // 37)
+    monkeypatch.setattr(f"{where}._AT_ONCE", 0)
+    parts = JointSpeeds(sample(one, None))
+    assert len(list(parts.used())) > 20
+    np.testing.assert_array_equal(stands([parts], DEFAULTS.sticking), [False, True])
+    np.testing.assert_array_equal(near_stops(parts, DEFAULTS.sticking), expected)
+    np.testing.assert_allclose(parts.rms, whole.rms, rtol=1e-9)
+
+
+def test_instruments_leave_out_the_same_rows() -> None:
+    settings = Filter(position_cutoff_hz=40.0, cutoff_hz=18.0, rate_hz=50.0)
+    data = replace(standing(0, 1), filter=settings)
+    found = di.fit(sharp(), data, di.IV(instruments=Filtered(20.0)))
+    place = given().names.index("Fc@elbow")
+    assert abs(found.values[place] - COULOMB[ELBOW]) < 0.05
+    assert found.joint_errors[ELBOW] < 0.1
+
+
+def test_a_width_beyond_what_a_joint_stands_at_is_said_with_the_line_that_mends_it() -> None:
+    data = standing(0, 1, 2)
+    wide, place = di.fit(given(), data), given().names.index("Fc@elbow")
+    (note,) = (one for one in wide.notes if "friction_width" in one)
+    assert "within which elbow stood" in note and "shoulder = 0.02" in note
+    width = float(note.rsplit("elbow = ", 1)[1].split(" ")[0])
+    mended = di.fit(given().with_friction_width("elbow", width), data)
+    assert not any("friction_width" in one for one in mended.notes)
+    off = [abs(one.values[place] - COULOMB[ELBOW]) for one in (wide, mended)]
+    assert off[1] < off[0] / 10

@@ -1,0 +1,88 @@
+"""Speeds of a recording's joints in all its samples, and their noise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from dynident.fitting.sampling import BLOCK, Sampled
+from dynident.recording.filters import butterworth
+from dynident.recording.sections import response
+from dynident.recording.white_noise import encoder_noise_std
+
+_FREQUENCIES = 4096  # at which a filter's response is taken
+_AT_ONCE = 1 << 21  # speeds that are kept once they are computed
+
+
+@dataclass(frozen=True, eq=False)
+class JointSpeeds:
+    """Speeds of a recording's joints in all its samples: a stop may be over in a few.
+
+    Parameters
+    ----------
+    sampled : the recording, whose rows they are asked for.
+    """
+
+    sampled: Sampled
+
+    @cached_property
+    def noise(self) -> np.ndarray:
+        """Standard deviation of the noise in them, (n,) rad/s or m/s.
+
+        White noise of the encoders, through the low-pass of the positions and the central
+        difference.
+        """
+        rate = self.sampled.recording.rate_hz
+        angle = np.linspace(0.0, np.pi, _FREQUENCIES)
+        gain = np.sin(angle) * rate
+        cutoff = self.sampled.parallel.filter.position_cutoff_hz
+        if cutoff:
+            gain = gain * np.abs(response(butterworth(rate, cutoff), angle)) ** 2
+        share = float(np.sqrt(np.trapezoid(gain**2, angle) / np.pi))
+        return encoder_noise_std(self.sampled.recording.q) * share
+
+    @cached_property
+    def rms(self) -> np.ndarray:
+        """Their root mean square from the first to the last row that is used, (n,)."""
+        squares = [np.sum(part**2, axis=0) for part in self.used()]
+        return np.sqrt(np.sum(squares, axis=0) / (self._used.stop - self._used.start))
+
+    def used(self) -> Iterator[np.ndarray]:
+        """Yield them (T, n) from the first to the last row that is used, part by part."""
+        for start in range(self._used.start, self._used.stop, BLOCK):
+            yield self._part(slice(start, min(start + BLOCK, self._used.stop)))
+
+    def slower(self, limits: np.ndarray) -> Iterator[np.ndarray]:
+        """Yield how much of each row's low-pass lies within a speed, (T, n), part by part.
+
+        Parameters
+        ----------
+        limits : (n,) the speed, rad/s or m/s.
+        """
+        full = self._full
+        for plan in full.parallel.blocks(full.source.samples, BLOCK, self.sampled.kept):
+            inside = np.abs(self._part(plan.raw)) < limits
+            yield full.parallel.apply_block(inside.astype(float), plan)
+
+    @property
+    def _full(self) -> Sampled:
+        return self.sampled.unthinned or self.sampled
+
+    @cached_property
+    def _used(self) -> slice:
+        rows = self._full.parallel.rows(self._full.source.samples)[self.sampled.kept]
+        return slice(int(rows[0]), int(rows[-1]) + 1)
+
+    def _part(self, raw: slice) -> np.ndarray:
+        source = self._full.source
+        if source.samples * self.sampled.recording.n <= _AT_ONCE:
+            return self._whole[raw]
+        return source.part(raw).v
+
+    @cached_property
+    def _whole(self) -> np.ndarray:
+        source = self._full.source
+        return source.part(slice(0, source.samples)).v
