@@ -74,6 +74,16 @@ def test_no_effect_is_called_small_that_is_needed_for_most_of_the_fall() -> None
     assert carried >= MOST_OF_IT * 0.1 and [len(found.leading), len(found.smaller)] == [1, 2]
 
 
+def test_a_fall_that_may_be_chance_does_not_lead() -> None:
+    steps = along((1.0, 2.0)).steps
+    chance = replace(steps[1], fall_standard_error=0.02)
+    assert chance.uncertain and not steps[0].uncertain
+    found = LeadingEffects.of((steps[0], chance))
+    assert [one.effect.name for one in found.leading[0]] == ["joint_spring"]
+    assert [one.effect.name for one in found.smaller[0]] == ["torque_ripple"]
+    assert len(LeadingEffects.of((chance,)).leading) == 1
+
+
 @pytest.mark.parametrize("falls", [(9.0, 0.1, 0.1), (0.1, 9.0, 0.1)])
 def test_what_requires_another_effect_leads_with_it(falls: tuple[float, float, float]) -> None:
     steps = along(falls).steps

@@ -140,6 +140,13 @@ def test_intervals_are_those_of_the_noise_where_the_model_holds(found):
     assert half == pytest.approx(1.96 * sigma, rel=0.1)  # as written, rounded
 
 
+def test_a_joint_is_not_called_in_order_by_another_measure_than_the_verdict(found):
+    one = rejected(found, *(0.45 for _ in found.joints))
+    assert {state.state for state in states(one)} == {"failing"}
+    calm = rejected(found, *(0.1 for _ in found.joints))
+    assert not any("nothing is left but noise" in state.words for state in states(calm))
+
+
 def test_intervals_of_a_rejected_model_are_wider_by_the_birge_ratio(found):
     one = rejected(found, 0.0, 3.0)
     wider = widening_after(one)

@@ -33,14 +33,18 @@ class LeadingEffects:
     def of(cls, steps: Sequence[Step]) -> LeadingEffects:
         """Divide the effects of a path: the largest falls first, until they make most of it.
 
+        A fall that may be chance leads only where all may be.
+
         What makes no torque without one of these goes with it, and what one of these requires:
         the values of both are right only together.
         """
         groups = [tuple(group) for group in together(steps)]
         falls = [_fall(group) for group in groups]
-        order = sorted(range(len(groups)), key=lambda k: -falls[k])
-        many, carried = 0, 0.0
-        while many < len(groups) and (many == 0 or carried < MOST_OF_IT * sum(falls)):
+        chance = [all(step.uncertain for step in group) for group in groups]
+        order = sorted(range(len(groups)), key=lambda k: (chance[k], -falls[k]))
+        leaders = chance.count(False) or len(groups)
+        whole, many, carried = sum(falls[k] for k in order[:leaders]), 0, 0.0
+        while many < leaders and (many == 0 or carried < MOST_OF_IT * whole):
             carried += falls[order[many]]
             many += 1
         led = [step.effect for k in order[:many] for step in groups[k]]

@@ -95,6 +95,8 @@ class Effect(EffectTraits, SimulatedEffect, ABC):
     most of the work."""
     requires: ClassVar[tuple[str, ...]] = ()
     """Labels of effects without which it makes no torque: a diagnosis asks for it beside them."""
+    beyond: ClassVar[tuple[str, ...]] = ()
+    """Effects at the same joint of which it is a refinement: a diagnosis asks for these first."""
     found_by: ClassVar[Literal["residual", "repetition"]] = "residual"
     """Where it shows: in what repetitions have in common, or in what differs between them."""
 

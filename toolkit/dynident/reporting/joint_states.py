@@ -13,10 +13,10 @@ from dynident.reporting.content import AFTER_COLOUR, BEFORE_COLOUR, GIVEN, GREY,
 from dynident.reporting.pictures.look import dressed, mark, plain
 from dynident.tables import number
 
-BEYOND = 0.5
-"""Systematic residual over noise from which on a joint is shown as failing."""
 MOST_OPEN = 1
 """Joints whose residual maps are shown without asking."""
+
+_NOISE_ALONE = "nothing is left but noise"
 
 State = Literal["fine", "repaired", "failing", "unknown"]
 
@@ -61,14 +61,17 @@ def _state(diagnosis: Diagnosis, joint: JointResult) -> JointState:
     if before is None or after is None:
         words = "an effect was added here" if named else "the noise is unknown"
         return JointState(joint, "unknown", words, (named, joint.error_before))
-    if after > BEYOND and diagnosis.verdict == "unexplained":
+    # By the measure of the verdict: else a page would contradict itself.
+    beyond, open_still = diagnosis.criteria.verdict.within_noise, diagnosis.verdict == "unexplained"
+    if after > beyond and open_still:
         words = f"what is left is {number(after, 2)} times the noise"
         return JointState(joint, "failing", words, (2, after))
-    if diagnosis.steps and (named or before > BEYOND):
+    if diagnosis.steps and (named or before > beyond):
         words = f"from {number(before, 2)} times the noise down to it"
         return JointState(joint, "repaired", words, (1, before))
     # Where the verdict is that nothing is missing, a large ratio is one of few samples.
-    return JointState(joint, "fine", "nothing is left but noise", (0, before))
+    words = "nothing beyond the noise shows on held-out data" if open_still else _NOISE_ALONE
+    return JointState(joint, "fine", words, (0, before))
 
 
 def joint_errors(diagnosis: Diagnosis) -> go.Figure:

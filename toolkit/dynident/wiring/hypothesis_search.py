@@ -171,6 +171,13 @@ class _Fits:
         sized = self._sized_as_described(one, regression, _fit(regression, one), criteria)
         return one if sized else None
 
+    def lengths_in_metres(self, one: Assignment, criteria: WiringCriteria) -> Assignment:
+        """An assignment with lengths that go too far taken for mm: they are told last."""
+        kinds = enumerate(self.model.robot.kinds)
+        slides = (j for j, kind in kinds if kind == "prismatic")
+        far = [j for j in slides if turns_too_far(self.model, self.rows, one, j, criteria)]
+        return one.positions_scaled(MILLI, *far) if far else one
+
     def _sized_as_described(
         self,
         one: Hypothesis,
@@ -242,15 +249,15 @@ def _settled(
     if one.kind == "degrees" and len(one.joints) == 1:
         return False
     joints = range(here.model.robot.n)
-    if any(turns_too_far(here.model, here.rows, one.mended, j, criteria) for j in joints):
+    mended = here.lengths_in_metres(one.mended, criteria)
+    if any(turns_too_far(here.model, here.rows, mended, j, criteria) for j in joints):
         return False
     if one.kind != "degrees":
         return True
-    far = [turns_too_far(here.model, here.rows, here.now, j, criteria) for j in joints]
+    far = [turns_too_far(here.model, here.rows, here.now, j, criteria) for j in one.joints]
     if any(far) and not all(far):
         return False  # where all are called degrees for the sake of one
-    described = DescribedScale.of(here.model, here.rows, one.mended, criteria)
-    return described.confirmed(criteria)
+    return DescribedScale.of(here.model, here.rows, mended, criteria).confirmed(criteria)
 
 
 def _but_degrees_of_all(

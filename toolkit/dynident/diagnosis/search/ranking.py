@@ -67,8 +67,9 @@ class Ranking:
 def candidates(model: Model) -> list[Effect]:
     """Every effect that shows in residuals, wherever the model has none of its label.
 
-    Of those that require others, the ones that have these in the model; of those that may be
-    common to all joints, no more than there are joints: with them, one more says nothing new.
+    Of those that require others, or refine others at their joint, the ones that have these in the
+    model; of those that may be common to all joints, no more than there are joints: with them, one
+    more says nothing new.
     """
     found = []
     laws = (law_effect(law) for law in model.laws)
@@ -78,7 +79,11 @@ def candidates(model: Model) -> list[Effect]:
         own = sum(one.name == effect.name for one in model.effects)
         if effect.place == "joint or robot" and own >= model.robot.n:
             continue
-        found += [e.on(model.robot) for e in effect.candidates(model.robot) if e not in model]
+        found += [
+            e.on(model.robot)
+            for e in effect.candidates(model.robot)
+            if e not in model and all(f"{one}@{e.joint}" in model for one in e.beyond)
+        ]
     return found
 
 

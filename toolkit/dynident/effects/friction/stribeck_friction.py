@@ -37,6 +37,7 @@ class StribeckFriction(JointEffect):
         _spikes(0.15),
     )
     confounded_with = ("coulomb_friction", "viscous_friction")
+    beyond = ("coulomb_friction",)
     shown_by = "slow"
     experiment = "move {joint} slowly, at speeds below 0.1 rad/s (or 0.01 m/s), in both directions"
 
