@@ -82,7 +82,7 @@ SCARA = "".join(
 
 
 def test_degrees_beside_mm_are_no_gears() -> None:
-    """The slide goes too far whatever the angles are, and gears take what friction at stops does."""
+    """A slide goes too far whatever the angles are; gears take what friction at stops does."""
     model = Model(Robot.from_text(SCARA)) + "viscous_friction" + "coulomb_friction"
     values = true_values(model, Fv__j1=3.0, Fv__j2=1.5, Fv__j3=20.0, Fv__j4=0.04)
     units = np.array([180.0 / np.pi, 180.0 / np.pi, 1e3, 180.0 / np.pi])
