@@ -268,3 +268,12 @@ def test_a_torque_of_another_moment_is_the_first_to_be_mended(steps):
     assert sampled.mend in told[0].what and "2 ms later" in told[0].why
     assert not any("use the model as it is" in one.what for one in told)
     assert not any("held_command" in one.what for one in next_steps(found))
+
+
+def test_a_contact_is_found_and_takes_no_error(six):
+    """Its rows are left out: the errors before and after are the same."""
+    pushed = effect("contact", "joint2")
+    values = (0.1,) * len(pushed.parameters(six.after.model.robot))
+    step = replace(six.steps[0], effect=pushed, values=values, indistinguishable=())
+    said = headline(replace(six, steps=(step,))).sentence
+    assert said.startswith("Contact at joint2 was found, and beside it the torque error is")

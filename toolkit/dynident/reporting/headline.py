@@ -10,7 +10,7 @@ from dynident.diagnosis.effect_groups import in_words
 from dynident.diagnosis.leading_effects import LeadingEffects
 from dynident.diagnosis.result import Diagnosis
 from dynident.reporting.content import step_groups
-from dynident.tables import percent, two_percent
+from dynident.tables import listed, percent, two_percent
 
 Mark = Literal["\u2713", "!", "?"]
 """Nothing is left but noise; something is to be mended or remains; it cannot be said."""
@@ -85,27 +85,27 @@ def _with_doubt(found: Headline, diagnosis: Diagnosis) -> Headline:
 
 
 def _of_verdict(diagnosis: Diagnosis) -> Headline:
-    added, fall = _added(diagnosis), _fall(diagnosis)
+    found = _found(diagnosis)
     known = diagnosis.noise_source != "unknown"
     if not diagnosis.steps:
         return _nothing_added(diagnosis, known)
     title, stopped = _title(diagnosis), diagnosis.limit is not None
     if diagnosis.following_motion:
-        said = f"{added} {fall}, and what is left {_followed(diagnosis)}."
+        said = f"{found}, and what is left {_followed(diagnosis)}."
         return Headline("!", f"{title}, a residual remains", said)
     if diagnosis.training_only:
-        said = f"{added} {fall}, and {_in_training(diagnosis)}."
+        said = f"{found}, and {_in_training(diagnosis)}."
         return Headline("!", f"{title}, a residual in training", said)
     if not known:
         more = diagnosis.verdict == "unexplained" and not stopped
         more = " More effects are significant." if more else ""
-        return Headline("?", f"{title}, noise unknown", f"{added} {fall}.{more} {_NOT_KNOWN}")
+        return Headline("?", f"{title}, noise unknown", f"{found}.{more} {_NOT_KNOWN}")
     if diagnosis.verdict == "unexplained":
         none = "" if stopped else " unexplained"
-        said = f"{added} {fall}, and a residual beyond the noise remains{none}."
+        said = f"{found}, and a residual beyond the noise remains{none}."
         return Headline("!", f"{title}, a residual remains", said)
     remains = f"what remains is {diagnosis.rest}{_MORE[diagnosis.rest]}"
-    return Headline("\u2713", title, f"{added} {fall}; {remains}.")
+    return Headline("\u2713", title, f"{found}; {remains}.")
 
 
 def _title(diagnosis: Diagnosis) -> str:
@@ -164,6 +164,18 @@ def _nothing_added(diagnosis: Diagnosis, known: bool) -> Headline:
     return Headline("?", "nothing found, noise unknown", said)
 
 
+def _found(diagnosis: Diagnosis) -> str:
+    """The effects added, and what they do to the error."""
+    error = diagnosis.test_error
+    if all(step.effect.found_by == "repetition" for step in diagnosis.steps):
+        # What happened once is no part of the errors.
+        names = _capitalised(listed([step.effect.title for step in diagnosis.steps]))
+        were = "was" if len(diagnosis.steps) == 1 else "were"
+        return f"{names} {were} found, and beside it the torque error is {percent(error.after)}"
+    before, after = two_percent(error.before, error.after)
+    return f"{_added(diagnosis)} the torque error from {before} to {after}"
+
+
 def _added(diagnosis: Diagnosis) -> str:
     groups, found = step_groups(diagnosis), LeadingEffects.of(diagnosis.steps)
     count = len(diagnosis.steps)
@@ -182,9 +194,3 @@ def _added(diagnosis: Diagnosis) -> str:
 
 def _capitalised(words: str) -> str:
     return f"{words[0].upper()}{words[1:]}"
-
-
-def _fall(diagnosis: Diagnosis) -> str:
-    error = diagnosis.test_error
-    before, after = two_percent(error.before, error.after)
-    return f"the torque error from {before} to {after}"
