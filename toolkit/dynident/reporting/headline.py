@@ -85,11 +85,10 @@ def _with_doubt(found: Headline, diagnosis: Diagnosis) -> Headline:
 
 
 def _of_verdict(diagnosis: Diagnosis) -> Headline:
-    found = _found(diagnosis)
     known = diagnosis.noise_source != "unknown"
     if not diagnosis.steps:
         return _nothing_added(diagnosis, known)
-    title, stopped = _title(diagnosis), diagnosis.limit is not None
+    found, title, stopped = _found(diagnosis), _title(diagnosis), diagnosis.limit is not None
     if diagnosis.following_motion:
         said = f"{found}, and what is left {_followed(diagnosis)}."
         return Headline("!", f"{title}, a residual remains", said)
