@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import dynident as di
+import standing_arm
 from dynident.diagnosis import Diagnosis
 from dynident.effects import Law
 from dynident.errors import StudyError
@@ -17,6 +18,7 @@ from dynident.explorer.effect_choices import MOST_OTHERS, EffectChoice, effect_c
 from dynident.explorer.opened_study import OpenedStudy, StudyVersions
 from dynident.explorer.search_thread import SearchThread
 from dynident.explorer.switched_fit import Refitter
+from dynident.recording import Dataset
 from dynident.study import study_digest
 from study_files import STUDY, edited, write_study
 
@@ -205,3 +207,15 @@ def test_a_law_is_written_with_its_formula(tmp_path, diagnosis, study):
     fitted = Refitter(study).fit([effect])
     wanted = di.fit(study.model + effect, study.train)
     np.testing.assert_allclose(fitted.estimate.values, wanted.values, rtol=1e-9)
+
+
+def test_of_a_joint_that_stands_a_switch_counts_the_rows_that_a_fit_does(study):
+    model = standing_arm.given().with_friction_width("elbow", 1e-3)
+    train = Dataset(tuple(standing_arm.record(k, standing_arm.STOPPED) for k in range(2)))
+    stands = replace(study, model=model, train=train, test=Dataset(()))
+    quick, slow = Refitter(stands).fit().estimate, di.fit(model, train)
+    np.testing.assert_allclose(quick.values, slow.values, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(quick.joint_errors, slow.joint_errors, rtol=1e-6)
+    dry = next(one for one in model.effects if one.label == "coulomb_friction@elbow")
+    later = Refitter(stands, model - dry).with_intervals([dry])
+    assert later.value("Fc@elbow") == pytest.approx(slow.value("Fc@elbow"), rel=1e-6)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import dynident as di
 from dynident.criteria import DEFAULTS
+from dynident.evidence.comparison import compare_models
 from dynident.fitting.instrumental import Filtered
+from dynident.fitting.noisy_inputs import encoder_noise, input_noise
 from dynident.fitting.sampling import BLOCK, sample
 from dynident.fitting.uncertainty.joint_speeds import JointSpeeds
 from dynident.fitting.uncertainty.standing_joints import (
@@ -19,8 +22,9 @@ from dynident.fitting.uncertainty.standing_joints import (
     without_stops,
 )
 from dynident.moments.factors import factorise
-from dynident.recording import Dataset, Filter, default_filter
+from dynident.recording import Dataset, Filter, Noise, Recording, default_filter, lowpass
 from standing_arm import COULOMB, RATE_HZ, STOPPED, given, record
+from synthetic import true_values
 
 ELBOW = 1
 
@@ -125,3 +129,60 @@ def test_a_width_beyond_what_a_joint_stands_at_is_said_with_the_line_that_mends_
     assert not any("friction_width" in one for one in mended.notes)
     off = [abs(one.values[place] - COULOMB[ELBOW]) for one in (wide, mended)]
     assert off[1] < off[0] / 10
+
+
+def test_a_short_recording_of_a_joint_that_is_known_to_stand_loses_its_stops_too() -> None:
+    """Fits and comparisons count the same rows, whatever either shows of the joint by itself."""
+    train = standing(0, 1, 2)
+    (long,) = standing(7).recordings
+    short = Dataset((long.cut(0.0, 4.0),))
+    assert without_stops(given(), short).recordings[0].stops == ()
+    fit = di.fit(sharp(), train)
+    assert fit.standing == ("elbow",)
+    found = di.compare(fit, short)
+    assert found.results[0].joint_errors[ELBOW] < 3.0 * fit.joint_errors[ELBOW]
+    models = compare_models({"given": sharp()}, train, short)
+    assert models.results[0].joint_errors[ELBOW] < 3.0 * fit.joint_errors[ELBOW]
+
+
+def test_a_standing_joint_is_remembered_in_the_file(tmp_path: Path) -> None:
+    fit = di.fit(sharp(), standing(0, 1))
+    fit.save(tmp_path / "fit.json")
+    assert di.load_estimate(tmp_path / "fit.json").standing == fit.standing == ("elbow",)
+
+
+def repeated(seed: int) -> Recording:
+    """A motion there and back, so that it joins to itself, three times with noise of its own."""
+    (one,) = standing(seed).recordings
+    q = np.concatenate([one.q, one.q[-2:0:-1]])
+    period, rate = len(q) / RATE_HZ, RATE_HZ
+    q = np.concatenate([q, q, q])
+    t = np.arange(len(q)) / rate
+    model, rng = sharp(), np.random.default_rng([seed, 9])
+    values = true_values(given(), Fv__shoulder=1.0, Fc__shoulder=3.0, Fc__elbow=2.0)
+    smooth = lowpass(q, rate, 30.0)
+    v = np.gradient(smooth, 1.0 / rate, axis=0)
+    a = np.gradient(v, 1.0 / rate, axis=0)
+    tau = model.torque(model.block(t, smooth, v, a), values)
+    q = smooth + 1e-5 * rng.normal(size=q.shape)
+    tau = tau + 0.05 * rng.normal(size=q.shape)
+    return Recording(t, q, tau, model.robot.names, period=period, name=f"{seed}")
+
+
+def test_rows_that_count_in_some_repetitions_alone_are_no_noise_of_the_inputs() -> None:
+    data = Dataset((repeated(0),))
+    marked = without_stops(sharp(), data)
+    assert marked.recordings[0].stops and len(marked.recordings[0].stops[ELBOW])
+    by_repeats, by_encoders = input_noise(sharp(), data), encoder_noise(sharp(), stated(data))
+    place = sharp().names.index("Fc@elbow")
+    assert by_repeats.share[place] < 10.0 * by_encoders.share[place]
+
+
+def stated(data: Dataset) -> Dataset:
+    return replace(data, noise=Noise(np.full(2, 1e-5), np.full(2, 0.05)))
+
+
+def test_noise_in_the_rows_that_count_is_no_lack_of_fit() -> None:
+    estimate = di.fit(sharp(), Dataset(tuple(repeated(seed) for seed in range(3))))
+    assert estimate.standing == ("elbow",)
+    assert "rejected" not in estimate.headline

@@ -17,7 +17,7 @@ from dynident.evidence.maps import residual_maps
 from dynident.evidence.runs import gather
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.row_objective import refine_shapes, shaped_effects
-from dynident.fitting.uncertainty.standing_joints import standing_note, without_stops
+from dynident.fitting.uncertainty.standing_joints import standing_in, standing_note, without_stops
 from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.tables import Shown, Table, finite, mostly_noise, percent
@@ -166,7 +166,8 @@ def compare(
     if not dataset.recordings:
         remedy = 'mark some recordings use = "test"'
         raise FitError("no recording to compare with", remedy=remedy)
-    dataset = without_stops([one.model for one in named.values()], dataset, criteria.sticking)
+    standing = {joint for one in named.values() for joint in one.standing}
+    dataset = without_stops([one.model for one in named.values()], dataset, standing)
     runs = gather(dataset, criteria.noise)
     results = []
     for estimate in named.values():
@@ -209,7 +210,8 @@ def compare_models(
     As `compare`, of the fitted models.
     """
     wiring = check_wiring(next(iter(models.values())), train, test, criteria.wiring)
-    train, test = (without_stops(models.values(), one, criteria.sticking) for one in (train, test))
+    train = without_stops(models.values(), train)
+    test = without_stops(models.values(), test, standing_in(train))
     runs = gather(train, criteria.noise)
     held = gather(test, criteria.noise) if len(test) else None
     results, compared, loops = [], [], []

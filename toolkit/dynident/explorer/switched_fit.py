@@ -10,7 +10,7 @@ from threading import RLock
 import numpy as np
 
 from dynident.diagnosis.search.refusal import impossible_in
-from dynident.effects import Effect
+from dynident.effects import Effect, effects_of
 from dynident.evidence import ResidualMap
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import fit_evidence
@@ -22,7 +22,7 @@ from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import LeastSquares, estimate_of
 from dynident.fitting.linear_solution import solve_factors
 from dynident.fitting.uncertainty.shape_errors import with_shape_errors
-from dynident.fitting.uncertainty.standing_joints import without_stops
+from dynident.fitting.uncertainty.standing_joints import standing_in, without_stops
 from dynident.model import Model
 from dynident.moments.factors import factorise
 from dynident.study import Study
@@ -69,9 +69,11 @@ class Refitter:
     def __init__(self, study: Study, model: Model | None = None) -> None:
         self.study, self.model = study, study.model if model is None else model
         criteria = study.criteria
-        self._recorded, test = (
-            without_stops(self.model, one, criteria.sticking) for one in (study.train, study.test)
-        )
+        # Both errors that a switch compares are of the same rows: as if all had dry friction.
+        dry = effects_of("coulomb_friction", self.model.robot)
+        every = self.model + tuple(one for one in dry if one not in self.model)
+        self._recorded = without_stops(every, study.train)
+        test = without_stops(every, study.test, standing_in(self._recorded))
         runs = gather(self._recorded, criteria.noise)
         self._train = Evidence(self.model, runs, criteria=criteria)
         self._test = None
@@ -142,7 +144,7 @@ class Refitter:
         """Columns (T, n, p) and torque (T, n) of a recording."""
         joints = range(model.robot.n)
         found = [model_columns(self._train, model, run, j, None)[0] for j in joints]
-        rows = np.stack(found, axis=1)
+        rows = self._train.runs[run].replicates[0].counted(np.stack(found, axis=1))
         return rows[:, :, :-1], rows[:, :, -1]
 
     @single_threaded

@@ -87,6 +87,7 @@ class Estimate(Shown):
     shapes : parameters inside effects, as they were found.
     trading_off : names of parameters of which the data tell no size, because another shape of their
         effect with another size does the same.
+    standing : joints that stand at their stops, of which rows around these did not count.
     """
 
     model: Model
@@ -110,6 +111,7 @@ class Estimate(Shown):
     headline: str = ""
     shapes: tuple[ShapeValue, ...] = ()
     trading_off: tuple[str, ...] = ()
+    standing: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -312,6 +314,7 @@ class Estimate(Shown):
             "notes": list(self.notes),
             "sigma_words": self.words_of_sigma,
             "headline": self.headline,
+            "standing": list(self.standing),
             "recordings": [vars(source) for source in self.sources],
             "shapes": [
                 {

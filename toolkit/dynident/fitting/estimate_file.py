@@ -113,6 +113,7 @@ def _estimate(content: EstimateFile, model: Model, where: str) -> Estimate:
         links=links,
         sigma_words=content.sigma_words,
         headline=content.headline,
+        standing=tuple(content.standing),
         shapes=tuple(
             ShapeValue(
                 name=one.name,

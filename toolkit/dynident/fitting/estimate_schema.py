@@ -217,6 +217,8 @@ class EstimateFile(_Part):
     """What the standard deviations hold, where the method has its own."""
     headline: str = ""
     """What is to be read before any number: that the model is rejected; empty if it is not."""
+    standing: list[str] = []
+    """Joints that stand at their stops, of which rows around these did not count."""
     shapes: list[_ShapePart] = []
     """Parameters inside effects, as they were found."""
     recordings: list[_Recording]

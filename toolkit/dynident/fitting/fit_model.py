@@ -13,6 +13,7 @@ from dynident.fitting.least_squares import LeastSquares
 from dynident.fitting.row_objective import refine_shapes, shaped_effects
 from dynident.fitting.uncertainty.shape_errors import with_shape_errors
 from dynident.fitting.uncertainty.standing_joints import (
+    standing_in,
     standing_note,
     too_wide_note,
     without_stops,
@@ -98,7 +99,8 @@ def _fitted(model: Model, dataset: Dataset, method: Method) -> Estimate:
     dataset = without_stops(model, dataset)
     estimate = _with_shapes(model, dataset, method)
     notes = (standing_note(dataset), too_wide_note(model, dataset))
-    return replace(estimate, notes=(*estimate.notes, *filter(None, notes)))
+    notes = (*estimate.notes, *filter(None, notes))
+    return replace(estimate, notes=notes, standing=standing_in(dataset))
 
 
 def _with_shapes(model: Model, dataset: Dataset, method: Method) -> Estimate:

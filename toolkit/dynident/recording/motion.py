@@ -154,6 +154,11 @@ class MotionInParts:
         """All of it; kept from then on."""
         return self.part(slice(0, self.samples))
 
+    @cached_property
+    def speeds(self) -> np.ndarray:
+        """Its velocities, (T, n) rad/s or m/s; kept from then on."""
+        return self.part(slice(0, self.samples)).v
+
     def part(self, rows: slice) -> Motion:
         """Compute some consecutive rows; those of the whole, to rounding.
 

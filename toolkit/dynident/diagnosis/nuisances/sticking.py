@@ -192,10 +192,11 @@ def _near_stops(evidence: Evidence, run: Run, j: int, least: float = 0.0) -> np.
     """Rows of a joint around its reversals, (T,) mask; asked for with every model."""
     sampled = run.replicates[0]
     known, kept = evidence.cache.along(sampled.motion), sampled.kept
-    key = ("near stops", least, kept.start, kept.stop)
+    key = ("near stops", j, least, kept.start, kept.stop)
     if key not in known:
-        known[key] = near_stops(_speeds(evidence, run), evidence.criteria.sticking, least)
-    return known[key][:, j]
+        near = near_stops(_speeds(evidence, run), evidence.criteria.sticking, least, [j])
+        known[key] = near[:, j]
+    return known[key]
 
 
 def _speeds(evidence: Evidence, run: Run) -> JointSpeeds:

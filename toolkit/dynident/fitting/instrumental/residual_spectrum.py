@@ -82,8 +82,7 @@ def residual_noise(
         own, smooth = sample(one, measured.filter), sample(other, instruments.filter)
         columns = np.concatenate(list(own.columns(model, values)))
         f, power = _periodogram(own.counted(own.tau) - columns @ values, own.rate_hz)
-        power = power / np.maximum(own.counting.mean(axis=0), 1.0 / own.count)
-        design = _design(model, values, own, smooth, f, position_std)
+        design = _seen_through(_design(model, values, own, smooth, f, position_std), own.counting)
         lost = -(-rank // (2 * n * len(measured.recordings))) + 1
         last = np.searchsorted(f, _TRUSTED * own.motion.rate_hz)
         cuts = np.unique(np.linspace(lost, max(last, lost + 2), _GROUPS + 1).astype(int))
@@ -93,6 +92,19 @@ def residual_noise(
         freedom.append(np.broadcast_to(count / _HANN, spectra[-1].shape))
     y, A = np.concatenate(spectra).ravel(), np.concatenate(designs).reshape(-1, 2 * n)
     return _weighted(y, A, np.concatenate(freedom).ravel(), position_std**2)
+
+
+def _seen_through(design: np.ndarray, counting: np.ndarray) -> np.ndarray:
+    """Densities (F, n, 2 n) of what is zero in the rows that do not count, (T, n).
+
+    Autocovariances are multiplied by the autocorrelation of the mask, over a circle.
+    """
+    if counting.all():
+        return design
+    count = len(counting)
+    mask = np.fft.irfft(np.abs(np.fft.rfft(counting, axis=0)) ** 2, count, axis=0) / count
+    covariance = np.fft.irfft(np.concatenate([design[:1], design]), count, axis=0)
+    return np.fft.rfft(covariance * mask[:, :, None], axis=0).real[1:]
 
 
 def _periodogram(residual: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:

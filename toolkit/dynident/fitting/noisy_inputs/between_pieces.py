@@ -29,9 +29,9 @@ def sandwich(pieces: TriangularFactors, coefficients: np.ndarray, psi: np.ndarra
     """
     X, y = pieces.R[:, :, :-1], pieces.R[:, :, -1]
     count = len(X)
-    each = pieces.rows / count
     M = np.einsum("kri,krj->ij", X, X) - pieces.rows * psi
-    scores = np.einsum("kri,kr->ki", X, y - X @ coefficients) + each * psi @ coefficients
+    scores = np.einsum("kri,kr->ki", X, y - X @ coefficients)
+    scores = scores + np.outer(pieces.counts, psi @ coefficients)
     inverse = np.linalg.inv(M)
     return inverse @ (scores.T @ scores) @ inverse * count / max(count - 1, 1)
 
@@ -59,7 +59,7 @@ def output_noise(
     ----------
     pieces, coefficients, psi : as of `sandwich`.
     """
-    each = pieces.residual_norms(coefficients) ** 2 * len(pieces.R) / pieces.rows
+    each = pieces.residual_norms(coefficients) ** 2 / np.maximum(pieces.counts, 1)
     left = each - coefficients @ psi @ coefficients
     sigma = float(np.std(left, ddof=1) / np.sqrt(len(left))) if len(left) > 1 else np.inf
     return OutputNoise(float(np.mean(left)), sigma)

@@ -10,6 +10,7 @@ from dynident.errors import FitError
 from dynident.fitting.linear_solution import solve_factors
 from dynident.fitting.noisy_inputs.measured import InputNoise
 from dynident.fitting.sampling import rows, sample
+from dynident.fitting.uncertainty.standing_joints import without_stops
 from dynident.model import Model
 from dynident.moments.factors import factorise
 from dynident.recording import Dataset, Recording, uniform
@@ -52,10 +53,12 @@ def encoder_noise(
     FitError
         If no noise of the positions is stated.
     """
-    if dataset.noise is None:
+    stated = dataset.noise
+    if stated is None:
         remedy = "state position_std in [noise], or take the noise from repetitions"
         raise FitError("the noise of the encoders is not stated", remedy=remedy)
     rng = np.random.default_rng(seed)
+    dataset = without_stops(model, dataset)
     factors = factorise(rows(model, dataset, values))
     std = solve_factors(model, factors).torque_std
     p = model.size
@@ -65,7 +68,7 @@ def encoder_noise(
         smooth = _smooth(recording, dataset)
         clean = list(_columns(model, smooth, dataset, values))
         for _ in range(draws):
-            noise = dataset.noise.position_std * rng.standard_normal(smooth.q.shape)
+            noise = stated.position_std * rng.standard_normal(smooth.q.shape)
             noisy = _columns(model, smooth.replace(q=smooth.q + noise), dataset, values)
             for one, other in zip(clean, noisy, strict=True):
                 difference = ((other - one) / std[:, None]).reshape(-1, p)

@@ -9,6 +9,7 @@ import numpy as np
 from dynident.errors import FitError
 from dynident.fitting.linear_solution import solve_factors
 from dynident.fitting.sampling import rows, sample
+from dynident.fitting.uncertainty.standing_joints import without_stops
 from dynident.model import Model
 from dynident.moments.factors import factorise
 from dynident.recording import Dataset, periods
@@ -69,6 +70,7 @@ def input_noise(model: Model, dataset: Dataset, values: np.ndarray | None = None
     FitError
         If no recording repeats.
     """
+    dataset = without_stops(model, dataset)
     factors = factorise(rows(model, dataset, values))
     std = solve_factors(model, factors).torque_std
     p = model.size
@@ -77,17 +79,19 @@ def input_noise(model: Model, dataset: Dataset, values: np.ndarray | None = None
     for recording in dataset.recordings:
         sampled = sample(recording, dataset.filter)
         columns = np.concatenate(list(sampled.columns(model, values)))
-        used += len(columns)
+        used += int(sampled.counting.sum())
         if recording.period is None:
             continue
         folded = periods(len(columns), sampled.rate_hz, recording.period, recording.where)
         if folded.count < 2:
             continue
-        repeated = folded.fold(columns / std[:, None])
+        # Rows that do not count in one repetition tell nothing of the noise in the others.
+        counting = np.asarray(folded.fold(sampled.counting).all(axis=0))
+        repeated = folded.fold(columns / std[:, None]) * counting[:, :, None]
         difference = (repeated - repeated.mean(axis=0)).reshape(-1, p)
         # P repetitions around their own mean hold P - 1 times the noise.
         gram += difference.T @ difference * folded.count / (folded.count - 1)
-        seen += folded.count * folded.rows
+        seen += folded.count * int(counting.sum())
     if not seen:
         raise FitError("no recording repeats", remedy="state its period, or give the input noise")
     gram *= used / seen

@@ -9,12 +9,13 @@ from functools import cached_property
 import numpy as np
 
 from dynident.fitting.sampling import BLOCK, Sampled
+from dynident.recording import MotionInParts
 from dynident.recording.filters import butterworth
 from dynident.recording.sections import response
 from dynident.recording.white_noise import encoder_noise_std
 
 _FREQUENCIES = 4096  # at which a filter's response is taken
-_AT_ONCE = 1 << 21  # speeds that are kept once they are computed
+_AT_ONCE = 1 << 21  # speeds that are computed at once, and kept with the recording's motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,11 +79,7 @@ class JointSpeeds:
 
     def _part(self, raw: slice) -> np.ndarray:
         source = self._full.source
-        if source.samples * self.sampled.recording.n <= _AT_ONCE:
-            return self._whole[raw]
+        few = source.samples * self.sampled.recording.n <= _AT_ONCE
+        if few and isinstance(source, MotionInParts):
+            return source.speeds[raw]
         return source.part(raw).v
-
-    @cached_property
-    def _whole(self) -> np.ndarray:
-        source = self._full.source
-        return source.part(slice(0, source.samples)).v

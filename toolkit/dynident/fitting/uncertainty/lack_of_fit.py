@@ -177,18 +177,21 @@ def _apart(folded: np.ndarray, counting: np.ndarray) -> tuple[np.ndarray, ...]:
     (n,) sum of systematic squares, of squared noise, variance of the first under noise alone, and
     rows that count.
     """
-    count, rows, _ = folded.shape
+    count, length, _ = folded.shape
+    # A row that does not count in one repetition says nothing of what they have in common.
+    everywhere = np.asarray(counting.all(axis=0))
+    folded, rows = folded * everywhere, np.maximum(everywhere.sum(axis=0), 1)
     mean = folded.mean(axis=0)
     noise = folded - mean
     squares = np.sum(noise**2, axis=(0, 1)) / (count - 1)
     systematic = np.sum(mean**2, axis=0) - squares / count
     # Products of correlated noise are correlated, too: as the square.
     alike = 1.0
-    for lag in range(1, min(_LAGS, rows - 1) + 1):
+    for lag in range(1, min(_LAGS, length - 1) + 1):
         products = np.sum(noise[:, :-lag] * noise[:, lag:], axis=(0, 1)) / (count - 1)
         alike = alike + 2.0 * (products / np.maximum(squares, np.finfo(float).tiny)) ** 2
     variance = 2.0 * (squares / count) ** 2 / rows * alike * count / (count - 1)
-    return systematic, squares, variance, np.maximum(counting.mean(axis=0).sum(axis=0), 1.0)
+    return systematic, squares, variance, rows
 
 
 def widened(covariance: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ count neither in fits nor in errors.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,11 +17,11 @@ from dynident.fitting.sampling import Sampled, sample
 from dynident.fitting.uncertainty.joint_speeds import JointSpeeds
 from dynident.formulas import quoted_joint
 from dynident.model import Model
-from dynident.recording import Dataset, Recording, uniform
+from dynident.recording import Dataset, Filter, Recording, uniform
 from dynident.tables import listed, number, percent
 
 
-def stands(every: Sequence[JointSpeeds], criteria: StickingCriteria) -> np.ndarray:
+def stands(every: Iterable[JointSpeeds], criteria: StickingCriteria) -> np.ndarray:
     """Return which joints are seen to stand at many of their stops, (n,) mask.
 
     A rest at an end of a recording is no stop. Counted in samples, a passage may last one longer
@@ -33,19 +33,24 @@ def stands(every: Sequence[JointSpeeds], criteria: StickingCriteria) -> np.ndarr
     every : speeds of each recording.
     criteria : what is standing, and at how many stops.
     """
-    n = every[0].sampled.recording.n
-    longer, count = np.zeros(n), np.zeros(n)
+    longer, count = 0.0, 0.0
     for speeds in every:
-        for j, stops in enumerate(_stops(speeds.used(), criteria.noise * speeds.noise)):
-            count[j] += len(stops)
-            longer[j] += sum(
-                stop.within - 1 > criteria.longer * (stop.around + 2) for stop in stops
-            )
+        each = _stops(speeds.used(), criteria.noise * speeds.noise)
+        count += np.array([len(stops) for stops in each])
+        longer += np.array(
+            [
+                sum(one.within - 1 > criteria.longer * (one.around + 2) for one in stops)
+                for stops in each
+            ]
+        )
     return longer >= np.maximum(criteria.stops, criteria.stops_share * count)
 
 
 def near_stops(
-    speeds: JointSpeeds, criteria: StickingCriteria, least: float | np.ndarray = 0.0
+    speeds: JointSpeeds,
+    criteria: StickingCriteria,
+    least: float = 0.0,
+    joints: Sequence[int] | None = None,
 ) -> np.ndarray:
     """Return the rows of each joint around its stops, (T, n) mask of the rows that are used.
 
@@ -53,18 +58,18 @@ def near_stops(
     ----------
     speeds : of the recording.
     criteria : how far around.
-    least : speed within which a joint's friction is not known, where that is more than the noise;
-        one for each joint, or for all.
+    least : speed within which a joint's friction is not known, where that is more than the noise.
+    joints : numbers of those that are looked at; None for all. The others have no such rows.
     """
     limits = np.maximum(_unknown_within(speeds, criteria), least)
+    if joints is not None:
+        limits[np.setdiff1d(np.arange(len(limits)), joints)] = 0.0
     near = np.concatenate(list(speeds.slower(limits)))
     return np.abs(near) > criteria.spread
 
 
 def without_stops(
-    model: Model | Collection[Model],
-    dataset: Dataset,
-    criteria: StickingCriteria = DEFAULTS.sticking,
+    model: Model | Collection[Model], dataset: Dataset, standing: Collection[str] = ()
 ) -> Dataset:
     """Return a dataset whose recordings say which rows around stops do not count.
 
@@ -75,7 +80,8 @@ def without_stops(
     ----------
     model : whose dry friction it is; of several models, that of any.
     dataset : as it was recorded; one that has been looked at comes back as it is.
-    criteria : what is standing.
+    standing : joints that are known to stand, of other recordings of the robot: a short one may
+        show too few stops.
 
     Raises
     ------
@@ -93,16 +99,35 @@ def without_stops(
     ]
     if not any(dry):
         return dataset
-    recordings = tuple(uniform(one) for one in recordings)
-    every = [JointSpeeds(sample(one, dataset.filter)) for one in recordings]
-    which = np.array(dry) & stands(every, criteria)
+    recordings, criteria = tuple(uniform(one) for one in recordings), DEFAULTS.sticking
+    known = np.isin(models[0].robot.names, list(standing))
+    which = np.array(dry) & (known | stands(_speeds(recordings, dataset.filter), criteria))
     if not which.any():
         return dataset
-    near = [near_stops(speeds, criteria) & which for speeds in every]
+    near = [near_stops(one, criteria) & which for one in _speeds(recordings, dataset.filter)]
     which = np.mean(np.concatenate(near), axis=0) <= criteria.most
-    pairs = zip(every, near, strict=True)
-    marked = [_with_stops(speeds.sampled, rows & which) for speeds, rows in pairs]
+    pairs = zip(recordings, near, strict=True)
+    marked = [_with_stops(sample(one, dataset.filter), rows & which) for one, rows in pairs]
     return replace(dataset, recordings=tuple(marked))
+
+
+def standing_in(dataset: Dataset) -> tuple[str, ...]:
+    """Return the joints of which rows around stops do not count.
+
+    Parameters
+    ----------
+    dataset : from `without_stops`.
+    """
+    marked = [one for one in dataset.recordings if one.stops]
+    joints = marked[0].joints if marked else ()
+    return tuple(
+        joint for j, joint in enumerate(joints) if any(len(one.stops[j]) for one in marked)
+    )
+
+
+def _speeds(recordings: Sequence[Recording], filter: Filter | None) -> Iterator[JointSpeeds]:
+    """Speeds of one recording after the other: those of many are not kept."""
+    return (JointSpeeds(sample(one, filter)) for one in recordings)
 
 
 def standing_note(dataset: Dataset) -> str:
@@ -127,9 +152,7 @@ def standing_note(dataset: Dataset) -> str:
     )
 
 
-def too_wide_note(
-    model: Model, dataset: Dataset, criteria: StickingCriteria = DEFAULTS.sticking
-) -> str:
+def too_wide_note(model: Model, dataset: Dataset) -> str:
     """Say which joints stand at less than their friction width; empty for none.
 
     A joint whose dry friction reversed over a wider speed would creep where these stand.
@@ -138,22 +161,21 @@ def too_wide_note(
     ----------
     model : that has the widths.
     dataset : from `without_stops`.
-    criteria : what is standing.
 
     Returns
     -------
     With the line of a study that mends it.
     """
-    marked = [one for one in dataset.recordings if one.stops]
-    if not marked:
+    standing, criteria = standing_in(dataset), DEFAULTS.sticking
+    if not standing:
         return ""
-    every = [JointSpeeds(sample(one, dataset.filter)) for one in marked]
+    every = _speeds(dataset.recordings, dataset.filter)
     speed = np.max([_unknown_within(one, criteria) for one in every], axis=0)
     widths = dict(zip(model.robot.names, map(float, model.friction_widths), strict=True))
     narrower = {
         joint: float(number(one / criteria.noise, 1))
-        for j, (joint, one) in enumerate(zip(model.robot.names, speed, strict=True))
-        if one < widths[joint] and any(len(recording.stops[j]) for recording in marked)
+        for joint, one in zip(model.robot.names, speed, strict=True)
+        if joint in standing and one < widths[joint]
     }
     if not narrower:
         return ""
