@@ -7,10 +7,11 @@ import pytest
 
 from dynident import diagnose
 from dynident.criteria import VerdictCriteria
-from dynident.diagnosis.dependence.bursts import burst_notes
+from dynident.diagnosis.dependence.bursts import burst_notes, bursts_in
 from dynident.evidence.held_out import HeldOut, HeldOutRun
 from dynident.model import Model
 from dynident.recording import Dataset, Recording
+from dynident.reporting.headline import headline
 from synthetic import arm, synthetic, true_values
 
 ROWS = 800
@@ -44,7 +45,7 @@ def left(
 
 def told(trained: HeldOut) -> tuple[str, ...]:
     """What is said of joints a and b."""
-    return burst_notes(trained, ["a", "b"], ["N m", "N"], VerdictCriteria())
+    return burst_notes(bursts_in(trained, ["a", "b"], ["N m", "N"], VerdictCriteria()))
 
 
 def noise(seed: int) -> np.ndarray:
@@ -131,3 +132,7 @@ def test_a_diagnosis_without_a_noise_floor_tells_of_knocks() -> None:
     assert len(said) == 1
     assert "; at elbow the " in said[0] and "shoulder" not in said[0]
     assert ": 3 bursts, " in said[0]
+    assert found.bursts == ("elbow",)
+    head = headline(found)
+    assert head.mark != "\u2713"
+    assert "At elbow a few bursts hold most of what is left" in head.sentence

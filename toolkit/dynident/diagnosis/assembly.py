@@ -16,7 +16,7 @@ import numpy as np
 from dynident.diagnosis.advice.experiments import Adviser
 from dynident.diagnosis.answer import Verdict
 from dynident.diagnosis.candidate_gains import candidate_gains
-from dynident.diagnosis.dependence.bursts import burst_notes
+from dynident.diagnosis.dependence.bursts import burst_notes, bursts_in
 from dynident.diagnosis.details import Candidate, JointResult, Status, Step, TestError, Trace
 from dynident.diagnosis.detection_limits import detection_limits
 from dynident.diagnosis.nuisances.contacts import Disturbance, contact_candidates
@@ -116,6 +116,8 @@ def assemble(
     steps = (*contacts, *_advised(steps, Adviser.of(evidence, stages[-1])))
     source = noise_source(evidence, held)
     trained = with_rounding(on_recordings(evidence, stages[-1]), stages[-1], train)
+    names, units = given.robot.names, given.robot.torque_units
+    bursts = bursts_in(trained, names, units, evidence.criteria.verdict)
     verdict = verdict_of(before, after, trained, steps, rounds[-1], evidence.criteria.verdict)
     final = _with_shapes(evidence, stages[-1], train)
     impossible = ()
@@ -148,9 +150,7 @@ def assemble(
             *notes_on(evidence, held, stages[-1], source, search.doubtful),
             *_differing_recordings(trained, after, evidence, held, stages[-1]),
             *_noise_doubts(evidence, source, rounded, after),
-            *burst_notes(
-                trained, given.robot.names, given.robot.torque_units, evidence.criteria.verdict
-            ),
+            *burst_notes(bursts),
             *rounding_notes(after, given.robot.names, evidence.criteria.verdict),
             *notes_on_steps(steps, held),
             *path.notes,
@@ -165,6 +165,7 @@ def assemble(
         detection_limits=limits,
         sampled=sampling_time(evidence, stages[-1], rounds[-1], least_share=most_of_it),
         training_only=_training_only(verdict, trained, after, evidence),
+        bursts=tuple(bursts),
         reversals_left_out={joint: left[joint] for joint in search.doubtful},
     )
 

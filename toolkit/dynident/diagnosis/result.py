@@ -37,6 +37,7 @@ class Diagnosis(Answer, Shown):
             notes=(),  # of residuals that the fault has made
             following_motion=(),
             training_only=(),
+            bursts=(),
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -47,6 +48,7 @@ class Diagnosis(Answer, Shown):
             **({} if self.limit is None else {"limit": self.limit}),
             **({"training_only": list(self.training_only)} if self.training_only else {}),
             **({"following_motion": list(self.following_motion)} if self.following_motion else {}),
+            **({"bursts": list(self.bursts)} if self.bursts else {}),
             "joints": [
                 {
                     "name": j.name,

@@ -68,6 +68,11 @@ def headline(diagnosis: Diagnosis) -> Headline:
         where = " and ".join(diagnosis.reversals_left_out)
         said = f"{found.sentence} The reversals of {where} are left out: see the notes."
         found = Headline(mark, found.title, said)
+    if diagnosis.bursts:
+        mark = "?" if found.mark == "\u2713" else found.mark
+        where = listed(list(diagnosis.bursts))
+        said = f"{found.sentence} At {where} a few bursts hold most of what is left: see the notes."
+        found = Headline(mark, found.title, said)
     if diagnosis.limit is None:
         return found
     said = f"{found.sentence} {diagnosis.limit_in_words}."

@@ -8,7 +8,7 @@ and recordings that judge may have none. So they are told, whatever the verdict.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -22,10 +22,10 @@ _GAP = 5
 """Rows between two parts of one burst, which a filter makes ring."""
 
 
-def burst_notes(
+def bursts_in(
     trained: HeldOut, joints: Sequence[str], units: Sequence[str], criteria: VerdictCriteria
-) -> tuple[str, ...]:
-    """Joints at which a few instants hold most of the residual, in plain words.
+) -> dict[str, str]:
+    """Find the joints at which a few instants hold most of the residual.
 
     Parameters
     ----------
@@ -36,9 +36,9 @@ def burst_notes(
 
     Returns
     -------
-    One note on all such joints, with the place and the height of the largest burst of each.
+    Of each such joint, by its name, the place and the height of its largest burst in words.
     """
-    found = []
+    found = {}
     for j, (joint, unit) in enumerate(zip(joints, units, strict=True)):
         rows = np.concatenate([run.residual[run.certain[:, j], j] for run in trained.runs])
         few = int(criteria.few_rows * len(rows))
@@ -53,18 +53,23 @@ def burst_notes(
             continue
         size, where = max(bursts)
         many = "one burst" if len(bursts) == 1 else f"{len(bursts)} bursts"
-        found.append(
+        found[joint] = (
             f"at {joint} the {few} largest of {len(rows)} hold "
             f"{percent(square[:few].sum() / square.sum(), 0)} of it: {many}, the largest of "
             f"{size:.2g} {unit} at {where}, {size / rest:.0f} times the rms of all other rows"
         )
+    return found
+
+
+def burst_notes(found: Mapping[str, str]) -> tuple[str, ...]:
+    """Return one note on all joints of `bursts_in`; none where there is no joint."""
     if not found:
         return ()
     return (
         "A few training rows hold most of the square of what the model leaves; "
-        f"{'; '.join(found)}. Noise of one size is seldom like that. Backlash or a stop that the "
-        "link knocks against is, a touch, friction at a reversal, a fault of the recording, or one "
-        "that is noisier than the others.",
+        f"{'; '.join(found.values())}. Noise of one size is seldom like that. Backlash or a stop "
+        "that the link knocks against is, a touch, friction at a reversal, a fault of the "
+        "recording, or one that is noisier than the others.",
     )
 
 
