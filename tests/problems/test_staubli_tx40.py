@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynident import LeastSquares, compare, diagnose, effects_of
+from dynident import LeastSquares, compare, diagnose, effects_of, fit
 from dynident.data_files import find_data
 from dynident.diagnosis import Diagnosis
 from dynident.errors import FileError
@@ -124,7 +124,7 @@ def test_six_joints_are_refitted_on_the_page_as_by_fit(study: Study) -> None:
     effects = [effects_of(label, study.robot)[0] for label in couplings]
     refitter = Refitter(study)
     now = refitter.fit(effects)
-    wanted = LeastSquares(errors="independent").fit(now.model, study.train)
+    wanted = fit(now.model, study.train, LeastSquares(errors="independent"))
     np.testing.assert_allclose(now.estimate.values, wanted.values, rtol=1e-9, atol=1e-9)
     errors = compare(wanted, study.test).results[0].joint_errors
     np.testing.assert_allclose(now.judged.joint_errors, errors, rtol=1e-9)
