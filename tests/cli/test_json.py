@@ -63,7 +63,12 @@ def check_diagnosis(said: dict[str, Any], source: str) -> None:
             *("effect", "joint", "source", "test_error_before", "test_error_after"),
             "indistinguishable",
             "fall_standard_error",
+            "at_joint",
         }
+        there = step["at_joint"]
+        assert set(there) == {"joint", "before", "after", "standard_error"}
+        assert there["joint"] in ("shoulder", "elbow")
+        assert 0.0 <= there["after"] < there["before"]
         assert is_place(step) and number(step["fall_standard_error"], 0)
         assert number(step["test_error_before"], 0) and number(step["test_error_after"], 0)
         for other in step["indistinguishable"]:

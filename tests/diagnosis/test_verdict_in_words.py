@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from dynident.diagnosis import Diagnosis
+from dynident.diagnosis.details import JointFall
 from dynident.diagnosis.leading_effects import MOST_OF_IT, LeadingEffects
 from dynident.diagnosis.procedure import diagnose
 from dynident.model import Model
@@ -128,3 +129,50 @@ def test_no_law_is_proposed_while_the_catalogue_has_more() -> None:
     found = diagnose(given, Dataset(runs[:2]), Dataset(runs[2:]), most=1)
     assert found.verdict == "unexplained" and found.limit == 1
     assert found.proposals == ()
+
+
+def test_what_takes_most_of_a_small_joints_own_error_is_not_called_small() -> None:
+    found = along((9.0, 0.01, 0.01))
+    wrist = JointFall(joint="elbow", before=0.15, after=0.04, standard_error=0.01)
+    steps = list(found.steps)
+    steps[1] = replace(steps[1], at_joint=wrist, fall_standard_error=0.1)
+    told = replace(found, steps=tuple(steps))
+    assert not told.steps[1].uncertain
+    groups = LeadingEffects.of(told.steps)
+    local, small = ([g[0].effect.name for g in part] for part in (groups.local, groups.smaller))
+    assert local == ["torque_ripple"] and small == ["torque_offset"]
+    assert "torque ripple at elbow (elbow from 15.00 % to 4.00 %)" in told.sentence
+    assert "one smaller one (0.01 points: torque offset at elbow)" in told.sentence
+    said = headline(told).sentence
+    assert said.count("torque ripple at elbow takes elbow from 15.00 % to 4.00 %") == 1
+    first = next_steps(told)[0]
+    assert first.commands[0] == "dynident add STUDY joint_spring@elbow torque_ripple@elbow"
+
+
+def test_where_all_joints_together_gain_little_the_joint_that_gains_is_told() -> None:
+    found = along((0.5,))
+    wrist = JointFall(joint="elbow", before=0.15, after=0.04)
+    told = replace(found, steps=(replace(found.steps[0], at_joint=wrist),))
+    for said in (headline(told).sentence, next_steps(told)[0].why):
+        assert "to 11.50 %, that of elbow from 15.00 % to 4.00 %" in said
+    assert "Most of the error stays" not in next_steps(told)[0].why
+    big = along((9.0,))
+    assert (
+        "that of"
+        not in headline(replace(big, steps=(replace(big.steps[0], at_joint=wrist),))).sentence
+    )
+
+
+@pytest.mark.parametrize(
+    "at_joint",
+    [
+        JointFall(joint="elbow", before=0.15, after=0.04, standard_error=0.06),
+        JointFall(joint="elbow", before=0.15, after=0.11, standard_error=0.001),
+    ],
+)
+def test_what_a_joint_gains_by_chance_or_little_of_is_small(at_joint: JointFall) -> None:
+    assert not at_joint.is_large
+    steps = along((9.0, 0.01)).steps
+    chance = replace(steps[1], at_joint=at_joint, fall_standard_error=0.1)
+    assert chance.uncertain
+    assert LeadingEffects.of((steps[0], chance)).local == ()

@@ -107,3 +107,14 @@ def test_repetitions_of_an_instant_are_in_one_block(period: float | None) -> Non
     for repetition in run.index:
         for number, (start, stop) in enumerate(zip(run.edges[:-1], run.edges[1:], strict=True)):
             assert np.all(blocks[repetition[start:stop]] == number)
+
+
+def test_of_one_joint_it_is_that_of_a_robot_with_this_joint_alone() -> None:
+    before, after = pair(1, 12.0, 1.0)
+    alone = [
+        judged(one.runs[0].measured[:, 1:], one.runs[0].residual[:, 1:]) for one in (before, after)
+    ]
+    assert fall_standard_error(before, after, 2, [1]) == pytest.approx(
+        fall_standard_error(*alone, 2)
+    )
+    assert fall_standard_error(before, after, 2, [1]) != fall_standard_error(before, after, 2)

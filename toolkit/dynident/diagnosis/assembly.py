@@ -6,7 +6,7 @@ effect with the experiment that would show it or distinguish it, residual maps, 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -17,7 +17,15 @@ from dynident.diagnosis.advice.experiments import Adviser
 from dynident.diagnosis.answer import Verdict
 from dynident.diagnosis.candidate_gains import candidate_gains
 from dynident.diagnosis.dependence.bursts import burst_notes, bursts_in
-from dynident.diagnosis.details import Candidate, JointResult, Status, Step, TestError, Trace
+from dynident.diagnosis.details import (
+    Candidate,
+    JointFall,
+    JointResult,
+    Status,
+    Step,
+    TestError,
+    Trace,
+)
 from dynident.diagnosis.detection_limits import detection_limits
 from dynident.diagnosis.nuisances.contacts import Disturbance, contact_candidates
 from dynident.diagnosis.nuisances.quantisation import rounding_notes, with_rounding
@@ -173,6 +181,7 @@ def assemble(
 def _steps_of(path: Path, evidence: Evidence) -> tuple[Step, ...]:
     """The effects of a path, each with the fall of the error that it brings."""
     by_label = {e.label: e for e in path.final.model.effects}
+    names, together = path.final.model.robot.names, evidence.criteria.search.set_block
     return tuple(
         Step(
             effect=by_label[one.score.effect.label],
@@ -181,11 +190,29 @@ def _steps_of(path: Path, evidence: Evidence) -> tuple[Step, ...]:
             test_error_after=new.error,
             indistinguishable=one.indistinguishable,
             p_value=one.p_value,
-            fall_standard_error=fall_standard_error(old, new, evidence.criteria.search.set_block),
+            fall_standard_error=fall_standard_error(old, new, together),
+            at_joint=_largest_fall(names, old, new, together),
         )
         for one, stage, (old, new) in zip(
             path.found, path.stages[1:], pairwise(path.judged), strict=True
         )
+    )
+
+
+def _largest_fall(
+    names: Sequence[str], before: HeldOut, after: HeldOut, together: int
+) -> JointFall | None:
+    """The joint whose own error falls by the largest part; None where none falls."""
+    old, new = before.joint_errors, after.joint_errors
+    falls = np.nan_to_num((old - new) / np.where(old > 0, old, np.nan))
+    k = int(np.argmax(falls))
+    if not falls[k] > 0:
+        return None
+    return JointFall(
+        joint=names[k],
+        before=float(old[k]),
+        after=float(new[k]),
+        standard_error=fall_standard_error(before, after, together, [k]),
     )
 
 

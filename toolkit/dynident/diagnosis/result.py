@@ -66,7 +66,7 @@ class Diagnosis(Answer, Shown):
                     "test_error_before": step.test_error_before,
                     "test_error_after": step.test_error_after,
                     "indistinguishable": [place(effect) for effect in step.indistinguishable],
-                    **step.doubt(),
+                    **step.details(),
                 }
                 for step in self.steps
             ],

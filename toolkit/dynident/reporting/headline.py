@@ -117,9 +117,9 @@ def _title(diagnosis: Diagnosis) -> str:
     count, found = len(diagnosis.steps), LeadingEffects.of(diagnosis.steps)
     if count == 1:
         return "one effect found"
+    main = len(found.leading + found.local)
     if not found.smaller:
         return f"{count} effects found"
-    main = len(found.leading)
     return f"{in_words(main)} main effect{'s' if main > 1 else ''} found"
 
 
@@ -177,13 +177,16 @@ def _found(diagnosis: Diagnosis) -> str:
         were = "was" if len(diagnosis.steps) == 1 else "were"
         return f"{names} {were} found, and beside it the torque error is {percent(error.after)}"
     before, after = two_percent(error.before, error.after)
-    return f"{_added(diagnosis)} the torque error from {before} to {after}"
+    effects = LeadingEffects.of(diagnosis.steps)
+    own, local = effects.own_joint_in_words(error), effects.local_in_words
+    there = f"{own and f', {own}'}{local and f'; {local}'}"
+    return f"{_added(diagnosis)} the torque error from {before} to {after}{there}"
 
 
 def _added(diagnosis: Diagnosis) -> str:
     groups, found = step_groups(diagnosis), LeadingEffects.of(diagnosis.steps)
     count = len(diagnosis.steps)
-    if found.smaller:
+    if found.local or found.smaller:
         main, names = len(found.leading), " and ".join(found.names)
         named = _capitalised(names) if main <= _MOST_NAMED else f"{main} effects"
         verb = "carries" if main == 1 else "carry"

@@ -153,11 +153,13 @@ def _to_add(diagnosis: Diagnosis) -> list[Advice]:
         return []
     error = diagnosis.test_error
     found = LeadingEffects.of(steps)
-    first = sorted(found.leading, key=lambda group: -sum(step.fall for step in group))
+    first = sorted(found.leading + found.local, key=lambda group: -sum(s.fall for s in group))
     names, labels = _added(first, len(diagnosis.joints))
     share, all_of_it = "", "That"
-    if found.smaller:
-        share = f"By this the error falls {found.carried}. "
+    if found.local or found.smaller:
+        by = listed(found.names) if found.local else "this"
+        there = found.local and f", and {found.local_in_words}"
+        share = f"By {by} the error falls {found.carried}{there or ''}. "
         all_of_it = "All that was added"
     brings = f"{all_of_it} brings the error from {percent(error.before)}"
     floor = (
@@ -165,9 +167,10 @@ def _to_add(diagnosis: Diagnosis) -> list[Advice]:
         if error.noise_floor is None
         else f"; noise alone would make {percent(error.noise_floor)}"
     )
-    why = f"{share}{brings} to {percent(error.after)}{floor}."
+    own = found.own_joint_in_words(error)
+    why = f"{share}{brings} to {percent(error.after)}{own and f', {own}'}{floor}."
     unclear = diagnosis.verdict == "unexplained" or diagnosis.noise_source == "unknown"
-    if unclear and error.before - error.after < _LITTLE * error.before:
+    if unclear and not own and error.before - error.after < _LITTLE * error.before:
         why += " Most of the error stays."
     if all(step.uncertain for group in first for step in group):
         asked = " ".join(f"--with {shlex.quote(label)}" for label in labels)

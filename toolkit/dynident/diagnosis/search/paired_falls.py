@@ -6,12 +6,16 @@ are paired, block of time by block of time, and the standard error is that of th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from dynident.evidence.held_out import HeldOut
 
 
-def fall_standard_error(before: HeldOut, after: HeldOut, together: int) -> float | None:
+def fall_standard_error(
+    before: HeldOut, after: HeldOut, together: int, joints: Sequence[int] | None = None
+) -> float | None:
     """Return the standard error of the fall `before.error - after.error`.
 
     By the jackknife over blocks of time, neighbours left out together, as what is left of one goes
@@ -23,13 +27,15 @@ def fall_standard_error(before: HeldOut, after: HeldOut, together: int) -> float
     ----------
     before, after : two models on the same rows.
     together : consecutive blocks that are left out at a time.
+    joints : those whose error it is; by default all.
 
     Returns
     -------
     Of the relative torque error, as `HeldOut.error`; None with fewer blocks than two such lots.
     """
-    rows, torque, old = _sums(before)
-    _, _, new = _sums(after)
+    chosen = slice(None) if joints is None else list(joints)
+    rows, torque, old = (one[:, chosen] for one in _sums(before))
+    new = _sums(after)[2][:, chosen]
     count = len(rows)
     if count < max(2 * together, 3):
         return None
