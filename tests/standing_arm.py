@@ -23,7 +23,13 @@ def given() -> Model:
     return Model(robot, tuple(e for name in names for e in effects_of(name, robot)), WIDTH)
 
 
-def record(seed: int, stands: float, stribeck: float = 0.0, rate_hz: float = RATE_HZ) -> Recording:
+def record(
+    seed: int,
+    stands: float,
+    stribeck: float = 0.0,
+    rate_hz: float = RATE_HZ,
+    position_std: float = 1e-5,
+) -> Recording:
     """A motion whose elbow stands while the reference is slower than `stands`, rad/s.
 
     While it stands, its dry friction passes from one side to the other as the reference does: it
@@ -40,6 +46,19 @@ def record(seed: int, stands: float, stribeck: float = 0.0, rate_hz: float = RAT
     tau = model.torque(model.block(t, q, v, a), values)
     share = np.clip(reference / stands, -1, 1) if stands else np.tanh(v[:, 1] / WIDTH)
     tau[:, 1] += share * (COULOMB[1] + stribeck * np.exp(-((v[:, 1] / 0.3) ** 2)))
-    q = q + 1e-5 * rng.normal(size=q.shape)
+    q = q + position_std * rng.normal(size=q.shape)
     tau = tau + 0.05 * rng.normal(size=tau.shape)
     return Recording(t, q, tau, model.robot.names, name=f"{seed}")
+
+
+def resting_joint(seed: int, joint: int) -> Recording:
+    """A motion of the other joint, while this one rests: its dry friction is as others ask."""
+    model, rng = given(), np.random.default_rng([seed, 6])
+    t, q, v, a = smooth_motion(2, seed, RATE_HZ, 16.0, 16.0)
+    q[:, joint], v[:, joint], a[:, joint] = q[0, joint], 0.0, 0.0
+    values = true_values(model, Fv__shoulder=1.0, Fv__elbow=0.6)
+    tau = model.torque(model.block(t, q, v, a), values)
+    tau[:, 1 - joint] += COULOMB[1 - joint] * np.tanh(v[:, 1 - joint] / WIDTH)
+    tau[:, joint] += 0.6 * COULOMB[joint] * np.sin(0.7 * t)
+    tau = tau + 0.05 * rng.normal(size=tau.shape)
+    return Recording(t, q, tau, model.robot.names, name=f"resting {seed}")

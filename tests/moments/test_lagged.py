@@ -29,6 +29,16 @@ def test_blocks_do_not_matter_and_stretches_do() -> None:
         )
 
 
+def test_a_stretch_in_which_no_row_of_a_joint_counts_adds_nothing() -> None:
+    rng = np.random.default_rng(2)
+    X = rng.normal(size=(400, 2, 3))
+    X[:, 1] = 0.0
+    found = LaggedColumns(4)
+    for start in (0, 200):
+        found.add(start, X[start : start + 200])
+    assert not found.columns[1].any() and found.columns[0].any()
+
+
 def test_some_rows_say_what_all_do_whatever_the_blocks() -> None:
     rng = np.random.default_rng(1)
     t = np.arange(20000) / 50.0

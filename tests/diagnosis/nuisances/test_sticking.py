@@ -95,11 +95,14 @@ def rested(recording: Recording, still: slice | None = None) -> Recording:
     return recording.replace(t=np.arange(len(q)) / RATE_HZ, q=q + noise, tau=tau)
 
 
-@pytest.mark.parametrize("still", [None, slice(1, 2)])
-def test_a_rest_at_an_end_or_an_idle_joint_is_no_sticking(still: slice | None) -> None:
+@pytest.mark.parametrize(("still", "sticks"), [(None, ()), (slice(1, 2), ("elbow",))])
+def test_a_rest_at_an_end_is_no_sticking_and_one_throughout_a_recording_is(
+    still: slice | None, sticks: tuple[str, ...]
+) -> None:
+    """What holds an idle joint is whatever others ask for; a recording may begin at rest."""
     each = tuple(rested(record(seed, 0.0), still) for seed in range(3))
     of = Evidence(given(), gather(Dataset((*each, record(5, 0.0)))))
-    assert sticking_joints(of, fit_evidence(of, of.model)) == ()
+    assert sticking_joints(of, fit_evidence(of, of.model)) == sticks
 
 
 def test_rows_around_reversals_count_no_more_and_the_others_do() -> None:

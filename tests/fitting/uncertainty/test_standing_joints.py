@@ -16,14 +16,16 @@ from dynident.fitting.noisy_inputs import encoder_noise, input_noise
 from dynident.fitting.sampling import BLOCK, sample
 from dynident.fitting.uncertainty.joint_speeds import JointSpeeds
 from dynident.fitting.uncertainty.standing_joints import (
+    few_enough,
     near_stops,
+    resting,
     standing_note,
     stands,
     without_stops,
 )
 from dynident.moments.factors import factorise
 from dynident.recording import Dataset, Filter, Noise, Recording, default_filter, lowpass
-from standing_arm import COULOMB, RATE_HZ, STOPPED, given, record
+from standing_arm import COULOMB, RATE_HZ, STOPPED, given, record, resting_joint
 from synthetic import true_values
 
 ELBOW = 1
@@ -47,6 +49,48 @@ def test_dry_friction_of_a_joint_that_stands_is_found_away_from_its_stops() -> N
     assert found.joint_errors[ELBOW] < 0.5 * every.joint_errors[ELBOW]
     assert any("elbow stands still at many of its stops" in one for one in found.notes)
     assert not any("stands still" in one for one in every.notes)
+
+
+def test_the_finest_encoders_show_a_stop_beside_which_the_low_pass_rings(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Before a joint starts, its filtered speed is not zero: that is no passage through zero."""
+
+    def seen(stops_below: float) -> list[bool]:
+        every = (record(seed, stops_below, position_std=1e-8) for seed in range(3))
+        speeds = [JointSpeeds(sample(one, None)) for one in every]
+        return stands(speeds, DEFAULTS.sticking).tolist()
+
+    assert seen(0.01) == [False, True] and seen(0.0) == [False, False]
+    monkeypatch.setattr(JointSpeeds, "ringing", np.zeros(2))
+    assert seen(0.01) == [False, False]
+
+
+def test_while_one_joint_moves_after_the_other_the_one_that_rests_tells_nothing() -> None:
+    data = Dataset(tuple(resting_joint(seed, seed % 2) for seed in range(4)))
+    found = di.fit(given(), data)
+    for j, name in enumerate(("Fc@shoulder", "Fc@elbow")):
+        place = given().names.index(name)
+        assert abs(found.values[place] - COULOMB[j]) < 3.0 * found.sigma[place] < 0.05
+    marked = without_stops(given(), data)
+    for seed, one in enumerate(marked.recordings):
+        counting = sample(one, None).counting
+        assert not counting[:, seed % 2].any() and counting[:, 1 - seed % 2].mean() > 0.5
+    (result,) = di.compare(found, Dataset((resting_joint(9, ELBOW),))).results
+    assert np.isnan(result.joint_errors[ELBOW])
+    assert result.joint_errors[0] < 0.1 and np.isfinite(result.error)
+
+
+def test_of_a_joint_that_turns_around_all_the_time_every_row_counts() -> None:
+    """Long rests are no part of its share, and without them rows must be left."""
+    near = np.zeros((1000, 4), dtype=bool)
+    near[::2, 0], near[:400, 1], near[:990, 2], near[:, 3] = True, True, True, True
+    near[500:, 0] = True
+    rest = resting(near, 100.0)
+    np.testing.assert_array_equal(rest.sum(axis=0), [500, 400, 990, 1000])
+    assert few_enough(near, rest, DEFAULTS.sticking).tolist() == [True, True, False, True]
+    near[1:500:4, 0] = True
+    assert not few_enough(near, resting(near, 100.0), DEFAULTS.sticking)[0]
 
 
 def test_a_comparison_counts_the_rows_that_a_fit_counts() -> None:

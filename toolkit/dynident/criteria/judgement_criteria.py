@@ -213,7 +213,7 @@ class StickingCriteria(CriteriaGroup):
     most: float = criterion(
         0.5,
         "1",
-        "share of a joint's rows up to which its reversals may be left out",
+        "share of a joint's rows, long rests apart, up to which its reversals may be left out",
         over=0,
         most=0.9,
     )

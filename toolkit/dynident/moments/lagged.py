@@ -226,6 +226,18 @@ class _Joint:
         for name in np.flatnonzero(~some):
             some[name] = columns[:, name].any() or before[:, name].any()
         used = np.flatnonzero(some)
+        if len(used):
+            self._add_products(before, columns, pieces, used)
+        after = columns[pieces[-1]]
+        after = after[max(0, len(after) - self._lags) :]
+        if len(pieces) == 1:
+            after = np.concatenate([before, after])
+        self._before = np.array(after[max(0, len(after) - self._lags) :])
+
+    def _add_products(
+        self, before: np.ndarray, columns: np.ndarray, pieces: Sequence[slice], used: np.ndarray
+    ) -> None:
+        """Add the products of some columns."""
         index, beyond = _windows([range(*one.indices(len(columns))) for one in pieces], self._lags)
         windows = np.empty((len(used), *index.shape))
         # Column by column, as blocks have them.
@@ -237,11 +249,6 @@ class _Joint:
         for k in range(1, self._lags + 1):
             found[k] += last[:, max(0, old - k) :] @ windows[:, 0, max(0, k - old) : k].T
         self.sums[:, used[:, None], used] += found
-        after = columns[pieces[-1]]
-        after = after[max(0, len(after) - self._lags) :]
-        if len(pieces) == 1:
-            after = np.concatenate([before, after])
-        self._before = np.array(after[max(0, len(after) - self._lags) :])
 
 
 def _windows(pieces: Sequence[range], lags: int) -> tuple[np.ndarray, np.ndarray]:

@@ -25,8 +25,10 @@ from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.runs import Run
 from dynident.fitting.uncertainty.joint_speeds import JointSpeeds
 from dynident.fitting.uncertainty.standing_joints import (
+    few_enough,
     left_out_words,
     near_stops,
+    resting,
     stands,
 )
 from dynident.tables import listed
@@ -85,7 +87,7 @@ def sticking_joints(evidence: Evidence, fitted: EvidenceFit) -> tuple[str, ...]:
             or standing[j]
             or _between_samples(evidence, j, model.friction_widths[j], criteria)
         )
-        and _share(evidence, j) <= criteria.most
+        and _may_leave_out(evidence, j)
     )
 
 
@@ -109,9 +111,9 @@ def without_reversals(
     within : rad/s or m/s, for some of them: speed within which their dry friction is not known,
         where that is more than the noise of the speed.
     """
-    criteria, names, reach = evidence.criteria.sticking, evidence.model.robot.names, within or {}
+    names, reach = evidence.model.robot.names, within or {}
     columns = [(names.index(joint), reach.get(joint, 0.0)) for joint in joints]
-    columns = [(j, least) for j, least in columns if _share(evidence, j, least) <= criteria.most]
+    columns = [(j, least) for j, least in columns if _may_leave_out(evidence, j, least)]
     runs = []
     for run in evidence.runs:
         uncertain = ~run.certain_rows
@@ -178,14 +180,15 @@ def sticking_notes(evidence: Evidence, others: Collection[str] = ()) -> tuple[st
     )
 
 
-def _share(evidence: Evidence, j: int, least: float = 0.0) -> float:
-    """Share of a joint's rows that leaving out its reversals takes."""
-    near = [
-        np.any(_near_stops(evidence, run, j, least)[run.index], axis=0)
-        for run in evidence.runs
-        if run.index.shape[1]
-    ]
-    return float(np.mean(np.concatenate(near))) if near else 1.0
+def _may_leave_out(evidence: Evidence, j: int, least: float = 0.0) -> bool:
+    """Whether enough of a joint's rows are left without its reversals."""
+    near, rest = [np.zeros((0, 1), dtype=bool)], [np.zeros((0, 1), dtype=bool)]
+    for run in evidence.runs:
+        rows = _near_stops(evidence, run, j, least)[:, None]
+        near.append(np.any(rows[run.index], axis=0))
+        rest.append(np.all(resting(rows, run.replicates[0].rate_hz)[run.index], axis=0))
+    few = few_enough(np.concatenate(near), np.concatenate(rest), evidence.criteria.sticking)
+    return bool(few[0])
 
 
 def _near_stops(evidence: Evidence, run: Run, j: int, least: float = 0.0) -> np.ndarray:

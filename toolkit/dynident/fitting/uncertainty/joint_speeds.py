@@ -15,6 +15,11 @@ from dynident.recording.sections import response
 from dynident.recording.white_noise import encoder_noise_std
 
 _FREQUENCIES = 4096  # at which a filter's response is taken
+_DIGITS = 1e-12  # of a position's size, that its low-pass keeps: some joints stand exactly
+_RINGING = 0.1
+"""Overshoot of the speed's low-pass beside a kink, of the change of acceleration times the time
+constant 1 / (2 pi cut-off)."""
+_KINK = 2.0  # change of acceleration where a joint stops or starts, of its root mean square
 _AT_ONCE = 1 << 21  # speeds that are computed at once, and kept with the recording's motion
 
 
@@ -33,8 +38,8 @@ class JointSpeeds:
     def noise(self) -> np.ndarray:
         """Standard deviation of the noise in them, (n,) rad/s or m/s.
 
-        White noise of the encoders, through the low-pass of the positions and the central
-        difference.
+        White noise of the encoders, or the digits of the numbers, through the low-pass of the
+        positions and the central difference.
         """
         rate = self.sampled.recording.rate_hz
         angle = np.linspace(0.0, np.pi, _FREQUENCIES)
@@ -43,13 +48,32 @@ class JointSpeeds:
         if cutoff:
             gain = gain * np.abs(response(butterworth(rate, cutoff), angle)) ** 2
         share = float(np.sqrt(np.trapezoid(gain**2, angle) / np.pi))
-        return encoder_noise_std(self.sampled.recording.q) * share
+        q = self.sampled.recording.q
+        digits = _DIGITS * np.abs(q).max(axis=0)
+        return np.maximum(encoder_noise_std(q), digits) * share
 
     @cached_property
     def rms(self) -> np.ndarray:
         """Their root mean square from the first to the last row that is used, (n,)."""
         squares = [np.sum(part**2, axis=0) for part in self.used()]
         return np.sqrt(np.sum(squares, axis=0) / (self._used.stop - self._used.start))
+
+    @cached_property
+    def ringing(self) -> np.ndarray:
+        """How far the low-pass of the positions rings beside a stop, (n,) rad/s or m/s.
+
+        A joint that stands is given that much speed before it starts, and after it has stopped.
+        """
+        cutoff, rate = (
+            self.sampled.parallel.filter.position_cutoff_hz,
+            self.sampled.recording.rate_hz,
+        )
+        if not cutoff:
+            return np.zeros(self.sampled.recording.n)
+        parts = [np.diff(part, axis=0) * rate for part in self.used()]
+        squares = np.sum([np.sum(part**2, axis=0) for part in parts], axis=0)
+        acceleration = np.sqrt(squares / max(sum(map(len, parts)), 1))
+        return _RINGING * _KINK * acceleration / (2.0 * np.pi * cutoff)
 
     def used(self) -> Iterator[np.ndarray]:
         """Yield them (T, n) from the first to the last row that is used, part by part."""
@@ -61,11 +85,11 @@ class JointSpeeds:
 
         Parameters
         ----------
-        limits : (n,) the speed, rad/s or m/s.
+        limits : (n,) the speed, rad/s or m/s; a negative one for joints that are not asked for.
         """
         full = self._full
         for plan in full.parallel.blocks(full.source.samples, BLOCK, self.sampled.kept):
-            inside = np.abs(self._part(plan.raw)) < limits
+            inside = np.abs(self._part(plan.raw)) <= limits
             yield full.parallel.apply_block(inside.astype(float), plan)
 
     @property

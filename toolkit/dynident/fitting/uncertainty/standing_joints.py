@@ -13,18 +13,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dynident.criteria import DEFAULTS, StickingCriteria
-from dynident.fitting.sampling import Sampled, sample
+from dynident.fitting.sampling import LEAST_ROWS, Sampled, sample
 from dynident.fitting.uncertainty.joint_speeds import JointSpeeds
 from dynident.formulas import quoted_joint
 from dynident.model import Model
 from dynident.recording import Dataset, Filter, Recording, uniform
 from dynident.tables import listed, number, percent
 
+_REST = 1.0
+"""Duration of a stop from which it is a rest, s."""
+
 
 def stands(every: Iterable[JointSpeeds], criteria: StickingCriteria) -> np.ndarray:
     """Return which joints are seen to stand at many of their stops, (n,) mask.
 
-    A rest at an end of a recording is no stop. Counted in samples, a passage may last one longer
+    A rest at an end of a recording is no stop; a joint that rests throughout one, while it moves in
+    others, has stood as often as it takes. Counted in samples, a passage may last one longer
     within a band than it does, and one shorter on either side of it: a joint that passes from one
     sample to the next is not seen to stand.
 
@@ -35,7 +39,9 @@ def stands(every: Iterable[JointSpeeds], criteria: StickingCriteria) -> np.ndarr
     """
     longer, count = 0.0, 0.0
     for speeds in every:
-        each = _stops(speeds.used(), criteria.noise * speeds.noise)
+        limits = criteria.noise * speeds.noise + speeds.ringing
+        each = _stops(speeds.used(), limits)
+        longer += criteria.stops * np.all([_all_within(v, limits) for v in speeds.used()], axis=0)
         count += np.array([len(stops) for stops in each])
         longer += np.array(
             [
@@ -63,9 +69,42 @@ def near_stops(
     """
     limits = np.maximum(_unknown_within(speeds, criteria), least)
     if joints is not None:
-        limits[np.setdiff1d(np.arange(len(limits)), joints)] = 0.0
+        limits[np.setdiff1d(np.arange(len(limits)), joints)] = -1.0
     near = np.concatenate(list(speeds.slower(limits)))
     return np.abs(near) > criteria.spread
+
+
+def resting(near: np.ndarray, rate_hz: float) -> np.ndarray:
+    """Return the rows of joints that stand for long, (T, n) mask.
+
+    As where one joint moves after the other: such a row tells no friction, however many there are.
+
+    Parameters
+    ----------
+    near : (T, n) mask of the rows around stops.
+    rate_hz : of the rows.
+    """
+    found = np.zeros_like(near)
+    for j in range(near.shape[1]):
+        for start, stop in _stretches(near[:, j]):
+            found[start:stop, j] = stop - start > _REST * rate_hz
+    return found
+
+
+def few_enough(near: np.ndarray, rest: np.ndarray, criteria: StickingCriteria) -> np.ndarray:
+    """Return of which joints the rows around stops may be left out, (n,) mask.
+
+    While a joint moves it must not turn around most of the time, and of one that moves some rows
+    must be left.
+
+    Parameters
+    ----------
+    near, rest : (N, n) masks of the rows around stops, and of those of long rests among them.
+    criteria : which share may be left out.
+    """
+    moving, turning = np.sum(~rest, axis=0), np.sum(near & ~rest, axis=0)
+    left = np.sum(~near, axis=0) >= LEAST_ROWS
+    return (turning <= criteria.most * moving) & (left | (moving == 0))
 
 
 def without_stops(
@@ -105,7 +144,11 @@ def without_stops(
     if not which.any():
         return dataset
     near = [near_stops(one, criteria) & which for one in _speeds(recordings, dataset.filter)]
-    which = np.mean(np.concatenate(near), axis=0) <= criteria.most
+    rest = [
+        resting(rows, sample(one, dataset.filter).rate_hz)
+        for one, rows in zip(recordings, near, strict=True)
+    ]
+    which = few_enough(np.concatenate(near), np.concatenate(rest), criteria)
     pairs = zip(recordings, near, strict=True)
     marked = [_with_stops(sample(one, dataset.filter), rows & which) for one, rows in pairs]
     return replace(dataset, recordings=tuple(marked))
@@ -224,15 +267,24 @@ def _unknown_within(speeds: JointSpeeds, criteria: StickingCriteria) -> np.ndarr
     return np.maximum(criteria.noise * speeds.noise, criteria.rounded * speeds.rms)
 
 
+def _all_within(v: np.ndarray, limits: np.ndarray) -> np.ndarray:
+    return np.all(np.abs(v) <= limits, axis=0)
+
+
 def _with_stops(sampled: Sampled, rows: np.ndarray) -> Recording:
     """A recording that says when its rows (T, n) do not count."""
     half = 0.5 / sampled.rate_hz
     stops = []
     for column in rows.T:
-        edges = np.diff(np.concatenate([[0], column.astype(int), [0]]))
-        first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
-        stops.append(np.stack([sampled.t[first] - half, sampled.t[last] + half], axis=1))
+        first, after = _stretches(column).T
+        stops.append(np.stack([sampled.t[first] - half, sampled.t[after - 1] + half], axis=1))
     return sampled.recording.replace(stops=tuple(stops))
+
+
+def _stretches(mask: np.ndarray) -> np.ndarray:
+    """First row, and the row after the last, of each stretch of a mask (T,), (k, 2)."""
+    edges = np.diff(np.concatenate([[0], mask.astype(int), [0]]))
+    return np.stack([np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)], axis=1)
 
 
 @dataclass(frozen=True)
@@ -268,10 +320,8 @@ def _stops(parts: Iterable[np.ndarray], limits: np.ndarray) -> list[list[_Stop]]
     for v in parts:
         wide, narrow = np.abs(v) < 3.0 * limits, np.abs(v) < limits
         for j, stops in enumerate(found):
-            edges = np.diff(np.concatenate([[0], wide[:, j].astype(int), [0]]))
-            begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
             inside = np.concatenate([[0], np.cumsum(narrow[:, j])])
-            for start, stop in zip(begins.tolist(), ends.tolist(), strict=True):
+            for start, stop in _stretches(wide[:, j]).tolist():
                 begun, within = first + start, int(inside[stop] - inside[start])
                 if stops and stops[-1].stop == begun:  # it goes on from the part before
                     before = stops.pop()
