@@ -8,6 +8,8 @@ from scipy.signal import lfilter
 
 from dynident.criteria import DEFAULTS
 from dynident.diagnosis.search.paired_falls import fall_standard_error
+from dynident.diagnosis.search.path import _why
+from dynident.effects import catalogue
 from dynident.evidence.held_out import HeldOut, HeldOutRun
 from dynident.evidence.runs import gather
 from dynident.model import Model
@@ -118,3 +120,39 @@ def test_of_one_joint_it_is_that_of_a_robot_with_this_joint_alone() -> None:
         fall_standard_error(*alone, 2)
     )
     assert fall_standard_error(before, after, 2, [1]) != fall_standard_error(before, after, 2)
+
+
+def small_and_large(seed: int, gain: float, rise: float) -> tuple[HeldOut, HeldOut]:
+    """A large joint that gets better or worse by chance or more, a small one by a share."""
+    stream = np.random.default_rng(seed)
+    torque, rest, chance = (slow(stream, 3.0) for _ in range(3))
+    torque, rest = torque * [200.0, 1.0], rest * [10.0, 0.1]
+    shaken = rest + chance * [0.1, 0.0]
+    shaken[:, 0] *= np.sqrt(np.mean(rest[:, 0] ** 2) / np.mean(shaken[:, 0] ** 2)) * (1.0 + rise)
+    return judged(torque, rest), judged(torque, shaken * [1.0, 1.0 - gain])
+
+
+NAMES = ("shoulder", "wrist")
+SPRING = catalogue()["joint_spring"]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_a_small_joint_gains_by_far_is_not_taken_back_for_chance_at_a_large_one(
+    seed: int,
+) -> None:
+    spring = SPRING("wrist")
+    before, after = small_and_large(seed, 0.8, 1e-5)
+    assert after.error < before.error or not _why(None, spring, (before, after), NAMES, 2)
+    before, after = small_and_large(seed, 0.8, 0.05)
+    assert "raises the error on held-out blocks" in _why(None, spring, (before, after), NAMES, 2)
+    before, after = small_and_large(seed, 0.0, 1e-5)
+    assert after.error > before.error
+    assert "raises the error on held-out blocks" in _why(None, spring, (before, after), NAMES, 2)
+
+
+def test_what_makes_its_own_joint_worse_is_taken_back() -> None:
+    worse = small_and_large(0, -0.5, -0.3)
+    assert worse[1].error < worse[0].error
+    for held in ("wrist", "shoulder"):
+        why = _why(None, SPRING(held), worse, NAMES, 2)
+        assert ("raises the error of wrist" in why) == (held == "wrist")

@@ -6,7 +6,7 @@ effect with the experiment that would show it or distinguish it, residual maps, 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -19,7 +19,6 @@ from dynident.diagnosis.candidate_gains import candidate_gains
 from dynident.diagnosis.dependence.bursts import burst_notes, bursts_in
 from dynident.diagnosis.details import (
     Candidate,
-    JointFall,
     JointResult,
     Status,
     Step,
@@ -34,7 +33,7 @@ from dynident.diagnosis.nuisances.stated_noise import stated_noise_notes
 from dynident.diagnosis.nuisances.sticking import shares_left_out
 from dynident.diagnosis.nuisances.unlike_recordings import training_notes, unlike_notes
 from dynident.diagnosis.result import Diagnosis
-from dynident.diagnosis.search.paired_falls import fall_standard_error
+from dynident.diagnosis.search.paired_falls import fall_standard_error, largest_fall
 from dynident.diagnosis.search.path import Path
 from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.search.refusal import impossible_joints_of
@@ -191,28 +190,11 @@ def _steps_of(path: Path, evidence: Evidence) -> tuple[Step, ...]:
             indistinguishable=one.indistinguishable,
             p_value=one.p_value,
             fall_standard_error=fall_standard_error(old, new, together),
-            at_joint=_largest_fall(names, old, new, together),
+            at_joint=largest_fall(names, old, new, together),
         )
         for one, stage, (old, new) in zip(
             path.found, path.stages[1:], pairwise(path.judged), strict=True
         )
-    )
-
-
-def _largest_fall(
-    names: Sequence[str], before: HeldOut, after: HeldOut, together: int
-) -> JointFall | None:
-    """The joint whose own error falls by the largest part; None where none falls."""
-    old, new = before.joint_errors, after.joint_errors
-    falls = np.nan_to_num((old - new) / np.where(old > 0, old, np.nan))
-    k = int(np.argmax(falls))
-    if not falls[k] > 0:
-        return None
-    return JointFall(
-        joint=names[k],
-        before=float(old[k]),
-        after=float(new[k]),
-        standard_error=fall_standard_error(before, after, together, [k]),
     )
 
 

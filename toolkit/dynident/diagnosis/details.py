@@ -82,8 +82,15 @@ class JointFall:
     def is_large(self) -> bool:
         """Whether it takes a good part of what that joint leaves, and not by chance."""
         fall = self.before - self.after
-        certain = self.standard_error is None or fall > _MANY * self.standard_error
-        return certain and fall >= LARGE_AT_A_JOINT * self.before
+        return self._certain(fall) and fall >= LARGE_AT_A_JOINT * self.before
+
+    @property
+    def is_rise(self) -> bool:
+        """Whether it rises instead, and not by chance."""
+        return self.after > self.before and self._certain(self.after - self.before)
+
+    def _certain(self, change: float) -> bool:
+        return self.standard_error is None or change > _MANY * self.standard_error
 
     @property
     def in_words(self) -> str:

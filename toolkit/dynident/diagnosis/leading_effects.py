@@ -153,7 +153,7 @@ def _steps(groups: Sequence[Sequence[Step]]) -> list[Step]:
 
 
 def _is_large(step: Step) -> bool:
-    return step.at_joint is not None and step.at_joint.is_large and step.fall > 0.0
+    return step.at_joint is not None and step.at_joint.is_large
 
 
 def _fall(group: Sequence[Step]) -> float:

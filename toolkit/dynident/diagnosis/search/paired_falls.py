@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from dynident.diagnosis.details import JointFall
 from dynident.evidence.held_out import HeldOut
 
 
@@ -46,6 +47,40 @@ def fall_standard_error(
         return None
     falls = np.sqrt(given / whole) - np.sqrt(wider / whole)
     return float(np.sqrt((count - together) / together * np.var(falls)))
+
+
+def largest_fall(
+    names: Sequence[str], before: HeldOut, after: HeldOut, together: int
+) -> JointFall | None:
+    """Return that of the joint whose own error falls by the largest part; None where none falls.
+
+    Parameters
+    ----------
+    names : of the joints.
+    before, after, together : as for `fall_standard_error`.
+    """
+    old, new = before.joint_errors, after.joint_errors
+    falls = np.nan_to_num((old - new) / np.where(old > 0, old, np.nan))
+    k = int(np.argmax(falls))
+    return joint_fall(names, k, before, after, together) if falls[k] > 0 else None
+
+
+def joint_fall(
+    names: Sequence[str], joint: int, before: HeldOut, after: HeldOut, together: int
+) -> JointFall:
+    """Return what becomes of the error of one joint.
+
+    Parameters
+    ----------
+    names, before, after, together : as for `largest_fall`.
+    joint : its number.
+    """
+    return JointFall(
+        joint=names[joint],
+        before=float(before.joint_errors[joint]),
+        after=float(after.joint_errors[joint]),
+        standard_error=fall_standard_error(before, after, together, [joint]),
+    )
 
 
 def _without(summed: np.ndarray, together: int) -> np.ndarray:

@@ -20,8 +20,14 @@ from operator import sub
 
 from dynident.diagnosis.details import Withdrawn
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
+from dynident.diagnosis.search.paired_falls import (
+    fall_standard_error,
+    joint_fall,
+    largest_fall,
+)
 from dynident.diagnosis.search.refusal import newly_impossible
 from dynident.diagnosis.search.selection import AddedEffect
+from dynident.effects import Effect
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import HeldOut, on_blocks, on_recordings, with_noise_of
@@ -38,7 +44,8 @@ class Path:
     ----------
     found : the effects, in the order of the steps.
     stages : the fits before any step and after each of them.
-    judged : held-out errors of the same; they fall from step to step.
+    judged : held-out errors of the same; they fall from step to step, over all joints or, within
+        the standard error of that, at one.
     withdrawn : effects that were taken back.
     looks : times that held-out data have judged a path: more than once where the search has gone on
         after something was withdrawn.
@@ -76,6 +83,9 @@ def path_of(
 ) -> Path:
     """Return the steps along which the held-out error falls; the others are withdrawn.
 
+    Over all joints, or at one by far with no more than chance at the others; and not where the
+    joint of an effect gets worse.
+
     A step with which it rises, or the values become impossible, is tried last, where another effect
     may be what it needs; if that does not help, the effect is withdrawn and all else fitted anew.
 
@@ -97,7 +107,11 @@ def path_of(
         along = _judged_stages(evidence, held, (start, fitted), found, known)
         stages, judged = tuple(fit for fit, _ in along), tuple(errors for _, errors in along)
         impossible = [newly_impossible(evidence, *fits) for fits in pairwise(stages)]
-        worse = [_why(held, *errors) for errors in pairwise(judged)]
+        together = evidence.criteria.search.set_block
+        worse = [
+            _why(held, one.score.effect, errors, evidence.model.robot.names, together)
+            for one, errors in zip(found, pairwise(judged), strict=True)
+        ]
         reasons = [one or other for one, other in zip(impossible, worse, strict=True)]
         wrong = next((k for k, why in enumerate(reasons) if why), None)
         if wrong is None:
@@ -126,13 +140,34 @@ def path_of(
         fitted = with_friction_width(evidence, rest) if found else start
 
 
-def _why(held: Evidence | None, before: HeldOut, after: HeldOut) -> str:
-    """Why a step is taken back; empty where the held-out error does not rise."""
-    if after.error <= before.error:
-        return ""
+def _why(
+    held: Evidence | None,
+    effect: Effect,
+    errors: tuple[HeldOut, HeldOut],
+    names: Sequence[str],
+    together: int,
+) -> str:
+    """Why a step is taken back; empty where the held-out error does not rise.
+
+    The torque of a wrist is nothing beside that of a shoulder, whose own error moves by chance: a
+    rise over all joints of less than its standard error counts for nothing beside a large fall at
+    one joint. And what lies at a joint must not make that joint worse.
+    """
+    before, after = errors
     where = "the test recordings" if held else "held-out blocks of time"
-    low, high = two_percent(before.error, after.error)
-    return f"raises the error on {where} from {low} to {high}"
+    if after.error > before.error:
+        there = largest_fall(names, before, after, together)
+        chance = fall_standard_error(before, after, together)
+        rise = after.error - before.error
+        if there is None or not there.is_large or chance is None or rise > chance:
+            low, high = two_percent(before.error, after.error)
+            return f"raises the error on {where} from {low} to {high}"
+    if effect.joint in names:
+        own = joint_fall(names, names.index(effect.joint), before, after, together)
+        if own.is_rise:
+            low, high = two_percent(own.before, own.after)
+            return f"raises the error of {own.joint} on {where} from {low} to {high}"
+    return ""
 
 
 def _judged_stages(
