@@ -12,7 +12,7 @@ from dynident.diagnosis.details import Step
 from dynident.diagnosis.nuisances.look_alikes import look_alike_notes
 from dynident.diagnosis.nuisances.sticking import sticking_notes
 from dynident.diagnosis.nuisances.width_notes import friction_width_notes
-from dynident.diagnosis.search.ranking import Ranking
+from dynident.diagnosis.search.ranking import Ranking, candidates, carries_noise
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut
@@ -111,6 +111,20 @@ def notes_on_steps(steps: Sequence[Step], held: Evidence | None) -> tuple[str, .
     return tuple(notes)
 
 
+def _not_tried(evidence: Evidence, fitted: EvidenceFit) -> list[str]:
+    """Which effects plain least squares takes for the noise in its columns; empty for none."""
+    responses = (one for one in candidates(fitted.model) if one.is_dynamic_response)
+    names = list(dict.fromkeys(one.name.replace("_", " ") for one in responses))
+    if not names or not carries_noise(evidence):
+        return []
+    were = "was" if len(names) == 1 else "were"
+    return [
+        f"{listed(names).capitalize()} {were} not tried: a joint that gives way looks like the "
+        "noise in accelerations. A motion that repeats would show it, and `dynident compare STUDY "
+        "--with EFFECT` how far the error falls with one, which that noise may bring about."
+    ]
+
+
 def notes_on(
     evidence, held, fitted: EvidenceFit, source: NoiseSource, doubtful: Collection[str] = ()
 ) -> tuple[str, ...]:
@@ -144,6 +158,7 @@ def notes_on(
             f"squares, whose columns carry noise{floor}. Small effects may be false; record a "
             "repeated motion."
         )
+        notes += _not_tried(evidence, fitted)
     responses = [one.title for one in fitted.model.effects if one.is_dynamic_response]
     if simulated and responses:
         notes.append(

@@ -87,6 +87,16 @@ def candidates(model: Model) -> list[Effect]:
     return found
 
 
+def carries_noise(evidence: Evidence) -> bool:
+    """Return whether columns are those of recordings throughout, and nothing tells their noise.
+
+    Parameters
+    ----------
+    evidence : of the training recordings.
+    """
+    return all(run.kind == "single" and run.columns_from == "recording" for run in evidence.runs)
+
+
 def rank(
     evidence: Evidence,
     fitted: EvidenceFit,
@@ -110,7 +120,7 @@ def rank(
     Every effect at its best shape, best first, with the gate that it does not pass.
     """
     criteria, best, tests = evidence.criteria, [], 0
-    noisy = all(run.kind == "single" and run.columns_from == "recording" for run in evidence.runs)
+    noisy = carries_noise(evidence)
     asked = only or tuple(candidates(fitted.model))
     below_noise: frozenset[str] = frozenset()
     if any(effect.is_dynamic_response for effect in asked):

@@ -185,13 +185,14 @@ def follows_the_filter(
 
 
 def _gram(lower: Evidence, wider: EvidenceFit, effect: Effect) -> np.ndarray:
-    """Return the products of an effect's columns behind a lower filter, (k, k)."""
+    """Return the products of an effect's columns behind a lower filter, (k, k): rows that count."""
     own = wider.model.slices[effect.label]
     whole = next(e for e in wider.model.effects if e.label == effect.label)
     gram = np.zeros((own.stop - own.start,) * 2)
-    for run in range(len(lower.runs)):
-        for columns in lower.of(whole, run, wider.model, wider.values):
-            rows = columns.reshape(-1, columns.shape[-1])
+    joints = list(whole.acting_at(wider.model.robot))
+    for number, run in enumerate(lower.runs):
+        for columns in lower.of(whole, number, wider.model, wider.values):
+            rows = columns[run.certain_rows[:, joints]]
             gram += rows.T @ rows
     return gram
 
