@@ -15,6 +15,7 @@ from dynident.recording import Dataset
 from dynident.reporting.headline import headline
 from dynident.reporting.html import page
 from dynident.reporting.next_steps import next_steps
+from dynident.tables import two_percent
 from reporting.fabricated import diagnosis, effect
 from synthetic import arm, synthetic, true_values
 
@@ -151,10 +152,15 @@ def test_what_takes_most_of_a_small_joints_own_error_is_not_called_small() -> No
 
 def test_where_all_joints_together_gain_little_the_joint_that_gains_is_told() -> None:
     found = along((0.5,))
-    wrist = JointFall(joint="elbow", before=0.15, after=0.04)
+    wrist = JointFall(joint="elbow", before=0.15, after=0.04, standard_error=0.01)
+    elbow = found.joints[1]
+    before, after = two_percent(elbow.error_before, elbow.error_after)
     told = replace(found, steps=(replace(found.steps[0], at_joint=wrist),))
     for said in (headline(told).sentence, next_steps(told)[0].why):
-        assert "to 11.50 %, that of elbow from 15.00 % to 4.00 %" in said
+        assert f"to 11.50 %, that of elbow from {before} to {after}" in said
+    none = replace(told, test_error=replace(told.test_error, after=told.test_error.before + 1e-6))
+    said = headline(none).sentence
+    assert f"takes the torque error of elbow from {before} to {after}, and that of all" in said
     assert "Most of the error stays" not in next_steps(told)[0].why
     big = along((9.0,))
     assert (
@@ -166,7 +172,8 @@ def test_where_all_joints_together_gain_little_the_joint_that_gains_is_told() ->
 @pytest.mark.parametrize(
     "at_joint",
     [
-        JointFall(joint="elbow", before=0.15, after=0.04, standard_error=0.06),
+        JointFall(joint="elbow", before=0.15, after=0.04),
+        JointFall(joint="elbow", before=0.15, after=0.04, standard_error=0.04),
         JointFall(joint="elbow", before=0.15, after=0.11, standard_error=0.001),
     ],
 )

@@ -19,6 +19,7 @@ from dynident.fitting.uncertainty.standing_joints import (
     few_enough,
     near_stops,
     resting,
+    rests_throughout,
     standing_note,
     stands,
     without_stops,
@@ -82,15 +83,30 @@ def test_while_one_joint_moves_after_the_other_the_one_that_rests_tells_nothing(
 
 
 def test_of_a_joint_that_turns_around_all_the_time_every_row_counts() -> None:
-    """Long rests are no part of its share, and without them rows must be left."""
-    near = np.zeros((1000, 4), dtype=bool)
-    near[::2, 0], near[:400, 1], near[:990, 2], near[:, 3] = True, True, True, True
-    near[500:, 0] = True
-    rest = resting(near, 100.0)
-    np.testing.assert_array_equal(rest.sum(axis=0), [500, 400, 990, 1000])
-    assert few_enough(near, rest, DEFAULTS.sticking).tolist() == [True, True, False, True]
-    near[1:500:4, 0] = True
-    assert not few_enough(near, resting(near, 100.0), DEFAULTS.sticking)[0]
+    """Long rests are no part of its share, and some rows must be left."""
+    near, rest = np.zeros((2, 1000, 4), dtype=bool)
+    near[:300, 0], near[:400, 1], near[:990, 2], near[:, 3] = True, True, True, True
+    near[500:, 0] = rest[500:, 0] = rest[:400, 1] = rest[:990, 2] = rest[:, 3] = True
+    assert few_enough(near, rest, DEFAULTS.sticking).tolist() == [False, True, False, False]
+    near[200:300, 0] = False
+    assert few_enough(near, rest, DEFAULTS.sticking)[0]
+
+
+def test_what_creeps_within_the_noise_of_its_speed_does_not_rest() -> None:
+    t = np.arange(8000) / RATE_HZ
+    noise = np.random.default_rng(0).normal(size=(len(t), 2))
+    q = np.stack([0.5 * np.sin(0.3 * t), np.clip(t - 4.0, 0.0, 4.0)], axis=1)
+    for std in (1e-3, 1e-5, 0.0):
+        one = Recording(t, q + std * noise, np.ones_like(q), ("shoulder", "elbow"))
+        sampled = sample(one, None)
+        rest = resting(sampled)
+        # Where it turns around slowly it may stay within the noise of a coarse encoder.
+        assert rest[:, 0].mean() <= (0.2 if std > 1e-4 else 0.0)
+        np.testing.assert_array_equal(rest[sampled.t < 3.5, 1], True)
+        assert not rest[(sampled.t > 4.3) & (sampled.t < 7.7), 1].any()
+        assert not rests_throughout(sampled).any()
+        still = sample(one.replace(q=0.3 + std * noise), None)
+        assert rests_throughout(still).all() and resting(still).all()
 
 
 def test_a_comparison_counts_the_rows_that_a_fit_counts() -> None:

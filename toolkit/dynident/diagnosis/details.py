@@ -16,6 +16,8 @@ LARGE_AT_A_JOINT = 1.0 / 3.0
 """Share of a joint's own error that an effect which is large there takes away, at least."""
 _MANY = 2.0
 """Standard errors within which a fall may be chance."""
+_BEST = 3.0
+"""The same of the joint at which it is largest: that is the best of several."""
 IMPOSSIBLE = "makes the impossible"
 """Begins the remark on an effect whose fit has values that no robot has."""
 
@@ -82,15 +84,16 @@ class JointFall:
     def is_large(self) -> bool:
         """Whether it takes a good part of what that joint leaves, and not by chance."""
         fall = self.before - self.after
-        return self._certain(fall) and fall >= LARGE_AT_A_JOINT * self.before
+        return self._beyond(_BEST, fall) and fall >= LARGE_AT_A_JOINT * self.before
 
     @property
     def is_rise(self) -> bool:
         """Whether it rises instead, and not by chance."""
-        return self.after > self.before and self._certain(self.after - self.before)
+        return self._beyond(_MANY, self.after - self.before)
 
-    def _certain(self, change: float) -> bool:
-        return self.standard_error is None or change > _MANY * self.standard_error
+    def _beyond(self, many: float, change: float) -> bool:
+        error = self.standard_error
+        return error is not None and change > max(many * error, 0.0)
 
     @property
     def in_words(self) -> str:
@@ -137,9 +140,14 @@ class Step:
 
         Over all joints a small one counts for little: what is large at its own joint is certain.
         """
-        error, there = self.fall_standard_error, self.at_joint
-        chance = error is not None and self.fall <= _MANY * error
-        return chance and not (there is not None and there.is_large)
+        there = self.at_joint
+        return self.uncertain_over_all and not (there is not None and there.is_large)
+
+    @property
+    def uncertain_over_all(self) -> bool:
+        """The same of the error over all joints alone."""
+        error = self.fall_standard_error
+        return error is not None and self.fall <= _MANY * error
 
     @property
     def fall_in_words(self) -> str:

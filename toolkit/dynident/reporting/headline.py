@@ -178,9 +178,13 @@ def _found(diagnosis: Diagnosis) -> str:
         return f"{names} {were} found, and beside it the torque error is {percent(error.after)}"
     before, after = two_percent(error.before, error.after)
     effects = LeadingEffects.of(diagnosis.steps)
-    own, local = effects.own_joint_in_words(error), effects.local_in_words
-    there = f"{own and f', {own}'}{local and f'; {local}'}"
-    return f"{_added(diagnosis)} the torque error from {before} to {after}{there}"
+    own, local = effects.own_joint_in_words(error, diagnosis.joints), effects.local_in_words
+    local = local and f"; {local}"
+    if own and error.after >= error.before:
+        added = f"{_added(diagnosis)} the torque error of {own}"
+        return f"{added}, and that of all joints from {before} to {after}{local}"
+    own = own and f", that of {own}"
+    return f"{_added(diagnosis)} the torque error from {before} to {after}{own}{local}"
 
 
 def _added(diagnosis: Diagnosis) -> str:

@@ -58,6 +58,9 @@ def _state(diagnosis: Diagnosis, joint: JointResult) -> JointState:
     if joint.name in diagnosis.following_motion:
         words = "what is left follows the motion: it is not all noise"
         return JointState(joint, "failing", words, (2, joint.error_after))
+    if joint.error_after != joint.error_after:
+        words = "none of its rows tells anything: it stands, or has no torque"
+        return JointState(joint, "unknown", words, (0, 0.0))
     if before is None or after is None:
         words = "an effect was added here" if named else "the noise is unknown"
         return JointState(joint, "unknown", words, (named, joint.error_before))

@@ -167,8 +167,8 @@ def _to_add(diagnosis: Diagnosis) -> list[Advice]:
         if error.noise_floor is None
         else f"; noise alone would make {percent(error.noise_floor)}"
     )
-    own = found.own_joint_in_words(error)
-    why = f"{share}{brings} to {percent(error.after)}{own and f', {own}'}{floor}."
+    own = found.own_joint_in_words(error, diagnosis.joints)
+    why = f"{share}{brings} to {percent(error.after)}{own and f', that of {own}'}{floor}."
     unclear = diagnosis.verdict == "unexplained" or diagnosis.noise_source == "unknown"
     if unclear and not own and error.before - error.after < _LITTLE * error.before:
         why += " Most of the error stays."

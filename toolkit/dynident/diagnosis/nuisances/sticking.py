@@ -113,7 +113,11 @@ def without_reversals(
     """
     names, reach = evidence.model.robot.names, within or {}
     columns = [(names.index(joint), reach.get(joint, 0.0)) for joint in joints]
-    columns = [(j, least) for j, least in columns if _may_leave_out(evidence, j, least)]
+    columns = [
+        (j, least)
+        for j, least in columns
+        if _may_leave_out(evidence, j, least) or _rests(evidence, j)
+    ]
     runs = []
     for run in evidence.runs:
         uncertain = ~run.certain_rows
@@ -182,13 +186,27 @@ def sticking_notes(evidence: Evidence, others: Collection[str] = ()) -> tuple[st
 
 def _may_leave_out(evidence: Evidence, j: int, least: float = 0.0) -> bool:
     """Whether enough of a joint's rows are left without its reversals."""
-    near, rest = [np.zeros((0, 1), dtype=bool)], [np.zeros((0, 1), dtype=bool)]
+    near, rest = [np.zeros(0, dtype=bool)], [np.zeros(0, dtype=bool)]
     for run in evidence.runs:
-        rows = _near_stops(evidence, run, j, least)[:, None]
-        near.append(np.any(rows[run.index], axis=0))
-        rest.append(np.all(resting(rows, run.replicates[0].rate_hz)[run.index], axis=0))
-    few = few_enough(np.concatenate(near), np.concatenate(rest), evidence.criteria.sticking)
-    return bool(few[0])
+        near.append(np.any(_near_stops(evidence, run, j, least)[run.index], axis=0))
+        rest.append(np.all(_resting(evidence, run)[:, j][run.index], axis=0))
+    both = (np.concatenate(one)[:, None] for one in (near, rest))
+    return bool(few_enough(*both, evidence.criteria.sticking)[0])
+
+
+def _rests(evidence: Evidence, j: int) -> bool:
+    """Whether a joint rests throughout the recordings."""
+    return all(bool(_resting(evidence, run)[:, j].all()) for run in evidence.runs)
+
+
+def _resting(evidence: Evidence, run: Run) -> np.ndarray:
+    """Rows of joints that rest, (T, n) mask; asked for with every model."""
+    sampled = run.replicates[0]
+    known, kept = evidence.cache.along(sampled.motion), sampled.kept
+    key = ("resting", kept.start, kept.stop)
+    if key not in known:
+        known[key] = resting(sampled)
+    return known[key]
 
 
 def _near_stops(evidence: Evidence, run: Run, j: int, least: float = 0.0) -> np.ndarray:

@@ -54,6 +54,8 @@ def largest_fall(
 ) -> JointFall | None:
     """Return that of the joint whose own error falls by the largest part; None where none falls.
 
+    Of those where it is large, if there are any: a joint of few rows may fall far by chance.
+
     Parameters
     ----------
     names : of the joints.
@@ -61,8 +63,9 @@ def largest_fall(
     """
     old, new = before.joint_errors, after.joint_errors
     falls = np.nan_to_num((old - new) / np.where(old > 0, old, np.nan))
-    k = int(np.argmax(falls))
-    return joint_fall(names, k, before, after, together) if falls[k] > 0 else None
+    found = (joint_fall(names, int(k), before, after, together) for k in np.argsort(-falls))
+    every = [one for one in found if one.after < one.before]
+    return max(every, key=lambda one: one.is_large, default=None)
 
 
 def joint_fall(

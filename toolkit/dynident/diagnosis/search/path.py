@@ -147,7 +147,7 @@ def _why(
     names: Sequence[str],
     together: int,
 ) -> str:
-    """Why a step is taken back; empty where the held-out error does not rise.
+    """Why a step is taken back; empty where held-out data do not speak against it.
 
     The torque of a wrist is nothing beside that of a shoulder, whose own error moves by chance: a
     rise over all joints of less than its standard error counts for nothing beside a large fall at

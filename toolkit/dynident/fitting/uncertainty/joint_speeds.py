@@ -15,7 +15,8 @@ from dynident.recording.sections import response
 from dynident.recording.white_noise import encoder_noise_std
 
 _FREQUENCIES = 4096  # at which a filter's response is taken
-_DIGITS = 1e-12  # of a position's size, that its low-pass keeps: some joints stand exactly
+DIGITS = 1e-12
+"""Of a position's size, that its low-pass keeps: some joints stand exactly."""
 _RINGING = 0.1
 """Overshoot of the speed's low-pass beside a kink, of the change of acceleration times the time
 constant 1 / (2 pi cut-off)."""
@@ -49,7 +50,7 @@ class JointSpeeds:
             gain = gain * np.abs(response(butterworth(rate, cutoff), angle)) ** 2
         share = float(np.sqrt(np.trapezoid(gain**2, angle) / np.pi))
         q = self.sampled.recording.q
-        digits = _DIGITS * np.abs(q).max(axis=0)
+        digits = DIGITS * np.abs(q).max(axis=0)
         return np.maximum(encoder_noise_std(q), digits) * share
 
     @cached_property

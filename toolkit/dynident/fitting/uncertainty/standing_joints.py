@@ -11,37 +11,42 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from dynident.criteria import DEFAULTS, StickingCriteria
 from dynident.fitting.sampling import LEAST_ROWS, Sampled, sample
-from dynident.fitting.uncertainty.joint_speeds import JointSpeeds
+from dynident.fitting.uncertainty.joint_speeds import DIGITS, JointSpeeds
 from dynident.formulas import quoted_joint
 from dynident.model import Model
 from dynident.recording import Dataset, Filter, Recording, uniform
+from dynident.recording.white_noise import encoder_noise_std
 from dynident.tables import listed, number, percent
 
 _REST = 1.0
 """Duration of a stop from which it is a rest, s."""
+_SCATTER = 10.0
+"""Range of the positions of a joint that rests, over the noise of its encoder."""
+_SLIPS = 1e-3
+"""Share of its travel that a joint which rests may slip in a second."""
 
 
 def stands(every: Iterable[JointSpeeds], criteria: StickingCriteria) -> np.ndarray:
     """Return which joints are seen to stand at many of their stops, (n,) mask.
 
-    A rest at an end of a recording is no stop; a joint that rests throughout one, while it moves in
-    others, has stood as often as it takes. Counted in samples, a passage may last one longer
-    within a band than it does, and one shorter on either side of it: a joint that passes from one
-    sample to the next is not seen to stand.
+    A rest at an end of a recording is no stop; a joint that rests throughout one stands. Counted in
+    samples, a passage may last one longer within a band than it does, and one shorter on either
+    side of it: a joint that passes from one sample to the next is not seen to stand.
 
     Parameters
     ----------
     every : speeds of each recording.
     criteria : what is standing, and at how many stops.
     """
-    longer, count = 0.0, 0.0
+    longer, count, rests = 0.0, 0.0, False
     for speeds in every:
         limits = criteria.noise * speeds.noise + speeds.ringing
         each = _stops(speeds.used(), limits)
-        longer += criteria.stops * np.all([_all_within(v, limits) for v in speeds.used()], axis=0)
+        rests = rests | rests_throughout(speeds.sampled)
         count += np.array([len(stops) for stops in each])
         longer += np.array(
             [
@@ -49,7 +54,7 @@ def stands(every: Iterable[JointSpeeds], criteria: StickingCriteria) -> np.ndarr
                 for stops in each
             ]
         )
-    return longer >= np.maximum(criteria.stops, criteria.stops_share * count)
+    return rests | (longer >= np.maximum(criteria.stops, criteria.stops_share * count))
 
 
 def near_stops(
@@ -74,28 +79,46 @@ def near_stops(
     return np.abs(near) > criteria.spread
 
 
-def resting(near: np.ndarray, rate_hz: float) -> np.ndarray:
-    """Return the rows of joints that stand for long, (T, n) mask.
+def resting(sampled: Sampled) -> np.ndarray:
+    """Return the rows of joints that rest, (T, n) mask: their position stays for over a second.
 
-    As where one joint moves after the other: such a row tells no friction, however many there are.
+    As where one joint moves after the other. A joint that creeps within the noise of its speed
+    does not rest.
 
     Parameters
     ----------
-    near : (T, n) mask of the rows around stops.
-    rate_hz : of the rows.
+    sampled : the recording.
     """
-    found = np.zeros_like(near)
-    for j in range(near.shape[1]):
-        for start, stop in _stretches(near[:, j]):
-            found[start:stop, j] = stop - start > _REST * rate_hz
-    return found
+    q, window = sampled.q, max(int(_REST * sampled.rate_hz), 1)
+    if len(q) < window:
+        return np.tile(np.ptp(q, axis=0) <= _stays_within(sampled), (len(q), 1))
+    highest = maximum_filter1d(q, window, axis=0, mode="nearest")
+    travel = highest - minimum_filter1d(q, window, axis=0, mode="nearest")
+    still = (travel <= _stays_within(sampled)).astype(np.uint8)
+    return maximum_filter1d(still, window, axis=0, mode="nearest").astype(bool)
+
+
+def rests_throughout(sampled: Sampled) -> np.ndarray:
+    """Return which joints rest from the first row of a recording to the last, (n,) mask.
+
+    Parameters
+    ----------
+    sampled : the recording.
+    """
+    return np.ptp(sampled.q, axis=0) <= _stays_within(sampled)
+
+
+def _stays_within(sampled: Sampled) -> np.ndarray:
+    """Range of positions that encoders make of one, or little of the travel, (n,) rad or m."""
+    q = sampled.recording.q
+    least = DIGITS * np.abs(q).max(axis=0) + _SCATTER * encoder_noise_std(q)
+    return np.maximum(least, _SLIPS * np.ptp(q, axis=0))
 
 
 def few_enough(near: np.ndarray, rest: np.ndarray, criteria: StickingCriteria) -> np.ndarray:
     """Return of which joints the rows around stops may be left out, (n,) mask.
 
-    While a joint moves it must not turn around most of the time, and of one that moves some rows
-    must be left.
+    While a joint moves it must not turn around most of the time, and some rows must be left.
 
     Parameters
     ----------
@@ -104,7 +127,7 @@ def few_enough(near: np.ndarray, rest: np.ndarray, criteria: StickingCriteria) -
     """
     moving, turning = np.sum(~rest, axis=0), np.sum(near & ~rest, axis=0)
     left = np.sum(~near, axis=0) >= LEAST_ROWS
-    return (turning <= criteria.most * moving) & (left | (moving == 0))
+    return (turning <= criteria.most * moving) & left
 
 
 def without_stops(
@@ -144,11 +167,8 @@ def without_stops(
     if not which.any():
         return dataset
     near = [near_stops(one, criteria) & which for one in _speeds(recordings, dataset.filter)]
-    rest = [
-        resting(rows, sample(one, dataset.filter).rate_hz)
-        for one, rows in zip(recordings, near, strict=True)
-    ]
-    which = few_enough(np.concatenate(near), np.concatenate(rest), criteria)
+    rest = np.concatenate([resting(sample(one, dataset.filter)) for one in recordings])
+    which = few_enough(np.concatenate(near), rest, criteria) | (known & rest.all(axis=0))
     pairs = zip(recordings, near, strict=True)
     marked = [_with_stops(sample(one, dataset.filter), rows & which) for one, rows in pairs]
     return replace(dataset, recordings=tuple(marked))
@@ -214,11 +234,12 @@ def too_wide_note(model: Model, dataset: Dataset) -> str:
         return ""
     every = _speeds(dataset.recordings, dataset.filter)
     speed = np.max([_unknown_within(one, criteria) for one in every], axis=0)
+    rest = np.all([rests_throughout(sample(r, dataset.filter)) for r in dataset.recordings], axis=0)
     widths = dict(zip(model.robot.names, map(float, model.friction_widths), strict=True))
     narrower = {
         joint: float(number(one / criteria.noise, 1))
-        for joint, one in zip(model.robot.names, speed, strict=True)
-        if joint in standing and one < widths[joint]
+        for joint, one, idle in zip(model.robot.names, speed, rest, strict=True)
+        if joint in standing and one < widths[joint] and not idle
     }
     if not narrower:
         return ""
@@ -265,10 +286,6 @@ def _unknown_within(speeds: JointSpeeds, criteria: StickingCriteria) -> np.ndarr
     That of its noise, and around a reversal what the low-pass of the positions rounds.
     """
     return np.maximum(criteria.noise * speeds.noise, criteria.rounded * speeds.rms)
-
-
-def _all_within(v: np.ndarray, limits: np.ndarray) -> np.ndarray:
-    return np.all(np.abs(v) <= limits, axis=0)
 
 
 def _with_stops(sampled: Sampled, rows: np.ndarray) -> Recording:
