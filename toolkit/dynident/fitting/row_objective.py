@@ -9,10 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from scipy.linalg import qr
 
 from dynident.effects import Block, Effect
 from dynident.errors import FitError
@@ -29,6 +27,7 @@ from dynident.fitting.shape_search import (
 )
 from dynident.model import Model
 from dynident.moments.factors import RANK_TOLERANCE, factorise
+from dynident.moments.solution import orthonormal
 from dynident.recording import Dataset
 
 _SCREEN_MOST = 400  # combinations of all effects' variants that are screened at most
@@ -152,7 +151,7 @@ class _RowObjective:
         self._weights = 1.0 / solve_factors(model, factorise(pairs)).torque_std
         own = np.concatenate([np.r_[model.slices[e.label]] for e in self.effects])
         rest = np.setdiff1d(np.arange(model.size), own)
-        self._basis = _orthonormal(self._rows([c[:, :, rest] for c in columns]))
+        self._basis = orthonormal(self._rows([c[:, :, rest] for c in columns]))
         self.torque = self._left([one[:, :, None] for one in torque])[:, 0]
         self._blocks = [self._ready(s) for s in samples]
 
@@ -317,14 +316,6 @@ def _rise(effect: Effect, block: Block, values: np.ndarray) -> np.ndarray:
     sensitivities = effect.sensitivities(block)
     assert sensitivities is not None
     return np.einsum("tnks,k->tns", sensitivities, values)
-
-
-def _orthonormal(columns: np.ndarray) -> np.ndarray:
-    """An orthonormal basis of what the columns span, (N, r)."""
-    norms = np.linalg.norm(columns, axis=0)
-    found: Any = qr(columns / np.where(norms > 0, norms, 1.0), mode="economic", pivoting=True)
-    size = np.abs(np.diag(found[1]))
-    return found[0][:, size > RANK_TOLERANCE * size[0]]
 
 
 def _solved(columns: np.ndarray, wanted: np.ndarray) -> np.ndarray:

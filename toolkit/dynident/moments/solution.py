@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from scipy.linalg import get_lapack_funcs
+from scipy.linalg import get_lapack_funcs, qr
 
 from dynident.errors import FitError
 from dynident.moments.factors import RANK_TOLERANCE
@@ -185,3 +186,22 @@ def orthonormal_directions(products: np.ndarray, scale: np.ndarray) -> np.ndarra
         raise FitError("the columns of the model are not finite")
     keep = size > EXACT * max(float(size[-1]), 1e-300)
     return directions[:, keep] / np.sqrt(size[keep]) / scale[:, None]
+
+
+def orthonormal(columns: np.ndarray, tolerance: float = RANK_TOLERANCE) -> np.ndarray:
+    """Return an orthonormal basis of what columns span, (N, r).
+
+    By QR with pivoting: of regressors, whose columns depend on each other, an SVD has been seen not
+    to converge.
+
+    Parameters
+    ----------
+    columns : (N, k), of any size each.
+    tolerance : size of a direction over that of the largest, from which it counts.
+    """
+    norms = np.linalg.norm(columns, axis=0)
+    if not norms.any():
+        return columns[:, :0]
+    found: Any = qr(columns / np.where(norms > 0, norms, 1.0), mode="economic", pivoting=True)
+    size = np.abs(np.diag(found[1]))
+    return found[0][:, : len(size)][:, size > tolerance * size[0]]

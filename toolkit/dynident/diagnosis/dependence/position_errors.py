@@ -13,13 +13,13 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.polynomial import Chebyshev
-from scipy.linalg import qr
 
 from dynident.diagnosis.dependence.residual_record import (
     FittedBody,
     ResidualRecord,
     joints_turning_round,
 )
+from dynident.moments.solution import orthonormal
 
 DEGREE = 6
 """Of the polynomials, over the range of each joint: up to about a wave and a half of an error; of
@@ -74,7 +74,7 @@ def position_error_columns(
         known.append(regressor[:, other] * here[:, None])
     if not np.isfinite(wrong).all():
         return np.empty((len(rows), 0))
-    basis = _basis(_scaled(np.hstack(known)))
+    basis = orthonormal(np.hstack(known), _NOTHING)
     wrong = _scaled(wrong)
     left = wrong - basis @ (basis.T @ wrong)
     size = float(np.sqrt(np.mean(left**2))) if left.size else 0.0
@@ -127,19 +127,6 @@ def _errors(
                 + inertia * (bend * v[:, k] ** 2 + slope * a[:, k])
             )
     return np.column_stack(found) if found else np.empty((len(q), 0))
-
-
-def _basis(columns: np.ndarray) -> np.ndarray:
-    """An orthonormal basis of what columns span, (N, r).
-
-    By QR with pivoting: of regressors, whose columns depend on each other, an SVD has been seen not
-    to converge.
-    """
-    if not columns.shape[1]:
-        return columns
-    basis, triangle, _ = qr(columns, mode="economic", pivoting=True)
-    size = np.abs(np.diag(triangle))
-    return basis[:, : int(np.sum(size > _NOTHING * size[0]))]
 
 
 def _scaled(columns: np.ndarray) -> np.ndarray:

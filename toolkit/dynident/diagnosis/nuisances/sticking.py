@@ -190,8 +190,8 @@ def _may_leave_out(evidence: Evidence, j: int, least: float = 0.0) -> bool:
     for run in evidence.runs:
         near.append(np.any(_near_stops(evidence, run, j, least)[run.index], axis=0))
         rest.append(np.all(_resting(evidence, run)[:, j][run.index], axis=0))
-    both = (np.concatenate(one)[:, None] for one in (near, rest))
-    return bool(few_enough(*both, evidence.criteria.sticking)[0])
+    near_stop, at_rest = (np.concatenate(one)[:, None] for one in (near, rest))
+    return bool(few_enough(near_stop, at_rest, evidence.criteria.sticking)[0])
 
 
 def _rests(evidence: Evidence, j: int) -> bool:
