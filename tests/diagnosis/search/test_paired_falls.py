@@ -113,13 +113,12 @@ def test_repetitions_of_an_instant_are_in_one_block(period: float | None) -> Non
 
 def test_of_one_joint_it_is_that_of_a_robot_with_this_joint_alone() -> None:
     before, after = pair(1, 12.0, 1.0)
-    alone = [
+    old, new = (
         judged(one.runs[0].measured[:, 1:], one.runs[0].residual[:, 1:]) for one in (before, after)
-    ]
-    assert fall_standard_error(before, after, 2, [1]) == pytest.approx(
-        fall_standard_error(*alone, 2)
     )
-    assert fall_standard_error(before, after, 2, [1]) != fall_standard_error(before, after, 2)
+    of_one = fall_standard_error(before, after, 2, [1])
+    assert of_one == pytest.approx(fall_standard_error(old, new, 2))
+    assert of_one != fall_standard_error(before, after, 2)
 
 
 def small_and_large(seed: int, gain: float, rise: float) -> tuple[HeldOut, HeldOut]:
