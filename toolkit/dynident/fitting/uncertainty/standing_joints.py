@@ -22,7 +22,7 @@ from dynident.recording import Dataset, Filter, Recording, uniform
 from dynident.recording.white_noise import encoder_noise_std
 from dynident.tables import listed, number, percent
 
-_REST = 1.0
+_REST = 0.2
 """Duration of a stop from which it is a rest, s."""
 _SCATTER = 10.0
 """Range of the positions of a joint that rests, over the noise of its encoder."""
@@ -80,10 +80,10 @@ def near_stops(
 
 
 def resting(sampled: Sampled) -> np.ndarray:
-    """Return the rows of joints that rest, (T, n) mask: their position stays for over a second.
+    """Return the rows of joints that rest, (T, n) mask: their position stays for a while.
 
-    As where one joint moves after the other. A joint that creeps within the noise of its speed
-    does not rest.
+    As between moves from point to point, or where one joint moves after the other. A joint that
+    creeps within the noise of its speed does not rest.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def _stays_within(sampled: Sampled) -> np.ndarray:
     """Range of positions that encoders make of one, or little of the travel, (n,) rad or m."""
     q = sampled.recording.q
     least = DIGITS * np.abs(q).max(axis=0) + _SCATTER * encoder_noise_std(q)
-    return np.maximum(least, _SLIPS * np.ptp(q, axis=0))
+    return np.maximum(least, _SLIPS * _REST * np.ptp(q, axis=0))
 
 
 def few_enough(near: np.ndarray, rest: np.ndarray, criteria: StickingCriteria) -> np.ndarray:
