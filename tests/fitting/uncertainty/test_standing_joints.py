@@ -101,7 +101,7 @@ def test_what_creeps_within_the_noise_of_its_speed_does_not_rest() -> None:
         sampled = sample(one, None)
         rest = resting(sampled)
         # Where it turns around slowly it may stay within the noise of a coarse encoder.
-        assert rest[:, 0].mean() <= (0.3 if std > 1e-4 else 0.01)
+        assert rest[:, 0].mean() <= (0.3 if std > 1e-4 else 0.05)
         near = near_stops(JointSpeeds(sampled), DEFAULTS.sticking)
         assert few_enough(near, rest, DEFAULTS.sticking)[0] == (std < 1e-4)
         np.testing.assert_array_equal(rest[sampled.t < 3.5, 1], True)
