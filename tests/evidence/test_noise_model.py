@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
 from dynident.criteria import NoiseCriteria
 from dynident.evidence.noise_model import (
+    NoiseModel,
     SpeedClasses,
     differences,
     flat_noise,
@@ -113,6 +115,30 @@ def test_whitening_is_linear_and_column_by_column() -> None:
     together = model.whiten(2.0 * one - two, v)
     assert together == pytest.approx(2.0 * model.whiten(one, v) - model.whiten(two, v))
     assert model.whiten(one[:, 1:], v)[:, 0] == pytest.approx(model.whiten(one, v)[:, 1])
+
+
+def test_after_a_gap_noise_is_whitened_by_what_has_come_since() -> None:
+    """Exactly: within a stretch the whitened noise has the unit matrix as its covariance.
+
+    Of noise that is far larger than its innovations, the first row after a gap would otherwise
+    outweigh all others.
+    """
+    poles = np.array([0.95, 0.9 * np.exp(0.5j), 0.9 * np.exp(-0.5j), 0.4])
+    colour = np.real(np.poly(poles))
+    impulse = lfilter([1.0], colour, np.eye(1, 3000)[0])
+    covariance = [impulse[: 3000 - lag] @ impulse[lag:] for lag in range(90)]
+    assert covariance[0] > 25.0
+    noise = NoiseModel(1.0, np.zeros(1), np.ones(1), colour)
+    told = np.ones((1, 90), dtype=bool)
+    told[0, 30:42] = told[0, 60] = told[0, 63] = False
+    weights = np.ones((1, 90))
+    whitening = noise.whitened([[[np.eye(90)]]], weights, told)[0, 0].T
+    found = whitening @ toeplitz(covariance) @ whitening.T
+    for stretch in (slice(30), slice(42, 60), slice(61, 63), slice(64, 90)):
+        np.testing.assert_allclose(found[stretch, stretch], np.eye(90)[stretch, stretch], atol=1e-9)
+    assert not whitening[~told[0]].any() and not whitening[:, ~told[0]].any()
+    whole = noise.whitened([[[np.eye(90)]]], weights)[0, 0].T
+    np.testing.assert_allclose(whitening[46:60], whole[46:60], atol=1e-12)
 
 
 @pytest.mark.parametrize("coloured_noise", [True, False])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -29,10 +30,18 @@ def at_shoulder(name: str, model: Model) -> Effect:
     return next(e.on(model.robot) for e in effects if e.label == f"{name}@shoulder")
 
 
-def test_a_ramp_is_its_own_instrument_under_noise_of_any_colour() -> None:
-    """Whatever the motion, the next repetition's ramp at this one's time is this one's ramp."""
+@pytest.mark.parametrize("unknown", [(), (90, 91, 97, 150)])
+def test_a_ramp_is_its_own_instrument_under_noise_of_any_colour(unknown: tuple[int, ...]) -> None:
+    """Whatever the motion, the next repetition's ramp at this one's time is this one's ramp.
+
+    Also after rows whose dry friction nothing tells.
+    """
     evidence, found = fitted(0)
     assert len(found.noise[0].colour) > 1
+    (run,) = evidence.runs
+    uncertain = ~run.certain_rows
+    uncertain[list(unknown), 0] = True
+    evidence = evidence.with_runs((replace(run, uncertain=uncertain),))
     ramp = at_shoulder("torque_drift", evidence.model)
     columns = evidence.of(ramp, 0, evidence.model, None)[0][:, 0]
     (stack,) = evidence.stacks

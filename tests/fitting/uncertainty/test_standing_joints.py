@@ -67,6 +67,56 @@ def test_the_finest_encoders_show_a_stop_beside_which_the_low_pass_rings(
     assert seen(0.01) == [False, False]
 
 
+def jerky(hz: float, rests: float) -> tuple[Recording, np.ndarray]:
+    """A motion whose elbow swings and stops with a jerk, and its speed (T,) rad/s.
+
+    Parameters
+    ----------
+    hz : of the swing.
+    rests : share of the time that the elbow stands.
+    """
+    t = np.arange(int(20 * RATE_HZ)) / RATE_HZ
+    swing, held = np.sin(2.0 * np.pi * hz * t), np.sin(0.5 * np.pi * rests)
+    v = np.sign(swing) * np.maximum(np.abs(swing) - held, 0.0)
+    q = np.cumsum(np.stack([np.sin(0.9 * t), v], axis=1), axis=0) / RATE_HZ
+    return Recording(t, q, np.ones_like(q), given().robot.names), v
+
+
+@pytest.mark.parametrize("rests", [0.1, 0.6])
+def test_rows_whose_stop_the_low_pass_of_positions_has_rounded_do_not_count(rests: float) -> None:
+    """Where a joint stops with a jerk its filtered speed, and so its friction, has a sign still."""
+    recording, v = jerky(0.8, rests)
+    sampled = sample(recording, None)
+    speeds, first = JointSpeeds(sampled), sampled.source.first
+    kink = 1.6 * np.pi * np.cos(0.5 * np.pi * rests) / (2.0 * np.pi * 40.0)
+    assert speeds.rounding[ELBOW] == pytest.approx(0.3 * kink, rel=0.1)
+    true = np.sign(np.round(v[first : first + sampled.source.samples], 9))
+    errors = true - np.sign(sampled.motion.v[:, ELBOW])
+    errors = sampled.parallel.apply_each([errors[:, None]])[0][sampled.kept, 0]
+
+    def wrong(least: float) -> float:
+        """Largest error of the elbow's dry friction, of its level, in rows that count."""
+        counts = ~near_stops(speeds, DEFAULTS.sticking, least)[:, ELBOW]
+        assert counts.mean() > 0.25
+        return float(np.abs(errors[counts]).max())
+
+    assert wrong(speeds.rounding[ELBOW]) < 0.035
+    assert wrong(0.0) > 0.05
+
+
+def test_where_too_few_rows_would_be_left_those_that_are_rounded_count() -> None:
+    recording, _ = jerky(2.5, 0.1)
+    low = Filter(position_cutoff_hz=20.0, cutoff_hz=8.0, rate_hz=50.0)
+    sampled = sample(recording, low)
+    speeds = JointSpeeds(sampled)
+    rounded = ~near_stops(speeds, DEFAULTS.sticking, speeds.rounding)[:, ELBOW]
+    expected = ~near_stops(speeds, DEFAULTS.sticking)[:, ELBOW]
+    assert rounded.mean() < 0.4 < 0.5 < expected.mean()
+    data = Dataset((recording,), filter=low)
+    (marked,) = without_stops(given(), data, standing=("elbow",)).recordings
+    np.testing.assert_array_equal(sample(marked, low).counting[:, ELBOW], expected)
+
+
 def test_while_one_joint_moves_after_the_other_the_one_that_rests_tells_nothing() -> None:
     data = Dataset(tuple(resting_joint(seed, seed % 2) for seed in range(4)))
     found = di.fit(given(), data)
@@ -133,7 +183,8 @@ def test_what_was_looked_at_comes_back_and_copies_leave_out_the_same_rows() -> N
     assert without_stops(given(), marked) is marked
     one = marked.recordings[0]
     counting = sample(one, None).counting
-    expected = near_stops(JointSpeeds(sample(one.replace(stops=()), None)), DEFAULTS.sticking)
+    speeds = JointSpeeds(sample(one.replace(stops=()), None))
+    expected = near_stops(speeds, DEFAULTS.sticking, speeds.rounding)
     np.testing.assert_array_equal(counting[:, ELBOW], ~expected[:, ELBOW])
     assert counting[:, 0].all()
     moved = one.replace(q=one.q + 0.01 * np.sin(one.t)[:, None])

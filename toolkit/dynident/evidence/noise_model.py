@@ -75,7 +75,9 @@ class NoiseModel:
         """One over the local standard deviation, (T,), at a joint's velocity (T,)."""
         return 1.0 / (np.interp(np.abs(speed), self.speeds, self.scales) * self.std)
 
-    def whiten(self, signals: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    def whiten(
+        self, signals: np.ndarray, speed: np.ndarray, told: np.ndarray | None = None
+    ) -> np.ndarray:
         """Give the noise in signals (T, k) of one recording unit variance and no colour.
 
         Parameters
@@ -84,11 +86,17 @@ class NoiseModel:
             In the order of time; the first rows, as many as the order, come out unreliable.
         speed : (T,)
             Velocity of the joint, rad/s or m/s.
+        told : (T,)
+            Mask of the samples that count; None for all of them.
         """
-        return self.whitened([[[signals]]], self.weights(speed)[None])[0, 0].T
+        told = None if told is None else told[None]
+        return self.whitened([[[signals]]], self.weights(speed)[None], told)[0, 0].T
 
     def whitened(
-        self, signals: Sequence[Sequence[Sequence[np.ndarray]]], weights: np.ndarray
+        self,
+        signals: Sequence[Sequence[Sequence[np.ndarray]]],
+        weights: np.ndarray,
+        told: np.ndarray | None = None,
     ) -> np.ndarray:
         """Whiten signals of several recordings, in several parts.
 
@@ -97,11 +105,14 @@ class NoiseModel:
         signals : for each of R recordings, for each of M replicates, parts (T, k) in the order of
             time.
         weights : (R, T) by which they are multiplied first, see `weights`.
+        told : (R, T) mask of the samples that count; None for all of them.
 
         Returns
         -------
-        (R, M, k of all, T), the samples of a signal side by side.
+        (R, M, k of all, T), the samples of a signal side by side; zeros where they do not count.
         """
+        if told is not None:
+            weights = weights * told
         order, samples = len(self.colour) - 1, weights.shape[1]
         if order == 0:
             weights = weights * self.colour[0]
@@ -125,7 +136,29 @@ class NoiseModel:
             found = np.correlate(rows.ravel(), self.colour[::-1], "valid")
             apart = (rows.strides[0], found.itemsize)
             white[first : first + some] = as_strided(found, (len(rows), samples), apart)
-        return white.reshape(*scaled.shape[:3], samples)
+        found = white.reshape(*scaled.shape[:3], samples)
+        if told is not None:
+            found *= told[:, None, None]
+            for rows, here, known in zip(scaled[..., order:], found, told, strict=True):
+                self._whiten_starts(rows, here, known)
+        return found
+
+    def _whiten_starts(self, rows: np.ndarray, white: np.ndarray, told: np.ndarray) -> None:
+        """Whiten samples before which fewer count than the order, each by those that do.
+
+        The full filter would give the first sample after a gap its whole variance, and noise of a
+        low frequency has many times that of its innovations: such samples would outweigh the rest.
+
+        Parameters
+        ----------
+        rows, white : (M, k, T) weighted samples, and where they go.
+        told : (T,) mask of the samples that count.
+        """
+        place = np.arange(len(told))
+        before = place - np.maximum.accumulate(np.where(told, -1, place)) - 1
+        for count, filter in enumerate(_shorter(self.colour)):
+            at = np.flatnonzero(told & (before == count))
+            white[..., at] = sum(c * rows[..., at - lag] for lag, c in enumerate(filter))
 
 
 def flat_noise(std: float) -> NoiseModel:
@@ -229,6 +262,21 @@ def _whitening_filter(
     coefficients = solve_toeplitz(correlation[:-1], correlation[1:])
     innovation = correlation[0] - coefficients @ correlation[1:]
     return np.concatenate([[1.0], -coefficients]) / np.sqrt(max(innovation, 1e-12))
+
+
+def _shorter(colour: np.ndarray) -> list[np.ndarray]:
+    """Whitening filters of all lower orders, that of order 0 first: Durbin's recursion, backwards.
+
+    Each for innovations of variance one of the same noise.
+    """
+    variance, found = 1.0 / colour[0] ** 2, []
+    predictor = colour / colour[0]
+    for last in range(len(colour) - 1, 0, -1):
+        share = 1.0 - predictor[last] ** 2
+        predictor = (predictor[:last] - predictor[last] * predictor[last:0:-1]) / share
+        variance /= share
+        found.append(predictor / np.sqrt(variance))
+    return found[::-1]
 
 
 def inflation(noise: list[np.ndarray], criteria: NoiseCriteria, power: int = 1) -> float:

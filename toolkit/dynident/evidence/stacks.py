@@ -95,11 +95,7 @@ class Stack:
             signals = [each[:1] for each in signals]
         weights = noise.weights(self._speeds[joint])
         told = None if self._told is None else self._told[joint]
-        if told is not None:
-            weights = weights * told
-        white = noise.whitened(signals, weights)
-        if told is not None and not noise.is_flat:  # flat noise is whitened without looking back
-            white *= told[:, None, None]
+        white = noise.whitened(signals, weights, told)
         last = white.shape[1] - 1
         folded = [white[:, min(p, last)][..., rows] for p, rows in enumerate(self._repetitions)]
         return in_blocks(folded, self.runs[0].edges)

@@ -110,6 +110,6 @@ def _at_this_time(
         rows = np.arange(len(columns))
         after = np.clip(rows + there[0] - here[0], 0, len(columns) - 1)
         ratio = np.where(sound[after], factor / np.where(sound[after], factor[after], 1.0), 1.0)
-        moved = recorded.known(columns[after] * ratio[:, None], joint)
-        found.append(noise.whiten(moved, speed)[here])
+        moved = columns[after] * ratio[:, None]
+        found.append(noise.whiten(moved, speed, recorded.told(joint))[here])
     return np.stack(found)

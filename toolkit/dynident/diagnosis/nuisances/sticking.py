@@ -112,12 +112,13 @@ def without_reversals(
         where that is more than the noise of the speed.
     """
     names, reach = evidence.model.robot.names, within or {}
-    columns = [(names.index(joint), reach.get(joint, 0.0)) for joint in joints]
-    columns = [
-        (j, least)
-        for j, least in columns
-        if _may_leave_out(evidence, j, least) or _rests(evidence, j)
-    ]
+    columns = []
+    for j, least in [(names.index(joint), reach.get(joint, 0.0)) for joint in joints]:
+        wider = max(least, _rounding(evidence, j))
+        if _may_leave_out(evidence, j, wider):
+            columns.append((j, wider))
+        elif _may_leave_out(evidence, j, least) or _rests(evidence, j):
+            columns.append((j, least))
     runs = []
     for run in evidence.runs:
         uncertain = ~run.certain_rows
@@ -192,6 +193,11 @@ def _may_leave_out(evidence: Evidence, j: int, least: float = 0.0) -> bool:
         rest.append(np.all(_resting(evidence, run)[:, j][run.index], axis=0))
     near_stop, at_rest = (np.concatenate(one)[:, None] for one in (near, rest))
     return bool(few_enough(near_stop, at_rest, evidence.criteria.sticking)[0])
+
+
+def _rounding(evidence: Evidence, j: int) -> float:
+    """Speed that the low-pass of the positions makes up where a joint stops, rad/s or m/s."""
+    return max(float(_speeds(evidence, run).rounding[j]) for run in evidence.runs)
 
 
 def _rests(evidence: Evidence, j: int) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dynident.criteria import SearchCriteria
 from dynident.diagnosis.search.candidate_shapes import refined
 from dynident.diagnosis.search.cross_validation import cross_validate
 from dynident.diagnosis.search.payload_recordings import payload_scores, unconfirmed
@@ -136,11 +137,8 @@ def rank(
         best.append(_best_of(tried, evidence, fitted))
     alike = _ALIKE * fitted.error_total
     order = best_first([one.penalised for one in best], alike)
-    for i in order[: len(only) or criteria.search.contenders]:
-        if best[i].not_identifiable:
-            break
-        if best[i].p_value * tests > criteria.search.hopeless or best[i].penalised == -np.inf:
-            continue
+    contenders = [i for i in order if _may_win(best[i], tests, criteria.search)]
+    for i in contenders[: len(only) or criteria.search.contenders]:
         progress(f"{best[i].effect.label}, cross-validated")
         best[i] = _confirm(evidence, fitted, best[i])
     if least is None:
@@ -171,6 +169,13 @@ def best_first(values: Sequence[float], alike: float) -> list[int]:
             same = []
         same.append(place)
     return found + sorted(same)
+
+
+def _may_win(one: Score, tests: int, criteria: SearchCriteria) -> bool:
+    """Whether it is worth the time to cross-validate an effect."""
+    if one.not_identifiable or one.penalised == -np.inf:
+        return False
+    return one.p_value * tests <= criteria.hopeless
 
 
 def _unseen(one: Score, noisy: bool) -> str:

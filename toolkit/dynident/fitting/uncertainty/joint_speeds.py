@@ -17,10 +17,12 @@ from dynident.recording.white_noise import encoder_noise_std
 _FREQUENCIES = 4096  # at which a filter's response is taken
 DIGITS = 1e-12
 """Of a position's size, that its low-pass keeps: some joints stand exactly."""
-_RINGING = 0.1
-"""Overshoot of the speed's low-pass beside a kink, of the change of acceleration times the time
-constant 1 / (2 pi cut-off)."""
-_KINK = 2.0  # change of acceleration where a joint stops or starts, of its root mean square
+_RINGING, _ROUNDING = 0.1, 0.33
+"""Overshoot of the speed's low-pass beside a kink, and what it makes of no speed at the kink, of
+the change of acceleration times the time constant 1 / (2 pi cut-off)."""
+_KINK = 1.155
+"""Change of acceleration where a joint stops or starts, of the root of its mean fourth power over
+its mean square, which rests do not lower: the amplitude of a sine."""
 _AT_ONCE = 1 << 21  # speeds that are computed at once, and kept with the recording's motion
 
 
@@ -59,22 +61,33 @@ class JointSpeeds:
         squares = [np.sum(part**2, axis=0) for part in self.used()]
         return np.sqrt(np.sum(squares, axis=0) / (self._used.stop - self._used.start))
 
-    @cached_property
+    @property
     def ringing(self) -> np.ndarray:
         """How far the low-pass of the positions rings beside a stop, (n,) rad/s or m/s.
 
         A joint that stands is given that much speed before it starts, and after it has stopped.
         """
+        return _RINGING * self._kink
+
+    @property
+    def rounding(self) -> np.ndarray:
+        """Speed that the low-pass of the positions makes up where a stop begins or ends, (n,)."""
+        return _ROUNDING * self._kink
+
+    @cached_property
+    def _kink(self) -> np.ndarray:
+        """Change of acceleration at a stop times the time constant of the low-pass, (n,)."""
         cutoff, rate = (
             self.sampled.parallel.filter.position_cutoff_hz,
             self.sampled.recording.rate_hz,
         )
         if not cutoff:
             return np.zeros(self.sampled.recording.n)
-        parts = [np.diff(part, axis=0) * rate for part in self.used()]
-        squares = np.sum([np.sum(part**2, axis=0) for part in parts], axis=0)
-        acceleration = np.sqrt(squares / max(sum(map(len, parts)), 1))
-        return _RINGING * _KINK * acceleration / (2.0 * np.pi * cutoff)
+        squares = [(np.diff(part, axis=0) * rate) ** 2 for part in self.used()]
+        second = np.sum([part.sum(axis=0) for part in squares], axis=0)
+        fourth = np.sum([(part**2).sum(axis=0) for part in squares], axis=0)
+        change = np.sqrt(np.divide(fourth, second, out=np.zeros_like(second), where=second > 0))
+        return _KINK * change / (2.0 * np.pi * cutoff)
 
     def used(self) -> Iterator[np.ndarray]:
         """Yield them (T, n) from the first to the last row that is used, part by part."""

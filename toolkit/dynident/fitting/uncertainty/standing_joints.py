@@ -60,7 +60,7 @@ def stands(every: Iterable[JointSpeeds], criteria: StickingCriteria) -> np.ndarr
 def near_stops(
     speeds: JointSpeeds,
     criteria: StickingCriteria,
-    least: float = 0.0,
+    least: float | np.ndarray = 0.0,
     joints: Sequence[int] | None = None,
 ) -> np.ndarray:
     """Return the rows of each joint around its stops, (T, n) mask of the rows that are used.
@@ -69,7 +69,8 @@ def near_stops(
     ----------
     speeds : of the recording.
     criteria : how far around.
-    least : speed within which a joint's friction is not known, where that is more than the noise.
+    least : speed within which a joint's friction is not known, where that is more than the noise,
+        rad/s or m/s; a number, or one of each joint.
     joints : numbers of those that are looked at; None for all. The others have no such rows.
     """
     limits = np.maximum(_unknown_within(speeds, criteria), least)
@@ -166,9 +167,9 @@ def without_stops(
     which = np.array(dry) & (known | stands(_speeds(recordings, dataset.filter), criteria))
     if not which.any():
         return dataset
-    near = [near_stops(one, criteria) & which for one in _speeds(recordings, dataset.filter)]
     rest = np.concatenate([resting(sample(one, dataset.filter)) for one in recordings])
-    which = few_enough(np.concatenate(near), rest, criteria) | (known & rest.all(axis=0))
+    near, few = _around_stops(recordings, dataset.filter, rest, criteria)
+    which = which & (few | (known & rest.all(axis=0)))
     pairs = zip(recordings, near, strict=True)
     marked = [_with_stops(sample(one, dataset.filter), rows & which) for one, rows in pairs]
     return replace(dataset, recordings=tuple(marked))
@@ -186,6 +187,25 @@ def standing_in(dataset: Dataset) -> tuple[str, ...]:
     return tuple(
         joint for j, joint in enumerate(joints) if any(len(one.stops[j]) for one in marked)
     )
+
+
+def _around_stops(
+    recordings: Sequence[Recording],
+    filter: Filter | None,
+    rest: np.ndarray,
+    criteria: StickingCriteria,
+) -> tuple[list[np.ndarray], np.ndarray]:
+    """Rows around stops of each recording, (T, n) masks, and where they are few enough, (n,).
+
+    With those that the low-pass of positions has rounded, at joints of which enough are left.
+    """
+    wide = [near_stops(one, criteria, one.rounding) for one in _speeds(recordings, filter)]
+    few = few_enough(np.concatenate(wide), rest, criteria)
+    if few.all():
+        return wide, few
+    narrow = [near_stops(one, criteria) for one in _speeds(recordings, filter)]
+    near = [np.where(few, one, other) for one, other in zip(wide, narrow, strict=True)]
+    return near, few_enough(np.concatenate(near), rest, criteria)
 
 
 def _speeds(recordings: Sequence[Recording], filter: Filter | None) -> Iterator[JointSpeeds]:
