@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from dynident.criteria import DEFAULTS
-from dynident.diagnosis.search.paired_falls import fall_standard_error
+from dynident.diagnosis.search.paired_falls import fall_standard_error, joint_fall
 from dynident.diagnosis.search.path import _why
 from dynident.effects import catalogue
 from dynident.evidence.held_out import HeldOut, HeldOutRun
@@ -156,3 +156,20 @@ def test_what_makes_its_own_joint_worse_is_taken_back() -> None:
     for held in ("wrist", "shoulder"):
         why = _why(None, SPRING(held), worse, NAMES, 2)
         assert ("raises the error of wrist" in why) == (held == "wrist")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_makes_its_own_joint_worse_by_chance_needs_a_large_fall_elsewhere(seed: int) -> None:
+    """A backlash of a healthy wrist had taken a hundredth off the errors of a shoulder."""
+    stream = np.random.default_rng([seed, 1])
+    torque, rest, chance = (slow(stream, 3.0) for _ in range(3))
+    wrist = rest[:, 1] + 0.1 * chance[:, 1]
+    wrist *= 1.002 * np.sqrt(np.mean(rest[:, 1] ** 2) / np.mean(wrist**2))
+    for left, taken_back in ((0.99, True), (0.5, False)):
+        after = np.stack([left * rest[:, 0], wrist], axis=1)
+        both = judged(torque, rest), judged(torque, after)
+        own = joint_fall(NAMES, 1, *both, 2)
+        assert own.after > own.before and not own.is_rise and both[1].error < both[0].error
+        why = _why(None, SPRING("wrist"), both, NAMES, 2)
+        assert ("raises the error of wrist" in why) == taken_back
+        assert not _why(None, SPRING("shoulder"), both, NAMES, 2)

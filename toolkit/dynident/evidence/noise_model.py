@@ -88,6 +88,10 @@ class NoiseModel:
             Velocity of the joint, rad/s or m/s.
         told : (T,)
             Mask of the samples that count; None for all of them.
+
+        Returns
+        -------
+        (T, k), zeros in samples that do not count.
         """
         told = None if told is None else told[None]
         return self.whitened([[[signals]]], self.weights(speed)[None], told)[0, 0].T

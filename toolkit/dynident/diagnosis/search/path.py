@@ -151,20 +151,22 @@ def _why(
 
     The torque of a wrist is nothing beside that of a shoulder, whose own error moves by chance: a
     rise over all joints of less than its standard error counts for nothing beside a large fall at
-    one joint. And what lies at a joint must not make that joint worse.
+    one joint. And what lies at a joint must not make that joint worse: by chance it may only where
+    another one gains by far, as from the angle of a joint that turns what the next one carries.
     """
     before, after = errors
     where = "the test recordings" if held else "held-out blocks of time"
+    there = largest_fall(names, before, after, together)
+    large = there is not None and there.is_large
     if after.error > before.error:
-        there = largest_fall(names, before, after, together)
         chance = fall_standard_error(before, after, together)
         rise = after.error - before.error
-        if there is None or not there.is_large or chance is None or rise > chance:
+        if not large or chance is None or rise > chance:
             low, high = two_percent(before.error, after.error)
             return f"raises the error on {where} from {low} to {high}"
     if effect.joint in names:
         own = joint_fall(names, names.index(effect.joint), before, after, together)
-        if own.is_rise:
+        if own.is_rise or (own.after > own.before and not large):
             low, high = two_percent(own.before, own.after)
             return f"raises the error of {own.joint} on {where} from {low} to {high}"
     return ""

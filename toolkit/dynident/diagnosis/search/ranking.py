@@ -137,13 +137,15 @@ def rank(
         best.append(_best_of(tried, evidence, fitted))
     alike = _ALIKE * fitted.error_total
     order = best_first([one.penalised for one in best], alike)
-    contenders = [i for i in order if _may_win(best[i], tests, criteria.search)]
-    for i in contenders[: len(only) or criteria.search.contenders]:
+    hopeful = [i for i in order if _may_win(best[i], tests, criteria.search)]
+    for i in hopeful[: len(only) or criteria.search.contenders]:
         progress(f"{best[i].effect.label}, cross-validated")
         best[i] = _confirm(evidence, fitted, best[i])
     if least is None:
         least = criteria.gates.later_share if added else criteria.gates.first_share
-    scores = tuple(best[i] for i in best_first([one.penalised for one in best], alike))
+    order = best_first([one.penalised for one in best], alike)
+    # What falls most by chance, and can be significant nowhere, stands behind what may be.
+    scores = tuple(best[i] for i in sorted(order, key=lambda one: one not in hopeful))
     refusals = tuple(
         _unseen(s, noisy) or _refusal(s, evidence, fitted, tests, least) for s in scores
     )
