@@ -13,6 +13,7 @@ import dynident as di
 from dynident.cli import main
 from dynident.recording import Dataset, Recording, write
 from dynident.wiring import check_wiring
+from standing_arm import given, record
 from study_files import edited, recording, true_model, write_study
 from synthetic import ARM, smooth_motion, true_values
 from wiring_faults import Injected, broken, column_faults, data_faults
@@ -34,6 +35,14 @@ def test_every_single_fault_is_named(fault: Injected) -> None:
 
 def test_nothing_is_said_where_nothing_is_wrong() -> None:
     assert check_wiring(true_model(), data(), Dataset((recording(2),))) == ()
+
+
+@pytest.mark.parametrize("fault", [one for one in FAULTS if "sign" in one.kind[0]])
+def test_signs_are_told_though_a_joint_stands_where_it_is_slow(fault: Injected) -> None:
+    """While it stands its dry friction is as others ask, and no fit of all rows tells a sign."""
+    sticks = Dataset(tuple(record(seed, 0.6) for seed in (0, 1)))
+    assert check_wiring(given(), sticks) == ()
+    assert fault.is_named(check_wiring(given(), broken(sticks, fault.change)), given().robot.names)
 
 
 def drag(one: Recording) -> np.ndarray:

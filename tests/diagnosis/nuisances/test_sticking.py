@@ -22,6 +22,7 @@ from dynident.evidence.evidence_fit import fit_evidence
 from dynident.evidence.runs import gather
 from dynident.fitting.sampling import sample
 from dynident.fitting.uncertainty.joint_speeds import JointSpeeds
+from dynident.fitting.uncertainty.standing_joints import near_stops, without_stops
 from dynident.recording import Dataset, Recording, default_filter
 from standing_arm import COULOMB, RATE_HZ, STOPPED, WIDTH, given, record
 from synthetic import synthetic, true_values
@@ -46,6 +47,25 @@ def test_recordings_whose_reversals_cannot_be_left_out_are_not_the_same_seen_oth
     assert left_out_at(seen) == ("elbow",)
     assert len(seen_alike(lower, usual)) == len(seen_alike(lower, without, None, "shoulder")) == 2
     assert len(seen_alike(lower, without, None, "elbow")) == 1
+
+
+def test_fits_and_the_diagnosis_leave_out_the_same_rows_of_a_joint_that_stands() -> None:
+    """Also of recordings of unlike speed, beside one in which no reversal is rounded."""
+    usual, slow = record(0, STOPPED), record(1, STOPPED)
+    middle = slow.q.mean(axis=0)
+    both = usual, slow.replace(q=middle + 0.5 * (slow.q - middle))
+    fitted = without_stops(given(), Dataset(both))
+    diagnosed = without_reversals(Evidence(given(), gather(Dataset(both))), ("elbow",))
+    for one, run in zip(fitted.recordings, diagnosed.runs, strict=True):
+        np.testing.assert_array_equal(sample(one, None).counting, run.certain_rows)
+
+
+def test_a_joint_that_never_stands_has_no_stop_that_could_be_rounded() -> None:
+    moving = evidence(0.0)
+    (one, *_) = moving.runs
+    (less, *_) = without_reversals(moving, ("elbow",)).runs
+    plain = near_stops(JointSpeeds(one.replicates[0]), moving.criteria.sticking, 0.0, [1])
+    np.testing.assert_array_equal(less.certain_rows, ~plain)
 
 
 def test_only_the_joint_that_stands_sticks() -> None:

@@ -163,8 +163,13 @@ def test_what_makes_its_own_joint_worse_by_chance_needs_a_large_fall_elsewhere(s
     """A backlash of a healthy wrist had taken a hundredth off the errors of a shoulder."""
     stream = np.random.default_rng([seed, 1])
     torque, rest, chance = (slow(stream, 3.0) for _ in range(3))
+    rest *= [5.0, 1.0]
     wrist = rest[:, 1] + 0.1 * chance[:, 1]
-    wrist *= 1.002 * np.sqrt(np.mean(rest[:, 1] ** 2) / np.mean(wrist**2))
+    wrist *= np.sqrt(np.mean(rest[:, 1] ** 2) / np.mean(wrist**2))
+    same = judged(torque, rest), judged(torque, np.stack([rest[:, 0], wrist], axis=1))
+    by_chance = fall_standard_error(*same, 2, [1])
+    assert by_chance is not None
+    wrist *= 1.0 + 1.5 * by_chance / same[0].joint_errors[1]
     for left, taken_back in ((0.99, True), (0.5, False)):
         after = np.stack([left * rest[:, 0], wrist], axis=1)
         both = judged(torque, rest), judged(torque, after)

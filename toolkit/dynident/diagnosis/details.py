@@ -91,6 +91,11 @@ class JointFall:
         """Whether it rises instead, and not by chance."""
         return self._beyond(_MANY, self.after - self.before)
 
+    @property
+    def may_be_rise(self) -> bool:
+        """Whether it rises by more than the standard error."""
+        return self._beyond(1.0, self.after - self.before)
+
     def _beyond(self, many: float, change: float) -> bool:
         error = self.standard_error
         return error is not None and change > max(many * error, 0.0)

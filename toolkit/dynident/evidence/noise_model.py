@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
@@ -83,7 +84,8 @@ class NoiseModel:
         Parameters
         ----------
         signals : (T, k)
-            In the order of time; the first rows, as many as the order, come out unreliable.
+            In the order of time; the first rows, as many as the order, come out unreliable where
+            all of them count.
         speed : (T,)
             Velocity of the joint, rad/s or m/s.
         told : (T,)
@@ -143,8 +145,7 @@ class NoiseModel:
         found = white.reshape(*scaled.shape[:3], samples)
         if told is not None:
             found *= told[:, None, None]
-            for rows, here, known in zip(scaled[..., order:], found, told, strict=True):
-                self._whiten_starts(rows, here, known)
+            self._whiten_starts(scaled[..., order:], found, told)
         return found
 
     def _whiten_starts(self, rows: np.ndarray, white: np.ndarray, told: np.ndarray) -> None:
@@ -155,14 +156,29 @@ class NoiseModel:
 
         Parameters
         ----------
-        rows, white : (M, k, T) weighted samples, and where they go.
-        told : (T,) mask of the samples that count.
+        rows, white : (R, M, k, T) weighted samples, and where they go.
+        told : (R, T) mask of the samples that count.
         """
-        place = np.arange(len(told))
-        before = place - np.maximum.accumulate(np.where(told, -1, place)) - 1
-        for count, filter in enumerate(_shorter(self.colour)):
-            at = np.flatnonzero(told & (before == count))
-            white[..., at] = sum(c * rows[..., at - lag] for lag, c in enumerate(filter))
+        place = np.arange(told.shape[1])
+        before = place - np.maximum.accumulate(np.where(told, -1, place), axis=1) - 1
+        for count, filter in enumerate(self._shorter):
+            run, at = np.nonzero(told & (before == count))
+            white[run, :, :, at] = sum(c * rows[run, :, :, at - k] for k, c in enumerate(filter))
+
+    @cached_property
+    def _shorter(self) -> list[np.ndarray]:
+        """Whitening filters of all lower orders, that of order 0 first.
+
+        Each for innovations of variance one of the same noise: Durbin's recursion, backwards.
+        """
+        variance, found = 1.0 / self.colour[0] ** 2, []
+        predictor = self.colour / self.colour[0]
+        for last in range(len(predictor) - 1, 0, -1):
+            share = 1.0 - predictor[last] ** 2
+            predictor = (predictor[:last] - predictor[last] * predictor[last:0:-1]) / share
+            variance /= share
+            found.append(predictor / np.sqrt(variance))
+        return found[::-1]
 
 
 def flat_noise(std: float) -> NoiseModel:
@@ -266,21 +282,6 @@ def _whitening_filter(
     coefficients = solve_toeplitz(correlation[:-1], correlation[1:])
     innovation = correlation[0] - coefficients @ correlation[1:]
     return np.concatenate([[1.0], -coefficients]) / np.sqrt(max(innovation, 1e-12))
-
-
-def _shorter(colour: np.ndarray) -> list[np.ndarray]:
-    """Whitening filters of all lower orders, that of order 0 first: Durbin's recursion, backwards.
-
-    Each for innovations of variance one of the same noise.
-    """
-    variance, found = 1.0 / colour[0] ** 2, []
-    predictor = colour / colour[0]
-    for last in range(len(colour) - 1, 0, -1):
-        share = 1.0 - predictor[last] ** 2
-        predictor = (predictor[:last] - predictor[last] * predictor[last:0:-1]) / share
-        variance /= share
-        found.append(predictor / np.sqrt(variance))
-    return found[::-1]
 
 
 def inflation(noise: list[np.ndarray], criteria: NoiseCriteria, power: int = 1) -> float:

@@ -100,11 +100,6 @@ class Run:
         told = self.index if self.kind == "repeated" else self.index[1:]
         return list(self.replicates[0].v[:, joint][told][:, certain])
 
-    def known(self, signals: np.ndarray, joint: int) -> np.ndarray:
-        """Signals (T, k) of a joint, zero in rows whose dry friction nothing tells."""
-        told = self.told(joint)
-        return signals if told is None else signals * told[:, None]
-
     @property
     def kept(self) -> np.ndarray:
         """Rows of the recording that are judged, (T,) mask."""

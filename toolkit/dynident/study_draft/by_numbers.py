@@ -260,14 +260,14 @@ class _Blocks:
                 continue
             ends = np.linspace(0, len(rows.q), _PARTS + 1).round().astype(int)
             each = [
-                WiringRegression.of(self.model, _part(rows, slice(*pair)))
+                WiringRegression.of(self.model, rows.picked(slice(*pair)))
                 for pair in itertools.pairwise(ends)
             ]
             missed = np.zeros(n)
             for asked in each:
                 rest = [other for other in each if other is not asked]
                 values = _together(rest).fit(order, one).values
-                missed += asked.power - 2.0 * asked.cross[order, order] @ values
+                missed += asked.power[order, order] - 2.0 * asked.cross[order, order] @ values
                 missed += (asked.gram @ values) @ values
             varies = len(rows.tau) * np.var(rows.tau, axis=0)
             if -0.5 * np.sum(np.log(np.maximum(missed / varies, _EXACT))) > n * _SHOWN:
@@ -355,11 +355,6 @@ def _together(parts: Sequence[WiringRegression]) -> WiringRegression:
         np.sum([getattr(one, name) for one in parts], axis=0) for name in ("gram", "cross", "power")
     )
     return replace(parts[0], gram=gram, cross=cross, power=power)
-
-
-def _part(rows: WiringRows, at: slice) -> WiringRows:
-    """Rows of a part of the time."""
-    return replace(rows, q=rows.q[at], v=rows.v[at], a=rows.a[at], tau=rows.tau[at])
 
 
 def _is_same(x: np.ndarray, one: int, other: int, n: int) -> bool:

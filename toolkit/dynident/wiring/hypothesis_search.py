@@ -87,11 +87,11 @@ def search(model: Model, rows: WiringRows, criteria: WiringCriteria) -> SearchRe
         if len(accepted) == criteria.most_faults:
             break
         tried = here.but_excused(here.all_plain(criteria), criteria)
-        best = _best(tried, here.start, criteria.tie)
+        best = _best(tried, here, criteria)
         if not _settled(best, here, criteria):
             gears = motor_side_hypotheses(model, rows, now, here.start, criteria)
             tried = here.but_excused([*_but_degrees_of_all(tried, gears), *gears], criteria)
-            best = _best(tried, here.start, criteria.tie)
+            best = _best(tried, here, criteria)
         if best is None or not _wins(best, here.start, rows, criteria):
             break
         best = _nearest_described(best, tried, here)
@@ -296,13 +296,20 @@ def _fit(regression: WiringRegression, one: Hypothesis) -> TorqueFit:
 
 
 def _best(
-    tried: Sequence[tuple[Hypothesis, TorqueFit]], start: TorqueFit, tie: float
+    tried: Sequence[tuple[Hypothesis, TorqueFit]], here: _Fits, criteria: WiringCriteria
 ) -> tuple[Hypothesis, TorqueFit] | None:
-    """The most likely hypothesis; among those that are as likely as it, the plainest."""
+    """The most likely hypothesis; among those that are as likely as it, the plainest.
+
+    By less than a share of the gain and, where the most likely has no ratio that was sought, than
+    what it takes to win.
+    """
     if not tried:
         return None
-    gains = np.array([fit.score - start.score for _, fit in tried])
-    return tried[int(np.argmax(gains >= gains.max() - tie * max(float(gains.max()), 0.0)))]
+    gains = np.array([fit.score - here.start.score for _, fit in tried])
+    within = criteria.tie * max(float(gains.max()), 0.0)
+    if not tried[int(gains.argmax())][0].ratios:
+        within = min(within, criteria.evidence / here.rows.independent)
+    return tried[int(np.argmax(gains >= gains.max() - within))]
 
 
 def _wins(

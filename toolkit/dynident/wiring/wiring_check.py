@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
+from dataclasses import replace
+
 import numpy as np
 
 from dynident.criteria import DEFAULTS, WiringCriteria
+from dynident.errors import DynidentWarning
+from dynident.fitting.uncertainty.standing_joints import without_stops
 from dynident.model import Model
 from dynident.recording import Dataset
 from dynident.threads import single_threaded
@@ -61,7 +66,7 @@ def check_wiring(
     ]
     if any(fault.kind == "one_source" for fault in found):
         return tuple(found)  # every assignment of a column that is not there fits badly
-    rows = rows_of(train, criteria.rows, criteria.independent_hz)
+    rows = rows_of(_but_stops(model, train), criteria.rows, criteria.independent_hz)
     result = search(model, rows, criteria)
     named = faults_of(model, result, train.recordings[0])
     far = _out_of_range(model, rows, result, train, criteria)
@@ -69,6 +74,17 @@ def check_wiring(
     # Where a column is not what it is called, no filter makes it so.
     slowest = min(one.rate_hz for one in every.recordings)
     return faults or unsuitable_position_filter(model, train, slowest, criteria)
+
+
+def _but_stops(model: Model, train: Dataset) -> Dataset:
+    """Recordings without the rows around stops: every joint has dry friction in these fits."""
+    once = tuple(one.replace(period=None) for one in train.recordings)
+    with warnings.catch_warnings():
+        # Whoever fits the recordings is the one to warn of their clocks.
+        warnings.simplefilter("ignore", DynidentWarning)
+        return without_stops(
+            Model(model.robot) + "coulomb_friction", replace(train, recordings=once)
+        )
 
 
 def _weighs_as_described(model: Model, rows: WiringRows, result: SearchResult, joint: int) -> bool:

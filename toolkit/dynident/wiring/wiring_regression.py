@@ -68,7 +68,7 @@ class WiringRegression:
     ----------
     gram : (n, p, p) of each joint's rows.
     cross : (n, n, p) of joint i's rows with torque column k.
-    power : (n,) sum of squares of each torque column.
+    power : (n, n) sum of squares of torque column k over joint i's rows.
     inertia_of, friction_of : (n, p) mean inertia and friction power, linear in the values.
     """
 
@@ -89,7 +89,7 @@ class WiringRegression:
         """
         columns = _columns(model, rows)
         n = columns.shape[1]
-        by_joint = columns.transpose(1, 0, 2)
+        by_joint = columns.transpose(1, 0, 2) * rows.counts.T[:, :, None]
         own = columns.shape[2] - OF_A_JOINT * n
         friction_of = np.zeros((n, columns.shape[2]))
         dry = np.tanh(rows.v / model.friction_widths)
@@ -100,7 +100,7 @@ class WiringRegression:
         return cls(
             gram=by_joint.transpose(0, 2, 1) @ by_joint,
             cross=np.swapaxes(by_joint.transpose(0, 2, 1) @ rows.tau, 1, 2),
-            power=np.sum(rows.tau**2, axis=0),
+            power=rows.counts.T @ rows.tau**2,
             inertia_of=_inertia_of(model, rows, columns.shape[2]),
             friction_of=friction_of,
         )
@@ -115,7 +115,7 @@ class WiringRegression:
         """
         n = len(order)
         cross = self.cross[np.arange(n), order] * scale[:, None]
-        power = np.maximum(self.power[order] * scale**2, 1e-300)
+        power = np.maximum(self.power[np.arange(n), order] * scale**2, 1e-300)
         left = power
         for _ in range(_ROUNDS):
             weight = 1.0 / np.maximum(left, _LEAST * power)

@@ -20,6 +20,7 @@ class WiringRows:
     ----------
     q, v, a : (T, n) rad or m, and their derivatives.
     tau : (T, n) N m or N.
+    counts : (T, n) mask of each joint's rows: around a stop its dry friction is as others ask.
     independent : about how many of the rows are worth counting: neighbours err alike.
     motors : (n, n) speeds of the motors, behind their gears, from those of the joints, where a
         motor turns two of them: it then rubs at both; None where each turns one.
@@ -29,6 +30,7 @@ class WiringRows:
     v: np.ndarray
     a: np.ndarray
     tau: np.ndarray
+    counts: np.ndarray
     independent: float
     motors: np.ndarray | None = None
 
@@ -36,7 +38,8 @@ class WiringRows:
         """Return the rows with positions `change @ q`, (n, n): joints exchanged, or rescaled."""
         q, v, a = (x @ change.T for x in (self.q, self.v, self.a))
         motors = None if self.motors is None else self.motors @ np.linalg.inv(change)
-        return replace(self, q=q, v=v, a=a, motors=motors)
+        counts = self.counts[:, np.abs(change).argmax(axis=1)]
+        return replace(self, q=q, v=v, a=a, counts=counts, motors=motors)
 
     def held(self, joint: int) -> WiringRows:
         """Return the rows with a joint (a column) that stands still where it is on average."""
@@ -47,7 +50,12 @@ class WiringRows:
     def thinned(self, most: int) -> WiringRows:
         """Return at most so many of the rows, evenly."""
         at = np.unique(np.linspace(0, len(self.q) - 1, min(most, len(self.q))).round().astype(int))
-        return replace(self, q=self.q[at], v=self.v[at], a=self.a[at], tau=self.tau[at])
+        return self.picked(at)
+
+    def picked(self, at: np.ndarray | slice) -> WiringRows:
+        """Return some of the rows."""
+        arrays = {name: getattr(self, name)[at] for name in ("q", "v", "a", "tau", "counts")}
+        return replace(self, **arrays)
 
 
 def rows_of(dataset: Dataset, most: int, independent_hz: float) -> WiringRows:
@@ -55,7 +63,7 @@ def rows_of(dataset: Dataset, most: int, independent_hz: float) -> WiringRows:
 
     Parameters
     ----------
-    dataset : the recordings, filtered as their study says.
+    dataset : the recordings, filtered as their study says; from `without_stops`, if joints stand.
     most : rows that are picked, about.
     independent_hz : 1/s, rows that count as independent.
 
@@ -78,8 +86,7 @@ def rows_of(dataset: Dataset, most: int, independent_hz: float) -> WiringRows:
             one = sample(recording.replace(period=None), dataset.filter)
         duration += len(one.t) / one.rate_hz
         at = np.unique(np.linspace(0, len(one.t) - 1, min(each, len(one.t))).round().astype(int))
-        parts.append([x[at] for x in (one.q, one.v, one.a, one.tau)])
-    q, v, a, tau = (np.concatenate(pieces) for pieces in zip(*parts, strict=True))
-    return WiringRows(
-        q=q, v=v, a=a, tau=tau, independent=min(float(len(q)), duration * independent_hz)
-    )
+        parts.append([x[at] for x in (one.q, one.v, one.a, one.tau, one.counting)])
+    q, v, a, tau, counts = (np.concatenate(pieces) for pieces in zip(*parts, strict=True))
+    independent = min(float(len(q)), duration * independent_hz) * float(counts.mean())
+    return WiringRows(q=q, v=v, a=a, tau=tau, counts=counts, independent=independent)

@@ -14,7 +14,7 @@ until the next one is the mean of a friction that reverses there, and no frictio
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -32,6 +32,8 @@ from dynident.fitting.uncertainty.standing_joints import (
     stands,
 )
 from dynident.tables import listed
+
+NearStop = Callable[[Evidence, Run, int, float], np.ndarray]
 
 
 def without_sticking(
@@ -101,8 +103,9 @@ def without_reversals(
 ) -> Evidence:
     """Return the evidence without the rows of these joints around their reversals.
 
-    All rows of a joint stay of which these recordings would leave too few; what was left out
-    before stays so.
+    With those that the low-pass of the positions has rounded, where a joint is seen to stand and
+    enough rows are left. All rows of a joint stay of which these recordings would leave too few;
+    what was left out before stays so.
 
     Parameters
     ----------
@@ -112,18 +115,19 @@ def without_reversals(
         where that is more than the noise of the speed.
     """
     names, reach = evidence.model.robot.names, within or {}
-    columns = []
-    for j, least in [(names.index(joint), reach.get(joint, 0.0)) for joint in joints]:
-        wider = max(least, _rounding(evidence, j))
-        if _may_leave_out(evidence, j, wider):
-            columns.append((j, wider))
-        elif _may_leave_out(evidence, j, least) or _rests(evidence, j):
-            columns.append((j, least))
+    columns = [(names.index(joint), reach.get(joint, 0.0)) for joint in joints]
+    wide = [j for j, least in columns if _may_widen(evidence, j, least)]
+    columns = [
+        (j, least)
+        for j, least in columns
+        if j in wide or _may_leave_out(evidence, j, least) or _rests(evidence, j)
+    ]
     runs = []
     for run in evidence.runs:
         uncertain = ~run.certain_rows
         for j, least in columns:
-            uncertain[:, j] |= _near_stops(evidence, run, j, least)
+            near_stop = _near_rounded if j in wide else _near_stops
+            uncertain[:, j] |= near_stop(evidence, run, j, least)
         runs.append(replace(run, uncertain=uncertain))
     return evidence.with_runs(tuple(runs))
 
@@ -148,8 +152,13 @@ def seen_alike(
     """
     joints = left_out_at(evidence)
     same = {one for one in joints if joint in (None, one)}
-    found = (without_reversals(one, joints, within) for one in others)
-    return tuple(one for one in found if same <= set(left_out_at(one)))
+    wide = same & _widened(evidence, joints, within)
+    return tuple(
+        without_reversals(one, joints, within)
+        for one in others
+        if wide == same & _widened(one, joints, within)
+        and same <= set(left_out_at(without_reversals(one, joints, within)))
+    )
 
 
 def left_out_at(evidence: Evidence) -> tuple[str, ...]:
@@ -185,19 +194,33 @@ def sticking_notes(evidence: Evidence, others: Collection[str] = ()) -> tuple[st
     )
 
 
+def _widened(
+    evidence: Evidence, joints: Collection[str], within: Mapping[str, float] | None
+) -> set[str]:
+    """Joints of which rows that are rounded go, too."""
+    names, reach = evidence.model.robot.names, within or {}
+    return {one for one in joints if _may_widen(evidence, names.index(one), reach.get(one, 0.0))}
+
+
+def _may_widen(evidence: Evidence, j: int, least: float) -> bool:
+    """Whether a joint is seen to stand, and has enough rows without those that are rounded."""
+    every = [_speeds(evidence, run) for run in evidence.runs]
+    stood = stands(every, evidence.criteria.sticking)[j]
+    return bool(stood) and _are_few(evidence, j, least, _near_rounded)
+
+
 def _may_leave_out(evidence: Evidence, j: int, least: float = 0.0) -> bool:
     """Whether enough of a joint's rows are left without its reversals."""
+    return _are_few(evidence, j, least, _near_stops)
+
+
+def _are_few(evidence: Evidence, j: int, least: float, near_stop: NearStop) -> bool:
     near, rest = [np.zeros(0, dtype=bool)], [np.zeros(0, dtype=bool)]
     for run in evidence.runs:
-        near.append(np.any(_near_stops(evidence, run, j, least)[run.index], axis=0))
+        near.append(np.any(near_stop(evidence, run, j, least)[run.index], axis=0))
         rest.append(np.all(_resting(evidence, run)[:, j][run.index], axis=0))
-    near_stop, at_rest = (np.concatenate(one)[:, None] for one in (near, rest))
-    return bool(few_enough(near_stop, at_rest, evidence.criteria.sticking)[0])
-
-
-def _rounding(evidence: Evidence, j: int) -> float:
-    """Speed that the low-pass of the positions makes up where a joint stops, rad/s or m/s."""
-    return max(float(_speeds(evidence, run).rounding[j]) for run in evidence.runs)
+    both, at_rest = (np.concatenate(one)[:, None] for one in (near, rest))
+    return bool(few_enough(both, at_rest, evidence.criteria.sticking)[0])
 
 
 def _rests(evidence: Evidence, j: int) -> bool:
@@ -215,14 +238,33 @@ def _resting(evidence: Evidence, run: Run) -> np.ndarray:
     return known[key]
 
 
-def _near_stops(evidence: Evidence, run: Run, j: int, least: float = 0.0) -> np.ndarray:
-    """Rows of a joint around its reversals, (T,) mask; asked for with every model."""
+def _near_stops(evidence: Evidence, run: Run, j: int, least: float) -> np.ndarray:
+    """Rows of a joint around its reversals, (T,) mask."""
+    return _cached_stops(evidence, run, j, least, 0.0)
+
+
+def _near_rounded(evidence: Evidence, run: Run, j: int, least: float) -> np.ndarray:
+    """The same with those to which the low-pass of the positions gives a speed beside a stop."""
+    return _cached_stops(evidence, run, j, least, _speeds(evidence, run).rounding)
+
+
+def _cached_stops(
+    evidence: Evidence, run: Run, j: int, least: float, rounding: float
+) -> np.ndarray:
+    """Rows of a joint around its stops, (T,) mask; asked for with every model.
+
+    Parameters
+    ----------
+    evidence, run : a recording of it.
+    j : number of the joint.
+    least, rounding : as for `near_stops`.
+    """
     sampled = run.replicates[0]
     known, kept = evidence.cache.along(sampled.motion), sampled.kept
-    key = ("near stops", j, least, kept.start, kept.stop)
+    key = ("near stops", j, least, rounding, kept.start, kept.stop)
     if key not in known:
-        near = near_stops(_speeds(evidence, run), evidence.criteria.sticking, least, [j])
-        known[key] = near[:, j]
+        speeds = _speeds(evidence, run)
+        known[key] = near_stops(speeds, evidence.criteria.sticking, least, [j], rounding)[:, j]
     return known[key]
 
 

@@ -151,22 +151,24 @@ def _why(
 
     The torque of a wrist is nothing beside that of a shoulder, whose own error moves by chance: a
     rise over all joints of less than its standard error counts for nothing beside a large fall at
-    one joint. And what lies at a joint must not make that joint worse: by chance it may only where
-    another one gains by far, as from the angle of a joint that turns what the next one carries.
+    one joint. And what lies at a joint must not make that joint worse: by little more than chance
+    it may only where another one gains by far.
     """
     before, after = errors
     where = "the test recordings" if held else "held-out blocks of time"
-    there = largest_fall(names, before, after, together)
-    large = there is not None and there.is_large
+
+    def falls_far() -> bool:
+        there = largest_fall(names, before, after, together)
+        return there is not None and there.is_large
+
     if after.error > before.error:
         chance = fall_standard_error(before, after, together)
-        rise = after.error - before.error
-        if not large or chance is None or rise > chance:
+        if chance is None or after.error - before.error > chance or not falls_far():
             low, high = two_percent(before.error, after.error)
             return f"raises the error on {where} from {low} to {high}"
     if effect.joint in names:
         own = joint_fall(names, names.index(effect.joint), before, after, together)
-        if own.is_rise or (own.after > own.before and not large):
+        if own.is_rise or (own.may_be_rise and not falls_far()):
             low, high = two_percent(own.before, own.after)
             return f"raises the error of {own.joint} on {where} from {low} to {high}"
     return ""

@@ -118,7 +118,8 @@ def rank(
 
     Returns
     -------
-    Every effect at its best shape, best first, with the gate that it does not pass.
+    Every effect at its best shape, best first, with the gate that it does not pass; what can be
+    significant nowhere stands last.
     """
     criteria, best, tests = evidence.criteria, [], 0
     noisy = carries_noise(evidence)
@@ -144,8 +145,8 @@ def rank(
     if least is None:
         least = criteria.gates.later_share if added else criteria.gates.first_share
     order = best_first([one.penalised for one in best], alike)
-    # What falls most by chance, and can be significant nowhere, stands behind what may be.
-    scores = tuple(best[i] for i in sorted(order, key=lambda one: one not in hopeful))
+    others = (i for i in order if i not in hopeful)
+    scores = tuple(best[i] for i in (*(i for i in order if i in hopeful), *others))
     refusals = tuple(
         _unseen(s, noisy) or _refusal(s, evidence, fitted, tests, least) for s in scores
     )

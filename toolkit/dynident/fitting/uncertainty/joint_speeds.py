@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from math import ceil
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from dynident.fitting.sampling import BLOCK, Sampled
 from dynident.recording import MotionInParts
@@ -17,12 +19,11 @@ from dynident.recording.white_noise import encoder_noise_std
 _FREQUENCIES = 4096  # at which a filter's response is taken
 DIGITS = 1e-12
 """Of a position's size, that its low-pass keeps: some joints stand exactly."""
-_RINGING, _ROUNDING = 0.1, 0.33
-"""Overshoot of the speed's low-pass beside a kink, and what it makes of no speed at the kink, of
-the change of acceleration times the time constant 1 / (2 pi cut-off)."""
-_KINK = 1.155
-"""Change of acceleration where a joint stops or starts, of the root of its mean fourth power over
-its mean square, which rests do not lower: the amplitude of a sine."""
+_RINGING = 0.1
+"""Overshoot of the speed's low-pass beside a kink, of the change of acceleration times the time
+constant 1 / (2 pi cut-off)."""
+_KINK = 2.0  # change of acceleration where a joint stops or starts, of its root mean square
+_MARGIN = 1.2  # of what the low-pass makes of a kink: the acceleration before it may fall
 _AT_ONCE = 1 << 21  # speeds that are computed at once, and kept with the recording's motion
 
 
@@ -44,13 +45,9 @@ class JointSpeeds:
         White noise of the encoders, or the digits of the numbers, through the low-pass of the
         positions and the central difference.
         """
+        angle, gain = self._gain
         rate = self.sampled.recording.rate_hz
-        angle = np.linspace(0.0, np.pi, _FREQUENCIES)
-        gain = np.sin(angle) * rate
-        cutoff = self.sampled.parallel.filter.position_cutoff_hz
-        if cutoff:
-            gain = gain * np.abs(response(butterworth(rate, cutoff), angle)) ** 2
-        share = float(np.sqrt(np.trapezoid(gain**2, angle) / np.pi))
+        share = rate * float(np.sqrt(np.trapezoid(gain**2, angle) / np.pi))
         q = self.sampled.recording.q
         digits = DIGITS * np.abs(q).max(axis=0)
         return np.maximum(encoder_noise_std(q), digits) * share
@@ -61,50 +58,73 @@ class JointSpeeds:
         squares = [np.sum(part**2, axis=0) for part in self.used()]
         return np.sqrt(np.sum(squares, axis=0) / (self._used.stop - self._used.start))
 
-    @property
+    @cached_property
     def ringing(self) -> np.ndarray:
         """How far the low-pass of the positions rings beside a stop, (n,) rad/s or m/s.
 
         A joint that stands is given that much speed before it starts, and after it has stopped.
         """
-        return _RINGING * self._kink
-
-    @property
-    def rounding(self) -> np.ndarray:
-        """Speed that the low-pass of the positions makes up where a stop begins or ends, (n,)."""
-        return _ROUNDING * self._kink
-
-    @cached_property
-    def _kink(self) -> np.ndarray:
-        """Change of acceleration at a stop times the time constant of the low-pass, (n,)."""
         cutoff, rate = (
             self.sampled.parallel.filter.position_cutoff_hz,
             self.sampled.recording.rate_hz,
         )
         if not cutoff:
             return np.zeros(self.sampled.recording.n)
-        squares = [(np.diff(part, axis=0) * rate) ** 2 for part in self.used()]
-        second = np.sum([part.sum(axis=0) for part in squares], axis=0)
-        fourth = np.sum([(part**2).sum(axis=0) for part in squares], axis=0)
-        change = np.sqrt(np.divide(fourth, second, out=np.zeros_like(second), where=second > 0))
-        return _KINK * change / (2.0 * np.pi * cutoff)
+        parts = [np.diff(part, axis=0) * rate for part in self.used()]
+        squares = np.sum([np.sum(part**2, axis=0) for part in parts], axis=0)
+        acceleration = np.sqrt(squares / max(sum(map(len, parts)), 1))
+        return _RINGING * _KINK * acceleration / (2.0 * np.pi * cutoff)
+
+    @cached_property
+    def rounding(self) -> float:
+        """Speed that low-pass and difference make up where a stop begins, over the acceleration, s.
+
+        Of a speed that is zero until it rises steadily they make, where it begins to, that rise
+        times half the mean of |t| over their response.
+        """
+        angle, gain = self._gain
+        inside = np.trapezoid((1.0 - gain / angle) / angle**2, angle)
+        return float(_MARGIN * (inside + 1.0 / np.pi) / (np.pi * self.sampled.recording.rate_hz))
+
+    @cached_property
+    def _gain(self) -> tuple[np.ndarray, np.ndarray]:
+        """Angles up to pi, and there the gain from positions to speeds, per sample."""
+        angle = np.linspace(0.0, np.pi, _FREQUENCIES)[1:]
+        gain = np.sin(angle)
+        cutoff = self.sampled.parallel.filter.position_cutoff_hz
+        if cutoff:
+            rate = self.sampled.recording.rate_hz
+            gain = gain * np.abs(response(butterworth(rate, cutoff), angle)) ** 2
+        return angle, gain
 
     def used(self) -> Iterator[np.ndarray]:
         """Yield them (T, n) from the first to the last row that is used, part by part."""
         for start in range(self._used.start, self._used.stop, BLOCK):
             yield self._part(slice(start, min(start + BLOCK, self._used.stop)))
 
-    def slower(self, limits: np.ndarray) -> Iterator[np.ndarray]:
+    def slower(self, limits: np.ndarray, rounding: float = 0.0) -> Iterator[np.ndarray]:
         """Yield how much of each row's low-pass lies within a speed, (T, n), part by part.
 
         Parameters
         ----------
         limits : (n,) the speed, rad/s or m/s; a negative one for joints that are not asked for.
+        rounding : s, times the largest acceleration around a sample: speeds below count, too.
         """
-        full = self._full
+        full, asked = self._full, limits >= 0
         for plan in full.parallel.blocks(full.source.samples, BLOCK, self.sampled.kept):
-            inside = np.abs(self._part(plan.raw)) <= limits
-            yield full.parallel.apply_block(inside.astype(float), plan)
+            v = self._part(plan.raw)
+            within = np.tile(limits, (len(v), 1))
+            if rounding:
+                made_up = rounding * self._largest_around(v[:, asked])
+                within[:, asked] = np.maximum(within[:, asked], made_up)
+            yield full.parallel.apply_block((np.abs(v) <= within).astype(float), plan)
+
+    def _largest_around(self, v: np.ndarray) -> np.ndarray:
+        """Largest acceleration within a period of the positions' cut-off, (T, n)."""
+        rate = self.sampled.recording.rate_hz
+        cutoff = self.sampled.parallel.filter.position_cutoff_hz or rate
+        accelerations = np.abs(np.gradient(v, axis=0)) * rate
+        return maximum_filter1d(accelerations, 2 * ceil(rate / cutoff) + 1, axis=0)
 
     @property
     def _full(self) -> Sampled:

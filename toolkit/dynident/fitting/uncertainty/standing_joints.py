@@ -60,8 +60,9 @@ def stands(every: Iterable[JointSpeeds], criteria: StickingCriteria) -> np.ndarr
 def near_stops(
     speeds: JointSpeeds,
     criteria: StickingCriteria,
-    least: float | np.ndarray = 0.0,
+    least: float = 0.0,
     joints: Sequence[int] | None = None,
+    rounding: float = 0.0,
 ) -> np.ndarray:
     """Return the rows of each joint around its stops, (T, n) mask of the rows that are used.
 
@@ -69,14 +70,14 @@ def near_stops(
     ----------
     speeds : of the recording.
     criteria : how far around.
-    least : speed within which a joint's friction is not known, where that is more than the noise,
-        rad/s or m/s; a number, or one of each joint.
+    least : speed within which a joint's friction is not known, where that is more than the noise.
     joints : numbers of those that are looked at; None for all. The others have no such rows.
+    rounding : s, `JointSpeeds.rounding` of joints that stand: beside a stop they are given a speed.
     """
     limits = np.maximum(_unknown_within(speeds, criteria), least)
     if joints is not None:
         limits[np.setdiff1d(np.arange(len(limits)), joints)] = -1.0
-    near = np.concatenate(list(speeds.slower(limits)))
+    near = np.concatenate(list(speeds.slower(limits, rounding)))
     return np.abs(near) > criteria.spread
 
 
@@ -136,8 +137,9 @@ def without_stops(
 ) -> Dataset:
     """Return a dataset whose recordings say which rows around stops do not count.
 
-    Of joints with dry friction in the model that are seen to stand. Too few rows of a joint would
-    be left: all of them count. So do they where the filter keeps the ends, as published recipes do.
+    Of joints with dry friction in the model that are seen to stand, with those that the low-pass of
+    the positions has rounded. Where too few rows of a joint would be left, these count, and where
+    there are too few still, all of them; as they do where the filter keeps the ends.
 
     Parameters
     ----------
@@ -168,7 +170,7 @@ def without_stops(
     if not which.any():
         return dataset
     rest = np.concatenate([resting(sample(one, dataset.filter)) for one in recordings])
-    near, few = _around_stops(recordings, dataset.filter, rest, criteria)
+    near, few = _around_stops(recordings, dataset.filter, (rest, which), criteria)
     which = which & (few | (known & rest.all(axis=0)))
     pairs = zip(recordings, near, strict=True)
     marked = [_with_stops(sample(one, dataset.filter), rows & which) for one, rows in pairs]
@@ -192,20 +194,33 @@ def standing_in(dataset: Dataset) -> tuple[str, ...]:
 def _around_stops(
     recordings: Sequence[Recording],
     filter: Filter | None,
-    rest: np.ndarray,
+    rest_of: tuple[np.ndarray, np.ndarray],
     criteria: StickingCriteria,
 ) -> tuple[list[np.ndarray], np.ndarray]:
     """Rows around stops of each recording, (T, n) masks, and where they are few enough, (n,).
 
+    Parameters
+    ----------
+    recordings, filter : all of them.
+    rest_of : (N, n) mask of the rows of long rests, and (n,) of the joints that are asked for.
+    criteria : how many are few.
+
+    Returns
+    -------
     With those that the low-pass of positions has rounded, at joints of which enough are left.
     """
-    wide = [near_stops(one, criteria, one.rounding) for one in _speeds(recordings, filter)]
-    few = few_enough(np.concatenate(wide), rest, criteria)
-    if few.all():
-        return wide, few
-    narrow = [near_stops(one, criteria) for one in _speeds(recordings, filter)]
-    near = [np.where(few, one, other) for one, other in zip(wide, narrow, strict=True)]
-    return near, few_enough(np.concatenate(near), rest, criteria)
+    rest, which = rest_of
+    some = np.flatnonzero(which).tolist()
+    near = [
+        near_stops(one, criteria, 0.0, some, one.rounding) for one in _speeds(recordings, filter)
+    ]
+    few = few_enough(np.concatenate(near), rest, criteria)
+    left = np.flatnonzero(which & ~few).tolist()
+    if left:
+        narrow = (near_stops(one, criteria, 0.0, left) for one in _speeds(recordings, filter))
+        near = [np.where(few, one, other) for one, other in zip(near, narrow, strict=True)]
+        few = few_enough(np.concatenate(near), rest, criteria)
+    return near, few
 
 
 def _speeds(recordings: Sequence[Recording], filter: Filter | None) -> Iterator[JointSpeeds]:
