@@ -125,7 +125,7 @@ def test_after_a_gap_noise_is_whitened_by_what_has_come_since() -> None:
     """
     poles = np.array([0.95, 0.9 * np.exp(0.5j), 0.9 * np.exp(-0.5j), 0.4])
     colour = np.real(np.poly(poles))
-    impulse = lfilter([1.0], colour, np.eye(1, 3000)[0])
+    impulse = np.asarray(lfilter([1.0], colour, np.eye(1, 3000)[0]))
     covariance = [impulse[: 3000 - lag] @ impulse[lag:] for lag in range(90)]
     assert covariance[0] > 25.0
     noise = NoiseModel(1.0, np.zeros(1), np.ones(1), colour)
