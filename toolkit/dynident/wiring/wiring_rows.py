@@ -88,5 +88,5 @@ def rows_of(dataset: Dataset, most: int, independent_hz: float) -> WiringRows:
         at = np.unique(np.linspace(0, len(one.t) - 1, min(each, len(one.t))).round().astype(int))
         parts.append([x[at] for x in (one.q, one.v, one.a, one.tau, one.counting)])
     q, v, a, tau, counts = (np.concatenate(pieces) for pieces in zip(*parts, strict=True))
-    independent = min(float(len(q)), duration * independent_hz) * float(counts.mean())
+    independent = max(1.0, min(float(len(q)), duration * independent_hz) * float(counts.mean()))
     return WiringRows(q=q, v=v, a=a, tau=tau, counts=counts, independent=independent)
