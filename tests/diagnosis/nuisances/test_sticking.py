@@ -24,6 +24,7 @@ from dynident.fitting.sampling import sample
 from dynident.fitting.uncertainty.joint_speeds import JointSpeeds
 from dynident.fitting.uncertainty.standing_joints import near_stops, without_stops
 from dynident.recording import Dataset, Recording, default_filter
+from dynident.reporting.headline import headline
 from standing_arm import COULOMB, RATE_HZ, STOPPED, WIDTH, given, record
 from synthetic import synthetic, true_values
 
@@ -173,3 +174,5 @@ def test_a_robot_that_sticks_lacks_what_it_lacks_away_from_reversals(
     said = di.diagnose(given(), train, Dataset((record(7, STOPPED, stribeck),)))
     assert [step.effect.label for step in said.steps] == found
     assert said.verdict == ("explained" if found else "nothing_missing")
+    assert "What happens around stops at elbow is not judged." in said.sentence
+    assert "What happens around stops at elbow is not judged." in headline(said).sentence

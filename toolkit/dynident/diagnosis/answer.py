@@ -18,6 +18,7 @@ from dynident.diagnosis.details import (
     together,
 )
 from dynident.diagnosis.detection_limits import DetectionLimit
+from dynident.diagnosis.effect_groups import every_joint
 from dynident.diagnosis.leading_effects import LeadingEffects
 from dynident.diagnosis.nuisances.sampling_time import SamplingTime
 from dynident.diagnosis.proposals.proposal import Proposal
@@ -82,6 +83,7 @@ class Answer:
         residual depends on, before any proposal, at each joint at which something is left.
     reversals_left_out : share of the rows, for joints whose dry friction may follow another law at
         its reversals: these rows count neither in the fit nor in the errors.
+    stops_left_out : the same of joints that stick, where no data tell the dry friction.
     training_only : joints at which the training recordings leave more than their noise, where the
         held-out recordings leave none: the verdict is "unexplained" for that alone.
     following_motion : joints without a noise floor at which what is left is no noise, as functions
@@ -118,6 +120,7 @@ class Answer:
     rows: RowCount = field(default_factory=RowCount)
     residual_dependence: tuple[JointDependence, ...] = ()
     reversals_left_out: Mapping[str, float] = field(default_factory=dict)
+    stops_left_out: Mapping[str, float] = field(default_factory=dict)
     training_only: tuple[str, ...] = ()
     following_motion: tuple[str, ...] = ()
     bursts: tuple[str, ...] = ()
@@ -154,6 +157,7 @@ class Answer:
                 *self.whose_position,
                 self._verdict_in_words,
                 *self.left_out_in_words,
+                *self.not_judged_in_words,
                 *self.when_sampled,
             ]
         )
@@ -188,6 +192,17 @@ class Answer:
             f"That leaves out the reversals of {', '.join(each)}, where dry friction may follow "
             "another law than the model's.",
         )
+
+    @property
+    def not_judged_in_words(self) -> tuple[str, ...]:
+        """Where joints stick, of which a verdict that all is well does not speak; else empty."""
+        joints = list(self.stops_left_out)
+        if not joints or self.verdict == "unexplained":
+            return ()
+        where = f"at {listed(joints)}"
+        if len(joints) == len(self.joints) > 1:
+            where = f"at {every_joint(len(joints))}"
+        return (f"What happens around stops {where} is not judged.",)
 
     @property
     def whose_position(self) -> tuple[str, ...]:

@@ -174,6 +174,7 @@ def assemble(
         training_only=_training_only(verdict, trained, after, evidence),
         bursts=tuple(bursts),
         reversals_left_out={joint: left[joint] for joint in search.doubtful},
+        stops_left_out={j: share for j, share in left.items() if j not in search.doubtful},
     )
 
 

@@ -25,8 +25,13 @@ def grouped_title(effects: Sequence[Effect], joints: int) -> str:
         return f"{first.title}, and {in_words(len(effects) - 1)} more"
     name, at = first.name.replace("_", " "), [str(one.joint) for one in effects]
     if len(at) == joints:
-        return f"{name} at {'both' if joints == 2 else f'all {in_words(joints)}'} joints"
+        return f"{name} at {every_joint(joints)}"
     return f"{name} at {', '.join(at[:-1])} and {at[-1]}"
+
+
+def every_joint(count: int) -> str:
+    """All joints of a robot that has several, in words."""
+    return f"{'both' if count == 2 else f'all {in_words(count)}'} joints"
 
 
 def in_words(count: int) -> str:

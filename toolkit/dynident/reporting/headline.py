@@ -68,6 +68,9 @@ def headline(diagnosis: Diagnosis) -> Headline:
         where = " and ".join(diagnosis.reversals_left_out)
         said = f"{found.sentence} The reversals of {where} are left out: see the notes."
         found = Headline(mark, found.title, said)
+    if diagnosis.not_judged_in_words:
+        said = " ".join([found.sentence, *diagnosis.not_judged_in_words])
+        found = replace(found, sentence=said)
     if diagnosis.bursts:
         mark = "?" if found.mark == "\u2713" else found.mark
         where = listed(list(diagnosis.bursts))

@@ -190,7 +190,8 @@ def sticking_notes(evidence: Evidence, others: Collection[str] = ()) -> tuple[st
     return (
         f"{listed(list(shares))} {stand} still at many of {their} stops, or {their} dry friction "
         f"reverses within the noise of {their} speed or within a held command: "
-        f"{left_out_words(shares)}",
+        f"{left_out_words(shares)} Backlash, presliding or whatever else acts there alone would "
+        "not be seen.",
     )
 
 
