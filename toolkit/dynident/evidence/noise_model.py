@@ -159,26 +159,33 @@ class NoiseModel:
         rows, white : (R, M, k, T) weighted samples, and where they go.
         told : (R, T) mask of the samples that count.
         """
-        place = np.arange(told.shape[1])
+        order, samples = len(self._starts), told.shape[1]
+        place = np.arange(samples)
         before = place - np.maximum.accumulate(np.where(told, -1, place), axis=1) - 1
-        for count, filter in enumerate(self._shorter):
-            run, at = np.nonzero(told & (before == count))
-            white[run, :, :, at] = sum(c * rows[run, :, :, at - k] for k, c in enumerate(filter))
+        run, first = np.nonzero(told & (before == 0))
+        after = np.arange(order)
+        at = np.minimum(first[:, None] + after, samples - 1)
+        each, where = np.nonzero(told[run[:, None], at] & (before[run[:, None], at] == after))
+        signals = rows.shape[1:3]
+        found = rows[run[:, None], :, :, at].reshape(len(run), order, signals[0] * signals[1])
+        found = np.matmul(self._starts, found).reshape(len(run), order, *signals)
+        white[run[each], :, :, at[each, where]] = found[each, where]
 
     @cached_property
-    def _shorter(self) -> list[np.ndarray]:
-        """Whitening filters of all lower orders, that of order 0 first.
+    def _starts(self) -> np.ndarray:
+        """What whitens the first samples after a gap, (order, order) and lower triangular.
 
-        Each for innovations of variance one of the same noise: Durbin's recursion, backwards.
+        A row for each number of samples before, with the whitening filter of that order: each for
+        innovations of variance one of the same noise. Durbin's recursion, backwards.
         """
-        variance, found = 1.0 / self.colour[0] ** 2, []
-        predictor = self.colour / self.colour[0]
-        for last in range(len(predictor) - 1, 0, -1):
+        variance, order = 1.0 / self.colour[0] ** 2, len(self.colour) - 1
+        predictor, found = self.colour / self.colour[0], np.zeros((order, order))
+        for last in range(order, 0, -1):
             share = 1.0 - predictor[last] ** 2
             predictor = (predictor[:last] - predictor[last] * predictor[last:0:-1]) / share
             variance /= share
-            found.append(predictor / np.sqrt(variance))
-        return found[::-1]
+            found[last - 1, :last] = predictor[::-1] / np.sqrt(variance)
+        return found
 
 
 def flat_noise(std: float) -> NoiseModel:
