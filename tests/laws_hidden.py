@@ -72,11 +72,11 @@ def recordings(
 def searched(made: list[Recording], model: Model = MODEL) -> tuple[LawSearch, EvidenceFit]:
     """The search on all recordings but the last, which is held out; and the fit of the model."""
     criteria = Criteria()
+    train, test = Dataset(tuple(made[:-1])), Dataset(tuple(made[-1:]))
     evidence, held = (
-        Evidence(model, gather(Dataset(tuple(some)), criteria.noise), criteria=criteria)
-        for some in (made[:-1], made[-1:])
+        Evidence(model, gather(some, criteria.noise), criteria=criteria) for some in (train, test)
     )
-    return LawSearch(evidence=evidence, held=held), fit_evidence(evidence, model)
+    return LawSearch(evidence=evidence, held=held, train=train), fit_evidence(evidence, model)
 
 
 def path(search: LawSearch, start: EvidenceFit, *labels: str) -> Path:

@@ -7,7 +7,6 @@ effect with the experiment that would show it or distinguish it, residual maps, 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -26,6 +25,7 @@ from dynident.diagnosis.details import (
     Trace,
 )
 from dynident.diagnosis.detection_limits import detection_limits
+from dynident.diagnosis.evidence_estimate import estimate_of
 from dynident.diagnosis.nuisances.contacts import Disturbance, contact_candidates
 from dynident.diagnosis.nuisances.quantisation import rounding_notes, with_rounding
 from dynident.diagnosis.nuisances.sampling_time import sampling_time
@@ -45,33 +45,17 @@ from dynident.diagnosis.verdict import (
     verdict_of,
     within_noise,
 )
-from dynident.errors import FitError
 from dynident.evidence.evidence import Evidence
-from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
+from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut, on_recordings
 from dynident.evidence.maps import residual_maps
-from dynident.evidence.model_columns import rows_of_run
-from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import rows_of_recordings, sources_of
-from dynident.fitting.uncertainty.row_errors import row_covariance
-from dynident.fitting.uncertainty.shape_errors import with_shape_errors
 from dynident.model import Model
-from dynident.moments.factors import RANK_TOLERANCE
 from dynident.recording import Dataset
 from dynident.recording.dataset import NoiseSource
-from dynident.robot import base_parameters
 
 _SHOWN = 10
 """Candidates in a table."""
-
-_METHODS: dict[NoiseSource, str] = {
-    "replicates": "instrumental variables from the repeated periods, noise whitened",
-    "given": "least squares corrected for the stated noise, noise whitened",
-    "unknown": "least squares, weighted per joint",
-}
-
-
-_WHITENED = "sigma holds the noise, with its colour; what the model lacks is not in it."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,7 +110,7 @@ def assemble(
     names, units = given.robot.names, given.robot.torque_units
     bursts = bursts_in(trained, names, units, evidence.criteria.verdict)
     verdict = verdict_of(before, after, trained, steps, rounds[-1], evidence.criteria.verdict)
-    final = _with_shapes(evidence, stages[-1], train)
+    final = estimate_of(evidence, stages[-1], train)
     impossible = ()
     if verdict != "unexplained":
         impossible = impossible_joints_of(evidence, final.model, final.values, final.covariance)
@@ -148,7 +132,7 @@ def assemble(
         steps=steps,
         candidates=_revealed(first, evidence, start),
         remaining=_candidates(rounds[-1], last_gains),
-        before=_with_shapes(evidence, start, train),
+        before=estimate_of(evidence, start, train),
         after=final,
         maps=residual_maps(given, before, after, evidence.criteria),
         traces=_traces(given, before, after),
@@ -311,70 +295,6 @@ def _candidates(ranking: Ranking, gains: Mapping[str, float]) -> tuple[Candidate
             )
         )
     return tuple(found)
-
-
-def _with_shapes(evidence: Evidence, fitted: EvidenceFit, train: Dataset) -> Estimate:
-    """The fit of the diagnosis as an `Estimate` that takes no shape and no width as known."""
-
-    def again(wider: Model) -> Estimate:
-        return _estimate(evidence, fit_evidence(evidence, wider, fitted), train)
-
-    given, own = evidence.model.friction_widths, fitted.model.friction_widths
-    sought = [
-        joint
-        for joint, stated, found in zip(fitted.model.robot.names, given, own, strict=True)
-        if found != stated
-    ]
-    return with_shape_errors(_estimate(evidence, fitted, train), again, sought)
-
-
-def _estimate(evidence: Evidence, fitted: EvidenceFit, train: Dataset) -> Estimate:
-    """The fit of the diagnosis as an `Estimate`, at the shapes and widths that it has."""
-    judged = on_recordings(evidence, fitted)
-    model = fitted.model
-    # Rows that span what the data show: not the directions in which the columns are noise.
-    shown = fitted.solution.basis.T @ fitted.pooled.gram
-    basis = base_parameters(shown, model.names, RANK_TOLERANCE)
-    kept, combination = list(basis.independent), basis.combination
-    covariance = np.zeros((model.size, model.size))
-    whole, words = fitted.covariance, _WHITENED if fitted.noise_known else ""
-    measured = all(run.columns_from == "recording" for run in evidence.runs)
-    if measured and not fitted.noise_known:
-        # Nothing has whitened these rows: their errors hang together as the filters make them.
-        recordings = tuple(run.recording for run in evidence.runs)
-        with suppress(FitError):
-            whole, errors = row_covariance(
-                model,
-                replace(train, recordings=recordings),
-                fitted.values,
-                [run.certain_rows for run in evidence.runs],
-                lambda run: rows_of_run(evidence, model, run, fitted.values),
-            )
-            words = errors.words
-    covariance[np.ix_(kept, kept)] = combination @ whole @ combination.T
-    return Estimate(
-        model=model,
-        values=basis.lift(basis.coordinates(fitted.values), model.given_values()),
-        covariance=covariance,
-        basis=basis,
-        torque_std=judged.residual_rms,
-        joint_errors=judged.joint_errors,
-        error=judged.error,
-        condition_number=float(np.linalg.cond(shown[:, kept])),
-        rows=fitted.rows,
-        method=_method(evidence),
-        status="solved",
-        notes=(),
-        sources=sources_of(train),
-        sigma_words=words,
-    )
-
-
-def _method(evidence: Evidence) -> str:
-    """How the model was fitted, in words."""
-    if evidence.runs[0].columns_from == "simulation":
-        return "instrumental variables from the simulated closed loop"
-    return _METHODS[noise_source(evidence, None)]
 
 
 def _traces(given: Model, before: HeldOut, after: HeldOut) -> tuple[Trace, ...]:

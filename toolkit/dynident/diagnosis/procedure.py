@@ -400,7 +400,7 @@ def _judge(stage: Stage, path: Path, task: DiagnosisTask) -> Diagnosis:
         answer = replace(answer, switches=switches_of(stage.evidence, held, path))
     if not _asks_for_laws(answer, task):
         return answer
-    laws = LawSearch(evidence=stage.evidence, held=held, progress=task.progress)
+    laws = LawSearch(evidence=stage.evidence, held=held, train=task.train, progress=task.progress)
     return replace(answer, proposals=proposals_of(laws, path))
 
 

@@ -8,6 +8,7 @@ from itertools import count, islice
 
 import numpy as np
 
+from dynident.diagnosis.evidence_estimate import estimate_of
 from dynident.diagnosis.proposals.proposal import LawPicture, Proposal
 from dynident.diagnosis.proposals.term_library import LibraryTerm, centred, extended, library
 from dynident.diagnosis.proposals.term_screen import Screened, screen
@@ -19,9 +20,9 @@ from dynident.diagnosis.search.shaped_fit import refitted
 from dynident.diagnosis.verdict import within_noise
 from dynident.effects import Effect, LawEffect, law_effect
 from dynident.evidence.evidence import Evidence
-from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of
+from dynident.evidence.evidence_fit import EvidenceFit, in_metric_of
 from dynident.evidence.held_out import HeldOut
-from dynident.fitting.uncertainty.shape_slopes import ShapeSlope
+from dynident.recording import Dataset
 
 _SAME_SHAPE = 0.1
 _AT_BOUND = 1e-3
@@ -36,11 +37,13 @@ class LawSearch:
     ----------
     evidence : of the training recordings.
     held : of the test recordings; None where blocks of time are held out.
+    train : the training recordings.
     progress : is called with what is being done.
     """
 
     evidence: Evidence
     held: Evidence | None
+    train: Dataset
     progress: Callable[[str], None] = lambda _: None
 
     def found(self, fitted: EvidenceFit) -> Iterator[FoundLaw]:
@@ -171,12 +174,13 @@ class LawSearch:
         effect = next(one for one in wider.model.effects if one.label == label)
         assert isinstance(effect, LawEffect)
         own = wider.model.slices[label]
-        sigma, shape_sigma = self._spread(wider, effect)
+        estimate = estimate_of(self.evidence, wider, self.train)
+        shapes = {one.name: one.sigma for one in estimate.shapes}
         return Proposal(
             effect=_recentred(effect),
             values=tuple(wider.values[own].tolist()),
-            sigma=sigma,
-            shape_sigma=shape_sigma,
+            sigma=tuple(estimate.sigma[own].tolist()),
+            shape_sigma=tuple(shapes[name] for name in wider.model.shape_names[label]),
             explains=float(explains),
             is_explanation=explains >= criteria.explains and self._nothing_left(after),
             p_value=min(1.0, best.scores[0].p_value * best.tried),
@@ -188,22 +192,6 @@ class LawSearch:
             remark=_remark(effect),
             picture=_picture(before, after, fitted, str(effect.joint)),
         )
-
-    def _spread(
-        self, wider: EvidenceFit, effect: LawEffect
-    ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Standard deviations of a law's coefficients and shapes, estimated together."""
-        model, own = wider.model, wider.model.slices[effect.label]
-        if effect.shape:
-            values = tuple(wider.values[own].tolist())
-            slopes = ShapeSlope(effect.joint, of=effect, values=values)
-            wider = fit_evidence(self.evidence, model + slopes, wider)
-            shapes = effect.shape_parameters(model.robot)
-            scale = [one.slope(x) for one, x in zip(shapes, effect.shape, strict=True)]
-            spread = _sigma(wider, wider.model.slices[slopes.label]) * scale
-        else:
-            spread = np.zeros(0)
-        return tuple(_sigma(wider, own).tolist()), tuple(spread.tolist())
 
     def _nothing_left(self, after: HeldOut) -> bool:
         """Whether nothing but noise remains, as far as it is known."""
@@ -251,10 +239,6 @@ class _BestLaws:
                 assert isinstance(other.effect, LawEffect)
                 found.append(other.effect)
         return tuple(found)
-
-
-def _sigma(fitted: EvidenceFit, own: slice) -> np.ndarray:
-    return np.sqrt(np.clip(np.diag(fitted.covariance)[own], 0.0, None))
 
 
 def _recentred(effect: LawEffect) -> LawEffect:
