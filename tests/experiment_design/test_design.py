@@ -467,7 +467,10 @@ def test_torques_that_are_no_numbers_are_within_no_limit() -> None:
         scale=np.ones(columns.count),
     )
     known = PredictedTorque(
-        columns=columns, values=np.zeros(columns.count), factor=1e-3 * np.eye(columns.count)
+        model=model,
+        columns=columns,
+        values=np.zeros(columns.count),
+        factor=1e-3 * np.eye(columns.count),
     )
     program = MotionProgram(informations=(information,), motions=some, torque=known)
     variables = some.random(0) * 5.0

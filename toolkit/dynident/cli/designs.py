@@ -56,6 +56,14 @@ _PATH = click.Path(path_type=Path)
     help="Only the parameters of this joint and its link; may be repeated.",
 )
 @click.option("--clearance", type=float, help="m, that links keep from each other.")
+@click.option(
+    "--load",
+    "loads",
+    type=float,
+    multiple=True,
+    metavar="KG",
+    help="What the last link carries; of several, the one with which the recording tells most.",
+)
 @click.option("--limits", type=_PATH, help="A file of limits, [joints.NAME], boxes and obstacles.")
 @click.option(
     "--out",
@@ -90,10 +98,11 @@ def design(study: Path, limits: Path | None, out: Path | None, **settings) -> Co
     elif settings["intervals"] is not None:
         what = "--harmonics are of series, and --intervals of splines in their place"
         raise DesignError(what, remedy="choose one of them")
-    tell, show, joints = (settings.pop(name) for name in ("tell", "show", "joints"))
+    tell, show, joints, loads = (settings.pop(name) for name in ("tell", "show", "joints", "loads"))
     task = DesignTask(
         **settings,
         joints=tuple(joints),
+        loads=tuple(loads),
         tell=tuple(tuple(one(label) for label in pair) for pair in tell),
         show=tuple(one(label) for label in show),
     )

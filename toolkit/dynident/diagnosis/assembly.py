@@ -24,8 +24,7 @@ from dynident.diagnosis.details import (
     TestError,
     Trace,
 )
-from dynident.diagnosis.detection_limits import detection_limits
-from dynident.diagnosis.evidence_estimate import estimate_of
+from dynident.diagnosis.detection_limits import DetectionLimit, detection_limits
 from dynident.diagnosis.nuisances.contacts import Disturbance, contact_candidates
 from dynident.diagnosis.nuisances.quantisation import rounding_notes, with_rounding
 from dynident.diagnosis.nuisances.sampling_time import sampling_time
@@ -39,13 +38,13 @@ from dynident.diagnosis.search.ranking import Ranking
 from dynident.diagnosis.search.refusal import impossible_joints_of
 from dynident.diagnosis.verdict import (
     beyond_noise,
-    noise_source,
     notes_on,
     notes_on_steps,
     verdict_of,
     within_noise,
 )
-from dynident.evidence.evidence import Evidence
+from dynident.evidence.evidence import Evidence, noise_source
+from dynident.evidence.evidence_estimate import estimate_of
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut, on_recordings
 from dynident.evidence.maps import residual_maps
@@ -115,10 +114,7 @@ def assemble(
     if verdict != "unexplained":
         impossible = impossible_joints_of(evidence, final.model, final.values, final.covariance)
         verdict = "unexplained" if impossible else verdict
-    complete, left = verdict == "nothing_missing", shares_left_out(evidence)
-    limits = ()
-    if complete and not path.withdrawn:  # what was found, and withdrawn, is no limit
-        limits = detection_limits(evidence, held, stages[-1], rounds[-1], trained)
+    limits = _limits(search, held, trained) if verdict == "nothing_missing" else ()
     # Where a law is missing, a delay may be no more than a part of it.
     most_of_it = evidence.criteria.verdict.most_explained if verdict == "unexplained" else 0.0
     pushed = contact_candidates(given, evidence, search.disturbances)
@@ -157,9 +153,23 @@ def assemble(
         sampled=sampling_time(evidence, stages[-1], rounds[-1], least_share=most_of_it),
         training_only=_training_only(verdict, trained, after, evidence),
         bursts=tuple(bursts),
-        reversals_left_out={joint: left[joint] for joint in search.doubtful},
-        stops_left_out={j: share for j, share in left.items() if j not in search.doubtful},
+        **_left_out(search),
     )
+
+
+def _limits(search: Search, held: Evidence | None, trained: HeldOut) -> tuple[DetectionLimit, ...]:
+    """How large effects could have been unseen; what was found, and withdrawn, is no limit."""
+    if search.path.withdrawn:
+        return ()
+    return detection_limits(search.evidence, held, search.path.final, search.rounds[-1], trained)
+
+
+def _left_out(search: Search) -> dict[str, dict[str, float]]:
+    """Shares of rows left out around reversals, by why: of another law, or of joints that stick."""
+    every = shares_left_out(search.evidence)
+    doubtful = {joint: every[joint] for joint in search.doubtful}
+    others = {joint: share for joint, share in every.items() if joint not in doubtful}
+    return {"reversals_left_out": doubtful, "stops_left_out": others}
 
 
 def _steps_of(path: Path, evidence: Evidence) -> tuple[Step, ...]:

@@ -13,7 +13,7 @@ from dynident.diagnosis.nuisances.look_alikes import look_alike_notes
 from dynident.diagnosis.nuisances.sticking import sticking_notes
 from dynident.diagnosis.nuisances.width_notes import friction_width_notes
 from dynident.diagnosis.search.ranking import Ranking, candidates, carries_noise
-from dynident.evidence.evidence import Evidence
+from dynident.evidence.evidence import Evidence, noise_source
 from dynident.evidence.evidence_fit import EvidenceFit
 from dynident.evidence.held_out import HeldOut
 from dynident.fitting.estimate import nearly_hidden
@@ -77,14 +77,6 @@ def _more_than(share: float, judged: HeldOut, criteria: VerdictCriteria) -> np.n
     systematic = np.sqrt(np.clip(power, 0.0, None))
     matters = systematic > criteria.resolution * judged.torque_rms
     return matters & (systematic > share * judged.noise_std)
-
-
-def noise_source(evidence: Evidence, held: Evidence | None) -> NoiseSource:
-    """Where the noise floor that is reported comes from."""
-    kinds = {run.kind for run in (*evidence.runs, *(held.runs if held else ()))}
-    if "repeated" in kinds:
-        return "replicates"
-    return "given" if "noise_augmented" in kinds else "unknown"
 
 
 def notes_on_steps(steps: Sequence[Step], held: Evidence | None) -> tuple[str, ...]:

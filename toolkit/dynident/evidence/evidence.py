@@ -24,6 +24,7 @@ from dynident.evidence.runs import Run, Signals
 from dynident.evidence.stacks import Stack
 from dynident.fitting.sampling import Sampled
 from dynident.model import Model
+from dynident.recording.dataset import NoiseSource
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,3 +248,16 @@ class Evidence:
     @cached_property
     def _fitted(self) -> FittedColumns:
         return FittedColumns(self.motion)
+
+
+def noise_source(evidence: Evidence, held: Evidence | None) -> NoiseSource:
+    """Return where the noise floor that is reported comes from.
+
+    Parameters
+    ----------
+    evidence, held : of the training and of the test recordings; `held` may be None.
+    """
+    kinds = {run.kind for run in (*evidence.runs, *(held.runs if held else ()))}
+    if "repeated" in kinds:
+        return "replicates"
+    return "given" if "noise_augmented" in kinds else "unknown"

@@ -37,7 +37,14 @@ class ColumnFunction:
     n: int
 
     @classmethod
-    def of(cls, model: Model, values: np.ndarray, more: Sequence[Effect] = ()) -> ColumnFunction:
+    def of(
+        cls,
+        model: Model,
+        values: np.ndarray,
+        more: Sequence[Effect] = (),
+        *,
+        carries_payload: bool = False,
+    ) -> ColumnFunction:
         """Write the columns of a model out, and those of effects that it does not have.
 
         Parameters
@@ -45,6 +52,8 @@ class ColumnFunction:
         model : whose effects are functions of an instant of the motion.
         values : (p,) its parameters, for the torque and for columns that depend on it.
         more : effects beside it, at their shapes.
+        carries_payload : whether the payload of the model is on board; its columns are zero where
+            it is not.
 
         Returns
         -------
@@ -53,7 +62,7 @@ class ColumnFunction:
         Raises
         ------
         DesignError
-            If an effect depends on the past, or on which payload is on board: it is named.
+            If an effect depends on the past: it is named.
         """
         n, base = model.robot.n, model.base
         x = ca.SX.sym("x", 3 * n + 1)
@@ -65,6 +74,10 @@ class ColumnFunction:
             own.append(None)
             if effect.needs_torque:
                 later.append((place, effect))
+                continue
+            if effect.is_payload:
+                own[place] = _payload_columns(robot, x) * float(carries_payload)
+                torque = torque + own[place] @ values[model.slices[effect.label]]
                 continue
             own[place] = _effect_columns(model, effect, robot, x, None)
             torque = torque + own[place] @ values[model.slices[effect.label]]
@@ -149,12 +162,15 @@ def _rigid_torque(robot: Robot, x: Any) -> Any:
     return torque
 
 
+def _payload_columns(robot: Robot, x: Any) -> Any:
+    """Columns of what is added to the last link, (n, 10)."""
+    return _rigid_columns(robot, range(10 * robot.tip, 10 * robot.tip + 10), x)
+
+
 def _effect_columns(model: Model, effect: Effect, robot: Robot, x: Any, torque: Any) -> Any:
     """Columns of an effect, (n, k)."""
     if not is_of_an_instant(effect):
-        remedy = (
-            "leave it out: what depends on the past, the hour or a load is not designed for yet"
-        )
+        remedy = "leave it out: what depends on the past or the hour is not designed for"
         raise DesignError("its torque is no function of an instant", effect.label, remedy)
     if effect.needs_bodies:
         return _changes_of_bodies(effect, robot, x)

@@ -12,6 +12,7 @@ from dynident import files
 from dynident.closed_loop import Controller
 from dynident.closed_loop.experiments.virtual_study import controller_table
 from dynident.effects import LawEffect, laws_table
+from dynident.experiment_design.carried_load import payload_effect, usual_load
 from dynident.experiment_design.recording_design import RecordingDesign
 from dynident.experiment_design.written_design import DESIGN, MOTION_PAGE, design_file
 from dynident.file_groups import replaced_together
@@ -97,10 +98,16 @@ def _experiment(design: RecordingDesign, robot: str, controller: Controller):
     # An experiment has one width: the widest is the one that a motion shows.
     document["friction_width"] = float(np.max(model.friction_widths))
     entries = tomlkit.aot()
-    for effect in model.effects:
+    values = {effect.label: estimate.effect_values(effect.label) for effect in model.effects}
+    effects = {effect.label: effect for effect in model.effects}
+    if task.load:
+        carried = payload_effect(model.robot)
+        effects[carried.label] = carried
+        values[carried.label] = usual_load(model.robot, task.load)
+    for label, effect in effects.items():
         entry = tomlkit.table()
-        entry["effect"] = effect.label
-        own = estimate.effect_values(effect.label)
+        entry["effect"] = label
+        own = values[label]
         parameters = effect.parameters(model.robot)
         entry["values"] = {
             p.name: float(np.clip(x, p.lower, p.upper))
@@ -119,6 +126,8 @@ def _experiment(design: RecordingDesign, robot: str, controller: Controller):
     entry["file"] = "designed.csv"
     entry["duration"] = task.duration * task.repeat
     entry["period"] = task.duration
+    if task.load:
+        entry["payload"] = True
     entry["trajectory"] = design.trajectory.coefficients
     recordings = tomlkit.aot()
     recordings.append(entry)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import partial, reduce
 from operator import add
 
 import numpy as np
 
 from dynident.effects import Effect
 from dynident.errors import DesignError
+from dynident.experiment_design.carried_load import payload_effect, usual_load
 from dynident.experiment_design.column_function import ColumnFunction
 from dynident.experiment_design.design_task import DesignTask
 from dynident.experiment_design.information import Information
@@ -63,7 +64,7 @@ class DesignQuestion:
     task : what for.
     told : effects of which it is to be told which one it is, the first taken for true.
     shown : effects that are to be shown.
-    bare : the model without these.
+    bare : the model without these, but with what is carried.
     estimate : of the recordings so far, with the first of those that are to be told apart.
     torque : that motions will take, as far as the recordings and the description tell.
     """
@@ -98,26 +99,32 @@ class DesignQuestion:
         -------
         The question of that group; without one, that of what is to be shown, or of all parameters.
         """
-        told = tuple(one.on(model.robot) for one in told)
-        shown = () if told else tuple(one.on(model.robot) for one in task.show)
+        robot = model.robot
+        told = tuple(one.on(robot) for one in told)
+        shown = () if told else tuple(one.on(robot) for one in task.show)
         bare = model
         for one in (*told, *shown):
-            bare = bare - one.label if one in bare else bare
+            bare = bare - one.label if one in bare and not one.is_payload else bare
         estimate = fit(bare + told[:1] if told else bare, recorded)
         fitted = {one.label: one for one in estimate.model.effects}
+        torque = _torque(estimate, recorded, motions)
+        if task.load:
+            torque = torque.carrying(usual_load(robot, task.load))
+            carried = payload_effect(robot)
+            bare = bare if carried in bare else bare + carried
         return cls(
             task=task,
             told=tuple(fitted.get(one.label, one) for one in told),
             shown=shown,
             bare=bare,
             estimate=estimate,
-            torque=_torque(estimate, recorded, motions),
+            torque=torque,
         )
 
     @property
     def values(self) -> np.ndarray:
         """Of the bare model, (p,); not those of the fit alone, which small motions leave open."""
-        known = dict(zip(self.estimate.names, self.torque.values, strict=True))
+        known = dict(zip(self.torque.model.names, self.torque.values, strict=True))
         return np.array([known[name] for name in self.bare.names])
 
     @property
@@ -135,7 +142,7 @@ class DesignQuestion:
         """
         task, std = self.task, self.std
         extra = self._beside()
-        columns = ColumnFunction.of(self.bare, self.values, extra)
+        columns = self._columns(extra, carries_payload=task.load > 0)
         mix, last, labels = self._mix(columns, extra)
         size = _sizes(mix, columns, motions, std)
         kept = size > _UNSEEN * np.median(size[size > 0]) if np.any(size > 0) else size > 0
@@ -144,7 +151,7 @@ class DesignQuestion:
             named = self.told[0].title if self.told else task.of_what or "the model"
             raise DesignError(f"no motion of this robot makes a torque of {named}")
         mix = mix[:, kept]
-        prior, rate = _recorded(columns, mix, recorded, std)
+        prior, rate = _recorded(partial(self._columns, extra), mix, recorded, std)
         rows = rate * task.duration * task.repeat
         softer = self._softer(columns, extra, motions)
         information = Information(
@@ -163,6 +170,10 @@ class DesignQuestion:
             rows=rows,
         )
 
+    def _columns(self, extra: Sequence[Effect], *, carries_payload: bool) -> ColumnFunction:
+        """Columns of the bare model and of further effects."""
+        return ColumnFunction.of(self.bare, self.values, extra, carries_payload=carries_payload)
+
     def imitations(self, asked: Asked) -> Imitations:
         """Return what the rivals can imitate of the effect that is taken for true."""
         first, *rivals = self.told
@@ -173,15 +184,23 @@ class DesignQuestion:
             effect_values=self.estimate.effect_values(first.label),
             std=self.std,
             rivals=shapes_of(rivals, self.bare.robot),
+            carries_payload=self.task.load > 0,
         )
 
-    @staticmethod
-    def known(rivals: Imitations, recorded: Dataset) -> TellingMoments:
+    def known(self, rivals: Imitations, recorded: Dataset) -> TellingMoments:
         """Return what the recordings so far tell of the rivals of an effect."""
-        found = []
+        found, extra = [], self._beside()
+        marks = {bool(one.payload) for one in recorded.recordings}
+        some = {
+            mark: replace(
+                rivals, columns=self._columns(extra, carries_payload=mark), carries_payload=mark
+            )
+            for mark in marks
+        }
         for recording in recorded.recordings:
             rows = sample(recording, recorded.filter)
-            found.append(rivals.moments(rows.t, (rows.q, rows.v, rows.a)))
+            own = some[bool(recording.payload)]
+            found.append(own.moments(rows.t, (rows.q, rows.v, rows.a)))
         return reduce(add, found)
 
     def _softer(
@@ -197,7 +216,12 @@ class DesignQuestion:
         sharp = columns.along(t, *motion)[:, :, own]
         for wider in WIDER:
             widths = tuple(wider * one for one in self.bare.friction_widths)
-            soft = ColumnFunction.of(replace(self.bare, friction_width=widths), self.values, extra)
+            soft = ColumnFunction.of(
+                replace(self.bare, friction_width=widths),
+                self.values,
+                extra,
+                carries_payload=self.task.load > 0,
+            )
             if not found:
                 change = soft.along(t, *motion)[:, :, own] - sharp
                 sizes = [np.linalg.norm(one, axis=(0, 1)) for one in (change, sharp)]
@@ -209,7 +233,7 @@ class DesignQuestion:
     def _beside(self) -> tuple[Effect, ...]:
         """Rivals, with the other shapes that they may have, then the effect that is asked for."""
         if not self.told:
-            return self.shown
+            return tuple(one for one in self.shown if one not in self.bare)
         first, *others = self.told
         found: list[Effect] = []
         for rival in others:
@@ -242,9 +266,13 @@ class DesignQuestion:
         """Which of the columns are of interest, (count,), where no effects are told apart."""
         model, joints = self.bare, set(self.task.joints)
         if self.shown:
-            return np.arange(count) >= model.size
+            meant = np.arange(count) >= model.size
+            for one in self.shown:
+                meant[model.slices.get(one.label, slice(0))] = True
+            return meant
         if not joints:
-            return np.ones(count, dtype=bool)
+            # A load that is carried to tell the others is weighed, and not what is asked for.
+            return np.isin(self.bare.names, self.estimate.names)
         names = model.robot.names
         for one in self.task.joints:
             if one not in names:
@@ -266,19 +294,22 @@ def _std(estimate: Estimate) -> np.ndarray:
 def _torque(estimate: Estimate, recorded: Dataset, motions: MotionFamily) -> PredictedTorque:
     """The torque that motions will take; usual ones say how large a column is."""
     model, values, std = estimate.model, estimate.values, _std(estimate)
-    columns, every = ColumnFunction.of(model, values), np.eye(model.size)
+    columns, every = partial(ColumnFunction.of, model, values), np.eye(model.size)
     known, _ = _recorded(columns, every, recorded, std)
-    return PredictedTorque.of(model, values, known, _sizes(every, columns, motions, std))
+    size = _sizes(every, columns(carries_payload=False), motions, std)
+    return PredictedTorque.of(model, values, known, size)
 
 
 def _recorded(
-    columns: ColumnFunction, mix: np.ndarray, recorded: Dataset, std: np.ndarray
+    columns: Callable[..., ColumnFunction], mix: np.ndarray, recorded: Dataset, std: np.ndarray
 ) -> tuple[np.ndarray, float]:
     """Information of the recordings so far, (k, k), and their rows per second."""
     total, rates = np.zeros((mix.shape[1],) * 2), []
+    marks = {bool(one.payload) for one in recorded.recordings}
+    written = {mark: columns(carries_payload=mark) for mark in marks}
     for recording in recorded.recordings:
-        rows = sample(recording, recorded.filter)
-        found = _numbers(columns, columns.along(rows.t, rows.q, rows.v, rows.a)) @ mix
+        rows, own = sample(recording, recorded.filter), written[bool(recording.payload)]
+        found = _numbers(own, own.along(rows.t, rows.q, rows.v, rows.a)) @ mix
         weighted = (found / std[None, :, None]).reshape(-1, mix.shape[1])
         total += weighted.T @ weighted
         rates.append((len(rows.t) - 1) / float(rows.t[-1] - rows.t[0]))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from dynident.effects import Effect
 from dynident.errors import DesignError
 from dynident.experiment_design.information import Objective
@@ -29,6 +31,8 @@ class DesignTask:
         effects at them, all others estimated too; none for all parameters.
     starts, seed : of the search.
     clearance : m, that the robot's links keep from each other; None where that is not looked at.
+    loads : kg, masses of what the last link may carry, of which the one is chosen with which the
+        recording tells most; none for nothing. What is carried is weighed by the recording, too.
     """
 
     duration: float = 10.0
@@ -42,6 +46,7 @@ class DesignTask:
     starts: int = 3
     seed: int = 0
     clearance: float | None = None
+    loads: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         for group in self.tell:
@@ -57,9 +62,20 @@ class DesignTask:
         if self.joints and (self.tell or self.show):
             what = "joints whose parameters are meant, and effects to tell or to show"
             raise DesignError(what, remedy="design a recording for each")
+        if bad := [one for one in self.loads if not 0 <= one < np.inf]:
+            raise DesignError(f"a load of {bad[0]:g} kg", remedy="state masses of 0 kg or more")
+        if any(one.is_payload for group in self.tell for one in group):
+            raise DesignError("a payload to tell apart", remedy="show it, with the load's mass")
+        if any(one.is_payload for one in self.show) and 0.0 in (self.loads or (0.0,)):
+            raise DesignError("a payload to show, and none carried", remedy="state its mass, in kg")
         if self.repeat < 1 or self.starts < 1:
             what = f"repeat = {self.repeat}, starts = {self.starts}"
             raise DesignError(what, remedy="choose 1 or more of each")
+
+    @property
+    def load(self) -> float:
+        """Mass of what is carried, kg: the first of `loads`."""
+        return self.loads[0] if self.loads else 0.0
 
     @property
     def of_what(self) -> str:

@@ -20,7 +20,7 @@ from dynident.experiment_design.motions.fourier_motions import FourierMotions
 from dynident.experiment_design.motions.motion_family import MotionFamily
 from dynident.experiment_design.motions.spline_motions import SplineMotions
 from dynident.experiment_design.predicted_torque import WRONG
-from dynident.experiment_design.recording_design import RecordingDesign
+from dynident.experiment_design.recording_design import LoadTried, RecordingDesign
 from dynident.experiment_design.telling.separation import Separation, times_until
 from dynident.model import Model
 from dynident.progress import logged
@@ -71,6 +71,40 @@ def design(
     progress = progress or logged("designing")
     limits = limits or MotionLimits.of(model.robot)
     limits.require_ranges(model.robot)
+    if len(task.loads) < 2:
+        return _designed(model, recorded, task, limits, progress)
+    found: list[RecordingDesign] = []
+    tried: list[LoadTried] = []
+    refused: list[DesignError] = []
+    for load in dict.fromkeys(task.loads):
+        progress(f"with {load:g} kg on the last link")
+        try:
+            one = _designed(model, recorded, replace(task, loads=(load,)), limits, progress)
+        except DesignError as error:  # a load may be too heavy
+            tried.append(LoadTried(mass=load, why=str(error)))
+            refused.append(error)
+        else:
+            tried.append(LoadTried(mass=load, tells=one.tells))
+            found.append(one)
+    if not found:
+        raise refused[0]
+    best = max(found, key=lambda one: one.tells)
+    return replace(best, loads_tried=tuple(tried))
+
+
+def _designed(
+    model: Model,
+    recorded: Dataset,
+    task: DesignTask,
+    limits: MotionLimits,
+    progress: Callable[[str], None],
+) -> RecordingDesign:
+    """The design with one load, or with none.
+
+    Parameters
+    ----------
+    model, recorded, task, limits, progress : as for `design`; of the loads, the first.
+    """
     workspace = _workspace(model.robot, task, limits)
     motions = _motions(task, limits)
     progress("fitting what was recorded")
@@ -87,7 +121,7 @@ def design(
         workspace=workspace,
     )
     progress("comparing with usual motions")
-    some = _usual_motions(program)
+    some = _usual_motions(program, task.load)
     program = _without_hopeless(program, some)
     usual = sorted(some, key=program.loss)[len(some) // 2]
     found = program.solved(task.starts, task.seed, progress)
@@ -133,16 +167,16 @@ def _workspace(robot: Robot, task: DesignTask, limits: MotionLimits) -> Workspac
     return Workspace(None, limits.boxes)
 
 
-def _usual_motions(program: MotionProgram) -> list[np.ndarray]:
-    """Variables of random motions within the limits, of which there are some."""
+def _usual_motions(program: MotionProgram, load: float) -> list[np.ndarray]:
+    """Variables of random motions within the limits, of which there are some, with a load (kg)."""
     usual = _random_motions(program)
     if not usual:
         _require_known_torque(program)
         kept = program.workspace.in_words()
-        what = "no usual motion is within the limits" + (f" and {kept}" if kept else "")
-        raise DesignError(
-            what, remedy="widen them, or move the joints' ranges to where there is room"
-        )
+        carried = f" with {load:g} kg on the last link" if load else ""
+        what = f"no usual motion{carried} is within the limits" + (f" and {kept}" if kept else "")
+        remedy = "widen them, or move the joints' ranges to where there is room"
+        raise DesignError(what, remedy=f"carry less, {remedy}" if load else remedy)
     return usual
 
 

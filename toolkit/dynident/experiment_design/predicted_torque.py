@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dynident.constraints import ParameterSpace
+from dynident.experiment_design.carried_load import payload_effect
 from dynident.experiment_design.column_function import ColumnFunction
 from dynident.experiment_design.motion_limits import MotionLimits, above_instants
 from dynident.inertia import distance_rows
@@ -36,11 +37,12 @@ class PredictedTorque:
 
     Attributes
     ----------
-    columns : of the model, whose torque is that of the posterior mean.
+    model, columns : with its columns, whose torque is that of the posterior mean.
     values : (p,) this mean.
     factor : (p, p) of the posterior covariance, factor @ factor.T.
     """
 
+    model: Model
     columns: ColumnFunction
     values: np.ndarray
     factor: np.ndarray
@@ -82,7 +84,27 @@ class PredictedTorque:
         lower = np.linalg.cholesky(weighed)
         factor = np.linalg.solve(lower, before.T).T
         mean = given + factor @ (factor.T @ (counted @ (values - given)))
-        return cls(columns=ColumnFunction.of(model, mean), values=mean, factor=factor)
+        columns = ColumnFunction.of(model, mean)
+        return cls(model=model, columns=columns, values=mean, factor=factor)
+
+    def carrying(self, load: np.ndarray) -> PredictedTorque:
+        """Return the torque with a load on the last link, as far off as a link of a description.
+
+        Parameters
+        ----------
+        load : (10,) inertial parameters about the origin of the last joint's frame.
+        """
+        payload = payload_effect(self.model.robot)
+        bare = self.model - payload.label if payload in self.model else self.model
+        model = bare + payload
+        own = model.slices[payload.label]
+        known = [self.model.names.index(name) for name in bare.names]
+        values = np.insert(self.values[known], own.start, load)
+        factor = np.zeros((model.size, self.factor.shape[1] + 1))
+        others = np.delete(np.arange(model.size), np.arange(own.start, own.stop))
+        factor[others, :-1], factor[own, -1] = self.factor[known], WRONG * load
+        columns = ColumnFunction.of(model, values, carries_payload=True)
+        return replace(self, model=model, columns=columns, values=values, factor=factor)
 
     def along(self, t: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Return the torque that is predicted, (T, n) N m or N.

@@ -24,6 +24,22 @@ _CAVEAT = (
 )
 
 
+@dataclass(frozen=True, kw_only=True)
+class LoadTried:
+    """A load that the last link may carry in a recording.
+
+    Attributes
+    ----------
+    mass : kg.
+    tells : as `RecordingDesign.tells`; None where no motion was found.
+    why : that is so.
+    """
+
+    mass: float
+    tells: tuple[int, float] | None = None
+    why: str = ""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecordingDesign(Shown):
     """The answer of `design`.
@@ -39,6 +55,7 @@ class RecordingDesign(Shown):
     estimate : of the recordings so far; where effects are to be told apart, with the first.
     labels : of what is told, those of interest last.
     separations : of the effects to be told apart, a group each; none for another task.
+    loads_tried : each of several loads.
     """
 
     task: DesignTask
@@ -50,6 +67,7 @@ class RecordingDesign(Shown):
     estimate: Estimate
     labels: tuple[str, ...]
     separations: tuple[Separation, ...] = ()
+    loads_tried: tuple[LoadTried, ...] = ()
 
     @property
     def trajectory(self) -> Trajectory:
@@ -74,8 +92,27 @@ class RecordingDesign(Shown):
         return information.sigma(found)
 
     @property
+    def tells(self) -> tuple[int, float]:
+        """How much it tells: of two designs for one task, the larger one tells more.
+
+        How many parameters, and one over the geometric mean of their standard deviations; of
+        effects to be told apart, the standard deviations between those that are least apart.
+        """
+        if self.separations:
+            return len(self.separations), min(one.designed for one in self.separations)
+        after = self.sigma(self.motion.variables)
+        seen = np.isfinite(after)
+        return int(seen.sum()), 1.0 / _mean(after)
+
+    @property
     def sentence(self) -> str:
         """What the recording is worth, in plain words."""
+        if self.task.load:
+            return f"With a load of {self.task.load:g} kg on the last link: {self._sentence}"
+        return self._sentence
+
+    @property
+    def _sentence(self) -> str:
         length = self.task.duration * self.task.repeat
         if self.separations:
             return " ".join(one.sentence(length) for one in self.separations)
@@ -140,7 +177,27 @@ class RecordingDesign(Shown):
         tail = (_CAVEAT, self.motion.ended_in_words)
         told = () if self.separations else (self.sigma_table(),)
         near = () if self.least_distance is None else (self._clear_in_words(),)
-        return (self.sentence, *told, self.limit_table(), *near, *tail)
+        loads = (self.load_table(),) if self.loads_tried else ()
+        return (self.sentence, *loads, *told, self.limit_table(), *near, *tail)
+
+    def load_table(self) -> Table:
+        """The loads that were tried, and what the recording tells with each."""
+        count, best = self.tells
+        rows = []
+        for one in self.loads_tried:
+            if one.tells is None:
+                words = one.why
+            elif self.separations:
+                words = number(one.tells[1], 3)
+            else:
+                words = percent(best / one.tells[1], 0)
+                if one.tells[0] < count:
+                    words += f", and {count - one.tells[0]} parameters not at all"
+            rows.append((f"{one.mass:g}", words))
+        told = "sigma, over those of this design (geometric mean)"
+        if self.separations:
+            told = "standard deviations apart"
+        return Table("Loads on the last link", ("load, kg", told), tuple(rows))
 
     @cached_property
     def least_distance(self) -> float | None:
@@ -173,6 +230,7 @@ class RecordingDesign(Shown):
             "sentence": self.sentence,
             "duration": self.task.duration,
             "repeat": self.task.repeat,
+            "load": self.task.load,
             "joints": list(self.model.robot.names),
             **self.trajectory.coefficients,
             "separations": [one.to_dict() for one in self.separations],

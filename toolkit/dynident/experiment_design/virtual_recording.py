@@ -48,6 +48,7 @@ def record_virtually(
         duration=designed.task.duration * designed.task.repeat,
         file=FILE,
         start=start,
+        payload=designed.task.load > 0,
     )
     return replace(truth, runs=(run,), seed=seed).run()[0]
 

@@ -30,6 +30,8 @@ class DesignFile(SettingsTable):
     """How often the motion is to be followed."""
     duration: Duration
     """Of one repetition."""
+    load: float = Field(default=0.0, ge=0)
+    """What the last link carries, kg."""
     joints: list[str]
     """Their names, in the order of the coefficients."""
     centre: list[float] = Field(default_factory=list)
@@ -64,6 +66,7 @@ def design_file(design: RecordingDesign, study: str, motion: str = "") -> Design
         motion=_digest(motion.encode()) if motion else "",
         repeat=design.task.repeat,
         duration=design.task.duration,
+        load=design.task.load,
         joints=list(design.model.robot.names),
         **design.trajectory.coefficients,
     )

@@ -8,7 +8,6 @@ from itertools import count, islice
 
 import numpy as np
 
-from dynident.diagnosis.evidence_estimate import estimate_of
 from dynident.diagnosis.proposals.proposal import LawPicture, Proposal
 from dynident.diagnosis.proposals.term_library import LibraryTerm, centred, extended, library
 from dynident.diagnosis.proposals.term_screen import Screened, screen
@@ -20,6 +19,7 @@ from dynident.diagnosis.search.shaped_fit import refitted
 from dynident.diagnosis.verdict import within_noise
 from dynident.effects import Effect, LawEffect, law_effect
 from dynident.evidence.evidence import Evidence
+from dynident.evidence.evidence_estimate import estimate_of
 from dynident.evidence.evidence_fit import EvidenceFit, in_metric_of
 from dynident.evidence.held_out import HeldOut
 from dynident.recording import Dataset

@@ -61,6 +61,7 @@ class Imitations:
     effect_values : of the effect, (k,).
     std : (n,) of the noise.
     rivals : each rival in each of its shapes.
+    carries_payload : whether the payload of the model is on board.
     """
 
     model: Model
@@ -69,6 +70,7 @@ class Imitations:
     effect_values: np.ndarray
     std: np.ndarray
     rivals: tuple[Effect, ...]
+    carries_payload: bool = False
 
     def moments(
         self, t: np.ndarray, motion: tuple[np.ndarray, ...], rows: float | None = None
@@ -94,7 +96,7 @@ class Imitations:
         shared = np.concatenate([every[:, :, :size], torque[:, :, None]], axis=2)
         first = self._white(shared)
         crossed, own = [], np.zeros((len(self.rivals), self._most, self._most))
-        block = self.model.block(t, *motion)
+        block = self.model.block(t, *motion, carries_payload=self.carries_payload)
         for place, rival in enumerate(self.rivals):
             found = rival.columns(self.model.ready(rival, block, self.values))
             white, count = self._white(found), found.shape[2]

@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from dynident.diagnosis.verdict import noise_source
 from dynident.errors import FitError
-from dynident.evidence.evidence import Evidence
+from dynident.evidence.evidence import Evidence, noise_source
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence
 from dynident.evidence.held_out import on_recordings
 from dynident.evidence.model_columns import rows_of_run
