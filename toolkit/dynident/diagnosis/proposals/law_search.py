@@ -8,6 +8,7 @@ from itertools import count, islice
 
 import numpy as np
 
+from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.proposals.proposal import LawPicture, Proposal
 from dynident.diagnosis.proposals.term_library import LibraryTerm, centred, extended, library
 from dynident.diagnosis.proposals.term_screen import Screened, screen
@@ -20,7 +21,7 @@ from dynident.diagnosis.verdict import within_noise
 from dynident.effects import Effect, LawEffect, law_effect
 from dynident.evidence.evidence import Evidence
 from dynident.evidence.evidence_estimate import estimate_of
-from dynident.evidence.evidence_fit import EvidenceFit, in_metric_of
+from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of
 from dynident.evidence.held_out import HeldOut
 from dynident.recording import Dataset
 
@@ -58,10 +59,11 @@ class LawSearch:
         names = (f"proposal{k}" for k in count(1))
         free = (name for name in names if name not in known)
         for name in islice(free, self.evidence.criteria.proposals.most):
-            best = self._best(fitted, before, name)
-            if best is None:
+            every = [(self._best(one, before, name), one) for one in self._from(fitted)]
+            tried = [(best, self._with(best.effect, one)) for best, one in every if best]
+            if not tried:
                 return
-            wider = refitted(self.evidence, fitted.model + best.effect, fitted)
+            best, wider = min(tried, key=lambda one: one[1].misfit(fitted))
             after = self._judged(wider)
             proposal = self._proposal(best, (fitted, wider), (before, after))
             if proposal is None:
@@ -89,9 +91,26 @@ class LawSearch:
             if seen is not None and _alike(first, seen):
                 break
             seen = first
-            wider = refitted(self.evidence, fitted.model + first, fitted)
+            wider = self._with(first, fitted)
             metric = in_metric_of(self.evidence, fitted, wider)
         return best
+
+    def _with(self, law: Effect, fitted: EvidenceFit) -> EvidenceFit:
+        """Return the model with a law more, all of it fitted anew, friction widths too."""
+        wider = refitted(self.evidence, fitted.model + law, fitted)
+        return with_friction_width(self.evidence, wider)
+
+    def _from(self, fitted: EvidenceFit) -> Iterator[EvidenceFit]:
+        """Yield fits from which a law is sought.
+
+        What a law does at low speeds may have made dry friction look wider than the study says, and
+        hides behind that: it is sought from there, and from the stated widths.
+        """
+        yield fitted
+        stated, found = self.evidence.model.friction_widths, fitted.model.friction_widths
+        if np.any(found > stated):
+            widths = tuple(np.minimum(stated, found).tolist())
+            yield fit_evidence(self.evidence, replace(fitted.model, friction_width=widths), fitted)
 
     def _joints(self, fitted: EvidenceFit, before: HeldOut) -> list[int]:
         """Joints at which something is left that is worth a law."""
