@@ -109,6 +109,17 @@ def test_both_directions_of_the_wrist_coupling_come_first(found: Diagnosis) -> N
 
 
 @pytest.mark.slow
+def test_the_pages_have_the_figures_of_a_run(found: Diagnosis) -> None:
+    here = STUDY.with_name("README.md").read_text(encoding="utf-8")
+    for step in found.steps:
+        before, after = (100 * x for x in (step.test_error_before, step.test_error_after))
+        assert f"| {before:.2f} % | {after:.2f} % |" in here, step.effect.label
+    ends = f"{100 * found.test_error.before:.2f} to {100 * found.test_error.after:.2f} %"
+    for page in (STUDY.parents[2] / "README.md", STUDY.parents[2] / "docs/howto/coupled_motors.md"):
+        assert ends in page.read_text(encoding="utf-8"), page.name
+
+
+@pytest.mark.slow
 def test_the_error_falls_to_the_published_one_and_never_rises(found: Diagnosis) -> None:
     assert found.test_error.after <= 0.053
     assert all(step.test_error_after <= step.test_error_before for step in found.steps)

@@ -139,7 +139,7 @@ def test_a_map_without_a_sentence_is_put_into_words(found, unknown):
     quiet = replace(found.maps[1], sentence="")
     assert seen(replace(quiet, before=0 * quiet.before)) == "Within the noise."
     assert "Beyond the noise" in seen(replace(quiet, before=9 * quiet.band))
-    assert seen(replace(unknown.maps[1], sentence="")) == "No simple shape stands out."
+    assert seen(replace(unknown.maps[1], sentence="")).startswith("Not judged")
 
 
 def test_candidates_are_ranked_and_the_set_is_bracketed(found):

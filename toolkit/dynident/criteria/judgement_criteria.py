@@ -217,6 +217,14 @@ class StickingCriteria(CriteriaGroup):
         over=0,
         most=0.9,
     )
+    least_seen: float = criterion(
+        0.2,
+        "1",
+        "share of an effect's largest torque in rows that count, below which its values are said "
+        "to be extrapolated",
+        least=0,
+        most=1,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

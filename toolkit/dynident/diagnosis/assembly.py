@@ -31,6 +31,7 @@ from dynident.diagnosis.nuisances.sampling_time import sampling_time
 from dynident.diagnosis.nuisances.stated_noise import stated_noise_notes
 from dynident.diagnosis.nuisances.sticking import shares_left_out
 from dynident.diagnosis.nuisances.unlike_recordings import training_notes, unlike_notes
+from dynident.diagnosis.nuisances.unseen_rows import unseen_notes
 from dynident.diagnosis.result import Diagnosis
 from dynident.diagnosis.search.paired_falls import fall_standard_error, largest_fall
 from dynident.diagnosis.search.path import Path
@@ -140,6 +141,7 @@ def assemble(
             *burst_notes(bursts),
             *rounding_notes(after, given.robot.names, evidence.criteria.verdict),
             *notes_on_steps(steps, held),
+            *unseen_notes(evidence, stages[-1], tuple(step.effect.label for step in steps)),
             *path.notes,
             *search.notes,
         ),

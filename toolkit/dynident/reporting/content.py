@@ -218,7 +218,7 @@ def seen(one: ResidualMap) -> str:
     if one.sentence:
         return one.sentence[0].upper() + one.sentence[1:].rstrip(".") + "."
     if not np.isfinite(one.band).any():
-        return "No simple shape stands out."
+        return "Not judged: the noise is unknown, and nothing here has a name."
     beyond = _beyond(one, one.before)
     return f"{beyond}, without a simple shape." if "points" in beyond else f"{beyond}."
 

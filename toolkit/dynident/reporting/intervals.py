@@ -146,6 +146,8 @@ def _shape_rows(estimate: Estimate, widening: Widening | None) -> list[tuple[str
         factor = 1.0 if widening is None else widening.of(effect.joint)
         x, half = found.value, _QUANTILE * factor * found.sigma
         words, between = _placed(one.means, effect), _interval(x, half)
+        if one.lower >= 0.0 and x < half < np.inf:  # no such shape is negative
+            between = f"up to {number(x + half, _digits(x, half))}"
         rows.append((found.name, words, number(x, 4), between, relative(x, half), one.unit, ""))
     return rows
 
