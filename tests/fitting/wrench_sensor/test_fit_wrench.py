@@ -129,8 +129,8 @@ def test_a_sensor_that_records_what_the_load_does_is_told_by_the_mass() -> None:
     forth, back = weighed(one), weighed(one.replace(tau=-one.tau))
     assert back.records == "what the load does"
     np.testing.assert_allclose(back.loads[0].values, forth.loads[0].values, rtol=1e-9, atol=1e-12)
-    # The constants are of the load's wrench: their sign goes with it.
-    np.testing.assert_allclose(back.constants, forth.constants, rtol=1e-6)
+    # They are constants of what is recorded: what is subtracted from it.
+    np.testing.assert_allclose(back.constants, -forth.constants, rtol=1e-6)
 
 
 @pytest.mark.parametrize("position_std", [0.0, 2e-5, 3e-4])

@@ -6,7 +6,7 @@ effect with the experiment that would show it or distinguish it, residual maps, 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -155,7 +155,8 @@ def assemble(
         sampled=sampling_time(evidence, stages[-1], rounds[-1], least_share=most_of_it),
         training_only=_training_only(verdict, trained, after, evidence),
         bursts=tuple(bursts),
-        **_left_out(search),
+        reversals_left_out=_shares(search, search.doubtful),
+        stops_left_out=_shares(search, set(given.robot.names) - set(search.doubtful)),
     )
 
 
@@ -166,12 +167,10 @@ def _limits(search: Search, held: Evidence | None, trained: HeldOut) -> tuple[De
     return detection_limits(search.evidence, held, search.path.final, search.rounds[-1], trained)
 
 
-def _left_out(search: Search) -> dict[str, dict[str, float]]:
-    """Shares of rows left out around reversals, by why: of another law, or of joints that stick."""
-    every = shares_left_out(search.evidence)
-    doubtful = {joint: every[joint] for joint in search.doubtful}
-    others = {joint: share for joint, share in every.items() if joint not in doubtful}
-    return {"reversals_left_out": doubtful, "stops_left_out": others}
+def _shares(search: Search, joints: Collection[str]) -> dict[str, float]:
+    """Shares of the rows of some joints that are left out around their reversals."""
+    every = shares_left_out(search.evidence).items()
+    return {joint: share for joint, share in every if joint in joints}
 
 
 def _steps_of(path: Path, evidence: Evidence) -> tuple[Step, ...]:

@@ -19,6 +19,10 @@ def unseen_notes(
     evidence : of the training recordings.
     fitted : the final model.
     labels : of effects that were added.
+
+    Returns
+    -------
+    A sentence for each of these effects.
     """
     most, found = evidence.criteria.sticking.least_seen, []
     for effect in fitted.model.effects:

@@ -15,7 +15,6 @@ from dynident.inertia import (
     inertia_matrix,
     margins,
     pseudo_inertia,
-    to_com,
 )
 from dynident.tables import Table, number
 
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
     from dynident.fitting.loads.nearest_possible import PossibleLoad
 
 _STEP = 1e-6  # relative, of central differences
-_DIAGONAL = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+_PLACES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 QUANTITIES = ("mass", "x", "y", "z", *SYMMETRIC)
 UNITS = ("kg", "m", "m", "m", *(("kg m^2",) * 6))
 
@@ -254,11 +253,14 @@ def identified_load(
 def _quantities(phi: np.ndarray) -> np.ndarray:
     """Mass, centre and inertia about the centre, (10,); NaN where they rest on a NaN."""
     found = np.full(10, np.nan)
-    found[0] = phi[0]
-    if not np.all(np.isfinite(phi[:4])) or phi[0] == 0.0:
+    mass, moment = phi[0], phi[1:4]
+    found[0] = mass
+    if not np.isfinite(mass) or mass == 0.0:
         return found
-    found[1:4] = phi[1:4] / phi[0]
-    # Every entry of the shifted inertia rests on one parameter, and on mass and moments.
-    inertia = to_com(phi).inertia_com
-    found[4:] = [inertia[place] for place in _DIAGONAL]
+    found[1:4] = moment / mass
+    # Each entry of the shifted inertia rests on one parameter, on the mass, and on two moments.
+    about_origin = inertia_matrix(phi)
+    for at, (i, j) in enumerate(_PLACES, 4):
+        shift = -np.sum(np.delete(moment, i) ** 2) if i == j else moment[i] * moment[j]
+        found[at] = about_origin[i, j] + shift / mass
     return found

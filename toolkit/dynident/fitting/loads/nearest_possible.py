@@ -12,7 +12,8 @@ from dynident.inertia import PARAMETERS, UNITS, reference_body
 from dynident.nlp import Certificate, Problem
 
 _LENGTH = 0.1  # m, of a load of which nothing says how large it is
-_HELD = 1e-6  # of a parameter's size: sigma of one that was given
+_HELD = 1e-6  # of a body's size: sigma of what was given
+_RANGE = 1e-7  # of the largest sigma, in units of that size: what is less is as good as given
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -53,11 +54,11 @@ def nearest_possible(phi: np.ndarray, covariance: np.ndarray) -> PossibleLoad:
     length = float(np.clip(reach, 1e-3, None)) if np.any(phi[1:]) else _LENGTH
     reference = reference_body(phi, mass, length)
     scale = body_scale(reference)
-    # Nothing is known better than so much of its size, or rounding would decide.
-    std = np.maximum(np.sqrt(np.clip(np.diag(covariance), 0.0, None)), _HELD * scale)
-    held = np.diag(np.clip(std**2 - np.diag(covariance), 0.0, None))
-    values, vectors = np.linalg.eigh((covariance + held) / np.outer(std, std))
-    root = (vectors / np.sqrt(np.maximum(values, 1e-12 * values[-1]))).T / std
+    # Nothing is known better than so much of its size, or rounding would decide. Of a given centre
+    # combinations of parameters are known, and none of them alone.
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    least = max(_HELD**2, _RANGE**2 * values[-1])
+    root = (vectors / np.sqrt(np.maximum(values, least))).T / scale
     none = np.full(10, np.inf)
     space = ParameterSpace(
         names=PARAMETERS,

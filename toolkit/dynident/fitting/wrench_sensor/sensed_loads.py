@@ -25,7 +25,8 @@ class SensedLoads(Shown):
     frame : the link in whose frame the wrench is stated.
     records : whether the sensor records what moves the load, or what the load does to it.
     loads : first what hangs on it in recordings that name no load, if there are such.
-    constants : (6,) offset of each component, N and N m; NaN where it is not told apart.
+    constants : (6,) offset of each component as it is recorded, N and N m; NaN where it is not told
+        apart.
     sigma : (6,) of them.
     residual_std : (6,) N and N m.
     wrench_rms : (6,) root mean square of what was recorded, less what was given of loads.

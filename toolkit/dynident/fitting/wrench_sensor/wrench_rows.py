@@ -167,7 +167,8 @@ class WrenchProblem:
             W, wrench = parallel.apply_each([found[:, n:].copy(), motion.tau[:, n:].copy()], plan)
             wrench = sign * wrench
             block = np.zeros((len(W), 6, self.constants.stop))
-            block[:, :, self.constants] = np.eye(6)
+            # They are constants of what is recorded, whichever way round that is.
+            block[:, :, self.constants] = sign * np.eye(6)
             for load, parts, own in zip(self.bodies, self.splits, self.slices, strict=True):
                 if load.name in (ALWAYS, sampled.recording.load):
                     block[:, :, own] = W @ parts.unknown

@@ -45,7 +45,11 @@ class ZerosGuess:
     def evidence(self) -> str:
         """What the described bodies show, in words."""
         before, after = (percent(one) for one in self.described)
-        return f"; the bodies as described, with friction, leave {after} instead of {before}"
+        though = ", though" if self.described[1] > self.described[0] else ";"
+        return (
+            f"{though} the bodies as described, scaled joint by joint, with friction and rotors, "
+            f"leave {after} instead of {before}"
+        )
 
 
 def guess_zeros(
