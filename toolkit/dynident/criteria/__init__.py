@@ -41,6 +41,7 @@ from dynident.criteria.judgement_criteria import (
 from dynident.criteria.search_criteria import (
     GateCriteria,
     GlobalSearchCriteria,
+    ProposalCriteria,
     SearchCriteria,
     ShapeCriteria,
 )
@@ -59,6 +60,7 @@ __all__ = [
     "MapCriteria",
     "NoiseCriteria",
     "NuisanceCriteria",
+    "ProposalCriteria",
     "SearchCriteria",
     "ShapeCriteria",
     "StickingCriteria",

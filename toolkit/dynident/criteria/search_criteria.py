@@ -379,6 +379,14 @@ class ProposalCriteria(CriteriaGroup):
         over=0,
         most=1,
     )
+    simpler: float = criterion(
+        0.05,
+        "1",
+        "share of the drop by which a law of fewer parameters may fall short of a better one that "
+        "blocks of time do not tell from it, and comes first",
+        least=0,
+        most=1,
+    )
     contenders: int = criterion(12, "laws", "laws of each screening that are looked at", least=1)
     seeds: int = criterion(
         6, "laws", "products of two factors of each screening that a third is tried with", least=0

@@ -8,6 +8,7 @@ from itertools import count, islice
 
 import numpy as np
 
+from dynident.criteria import ProposalCriteria
 from dynident.diagnosis.nuisances.friction_width import with_friction_width
 from dynident.diagnosis.proposals.proposal import LawPicture, Proposal
 from dynident.diagnosis.proposals.term_library import LibraryTerm, centred, extended, library
@@ -174,7 +175,7 @@ class LawSearch:
                 price = criteria.factor_price * term.price
                 passing.append(replace(one, penalised=one.penalised - price))
         passing.sort(key=lambda one: -one.penalised)
-        return _each_once(passing)
+        return _simplest_first(_each_once(passing), criteria)
 
     def _proposal(
         self,
@@ -207,7 +208,7 @@ class LawSearch:
             test_error_before=before.error,
             test_error_after=after.error,
             noise_floor=after.floor,
-            rivals=best.rivals(criteria.rival_level),
+            rivals=best.rivals(criteria),
             remark=_remark(effect),
             picture=_picture(before, after, fitted, str(effect.joint)),
         )
@@ -248,16 +249,11 @@ class _BestLaws:
         assert isinstance(effect, LawEffect)
         return effect
 
-    def rivals(self, level: float) -> tuple[LawEffect, ...]:
+    def rivals(self, criteria: ProposalCriteria) -> tuple[LawEffect, ...]:
         """Return the others that no signed-rank test over the held-out blocks tells from it."""
         best, *others = self.scores
-        found = []
-        for other in others:
-            assert best.losses is not None and other.losses is not None
-            if signed_rank(other.losses, best.losses) >= level:
-                assert isinstance(other.effect, LawEffect)
-                found.append(other.effect)
-        return tuple(found)
+        found = [one.effect for one in others if _as_good(one, best, criteria)]
+        return tuple(one for one in found if isinstance(one, LawEffect))
 
 
 def _recentred(effect: LawEffect) -> LawEffect:
@@ -294,6 +290,32 @@ def _each_once(scores: Sequence[Score]) -> list[Score]:
         if not any(_alike(one.effect, other.effect) for other in kept):
             kept.append(one)
     return kept
+
+
+def _simplest_first(scores: list[Score], criteria: ProposalCriteria) -> list[Score]:
+    """Scores with the simplest of those first that nothing tells from the best.
+
+    A wave of a low frequency is a constant, or a line: beside another law it is as good as none.
+    """
+    if not scores:
+        return scores
+    best, least = scores[0], (1.0 - criteria.simpler) * scores[0].penalised
+    alike = [one for one in scores if one.penalised >= least and _as_good(one, best, criteria)]
+    first = min(alike, key=_parameters, default=best)
+    return [first, *(one for one in scores if one is not first)]
+
+
+def _as_good(one: Score, best: Score, criteria: ProposalCriteria) -> bool:
+    """Whether no signed-rank test over the held-out blocks tells a law from the best."""
+    assert best.losses is not None and one.losses is not None
+    return signed_rank(one.losses, best.losses) >= criteria.rival_level
+
+
+def _parameters(score: Score) -> int:
+    """Of a law: coefficients and shapes."""
+    assert isinstance(score.effect, LawEffect)
+    law = score.effect.made_of
+    return len(law.linear) + len(law.shape)
 
 
 def _alike(one: Effect, other: Effect) -> bool:
