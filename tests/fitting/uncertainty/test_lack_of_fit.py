@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import two_link_loop as lab
-from dynident.fitting import Estimate, LeastSquares, fit, load_estimate
+from dynident import IV, Constrained, Regression
+from dynident.fitting import Estimate, LeastSquares, Method, SwappedPeriods, fit, load_estimate
 from dynident.fitting.uncertainty.lack_of_fit import widened
 from dynident.recording import Dataset
 
@@ -27,6 +28,13 @@ def test_a_missing_effect_is_said_in_the_first_line(rejected: Estimate, tmp_path
     assert first.startswith("The model is rejected") and "at shoulder" in first
     assert "cluster sandwich" in rejected.words_of_sigma
     assert load_estimate(rejected.save(tmp_path / "e.json")).headline == rejected.headline
+
+
+@pytest.mark.parametrize("method", [Constrained(), IV(SwappedPeriods()), Regression("ridge")])
+def test_whatever_fitted_it_a_model_that_is_rejected_says_so(method: Method) -> None:
+    found = fit(lab.model(), repeated(stribeck=0.4), method)
+    assert "The model is rejected" in found.headline
+    assert "rejected" not in fit(lab.model(), repeated(), method).headline
 
 
 def test_its_intervals_are_wider_in_every_direction(rejected: Estimate) -> None:

@@ -11,6 +11,7 @@ from dynident.errors import FitError
 from dynident.fitting.estimate import Estimate
 from dynident.fitting.least_squares import LeastSquares
 from dynident.fitting.row_objective import refine_shapes, shaped_effects
+from dynident.fitting.uncertainty.lack_of_fit import lack_of_fit
 from dynident.fitting.uncertainty.shape_errors import with_shape_errors
 from dynident.fitting.uncertainty.standing_joints import (
     standing_in,
@@ -98,6 +99,10 @@ def fit(
 def _fitted(model: Model, dataset: Dataset, method: Method) -> Estimate:
     dataset = without_stops(model, dataset)
     estimate = _with_shapes(model, dataset, method)
+    if not isinstance(method, LeastSquares):  # which widens its sigma by what speaks against it
+        judged = lack_of_fit(estimate.model, dataset, estimate.values)
+        said = (estimate.headline, judged.headline if judged is not None else "")
+        estimate = replace(estimate, headline=" ".join(filter(None, said)))
     notes = (standing_note(dataset), too_wide_note(model, dataset))
     notes = (*estimate.notes, *filter(None, notes))
     return replace(estimate, notes=notes, standing=standing_in(dataset))

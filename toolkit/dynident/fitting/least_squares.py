@@ -81,7 +81,7 @@ class LeastSquares:
             return estimate
         found = row_errors(model, dataset, solution.values, solution, columns)
         covariance, words, headline = found.covariance, found.words, ""
-        judged = lack_of_fit(model, dataset, solution.values, solution)
+        judged = lack_of_fit(model, dataset, solution.values)
         if judged is not None and judged.rejected:
             other, words = scattered(model, dataset, solution.values, solution)
             covariance, headline = widened(covariance, other), judged.headline

@@ -70,16 +70,13 @@ class LackOfFit:
         )
 
 
-def lack_of_fit(
-    model: Model, dataset: Dataset, values: np.ndarray, solution: LinearSolution
-) -> LackOfFit | None:
+def lack_of_fit(model: Model, dataset: Dataset, values: np.ndarray) -> LackOfFit | None:
     """Compare what repetitions have in common with what they have not.
 
     Parameters
     ----------
     model, values : (p,) the estimate.
     dataset : what was fitted.
-    solution : its weights and independent columns.
 
     Returns
     -------
@@ -125,7 +122,8 @@ def scattered(
 
     Parameters
     ----------
-    model, dataset, values, solution : as for `lack_of_fit`.
+    model, dataset, values : as for `lack_of_fit`.
+    solution : its weights and independent columns.
 
     Returns
     -------
