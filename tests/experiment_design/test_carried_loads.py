@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from dynident.cli import main
-from dynident.effects import effects_of
+from dynident.effects import Law, effects_of, law_effect
 from dynident.errors import DesignError
 from dynident.experiment_design import DesignTask, MotionLimits, design
 from dynident.experiment_design.carried_load import payload_effect, usual_load
 from dynident.experiment_design.column_function import ColumnFunction
 from dynident.experiment_design.design_files import write_design
+from dynident.experiment_design.telling.imitations import Imitations
+from dynident.experiment_design.virtual_recording import record_virtually
 from dynident.experiment_design.written_design import read_design
 from dynident.fitting import fit
 from dynident.inertia import pseudo_inertia
@@ -85,7 +87,7 @@ def test_what_a_recording_is_to_tell_of_a_load_is_what_it_tells() -> None:
     for name in known:
         sigma = told.sigma[told.names.index(name)]
         assert 0.75 < sigma / predicted[name] < 1.35, name
-    assert "a load of 1.5 kg on the last link" in found.sentence
+    assert "The last link carries 1.5 kg." in found.sentence
     assert not np.isfinite(found.sigma(None)).any()
 
 
@@ -110,6 +112,71 @@ def test_of_several_loads_the_one_that_tells_most_is_carried() -> None:
     assert "1000" in str(found.load_table())
 
 
+def test_a_pair_that_no_motion_tells_does_not_choose_the_load() -> None:
+    labels = "load_friction@elbow", "coulomb_friction@elbow", "viscous_friction@elbow"
+    friction, dry, viscous = (effects_of(label, ROBOT)[0] for label in labels)
+    same = law_effect(Law(name="same", torque="c*v"))("elbow").on(ROBOT)
+    true = MODEL - "coulomb_friction@elbow" + friction
+    data = Dataset((synthetic(true, true_values(true, mu__elbow=0.1), 1, torque_std=NOISE),))
+    task = DesignTask(tell=((viscous, same), (friction, dry)), loads=(0.0, 3.0), **SHORT)
+    found = design(true - "load_friction@elbow", data, task)
+    tried = {one.mass: one.tells for one in found.loads_tried}
+    assert [one[0] for one in tried.values() if one] == [1, 1]
+    assert found.task.load == max(tried, key=lambda mass: tried[mass] or (0, 0.0))
+    assert found.tells[1] > 1.0
+
+
+def test_rivals_imitate_with_the_load_on_board() -> None:
+    model = MODEL - "coulomb_friction@elbow" + PAYLOAD
+    values = true_values(model)
+    values[model.slices["payload"]] = usual_load(ROBOT, 3.0)
+    dry, friction = (effects_of(f"{one}_friction@elbow", ROBOT)[0] for one in ("coulomb", "load"))
+    q, v, a = ROBOT.random_motion(4, 200)
+    t = np.linspace(0, 3, 200)
+    for carries in (False, True):
+        rivals = Imitations(
+            model=model,
+            values=values,
+            columns=ColumnFunction.of(model, values, (dry,), carries_payload=carries),
+            effect_values=np.array([0.5]),
+            std=np.ones(2),
+            rivals=(friction,),
+            carries_payload=carries,
+        )
+        block = model.block(t, q, v, a, carries_payload=carries)
+        own = friction.columns(model.ready(friction, block, values)).ravel()
+        found = rivals.moments(t, (q, v, a)).own
+        np.testing.assert_allclose(found.ravel(), own @ own, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("loads", "said"), [((), "payload"), ((2.0,), "payload")])
+def test_a_payload_that_the_model_has_is_refused(loads: tuple[float, ...], said: str) -> None:
+    """What the recordings carry would count as known, or for the next one's load."""
+    with pytest.raises(DesignError, match=said):
+        design(MODEL + PAYLOAD, recorded(), DesignTask(loads=loads, **SHORT))
+
+
+def test_recordings_that_carry_a_load_are_refused_for_another() -> None:
+    marked = Dataset(tuple(one.replace(payload=True) for one in recorded().recordings))
+    with pytest.raises(DesignError, match="carries a payload"):
+        design(MODEL, marked, DesignTask(loads=(2.0,), **SHORT))
+
+
+def test_limits_of_torque_leave_room_for_another_centre() -> None:
+    limits = MotionLimits.of(ROBOT)
+    limits.torque[:] = 120.0, 25.0
+    found = design(MODEL, recorded(), DesignTask(loads=(3.0,), **SHORT), limits=limits)
+    model, load = MODEL + PAYLOAD, usual_load(ROBOT, 3.0)
+    values = true_values(model)
+    q, v, a = found.trajectory.at(np.linspace(0.0, 6.0, 3001))
+    block = model.block(np.linspace(0.0, 6.0, 3001), q, v, a, carries_payload=True)
+    for shift in (0.1, -0.1):
+        moved = load + np.eye(10)[1] * 3.0 * shift
+        values[model.slices["payload"]] = moved
+        torque = model.torque(block, values)
+        assert np.all(np.abs(torque).max(axis=0) <= limits.torque)
+
+
 def test_files_say_what_is_carried(tmp_path: Path) -> None:
     import dynident as di
     from dynident.closed_loop import load_experiment
@@ -122,7 +189,9 @@ def test_files_say_what_is_carried(tmp_path: Path) -> None:
     assert [run.payload for run in experiment.runs] == [True]
     (carried,) = (one for one in experiment.effects if one.effect.is_payload)
     assert carried.values[0] == pytest.approx(0.5)
-    assert "payload" not in found.model.robot.names and found.to_dict()["load"] == 0.5
+    assert found.to_dict()["load"] == 0.5
+    with pytest.raises(DesignError, match="payload"):  # this robot has none
+        record_virtually(found, load_experiment(PROBLEM / "experiment.toml"), 1)
 
 
 @pytest.mark.parametrize(
@@ -130,8 +199,9 @@ def test_files_say_what_is_carried(tmp_path: Path) -> None:
     [
         ({"loads": (-1.0,)}, "a load of -1 kg"),
         ({"loads": (np.inf,)}, "a load of inf kg"),
-        ({"show": (PAYLOAD,)}, "none carried"),
-        ({"show": (PAYLOAD,), "loads": (0.0, 2.0)}, "none carried"),
+        ({"show": (PAYLOAD,)}, "state its mass"),
+        ({"show": (PAYLOAD,), "loads": (0.0,)}, "state its mass"),
+        ({"show": (PAYLOAD,), "loads": (1.0, 2.0)}, "and no other"),
         ({"tell": ((PAYLOAD, effects_of("drive_gain@elbow", ROBOT)[0]),)}, "a payload to tell"),
     ],
 )

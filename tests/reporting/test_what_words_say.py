@@ -83,10 +83,14 @@ def test_shapes_have_intervals_where_their_sigma_is_known(found: Diagnosis) -> N
     value = next(e.shape[0] for e in after.model.effects if e.shape)
     unknown = {row[0]: row for row in parameter_table(after, None, "replicates").rows}
     assert unknown[name][3] == "-"
-    known = replace(after, shapes=(ShapeValue(name=name, value=value, sigma=0.1, unit="rad/s"),))
+    known = replace(after, shapes=(ShapeValue(name=name, value=value, sigma=0.02, unit="rad/s"),))
     rows = {row[0]: row for row in parameter_table(known, None, "replicates").rows}
     low, high = map(float, rows[name][3].split(" to "))
-    assert high - low == pytest.approx(2 * 1.96 * 0.1, rel=0.05) and low < value < high
+    assert high - low == pytest.approx(2 * 1.96 * 0.02, rel=0.05) and low < value < high
+    wide = replace(after, shapes=(ShapeValue(name=name, value=value, sigma=value, unit="rad/s"),))
+    rows = {row[0]: row for row in parameter_table(wide, None, "replicates").rows}
+    said, _, most = rows[name][3].rpartition(" ")  # no such speed is negative
+    assert said == "up to" and float(most) == pytest.approx(2.96 * value, rel=0.05)
 
 
 def test_a_stated_coupling_is_not_doubted_by_what_is_left_there(found: Diagnosis) -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from dynident.diagnosis.proposals.proposals_of import proposals_of
+from dynident.evidence.evidence_fit import fit_evidence
 from laws_hidden import MODEL, path, recordings, searched, together, with_law
 
 
@@ -23,6 +24,30 @@ def test_a_hidden_law_is_proposed_with_its_coefficient() -> None:
     assert found.is_explanation
     assert found.noise_floor is not None
     assert found.test_error_after < 1.05 * found.noise_floor
+
+
+@pytest.mark.slow
+def test_a_law_of_low_speeds_is_found_behind_friction_that_looks_wide() -> None:
+    """A missing law that fades with the speed widens dry friction, and hides behind that."""
+    torque = "c*q*sign(v)*exp(-abs(v)/0.07)"
+    search, fitted = searched(recordings({torque: 1.0}))
+    wide = fit_evidence(search.evidence, MODEL.with_friction_width("elbow", 0.1), fitted)
+    found = next(search.found(wide)).proposal
+    assert found.torque == "c*sign(v)*exp(-abs(v)/w)*q"
+    (speed,) = found.effect.shape
+    assert speed == pytest.approx(0.07, abs=4 * found.shape_sigma[0]) and speed < 0.1
+    assert "at elbow in place of 0.1" in found.remark
+    # Both searches count.
+    alone = next(search.found(fitted)).proposal
+    assert found.tried > 1.5 * alone.tried and not alone.remark
+
+
+def test_of_laws_that_nothing_tells_apart_the_simplest_comes_first() -> None:
+    """A wave of a low frequency beside it is a constant, and never worse on the rows fitted."""
+    search, fitted = searched(recordings({"c*v*q": 0.5}))
+    found = next(search.found(fitted)).proposal
+    assert found.torque == "c*v*q"
+    assert any("sin(k*q[shoulder])" in one.made_of.torque for one in found.rivals)
 
 
 @pytest.mark.slow

@@ -83,12 +83,8 @@ class JointFall:
     @property
     def is_large(self) -> bool:
         """Whether it takes a good part of what that joint leaves, and not by chance."""
-        return self.is_fall and self.before - self.after >= LARGE_AT_A_JOINT * self.before
-
-    @property
-    def is_fall(self) -> bool:
-        """Whether it falls, and not by chance."""
-        return self._beyond(_BEST, self.before - self.after)
+        fall = self.before - self.after
+        return self._beyond(_BEST, fall) and fall >= LARGE_AT_A_JOINT * self.before
 
     @property
     def is_rise(self) -> bool:
@@ -147,10 +143,10 @@ class Step:
     def uncertain(self) -> bool:
         """Whether its fall is within two standard errors: blocks of time scatter as much.
 
-        Over all joints a small one counts for little: a fall there that is certain is none here.
+        Over all joints a small one counts for little: what is large at its own joint is certain.
         """
         there = self.at_joint
-        return self.uncertain_over_all and not (there is not None and there.is_fall)
+        return self.uncertain_over_all and not (there is not None and there.is_large)
 
     @property
     def uncertain_over_all(self) -> bool:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial, reduce
+from functools import reduce
 from operator import add
 
 import numpy as np
@@ -99,19 +99,19 @@ class DesignQuestion:
         -------
         The question of that group; without one, that of what is to be shown, or of all parameters.
         """
+        _require_no_payload(model, recorded, task)
         robot = model.robot
         told = tuple(one.on(robot) for one in told)
         shown = () if told else tuple(one.on(robot) for one in task.show)
         bare = model
         for one in (*told, *shown):
-            bare = bare - one.label if one in bare and not one.is_payload else bare
+            bare = bare - one.label if one in bare else bare
         estimate = fit(bare + told[:1] if told else bare, recorded)
         fitted = {one.label: one for one in estimate.model.effects}
         torque = _torque(estimate, recorded, motions)
         if task.load:
             torque = torque.carrying(usual_load(robot, task.load))
-            carried = payload_effect(robot)
-            bare = bare if carried in bare else bare + carried
+            bare = bare + payload_effect(robot)
         return cls(
             task=task,
             told=tuple(fitted.get(one.label, one) for one in told),
@@ -151,7 +151,8 @@ class DesignQuestion:
             named = self.told[0].title if self.told else task.of_what or "the model"
             raise DesignError(f"no motion of this robot makes a torque of {named}")
         mix = mix[:, kept]
-        prior, rate = _recorded(partial(self._columns, extra), mix, recorded, std)
+        unladen = self._columns(extra, carries_payload=False)
+        prior, rate = _recorded(unladen, mix, recorded, std)
         rows = rate * task.duration * task.repeat
         softer = self._softer(columns, extra, motions)
         information = Information(
@@ -188,19 +189,12 @@ class DesignQuestion:
         )
 
     def known(self, rivals: Imitations, recorded: Dataset) -> TellingMoments:
-        """Return what the recordings so far tell of the rivals of an effect."""
-        found, extra = [], self._beside()
-        marks = {bool(one.payload) for one in recorded.recordings}
-        some = {
-            mark: replace(
-                rivals, columns=self._columns(extra, carries_payload=mark), carries_payload=mark
-            )
-            for mark in marks
-        }
+        """Return what the recordings so far, without a load, tell of the rivals of an effect."""
+        columns = self._columns(self._beside(), carries_payload=False)
+        found, rivals = [], replace(rivals, columns=columns, carries_payload=False)
         for recording in recorded.recordings:
             rows = sample(recording, recorded.filter)
-            own = some[bool(recording.payload)]
-            found.append(own.moments(rows.t, (rows.q, rows.v, rows.a)))
+            found.append(rivals.moments(rows.t, (rows.q, rows.v, rows.a)))
         return reduce(add, found)
 
     def _softer(
@@ -291,25 +285,39 @@ def _std(estimate: Estimate) -> np.ndarray:
     return np.where(found > 0, found, np.inf)
 
 
+def _require_no_payload(model: Model, recorded: Dataset, task: DesignTask) -> None:
+    """Raise `DesignError` if the recordings carry a load, where that would not be allowed for."""
+    if any(effect.is_payload for effect in model.effects):
+        raise DesignError(
+            "is not designed for: what the recordings carry would count as known",
+            "payload",
+            "leave it out, and the recordings that carry it; a load says what the next one carries",
+        )
+    carrying = next((one for one in recorded.recordings if one.payload), None)
+    if task.load and carrying is not None:
+        raise DesignError(
+            "carries a payload, and may be another than the next recording's",
+            carrying.where,
+            "leave the recordings that carry it out",
+        )
+
+
 def _torque(estimate: Estimate, recorded: Dataset, motions: MotionFamily) -> PredictedTorque:
     """The torque that motions will take; usual ones say how large a column is."""
     model, values, std = estimate.model, estimate.values, _std(estimate)
-    columns, every = partial(ColumnFunction.of, model, values), np.eye(model.size)
+    columns, every = ColumnFunction.of(model, values), np.eye(model.size)
     known, _ = _recorded(columns, every, recorded, std)
-    size = _sizes(every, columns(carries_payload=False), motions, std)
-    return PredictedTorque.of(model, values, known, size)
+    return PredictedTorque.of(model, values, known, _sizes(every, columns, motions, std))
 
 
 def _recorded(
-    columns: Callable[..., ColumnFunction], mix: np.ndarray, recorded: Dataset, std: np.ndarray
+    columns: ColumnFunction, mix: np.ndarray, recorded: Dataset, std: np.ndarray
 ) -> tuple[np.ndarray, float]:
     """Information of the recordings so far, (k, k), and their rows per second."""
     total, rates = np.zeros((mix.shape[1],) * 2), []
-    marks = {bool(one.payload) for one in recorded.recordings}
-    written = {mark: columns(carries_payload=mark) for mark in marks}
     for recording in recorded.recordings:
-        rows, own = sample(recording, recorded.filter), written[bool(recording.payload)]
-        found = _numbers(own, own.along(rows.t, rows.q, rows.v, rows.a)) @ mix
+        rows = sample(recording, recorded.filter)
+        found = _numbers(columns, columns.along(rows.t, rows.q, rows.v, rows.a)) @ mix
         weighted = (found / std[None, :, None]).reshape(-1, mix.shape[1])
         total += weighted.T @ weighted
         rates.append((len(rows.t) - 1) / float(rows.t[-1] - rows.t[0]))

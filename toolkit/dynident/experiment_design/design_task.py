@@ -66,8 +66,8 @@ class DesignTask:
             raise DesignError(f"a load of {bad[0]:g} kg", remedy="state masses of 0 kg or more")
         if any(one.is_payload for group in self.tell for one in group):
             raise DesignError("a payload to tell apart", remedy="show it, with the load's mass")
-        if any(one.is_payload for one in self.show) and 0.0 in (self.loads or (0.0,)):
-            raise DesignError("a payload to show, and none carried", remedy="state its mass, in kg")
+        if any(one.is_payload for one in self.show) and (len(self.loads) != 1 or not self.load):
+            raise DesignError("a payload to show", remedy="state its mass, in kg, and no other")
         if self.repeat < 1 or self.starts < 1:
             what = f"repeat = {self.repeat}, starts = {self.starts}"
             raise DesignError(what, remedy="choose 1 or more of each")

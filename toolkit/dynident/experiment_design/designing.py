@@ -71,12 +71,13 @@ def design(
     progress = progress or logged("designing")
     limits = limits or MotionLimits.of(model.robot)
     limits.require_ranges(model.robot)
-    if len(task.loads) < 2:
+    loads = tuple(dict.fromkeys(task.loads))
+    if len(loads) < 2:
         return _designed(model, recorded, task, limits, progress)
     found: list[RecordingDesign] = []
     tried: list[LoadTried] = []
     refused: list[DesignError] = []
-    for load in dict.fromkeys(task.loads):
+    for load in loads:
         progress(f"with {load:g} kg on the last link")
         try:
             one = _designed(model, recorded, replace(task, loads=(load,)), limits, progress)
@@ -171,7 +172,8 @@ def _usual_motions(program: MotionProgram, load: float) -> list[np.ndarray]:
     """Variables of random motions within the limits, of which there are some, with a load (kg)."""
     usual = _random_motions(program)
     if not usual:
-        _require_known_torque(program)
+        if not load:  # what is not known of a load no recording tells
+            _require_known_torque(program)
         kept = program.workspace.in_words()
         carried = f" with {load:g} kg on the last link" if load else ""
         what = f"no usual motion{carried} is within the limits" + (f" and {kept}" if kept else "")

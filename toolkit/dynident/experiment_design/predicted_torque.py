@@ -20,6 +20,8 @@ from dynident.model import Model
 
 WRONG = 0.2
 """Relative standard deviation of what a description says of a link."""
+CENTRE = 0.05
+"""Standard deviation of the centre of mass of a load, m, of which nothing is stated."""
 SIGMAS = 3.0
 """Standard deviations of the predicted torque that stay below a limit, too."""
 _EFFECTS = 100.0
@@ -88,21 +90,21 @@ class PredictedTorque:
         return cls(model=model, columns=columns, values=mean, factor=factor)
 
     def carrying(self, load: np.ndarray) -> PredictedTorque:
-        """Return the torque with a load on the last link, as far off as a link of a description.
+        """Return the torque with a load on the last link, whose size and centre may be others.
 
         Parameters
         ----------
         load : (10,) inertial parameters about the origin of the last joint's frame.
         """
         payload = payload_effect(self.model.robot)
-        bare = self.model - payload.label if payload in self.model else self.model
-        model = bare + payload
+        model = self.model + payload
         own = model.slices[payload.label]
-        known = [self.model.names.index(name) for name in bare.names]
-        values = np.insert(self.values[known], own.start, load)
-        factor = np.zeros((model.size, self.factor.shape[1] + 1))
+        values = np.insert(self.values, own.start, load)
+        spread = np.column_stack([WRONG * load, np.eye(10)[:, 1:4] * (load[0] * CENTRE)])
+        factor = np.zeros((model.size, self.factor.shape[1] + spread.shape[1]))
         others = np.delete(np.arange(model.size), np.arange(own.start, own.stop))
-        factor[others, :-1], factor[own, -1] = self.factor[known], WRONG * load
+        factor[others, : self.factor.shape[1]] = self.factor
+        factor[own, self.factor.shape[1] :] = spread
         columns = ColumnFunction.of(model, values, carries_payload=True)
         return replace(self, model=model, columns=columns, values=values, factor=factor)
 

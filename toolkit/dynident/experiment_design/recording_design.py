@@ -13,7 +13,7 @@ from dynident.experiment_design.design_task import DesignTask
 from dynident.experiment_design.motion_limits import MotionLimits
 from dynident.experiment_design.motion_program import FINER, MotionProgram
 from dynident.experiment_design.motion_solver import DesignedMotion
-from dynident.experiment_design.telling.separation import Separation
+from dynident.experiment_design.telling.separation import NEVER, Separation
 from dynident.fitting.estimate import Estimate
 from dynident.model import Model
 from dynident.tables import Shown, Table, number, percent
@@ -96,10 +96,12 @@ class RecordingDesign(Shown):
         """How much it tells: of two designs for one task, the larger one tells more.
 
         How many parameters, and one over the geometric mean of their standard deviations; of
-        effects to be told apart, the standard deviations between those that are least apart.
+        effects to be told apart, how many groups, and the standard deviations between those that
+        are least apart; groups that no motion tells do not count.
         """
         if self.separations:
-            return len(self.separations), min(one.designed for one in self.separations)
+            told = [one.designed for one in self.separations if one.designed > NEVER]
+            return len(told), min(told, default=0.0)
         after = self.sigma(self.motion.variables)
         seen = np.isfinite(after)
         return int(seen.sum()), 1.0 / _mean(after)
@@ -107,9 +109,8 @@ class RecordingDesign(Shown):
     @property
     def sentence(self) -> str:
         """What the recording is worth, in plain words."""
-        if self.task.load:
-            return f"With a load of {self.task.load:g} kg on the last link: {self._sentence}"
-        return self._sentence
+        carried = f" The last link carries {self.task.load:g} kg." if self.task.load else ""
+        return f"{self._sentence}{carried}"
 
     @property
     def _sentence(self) -> str:
@@ -191,8 +192,8 @@ class RecordingDesign(Shown):
                 words = number(one.tells[1], 3)
             else:
                 words = percent(best / one.tells[1], 0)
-                if one.tells[0] < count:
-                    words += f", and {count - one.tells[0]} parameters not at all"
+            if one.tells is not None and one.tells[0] < count:
+                words += f", and {count - one.tells[0]} not at all"
             rows.append((f"{one.mass:g}", words))
         told = "sigma, over those of this design (geometric mean)"
         if self.separations:
@@ -231,6 +232,10 @@ class RecordingDesign(Shown):
             "duration": self.task.duration,
             "repeat": self.task.repeat,
             "load": self.task.load,
+            "loads_tried": [
+                {"load": one.mass, "tells": one.tells and list(one.tells), "why": one.why}
+                for one in self.loads_tried
+            ],
             "joints": list(self.model.robot.names),
             **self.trajectory.coefficients,
             "separations": [one.to_dict() for one in self.separations],

@@ -42,7 +42,11 @@ def record_virtually(
     ------
     SimulationError
         If the loop diverges.
+    DesignError
+        If the motion is for a load, and the robot has no payload to carry.
     """
+    if designed.task.load and not any(one.effect.is_payload for one in truth.effects):
+        raise DesignError("the robot that is to carry a load has none", "payload", "add the effect")
     run = ExperimentRun(
         trajectory=designed.trajectory,
         duration=designed.task.duration * designed.task.repeat,

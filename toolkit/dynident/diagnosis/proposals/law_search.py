@@ -25,6 +25,7 @@ from dynident.evidence.evidence_estimate import estimate_of
 from dynident.evidence.evidence_fit import EvidenceFit, fit_evidence, in_metric_of
 from dynident.evidence.held_out import HeldOut
 from dynident.recording import Dataset
+from dynident.tables import number
 
 _SAME_SHAPE = 0.1
 _AT_BOUND = 1e-3
@@ -60,7 +61,8 @@ class LawSearch:
         names = (f"proposal{k}" for k in count(1))
         free = (name for name in names if name not in known)
         for name in islice(free, self.evidence.criteria.proposals.most):
-            every = [(self._best(one, before, name), one) for one in self._from(fitted)]
+            starts = list(self._from(fitted))
+            every = [(self._best(one, before, name, len(starts)), one) for one in starts]
             tried = [(best, self._with(best.effect, one)) for best, one in every if best]
             if not tried:
                 return
@@ -74,8 +76,17 @@ class LawSearch:
 
     # --- one law ------------------------------------------------------------------------------
 
-    def _best(self, fitted: EvidenceFit, before: HeldOut, name: str) -> _BestLaws | None:
-        """Return the best law, confirmed, in the metric that it makes itself."""
+    def _best(
+        self, fitted: EvidenceFit, before: HeldOut, name: str, searches: int
+    ) -> _BestLaws | None:
+        """Return the best law, confirmed, in the metric that it makes itself.
+
+        Parameters
+        ----------
+        fitted, before : the model to which it is added, and what that leaves.
+        name : of the law.
+        searches : of which this is one: each tries as many terms.
+        """
         criteria = self.evidence.criteria.proposals
         joints = self._joints(fitted, before)
         terms = {j: self._terms(fitted, before, j) for j in joints}
@@ -83,6 +94,7 @@ class LawSearch:
         seen: Effect | None = None
         for _ in range(criteria.rounds):
             looked_at, tried = self._looked_at(metric, terms)
+            tried *= searches
             passing = self._confirmed(metric, looked_at, tried, name)
             if not passing:
                 break
@@ -209,7 +221,7 @@ class LawSearch:
             test_error_after=after.error,
             noise_floor=after.floor,
             rivals=best.rivals(criteria),
-            remark=_remark(effect),
+            remark=" ".join(filter(None, (_remark(effect), _other_widths(fitted, wider)))),
             picture=_picture(before, after, fitted, str(effect.joint)),
         )
 
@@ -272,6 +284,17 @@ def _remark(effect: LawEffect) -> str:
         if min(value - lower, upper - value) <= _AT_BOUND * (upper - lower):
             return f"Its {name} is at the end of what was sought: it may lie beyond."
     return ""
+
+
+def _other_widths(fitted: EvidenceFit, wider: EvidenceFit) -> str:
+    """Which friction widths the model with a law has, and had not without it, in words."""
+    robot, pairs = fitted.model.robot, (fitted.model.friction_widths, wider.model.friction_widths)
+    changed = [
+        f"{number(new, 2)} {unit}/s at {joint} in place of {number(old, 2)}"
+        for joint, unit, old, new in zip(robot.names, robot.units, *pairs, strict=True)
+        if new != old
+    ]
+    return f"With it dry friction reverses over {', '.join(changed)}." if changed else ""
 
 
 def _best_start(found: Sequence[tuple[float, int, LibraryTerm]]) -> list:

@@ -43,7 +43,8 @@ class Proposal:
     explains : share of the systematic squared residual that it takes off, at all joints.
     is_explanation : whether it is enough for these recordings: it is the only law that is proposed,
         takes most, and nothing but noise is left on held-out data, as far as that is known.
-    p_value : of the hypothesis that it has no part, times the number of terms tried.
+    p_value : of the hypothesis that it has no part beside the model, at the friction widths that
+        `remark` may say, times the number of terms tried.
     tried : how many terms that were.
     test_error_before, test_error_after : relative error on held-out data.
     noise_floor : the least that a model can reach; None where the noise is unknown.
